@@ -63,10 +63,11 @@ lock: $(VENV)/installed-nightly
 		--python-version 3.11 --generate-hashes --quiet --no-header -o requirements/dev.lock
 
 # A tenth of all mutants, another one each day of ten; `make mutation TENTH=3` chooses. Two hours at
-# most: what is not tried then is not counted.
+# most, or MUTATION_TIME: what is not tried then is not counted.
+MUTATION_TIME ?= 2h
 TENTH ?= $(shell date +%j | tail -c 2)
 mutation: $(VENV)/installed-nightly
-	timeout 2h $(BIN)/mutmut run '*__mutmut_*$(TENTH)' > mutants.log || test $$? -eq 124
+	timeout $(MUTATION_TIME) $(BIN)/mutmut run '*__mutmut_*$(TENTH)' > mutants.log || test $$? -eq 124
 	$(BIN)/python tools/survivors.py
 
 docs: $(VENV)/installed-dev
@@ -79,6 +80,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/study.py 50
 	$(BIN)/python benchmarks/compensation.py
 	$(BIN)/python benchmarks/ladder.py
+	$(BIN)/python benchmarks/geometry.py
 	$(BIN)/python benchmarks/codec.py
 	$(BIN)/python benchmarks/record.py
 

@@ -53,6 +53,7 @@ _LARGEST: dict[str, tuple[float, str]] = {
     "force rate": (1e9, "1 GN/s"),
     "time": (1e6, "1e6 s"),
     "acceleration": (1e3, "1000 m/s2"),
+    "frequency": (1e6, "1 MHz"),
     # A metre under a newton, a radian under a newton metre: not even a toy's servo is as soft. The
     # stiffest bearings of large machines have some 1e10 N/m and N·m/rad.
     "rotational compliance": (1.0, "1 rad/(N·m)"),

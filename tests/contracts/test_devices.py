@@ -1,10 +1,24 @@
-"""The contract that every set of devices keeps, simulated or real."""
+"""The contracts that every driver keeps, and every set of devices, simulated or real."""
+
+import importlib
+import itertools
+import pkgutil
+import struct
+import tomllib
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from elastocal import drivers
+from elastocal.cell import KINDS, LOOPBACK, SIMULATED, DeviceSettings
 from elastocal.cell.devices import BeamState, Devices, Motion, SensorStatus
+from elastocal.drivers.net_ft import CountScale, NetFtSensor
 from elastocal.errors import DeviceError, ElastocalError
+from elastocal.records import validate
+from elastocal.sim.wire import NetFtBox
+from elastocal.workflows import GROUP, driver_names, find_driver
 from support.simulated import CYCLE, Place, Session, example_cell, places
 
 PRESS = np.array([0.0, 0.0, -300.0])
@@ -14,10 +28,64 @@ def _simulated(like: str) -> tuple[Devices, Place]:
     return Session.of(example_cell(like), start=5.0).devices, places(like)[0]
 
 
+def _read_from_a_box(like: str) -> tuple[Devices, Place]:
+    """Return the simulated devices with their sensor behind the records of a Net F/T box."""
+    devices, place = _simulated(like)
+    box, there = NetFtBox.of(example_cell(like)), devices.sensor
+    units = CountScale(box.counts_per_force, box.counts_per_torque, "N", "N-m")
+    sensor = NetFtSensor(devices.clock, units, there.rate, "Net F/T at 127.0.0.1")
+    sent = itertools.count(1)
+
+    def send(now: int) -> None:
+        block = there.read()
+        for counts in box.count(block):
+            number = next(sent)
+            sensor.received(struct.pack(">III6i", number, 70 * number, 0, *counts))
+
+    devices.clock.on_wake(send)
+    return replace(devices, sensor=sensor), place
+
+
 RIGS = {
+    "Net F/T": lambda: _read_from_a_box("afp"),
     "simulated fibre placement": lambda: _simulated("afp"),
     "simulated machining": lambda: _simulated("machining"),
 }
+
+
+PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))
+DRIVERS = PROJECT["project"]["entry-points"][GROUP]
+"""Where each driver of ours is, by name."""
+
+
+def test_every_driver_of_ours_is_an_entry_point():
+    assert set(driver_names()) >= set(DRIVERS)
+    packages = {each.name for each in pkgutil.iter_modules(drivers.__path__) if each.ispkg}
+    assert packages | {SIMULATED} == set(DRIVERS)
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+class TestEveryDriver:
+    def test_it_is_the_object_that_its_entry_point_names(self, name):
+        module, _, attribute = DRIVERS[name].partition(":")
+        assert find_driver(name) is getattr(importlib.import_module(module), attribute)
+
+    def test_it_says_what_it_makes_and_whether_it_can_hurt(self, name):
+        driver = find_driver(name)
+        assert driver.kinds
+        assert driver.kinds <= set(KINDS)
+        assert isinstance(driver.real, bool)
+        assert driver.real or "arm" not in driver.kinds or name == SIMULATED
+
+    def test_its_settings_are_strict_and_on_this_machine_by_default(self, name):
+        driver = find_driver(name)
+        for kind in driver.kinds:
+            settings = driver.settings(kind)
+            assert issubclass(settings, DeviceSettings)
+            with pytest.raises(ElastocalError, match="unknown key 'adress'"):
+                validate({"adress": "10.0.0.1"}, settings, "devices")
+            address = settings.model_fields.get("address")
+            assert address is None or address.default == LOOPBACK
 
 
 @pytest.fixture(params=RIGS)

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError
-from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics, NumericalInverse, OpwInverse
+from elastocal.robot import Rail, Robot, T_from_xyzabc, catalogue, on_rail, with_tool
+from elastocal.robot.inverse import (
+    InverseKinematics,
+    NumericalInverse,
+    OpwInverse,
+    ParallelInverse,
+)
 from elastocal.robot.inverse.arm import nearest_zero
 from support.urdfs import (
     CEILING,
@@ -24,6 +29,15 @@ def _robot(text: str) -> Robot:
     return Robot.from_urdf(text, "tcp")
 
 
+def _parallel_robot(rail: bool = False) -> Robot:
+    """Return a UR20 with a crooked tool."""
+    T = T_from_xyzabc(0.1, -0.05, 0.2, 0.3, 0.2, -0.4)
+    text = with_tool(catalogue.urdf("UR20"), "flange", "tcp", T)
+    if rail:
+        text = on_rail(text, Rail("rail", (0.0, 1.0, 0.0), -1.0, 4.0))
+    return _robot(text)
+
+
 def _solvers() -> dict[str, InverseKinematics]:
     floor = _robot(opw_arm_urdf(**KR_LIKE))
     turned = opw_arm_urdf(
@@ -39,6 +53,8 @@ def _solvers() -> dict[str, InverseKinematics]:
         "opw": OpwInverse(floor),
         "opw on a wall": OpwInverse(_robot(turned)),
         "opw on external axes": OpwInverse(_robot(external)),
+        "parallel axes": ParallelInverse(_parallel_robot()),
+        "parallel axes on a rail": ParallelInverse(_parallel_robot(rail=True)),
         "numerical on an opw arm": NumericalInverse(floor),
         "numerical, offset wrist": NumericalInverse(_robot(offset_wrist_urdf())),
         "numerical on a rail": NumericalInverse(_robot(offset_wrist_urdf(rail=(-1.0, 4.0)))),

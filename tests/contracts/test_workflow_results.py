@@ -12,7 +12,7 @@ from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
 from elastocal.robot import catalogue
-from support import foreign_logs, measured_arms, plans, reported, studies
+from support import foreign_logs, kuka_bench, measured_arms, plans, reported, studies
 
 CLASSES = {
     name: getattr(workflows, name)
@@ -26,7 +26,10 @@ WITHOUT = {
     "DryRunResult",
     "ExportResult",
     "InitResult",
+    "KrcConfigResult",
+    "MeasureDelayResult",
     "ReportResult",
+    "SimulateResult",
     "ToolResult",
     "VerifyResult",
 }
@@ -66,11 +69,14 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.guess_map(logs),
         workflows.import_logs(logs, map=log_map),
         workflows.init(out / "new"),
+        workflows.krc_config(kuka_bench.write_cell(out), out=out / "krc"),
+        workflows.MeasureDelayResult(out / "record.json", kuka_bench.record()),
         plans.plan(),
         workflows.predict(model, rows=path),
         workflows.report(run, out=out / "report.html"),
         workflows.RunResult(figures, RunEnd.DONE, derived.summary, None),
         process,
+        workflows.simulate(cell, meanwhile=lambda _: None),
         workflows.stiffness(model, path=path, spins=4, external_positions=3, stations=5),
         workflows.StudyResult(study_summary(design, samples, None), design, samples, ()),
         workflows.tool(run),

@@ -55,6 +55,9 @@ _NOISE = re.compile(
 """What NumPy, urdfdom and HDF5 print by themselves."""
 
 
+_LINKS = re.compile(r"^(whole|broken|not signed|not verifiable) +[^:\n]+: .*\n", re.M)
+
+
 @dataclass(frozen=True)
 class Case:
     """A file of a kind, damaged, and a command that reads it; or options of a command."""
@@ -170,7 +173,18 @@ def _absurd_command(rng: random.Random) -> str:
     return json.dumps([word.replace("\0", "").encode("utf-8", "ignore").decode() for word in words])
 
 
-_SLOW = ("init", "plan", "codec", "tool", "stiffness", "simulate-process", "report")
+_SLOW = (
+    "init",
+    "plan",
+    "codec",
+    "tool",
+    "stiffness",
+    "simulate-process",
+    "report",
+    "study",
+    "import",
+    "derive",
+)
 """Commands that take a second or more: drawn seldom."""
 _PLAIN = {
     "robots": "robots",
@@ -188,6 +202,12 @@ _PLAIN = {
     "simulate-process": "simulate-process {s}/cell.yaml --model {s}/model.json --out {o}",
     "compare": "compare {s}/old.json {s}/model.json",
     "report": "report {s}/model.json --out {o}.html",
+    "geometry": "geometry {s}/positions.csv --robot {s}/arm.urdf --tcp flange --draws 40"
+    " --out {o}.json",
+    "import": "import {s}/controller.csv {s}/force.csv {s}/tracker.txt --map {s}/map.yaml"
+    " --out {o}.nc",
+    "verify": "verify {s}/report.html",
+    "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
 }
 """Commands that work, to which absurd options are added; an option that stands twice: the last."""
 
@@ -308,7 +328,9 @@ def _ended(case: Case, seeds: Path, folder: Path, err: Path) -> dict[str, object
     seconds = time.process_time() - started
     text = err.read_bytes().decode("utf-8", "replace")
     memory = _status("VmHWM") - base
-    word = _judged(code, text, seconds, memory)
+    # What verify prints before its reason is a line a link.
+    judged = _LINKS.sub("", text) if words[0] == "verify" else text
+    word = _judged(code, judged, seconds, memory)
     if word == "ok" and code and _listed(folder) != before:
         word, text = "half-written", f"{sorted(set(_listed(folder)) ^ set(before))} {text}"
     return {

@@ -10,6 +10,7 @@ import io
 import json
 import random
 import re
+import zipfile
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -39,6 +40,8 @@ UNREADABLE = (
     csv.Error,
     McapError,
     zstandard.ZstdError,
+    zipfile.BadZipFile,
+    NotImplementedError,
     OverflowError,
     MemoryError,
 )
@@ -692,6 +695,49 @@ def _leaves(data: bytes, rng: random.Random) -> bytes:
     return rng.choice((data.replace(b"</robot>", links + b"</robot>"), bomb, nested))
 
 
+# Containers of text
+
+
+def _in_manifest(change: Callable[[Tree, random.Random], Tree]) -> Mutation:
+    """Change the JSON that stands in a page."""
+
+    def mutate(data: bytes, rng: random.Random) -> bytes:
+        before, opened, rest = data.partition(b'id="manifest">')
+        text, closed, after = rest.partition(b"</script>")
+        new = json.dumps(change(json.loads(text), rng)).encode()
+        return before + opened + new.replace(b"<", b"\\u003c") + closed + after
+
+    return mutate
+
+
+def _in_zip(change: Mutation) -> Mutation:
+    """Change one member of an archive, or put a huge one in its place."""
+
+    def mutate(data: bytes, rng: random.Random) -> bytes:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+        name = rng.choice(list(members))
+        members[name] = change(members[name], rng)
+        out = io.BytesIO()
+        with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+            for each, content in members.items():
+                archive.writestr(each, content)
+        return out.getvalue()
+
+    return mutate
+
+
+def _long_row(data: bytes, rng: random.Random) -> bytes:
+    """Add a row that stands, or ends, far away, or very many of them."""
+    far = b'<row r="1048576"><c r="XFD1048576" t="n"><v>1</v></c></row></sheetData>'
+    many = b'<row><c t="n"><v>1</v></c></row>' * rng.choice((1000, 300_000)) + b"</sheetData>"
+    return data.replace(b"</sheetData>", rng.choice((far, many)))
+
+
+def _bomb_in_zip(data: bytes, rng: random.Random) -> bytes:
+    return data.replace(b"<sheetData>", b"<sheetData>" + b" " * (rng.choice((1, 300)) << 20))
+
+
 def _number_in_text(data: bytes, rng: random.Random) -> bytes:
     """Change a number of a text file: a mesh, a program."""
     found = list(re.finditer(rb"-?\d+(\.\d*)?([eE][+-]?\d+)?", data))
@@ -703,6 +749,7 @@ def _number_in_text(data: bytes, rng: random.Random) -> bytes:
 
 
 _TEXT = {**BYTES, "lines": _lines, "number": _number_in_text}
+_XML = {"element": _element, "elements": _element, "leaves": _leaves}
 FORMS: dict[str, dict[str, Mutation]] = {
     "json": {**BYTES, **{name: _json(change) for name, change in TREES.items()}},
     "yaml": {
@@ -725,8 +772,15 @@ FORMS: dict[str, dict[str, Mutation]] = {
         "zip bomb": _bomb_in_mcap,
         **{name: _messages(change) for name, change in TREES.items()},
     },
-    "xml": {**_TEXT, "element": _element, "elements": _element, "leaves": _leaves},
+    "xml": {**_TEXT, **_XML},
     "text": _TEXT,
+    "page": {**_TEXT, **{name: _in_manifest(change) for name, change in TREES.items()}},
+    "workbook": {
+        **BYTES,
+        **{f"{name} inside": _in_zip(change) for name, change in (*_TEXT.items(), *_XML.items())},
+        "long row": _in_zip(_long_row),
+        "zip bomb": _in_zip(_bomb_in_zip),
+    },
     "bytes": BYTES,
 }
 """Mutations by name, for each form of file."""

@@ -1,19 +1,33 @@
 """Valid files of every kind that commands read, and the commands that read them."""
 
+import importlib.resources
 import json
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from openpyxl import Workbook
 
 from elastocal import dataset
 from elastocal.cell import ArmState, BeamState, Motion, PointBlock, SensorStatus, WrenchBlock
+from elastocal.codec.study import (
+    StudyStore,
+    one_after_the_other,
+    run_study,
+    study_summary,
+    write_study,
+)
 from elastocal.identification import read_model
-from elastocal.procedure import PoseRecorder
-from elastocal.robot import xyzabc_from_T
-from support import reported
+from elastocal.planning import read_plan
+from elastocal.planning.export import write_table
+from elastocal.procedure import PoseRecorder, file_sha256
+from elastocal.robot import catalogue, xyzabc_from_T
+from elastocal.verdict import OF_RUN, make_key, read_private_key, sign, write_signature
+from support import foreign_logs, reported, studies
 from support.cli import elastocal
+from support.foreign_bags import write_bag
+from support.measured_arms import measure, write_positions
 
 
 @dataclass(frozen=True)
@@ -61,6 +75,10 @@ _REPORT = (
     "report run --model {s}/model.json --tool {s}/tool.json --codec {s}/codec"
     " --process {s}/process --out {o}.html"
 )
+_LOGS = ("map.yaml", "controller.csv", "force.csv", "tracker.txt", "cell.yaml", "dome.stl")
+_GUESS = "import {f} --map {o}.yaml --guess"
+_IMPORT = "import controller.csv force.csv tracker.txt --map map.yaml --out {o}.nc"
+_STUDY = ("study/settings.json", "study/study.json", "study/samples/000000-000001.json")
 _BASE = "--base 0m,0m,0m,0deg,0deg,0deg --out {o}.src"
 
 KINDS: dict[str, Kind] = {
@@ -71,6 +89,14 @@ KINDS: dict[str, Kind] = {
         ("dome.stl",),
         0.03,
         1.5,
+    ),
+    "rig": Kind(
+        "rig.yaml",
+        "yaml",
+        ("run {f} --plan {s}/plan --out {o} --dry-run",),
+        ("dome.stl",),
+        0.0,
+        0.5,
     ),
     "springs": Kind(
         "springs.yaml",
@@ -183,6 +209,59 @@ KINDS: dict[str, Kind] = {
         0.0,
         0.5,
     ),
+    "catalogue": Kind("catalogue.yaml", "yaml", ("check {f}",), (), 0.0, 0.3),
+    "log map": Kind("map.yaml", "yaml", ("check {f}", _IMPORT), _LOGS, 0.2),
+    "log": Kind("controller.csv", "csv", (_GUESS, _IMPORT), _LOGS, 0.1, 0.5),
+    "point list": Kind("tracker.txt", "text", (_GUESS, _IMPORT), _LOGS, 0.1, 0.3),
+    "workbook": Kind("force.xlsx", "workbook", (_GUESS,), (), 0.0, 0.5),
+    "recording": Kind("foreign.mcap", "mcap", (_GUESS,), (), 0.0, 0.5),
+    "bag": Kind("log.bag", "bytes", (_GUESS,), (), 0.0, 0.3),
+    "bag of ROS 2": Kind(
+        "log/log.db3",
+        "bytes",
+        ("import log --map {o}.yaml --guess",),
+        ("log/metadata.yaml",),
+        0.0,
+        0.3,
+    ),
+    "metadata of a bag": Kind(
+        "log/metadata.yaml",
+        "yaml",
+        ("import log --map {o}.yaml --guess",),
+        ("log/log.db3",),
+        0.0,
+        0.3,
+    ),
+    "marker positions": Kind(
+        "positions.csv",
+        "csv",
+        ("geometry {f} --robot {s}/arm.urdf --tcp flange --draws 40 --out {o}.json",),
+        (),
+        0.0,
+        0.7,
+    ),
+    "geometry": Kind("geometry.json", "json", ("check {f}",), (), 0.0, 0.5),
+    "plan table": Kind("plan.csv", "csv", ("check {f}",), (), 0.0, 0.3),
+    "study settings": Kind(
+        "study/settings.json", "json", ("check {f}", "check study"), _STUDY, 0.3, 0.3
+    ),
+    "study samples": Kind(
+        "study/samples/000000-000001.json", "json", ("check {f}", "check study"), _STUDY, 0.3, 0.3
+    ),
+    "study": Kind("study/study.json", "json", ("check {f}",), _STUDY, 0.3, 0.3),
+    "signature": Kind("run/signature.json", "json", ("check {f}", "verify run"), _RUN, 0.03, 0.5),
+    "public key": Kind(
+        "key.pub", "text", ("verify report.html --key {f}",), ("report.html",), 0.0, 0.3
+    ),
+    "private key": Kind(
+        "key",
+        "text",
+        ("run {s}/cell.yaml --plan {s}/plan --out {o} --dry-run --sign {f}",),
+        (),
+        0.0,
+        0.1,
+    ),
+    "report": Kind("report.html", "page", ("verify {f}", "verify {f} --key {s}/key.pub"), (), 0.3),
     "forces": Kind(
         "forces.csv",
         "csv",
@@ -194,6 +273,11 @@ KINDS: dict[str, Kind] = {
 }
 """All kinds of files, by name."""
 
+_DEVICES = """devices:
+  arm: simulated
+  sensor: {driver: net_ft, address: 127.0.0.1, port: 49152, tcp_port: null, rate: 1000.0}
+  clock_rate: 2
+"""
 _SPRINGS = """schema: elastocal.springs/1
 include: actuated
 springs:
@@ -260,19 +344,23 @@ def make_seeds(folder: Path) -> None:
         for suffix in ("stl", "obj")
     )
     (folder / "meshed.yaml").write_text(cell.replace("\nfixtures:", f"\nfixtures:{meshes}", 1))
+    (folder / "rig.yaml").write_text(f"{cell}\n{_DEVICES}")
     data = dataset.read(folder / "dataset.nc")
     dataset.write(data, folder / "dataset.csv")
     (folder / "robot.urdf").write_text(str(data.attributes["robot_urdf"]))
     _write_paths(folder)
     _write_poses(folder)
     _write_stream(folder / "stream.mcap", data.joint_names)
+    _write_logs(folder)
+    _write_geometry(folder)
+    _write_study(folder / "study")
+    _write_keys(folder)
     old = json.loads((folder / "model.json").read_text())
     old["compliance"] = [1.02 * value for value in old["compliance"]]
     (folder / "old.json").write_text(json.dumps(old))
-    done = elastocal(
+    _done(
         "compare", folder / "old.json", folder / "model.json", "--out", folder / "comparison.json"
     )
-    assert done.code == 0, done.err
 
 
 def _write_paths(folder: Path) -> None:
@@ -353,3 +441,57 @@ def _write_stream(path: Path, joints: tuple[str, ...]) -> None:
     )
     recorder.mark(0.1, "a mark")
     recorder.save(path)
+
+
+def _write_logs(folder: Path) -> None:
+    """Write three logs of other programs with their map, a workbook, a recording and bags."""
+    rows = foreign_logs.rows_of(folder / "run")
+    steps = {"q": 2, "T": 2, "arm_time": 2}
+    rows = foreign_logs.Rows(
+        *(getattr(rows, name)[:: steps.get(name, 8)] for name in rows.__dataclass_fields__)
+    )
+    foreign_logs.write_logs(rows, folder)
+    foreign_logs.write_map(folder, Path("cell.yaml"))
+    book = Workbook()
+    for row in [("t", "Fx", "Fy", "Fz"), *np.column_stack([rows.force_time, rows.force])[:50]]:
+        book.active.append(list(row))
+    book.save(folder / "force.xlsx")
+    shutil.copy(folder / "run" / "streams" / "pose_0002_1.mcap", folder / "foreign.mcap")
+    for form in ("ros1", "ros2"):
+        write_bag(folder, form)
+
+
+def _write_geometry(folder: Path) -> None:
+    """Write absolute positions of markers on the robot, the geometry in them, and a catalogue."""
+    robot = catalogue.load("KR 210 R2700-2")
+    (folder / "arm.urdf").write_text(robot.urdf)
+    write_positions(folder / "positions.csv", measure(robot, 40))
+    _done(
+        *("geometry", folder / "positions.csv", "--robot", folder / "arm.urdf", "--tcp", "flange"),
+        *("--draws", 40, "--out", folder / "geometry.json"),
+    )
+    table = importlib.resources.files(catalogue) / "robots.yaml"
+    (folder / "catalogue.yaml").write_text(table.read_text(encoding="utf-8"))
+    write_table(folder, read_plan(folder / "plan" / "plan.json"))
+
+
+def _write_study(folder: Path) -> None:
+    design = studies.settings()
+    results = run_study(StudyStore(folder), design, 3, studies.simulate, one_after_the_other)
+    write_study(folder, design, results, study_summary(design, results, 5e-5))
+
+
+def _write_keys(folder: Path) -> None:
+    """Write a key pair, and sign a run's journal and its report."""
+    make_key(folder / "key")
+    signed = sign(
+        read_private_key(folder / "key"), OF_RUN, file_sha256(folder / "run" / "journal.jsonl"),
+        reported.MADE,
+    )  # fmt: skip
+    write_signature(folder / "run" / "signature.json", signed)
+    _done("report", folder / "run", "--out", folder / "report.html", "--sign", folder / "key")
+
+
+def _done(*arguments: object) -> None:
+    done = elastocal(*arguments)
+    assert done.code == 0, (arguments, done.err)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray
 
 from elastocal.errors import GeometryError
 from elastocal.geometry import (
@@ -11,16 +12,18 @@ from elastocal.geometry import (
     GeometryModel,
     GeometryProblem,
     climb,
-    derivatives,
     fit,
     frames,
     geometry_model,
+    read_positions,
     register,
+    screws,
     told_apart,
 )
 from elastocal.progress import silent
 from elastocal.records import read_json
 from elastocal.robot import GRAVITY, Robot, catalogue, with_joint_origins
+from elastocal.units import split_column
 from support.cli import elastocal
 from support.measured_arms import MARKERS, measure, write_positions
 
@@ -74,7 +77,7 @@ def ladder(measured, draws=100):
     return problem, climb(problem, draws, np.random.default_rng(1), silent)
 
 
-def test_derivatives_are_those_of_finite_differences():
+def test_screws_are_those_of_finite_differences():
     robot, rng, step = kuka(), np.random.default_rng(2), 1e-6
     q, torque = rng.uniform(-1.0, 1.0, (3, 6)), rng.normal(0.0, 1.0, (3, 6))
 
@@ -83,14 +86,29 @@ def test_derivatives_are_those_of_finite_differences():
         return T[:, :3, 3] + T[:, :3, :3] @ np.array([0.1, 0.2, 0.3])
 
     nominal = ArmErrors.none(6)
-    found = derivatives(robot, frames(robot, q, torque, nominal), q, torque, place(nominal))
-    for which, columns in zip(("place", "motion"), found, strict=True):
+    found = screws(robot, frames(robot, q, torque, nominal), q, torque)
+    for which, columns in (("place", found[..., :6]), ("motion", found[..., 6:])):
         for index in np.ndindex(*columns.shape[2:]):
             up, down = ({n: v.copy() for n, v in vars(nominal).items()} for _ in range(2))
             up[which][index] += step
             down[which][index] -= step
             slope = (place(ArmErrors(**up)) - place(ArmErrors(**down))) / (2.0 * step)
-            assert np.allclose(columns[:, :, *index], slope, atol=1e-8)
+            v, w = columns[:, :3, *index], columns[:, 3:, *index]
+            assert np.allclose(v + np.cross(w, place(nominal)), slope, atol=1e-8)
+
+
+def test_the_linearised_problem_is_that_of_finite_differences():
+    """At the minimum: elsewhere residuals turn with their station."""
+    measured = measure(universal(), 12, error=0.0, noise=0.0)
+    problem, step = GeometryProblem(measured.robot, measured.data), 1e-6
+    at = register(problem)
+    J = problem.linearise(at)[1]
+    for unknown in range(len(problem.unknowns)):
+        move = np.zeros(len(problem.unknowns))
+        move[unknown] = step
+        ends = (problem.residual(problem.moved(at, sign * move)) for sign in (1.0, -1.0))
+        slope = -np.subtract(*ends) / (2.0 * step)
+        assert np.allclose(J[:, :, unknown], slope, rtol=1e-5, atol=1e-5), unknown
 
 
 @pytest.mark.parametrize("arm", ARMS)
@@ -234,6 +252,25 @@ def test_bad_positions_are_refused_in_a_line(tmp_path, change, message):
     )
     assert message in result.reason
     assert not (tmp_path / "model.json").exists()
+
+
+def test_positions_in_netcdf_are_those_of_the_table(tmp_path):
+    measured = measure(kuka(), 20)
+    measured.data.markers[3, 1] = np.nan
+    path = write_positions(tmp_path / "positions.csv", measured)
+    header, *rows = (line.split(",") for line in path.read_text(encoding="utf-8").splitlines())
+    columns = {}
+    for heading, cells in zip(header, zip(*rows, strict=True), strict=True):
+        name, unit = split_column(heading)
+        values = np.array(cells) if unit is None else np.array(cells, dtype=float)
+        columns[name] = ("row", values, {} if unit is None else {"units": unit})
+    xarray.Dataset(columns).to_netcdf(tmp_path / "positions.nc", engine="h5netcdf")
+    table, twin = (read_positions(tmp_path / f"positions.{end}", kuka()) for end in ("csv", "nc"))
+    for name, values in vars(table).items():
+        if name != "lines":
+            assert np.array_equal(values, getattr(twin, name), equal_nan=values.dtype == float), (
+                name
+            )
 
 
 def test_a_fit_of_nonsense_is_refused():

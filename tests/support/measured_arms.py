@@ -22,6 +22,8 @@ class Measured:
     """The arm as it was built."""
     data: Positions
     blunders: frozenset[int]
+    T_station_base: np.ndarray
+    """Base in the frame of each station, shape (station, 4, 4)."""
 
 
 def measure(  # noqa: PLR0913 (a campaign has as many properties)
@@ -46,12 +48,14 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     low, high = np.maximum(robot.limits.lower, -2.0), np.minimum(robot.limits.upper, 2.0)
     q = rng.uniform(low, high, (rows, len(low)))
     payload = np.resize(payloads, rows).astype(float)
-    yielded = q + compliance * _torque(robot, q, payload)
+    yielded = q + compliance * weight_torque(robot, q, payload)
     T = truth.forward(yielded)
     points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], MARKERS[:markers])
     station = np.arange(rows) % stations
-    R = Rotation.random(stations, random_state=seed).as_matrix()[station]
-    t = rng.uniform(-4.0, 4.0, (stations, 3))[station]
+    T_station_base = np.tile(np.eye(4), (stations, 1, 1))
+    T_station_base[:, :3, :3] = Rotation.random(stations, random_state=seed).as_matrix()
+    T_station_base[:, :3, 3] = rng.uniform(-4.0, 4.0, (stations, 3))
+    R, t = T_station_base[station, :3, :3], T_station_base[station, :3, 3]
     seen = t[:, None] + np.einsum("nij,nmj->nmi", R, points) + rng.normal(0.0, noise, points.shape)
     wrong = rng.choice(rows, blunders, replace=False)
     seen[wrong] += rng.normal(0.0, 0.05, (blunders, 1, 3))
@@ -65,7 +69,7 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
         payload_centre=np.zeros((rows, 3)),
         force=np.zeros((rows, 3)),
     )
-    return Measured(robot, truth, data, frozenset(wrong.tolist()))
+    return Measured(robot, truth, data, frozenset(wrong.tolist()), T_station_base)
 
 
 def write_positions(path: Path, measured: Measured) -> Path:
@@ -92,7 +96,7 @@ def _small(rng: np.random.Generator, error: float) -> np.ndarray:
     return T
 
 
-def _torque(robot: Robot, q: np.ndarray, payload: np.ndarray) -> np.ndarray:
+def weight_torque(robot: Robot, q: np.ndarray, payload: np.ndarray) -> np.ndarray:
     """Return the torque of weight and payload, the latter by central differences of its height."""
     torque = -robot.gravity_torques(q) if robot.has_masses else np.zeros_like(q)
     step = 1e-6

@@ -1,6 +1,6 @@
 """A small plan on a dome, with its pool: a catalogue arm, on a rail or standing still."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -262,3 +262,34 @@ def _checks(data: PoolData) -> tuple[CheckRecord, ...]:
             zip(data.refusal_names, (None, *data.check_units), strict=True)
         )
     )
+
+
+@cache
+def plan_for(model: str, rail: bool = False, shift: tuple[float, float, float] = (0, 0, 0)):
+    """Return the plan with another robot of the catalogue, its poses moved to within its reach."""
+    urdf = with_tool(catalogue.urdf(model), "flange", "tcp", T_FLANGE_TCP)
+    if rail:
+        urdf = on_rail(urdf, Rail("rail", (0.0, 1.0, 0.0), -1.0, 1.0))
+    arm, external = Robot.from_urdf(urdf, "tcp"), (RAIL_AT,) if rail else ()
+    solver, old = inverse_for(arm), plan(rail)
+    poses = []
+    for pose in old.poses:
+        T = pose.T_base_tcp
+        T[:3, 3] += shift
+        off = T.copy()
+        off[:3, 3] += APPROACH * np.array(pose.normal)
+        here, there = solver.solve_many(np.array([T, off]), external).q
+        slot = int(np.nanargmin(np.abs(here - there).max(axis=-1)))
+        new = {"joints": here[slot], "approach_joints": there[slot], "tcp_position": T[:3, 3]}
+        poses.append(replace(pose, **{key: tuple(q.tolist()) for key, q in new.items()}))
+    middle = (0.5 * (np.array(poses[0].approach_joints) + poses[1].approach_joints)).tolist()
+    moves = tuple(replace(m, via=(tuple(middle),) if m.via else ()) for m in old.moves)
+    record = replace(
+        old.robot,
+        name=arm.name,
+        urdf=urdf,
+        base=arm.base,
+        joints=arm.joint_names,
+        home=poses[0].approach_joints,
+    )
+    return replace(old, robot=record, poses=tuple(poses), moves=moves)

@@ -7,6 +7,10 @@ to come from the joint axes. The last link is always `tcp`, its z axis out of th
 import math
 from collections.abc import Sequence
 
+import coal
+import numpy as np
+import pinocchio as pin
+
 HALF_TURN = (-math.pi, math.pi)
 WALL = "0.2 -0.4 1.5", "0 1.5707963267948966 0.3"
 CEILING = "0.5 0.1 3.0", "3.141592653589793 0 0.7"
@@ -147,3 +151,25 @@ def _robot(name: str, parts: Sequence[str]) -> str:
         links.append(part.split('<child link="')[1].split('"')[0])
     listed = "".join(f'<link name="{link}"/>' for link in links)
     return f'<robot name="{name}">{listed}{"".join(parts)}</robot>'
+
+
+def colliding_links(urdf: str, q: np.ndarray) -> list[tuple[str, str]]:
+    """Return the pairs of links, not neighbours, whose shapes touch."""
+    model = pin.buildModelFromXML(urdf)
+    shapes = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
+    data = shapes.createData()
+    pin.updateGeometryPlacements(model, model.createData(), shapes, data, q)
+    objects = shapes.geometryObjects
+    hits = []
+    for i, first in enumerate(objects):
+        for j, second in enumerate(objects[:i]):
+            if abs(first.parentJoint - second.parentJoint) < 2:
+                continue
+            at_first, at_second = (
+                coal.Transform3s(data.oMg[k].rotation, data.oMg[k].translation) for k in (i, j)
+            )
+            result = coal.CollisionResult()
+            request = coal.CollisionRequest()
+            if coal.collide(first.geometry, at_first, second.geometry, at_second, request, result):
+                hits.append((first.name, second.name))
+    return hits

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from process_tables import renew_readme
 
-from elastocal.cell import SensorLoad, load_cell
+from elastocal.cell import PROCESS_FILE, SensorLoad, load_cell
 from elastocal.compensation import process
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.process import DeviationComparison
@@ -181,7 +181,8 @@ class Measurement:
         tool(made / "run", out=made / "tool.json")
         settings = process.PROCESSES[case.kind].compensator
         for springs in campaign.springs:
-            result = calibrate(made / "run" / "dataset.nc", springs=springs)
+            data = made / "run" / "dataset.nc"
+            result = calibrate(data, springs=springs, process=cell.parent / PROCESS_FILE)
             load = _load(made / "tool.json", result.calibrated.model.robot)
             trial = ProcessTrial(
                 load_cell(cell), result.calibrated, load, settings, case.seed, jobs=self.jobs

@@ -3,12 +3,17 @@ from ._quantities import (
     Angle as Angle,
     Distance as Distance,
     Length as Length,
+    Name as Name,
     Point as Point,
     Pose as Pose,
     PositiveForce as PositiveForce,
     PositiveLength as PositiveLength,
     PositiveMoment as PositiveMoment,
+    PositiveSpeed as PositiveSpeed,
+    PositiveTime as PositiveTime,
+    SampleRate as SampleRate,
     SignedForce as SignedForce,
+    TranslationalStiffness as TranslationalStiffness,
 )
 from .cell import (
     SCHEMA as SCHEMA,
@@ -20,6 +25,7 @@ from .cell import (
 )
 from .devices import (
     ArmState as ArmState,
+    AskedMetrology as AskedMetrology,
     BeamState as BeamState,
     Clock as Clock,
     Devices as Devices,
@@ -30,6 +36,7 @@ from .devices import (
     RobotArm as RobotArm,
     SensorStatus as SensorStatus,
     WrenchBlock as WrenchBlock,
+    close_nothing as close_nothing,
 )
 from .examples import (
     BLOCK_SIZE as BLOCK_SIZE,
@@ -87,9 +94,7 @@ from .procedure import (
     DEFAULT_POSES as DEFAULT_POSES,
     DIRECTIONS as DIRECTIONS,
     LIGHT_CONTACT as LIGHT_CONTACT,
-    SIMULATED as SIMULATED,
     Acceptance as Acceptance,
-    DeviceNames as DeviceNames,
     Engagement as Engagement,
     Limits as Limits,
     LoadCases as LoadCases,
@@ -101,6 +106,20 @@ from .production import (
     ProcessFile as ProcessFile,
     ProductionPath as ProductionPath,
     read_production as read_production,
+)
+from .rig import (
+    KINDS as KINDS,
+    LOOPBACK as LOOPBACK,
+    SIMULATED as SIMULATED,
+    DeviceChoice as DeviceChoice,
+    DeviceChoices as DeviceChoices,
+    DeviceSet as DeviceSet,
+    DeviceSettings as DeviceSettings,
+    Driver as Driver,
+    RigContext as RigContext,
+    WallClock as WallClock,
+    WrenchFeed as WrenchFeed,
+    WrenchSample as WrenchSample,
 )
 from .sensor import (
     SENSOR_CORRECTED as SENSOR_CORRECTED,

@@ -34,7 +34,6 @@ from elastocal.cell.procedure import (
     CONDITIONING,
     LIGHT_CONTACT,
     Acceptance,
-    DeviceNames,
     Engagement,
     Limits,
     LoadCases,
@@ -42,6 +41,7 @@ from elastocal.cell.procedure import (
     Search,
 )
 from elastocal.cell.production import ProcessFile, ProductionPath, read_production
+from elastocal.cell.rig import DeviceChoices
 from elastocal.cell.simulation import Fault, Simulation
 from elastocal.dataset import require_joint_names
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
@@ -90,7 +90,7 @@ class CellFile(StrictModel):
     acceptance: Acceptance = Field(default_factory=Acceptance)
     """Tolerances that the result is judged by; neither plan nor run depends on it."""
     procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
-    devices: DeviceNames = Field(default_factory=DeviceNames)
+    devices: DeviceChoices = Field(default_factory=DeviceChoices)
     simulation: Simulation = Field(default_factory=Simulation)
     """Truth of the simulated devices; the calibration never reads it."""
     faults: tuple[Fault, ...] = ()

@@ -10,13 +10,14 @@ calls is the same that stops the arm. A driver whose line may be slow talks to i
 its own and answers from what came last. A call may raise `DeviceError`, or an `OSError` of its
 line; the arm is then brought off the surface with what still works.
 
-A new source of devices is one package, ``drivers/NAME`` (none is there yet: the devices that
-exist are simulated), with its entries as docs/how-to/write-a-driver.md says.
+A new driver is one package, ``drivers/NAME``; see `elastocal.cell.rig` and
+docs/how-to/write-a-driver.md.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from elastocal.arrays import FloatArray
 from elastocal.results import brief_repr
@@ -217,6 +218,8 @@ class PointBlock:
     station: str
     """Which station measures."""
     source: str
+    note: str = ""
+    """Why the beam is broken, where the device says so."""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -244,6 +247,26 @@ class Metrology(Protocol):
         """Return the positions since the last call, at once; none while the beam is broken."""
 
 
+@runtime_checkable
+class AskedMetrology(Metrology, Protocol):
+    """Metrology that measures when it is asked: a person reads the instrument."""
+
+    def ask(self, what: str) -> None:
+        """Ask for a reading of the marker, which stands still; returns at once.
+
+        Until it has come the beam is broken; from then on it stands, until the next is asked for.
+
+        Parameters
+        ----------
+        what : str
+            Where in the procedure, for the person.
+        """
+
+
+def close_nothing() -> None:
+    """Give nothing back: of devices that hold no line and no thread."""
+
+
 @dataclass(frozen=True, eq=False)
 class Devices:
     """The devices of a run, with the clock that they share."""
@@ -252,3 +275,5 @@ class Devices:
     sensor: ForceSensor
     metrology: Metrology
     clock: Clock
+    close: Callable[[], None] = close_nothing
+    """Gives lines and threads back, at the end of a run, whatever happened."""

@@ -53,7 +53,7 @@ class MotionEntry(StrictModel):
     acceleration_time: PositiveTime = 0.5
     """Time in which a joint reaches its full speed, in s."""
     contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4)] = 0.02
-    """Fastest straight motion of the KRL program between approach pose and contact, in m/s.
+    """Fastest straight motion of the robot program between approach pose and contact, in m/s.
     `elastocal run` has ``procedure.approach_speed``, and for the last millimetres
     ``procedure.contact_speed``: the times of a plan are for those."""
     unloaded_time: PositiveTime = 4.0

@@ -44,8 +44,6 @@ DEFAULT_POSES = 31
 """Number of poses of the paper's first case study."""
 _MOST_CANDIDATES = 10_000_000
 """Largest pool; with more, no memory would hold the candidates."""
-SIMULATED = "simulated"
-"""Name of the device of each kind that needs no hardware."""
 DIRECTIONS = {
     "normal": (0.0, 0.0, -1.0),
     "north": (1.0, 0.0, -1.0),
@@ -372,16 +370,6 @@ class ProcedureSettings(StrictModel):
             yield "timeout", f"must be at least dwell and average together ({least:g} s)"
         if not self.beam_timeout >= self.stale:
             yield "beam_timeout", f"must be at least stale ({self.stale:g} s)"
-
-
-class DeviceNames(StrictModel):
-    """Name of each device; which names there are is known to `elastocal run`."""
-
-    arm: str = SIMULATED
-    sensor: str = SIMULATED
-    """Force/torque sensor."""
-    metrology: str = SIMULATED
-    """Laser trackers."""
 
 
 class Acceptance(StrictModel):

@@ -58,9 +58,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _ORDER = (
-    "robots", "init", "check", "plan", "run", "derive", "import_", "geometry", "calibrate", "codec",
-    "study", "predict", "tool", "compensate", "stiffness", "export", "simulate_process", "compare",
-    "report", "verify", "demo",
+    "robots", "init", "check", "plan", "run", "simulate", "krc_config", "measure_delay",
+    "derive", "import_", "geometry", "calibrate", "codec", "study", "predict", "tool",
+    "compensate", "stiffness", "export", "simulate_process", "compare", "report", "verify", "demo",
 )  # fmt: skip
 """The order in which help lists commands: that of the work; others follow by name."""
 
@@ -100,6 +100,10 @@ def _root(
     ),
 ) -> None:
     """In-situ elastic calibration of industrial robots."""
+    import logging  # not for help
+
+    # What libraries log is, as their warnings are, for whoever sets up a handler.
+    logging.lastResort = None
 
 
 def run() -> None:

@@ -42,6 +42,16 @@ ToolMass = Annotated[
 ToolCentre = Annotated[
     str | None, typer.Option(help="Its centre in the new tcp's frame: 'x, y, z' with units.")
 ]
+Geometry = Annotated[
+    Path | None,
+    typer.Option(help="Model file from geometry: the arm as built, its errors and its sag."),
+]
+Payload = Annotated[
+    str | None, typer.Option(help="With --geometry: mass beyond its description, '12 kg'.")
+]
+PayloadCentre = Annotated[
+    str | None, typer.Option(help="Its centre in that model's tcp: 'x, y, z' with units.")
+]
 Marker = Annotated[
     str | None,
     typer.Option(help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's."),

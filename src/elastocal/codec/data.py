@@ -210,19 +210,20 @@ class CodecData:
         object.__setattr__(self, name, array)
 
     def _check(self) -> None:
-        v, cv, n = len(self.variants), len(self.seed_pose), self.error_mean.shape[2]
+        v, cv, n = len(self.variants), self.seed_pose.size, _length(self.error_mean, 2)
         poses = len(self.pose_labels)
         expected = {
             "contact": (poses, 3),
+            "seed_pose": (cv,),
             "chosen": (v, cv, n, n),
             "error_mean": (v, cv, n, len(AXES)),
             "error_max": (v, cv, n, len(AXES)),
-            "verification": (cv, self.verification.shape[-1]),
+            "verification": (cv, _length(self.verification, 1)),
         }
         if self.zero_error is not None:
             expected["zero_error"] = (cv,)
         if self.left_out is not None:
-            expected["left_out"] = (v, self.left_out.shape[-1])
+            expected["left_out"] = (v, _length(self.left_out, 1))
         found = {name: getattr(self, name).shape for name in expected}
         found["split_layouts"] = np.shape(self.split_layouts)
         expected["split_layouts"] = (v, cv, n)
@@ -238,6 +239,11 @@ class CodecData:
             outside = getattr(self, name)
             if np.any((outside < NO_POSE) | (outside >= poses)):
                 raise CodecError(f"{name} names a pose that is not one of the {poses}")
+
+
+def _length(array: FloatArray | IndexArray, axis: int) -> int:
+    """Return the length of an array along an axis; 0 where it has no such axis."""
+    return array.shape[axis] if axis < array.ndim else 0
 
 
 def known(value: float) -> float | None:

@@ -59,7 +59,7 @@ def xarray_from_labelled(arrays: LabelledArrays) -> "xr.Dataset":
 def pose_labels(data: LabelledArrays) -> tuple[int, ...]:
     """Return the labels of the poses, which must be integers."""
     labels = data["pose"].values
-    if labels.dtype.kind not in "iu":
+    if labels.dtype.kind not in "iu" or labels.ndim != 1:
         raise DatasetError(f"coordinate 'pose' has {labels.dtype} labels: they must be integers")
     return tuple(labels.tolist())
 
@@ -82,9 +82,11 @@ def campaign_labels(data: LabelledArrays) -> list[str]:
 
 def text_labels(data: LabelledArrays, name: str) -> list[str]:
     """Return the labels of a dimension, which must be texts."""
-    labels: list[object] = data[name].values.tolist()
-    texts = [label for label in labels if isinstance(label, str)]
-    if len(texts) != len(labels):
+    # Of an array without dimensions, this is its one value.
+    labels: object = data[name].values.tolist()
+    listed = labels if isinstance(labels, list) else []
+    texts = [label for label in listed if isinstance(label, str)]
+    if texts != labels:
         raise DatasetError(f"coordinate {name!r} is {labels!r:.60}: its labels must be texts")
     return texts
 

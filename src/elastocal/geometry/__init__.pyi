@@ -3,9 +3,9 @@ from .arm import (
     MOTION as MOTION,
     ArmErrors as ArmErrors,
     ArmFrames as ArmFrames,
-    derivatives as derivatives,
     frames as frames,
     motion_terms as motion_terms,
+    screws as screws,
 )
 from .ladder import (
     FOLDS as FOLDS,
@@ -14,6 +14,7 @@ from .ladder import (
     blocks as blocks,
     climb as climb,
 )
+from .mistakes import findings as findings, require_own_joints as require_own_joints
 from .model import (
     SCHEMA as SCHEMA,
     URDF_MARK as URDF_MARK,
@@ -24,10 +25,12 @@ from .model import (
     GeometryRung as GeometryRung,
     HeldOutFigures as HeldOutFigures,
     geometry_model as geometry_model,
+    read_geometry as read_geometry,
 )
 from .position_file import AXES as AXES, read_positions as read_positions
 from .positions import (
     LEAST_READINGS as LEAST_READINGS,
+    Payload as Payload,
     Positions as Positions,
     joint_torques as joint_torques,
 )

@@ -108,10 +108,11 @@ def motion_terms(q: FloatArray, torque: FloatArray) -> FloatArray:
     )
 
 
-def derivatives(
-    robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray, points: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return how points on the tool move by each error.
+def screws(robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray) -> FloatArray:
+    """Return how the tool moves by each error: a velocity at the base's origin, and a turn.
+
+    A point ``p`` on the tool moves by ``v + w x p``; ``(v, w)`` is the error's instantaneous screw
+    (K. M. Lynch, F. C. Park, "Modern Robotics", 2017, section 3.3).
 
     Parameters
     ----------
@@ -121,21 +122,18 @@ def derivatives(
         Of the arm with its errors.
     q, torque : ndarray, shape (pose, joint)
         As for `frames`.
-    points : ndarray, shape (pose, 3)
-        Points that move with the tool, in base, in m.
 
     Returns
     -------
-    place : ndarray, shape (pose, 3, joint, 6)
-        By shifts and turns of the joints' places.
-    motion : ndarray, shape (pose, 3, joint, 7)
-        By errors of their motion.
+    ndarray, shape (pose, 6, joint, 13)
+        By shifts and turns of the joints' places (`KINDS`), then errors of their motion (`MOTION`).
     """
-    arm = points - at.origin  # (joint, pose, 3)
-    shifts = at.rotation
-    turns = np.cross(np.swapaxes(at.rotation, 2, 3), arm[:, :, None]).swapaxes(2, 3)
-    place = np.concatenate([shifts, turns], axis=3)
-    revolute = np.array([joint.revolute for joint in robot.chain.joints])
-    by_axis = np.where(revolute[:, None, None], np.cross(at.axis, arm), at.axis)
-    motion = by_axis[..., None] * motion_terms(q, torque).swapaxes(0, 1)[:, :, None]
-    return place.transpose(1, 2, 0, 3), motion.transpose(1, 2, 0, 3)
+    origin, axes = at.origin[..., None], at.rotation
+    turns = np.concatenate([np.cross(origin, axes, axis=2), axes], axis=2)
+    shifts = np.concatenate([axes, np.zeros_like(axes)], axis=2)
+    revolute = np.array([joint.revolute for joint in robot.chain.joints])[:, None, None]
+    turned = np.concatenate([np.cross(at.origin, at.axis), at.axis], axis=2)
+    pushed = np.concatenate([at.axis, np.zeros_like(at.axis)], axis=2)
+    own = np.where(revolute, turned, pushed)
+    motion = own[..., None] * motion_terms(q, torque).swapaxes(0, 1)[:, :, None]
+    return np.concatenate([shifts, turns, motion], axis=3).transpose(1, 2, 0, 3)

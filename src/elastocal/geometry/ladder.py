@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.geometry.mistakes import require_own_joints
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
 from elastocal.geometry.solve import PRIOR_WIDTH, GeometryFit, fit, register, told_apart
 from elastocal.identification import Overlap, judge_models
@@ -70,10 +71,11 @@ def climb(
     """
     progress("geometry", 0, 4)
     start = register(problem)
+    require_own_joints(problem, start)
     progress("geometry", 1, 4)
     nominal = problem.linearise(start)[1]
     free = {rung: told_apart(nominal, problem, rung) for rung in RUNGS}
-    reference = fit(problem, free["weight"], start)
+    reference = fit(problem, free["weight"], start, J=nominal)
     progress("geometry", 2, 4)
     block = blocks(problem)
     sums = _Sums(problem, reference, block)
@@ -85,7 +87,8 @@ def climb(
     judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)
     chosen = RUNGS[judged.chosen]
     progress("geometry", 3, 4)
-    final = fit(problem, free[chosen], _without(reference, problem, chosen), reference.used)
+    begin = _without(reference, problem, chosen)
+    final = fit(problem, free[chosen], begin, reference.used, reference.J)
     values = problem.values(final.state)
     spread = _Sums(problem, final, block).draws(draws, rng)
     progress("geometry", 4, 4)

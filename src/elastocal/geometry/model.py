@@ -1,22 +1,38 @@
 """The geometric model of an arm: what a fit found, as a file, and as a URDF."""
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.geometry.arm import MOTION, ArmErrors, frames
+from elastocal.errors import GeometryError, SchemaError
+from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
 from elastocal.geometry.ladder import GeometryLadder
-from elastocal.geometry.positions import Positions, joint_torques
+from elastocal.geometry.mistakes import findings
+from elastocal.geometry.positions import Payload, Positions, joint_torques
 from elastocal.geometry.problem import GeometryProblem
 from elastocal.identification import interval
-from elastocal.records import record
+from elastocal.records import read_json, record
 from elastocal.results import brief_repr
-from elastocal.robot import Robot, with_joint_origins
+from elastocal.robot import (
+    Robot,
+    probe_configurations,
+    refusals_naming,
+    same_joints,
+    with_joint_origins,
+)
+from elastocal.wording import counted
 
 SCHEMA = "elastocal.geometry/1"
 URDF_MARK = "made by elastocal geometry"
 """Comment by which a calibrated URDF is known."""
 _OFFSET = MOTION.index("offset")
+_LINE = 1e-2
+"""Spread of markers across their line, in m, from which they show a turn."""
+_SAME = 1e-6
+"""Largest difference of two descriptions of one arm, in m and rad."""
 
 
 @record()
@@ -94,6 +110,11 @@ class GeometryModel:
     positions: int
     """Positions of markers, blunders included."""
     provenance: str
+    findings: tuple[str, ...] = ()
+    """What a person should know of the positions, a sentence each."""
+    T_tcp_built: FloatArray | None = None
+    """The tcp as built in the tcp as described, shape (4, 4), in m; none where nobody knew where on
+    the tool the markers are."""
 
     @property
     def robot(self) -> Robot:
@@ -103,7 +124,8 @@ class GeometryModel:
     @property
     def errors(self) -> ArmErrors:
         """Its errors."""
-        return ArmErrors(self.place, self.motion)
+        # SciPy takes no arrays that are only to be read.
+        return ArmErrors(self.place.copy(), self.motion.copy())
 
     def predict(self, data: Positions) -> FloatArray:
         """Return where the markers are expected, in the frames of their stations, (row, marker, 3).
@@ -119,17 +141,62 @@ class GeometryModel:
         S = np.stack([self.stations[name] for name in data.station.tolist()])
         return np.asarray(S[:, None, :3, 3] + np.einsum("nij,nmj->nmi", S[:, :3, :3], points))
 
+    def tool_of(self, robot: Robot, payload: Payload | None = None) -> Callable[..., FloatArray]:
+        """Return what says where the tool of the same arm stands without process force.
+
+        Parameters
+        ----------
+        robot : Robot
+            The same arm, perhaps with another tool behind this model's tcp.
+        payload : Payload, optional
+            What the tool weighs beyond the model's description.
+
+        Returns
+        -------
+        callable
+            From joints as the controller states them, shape (row, joint), in rad or m, to the tcp
+            in base, shape (row, 3), in m, under weight and payload.
+
+        Raises
+        ------
+        GeometryError
+            If it is another arm.
+        """
+        own, errors = self.robot, self.errors
+        if not same_joints(own, robot):
+            raise GeometryError(
+                f"the geometry is of an arm with the joints {', '.join(own.joint_names)}, not"
+                f" {', '.join(robot.joint_names)}"
+            )
+        some = probe_configurations(own)
+        T_own_tool = np.linalg.inv(own.forward(some)) @ robot.forward(some)
+        if not np.abs(T_own_tool - T_own_tool[0]).max() < _SAME:
+            raise GeometryError(
+                f"the geometry is of another arm than {robot.name}: from {self.tcp} to"
+                f" {robot.tip} it is not the same way at all postures"
+            )
+        weight = Payload() if payload is None else payload
+
+        T_tcp_tool = T_own_tool[0] if self.T_tcp_built is None else self.T_tcp_built @ T_own_tool[0]
+
+        def stands(q: FloatArray) -> FloatArray:
+            torque = joint_torques(own, Positions.unloaded(q, weight))
+            T = frames(own, q, torque, errors).T_base_tcp
+            return np.asarray((T @ T_tcp_tool)[:, :3, 3])
+
+        return stands
+
     def calibrated_urdf(self) -> str:
         """Return the URDF with corrected origins of the joints.
 
         Errors of gears and compliances have no place in a URDF: they are left out.
         """
-        robot = self.robot
+        robot, place = self.robot, self.errors.place
         corrections = {}
         for index, joint in enumerate(robot.chain.joints):
             T = np.eye(4)
-            T[:3, 3] = self.place[index, :3]
-            T[:3, :3] = Rotation.from_rotvec(self.place[index, 3:]).as_matrix()
+            T[:3, 3] = place[index, :3]
+            T[:3, :3] = Rotation.from_rotvec(place[index, 3:]).as_matrix()
             offset = self.motion[index, _OFFSET] * joint.axis
             if joint.revolute:
                 T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(offset).as_matrix()
@@ -140,11 +207,60 @@ class GeometryModel:
         return urdf.replace("</robot>", f"  <!-- {URDF_MARK}: {self.provenance} -->\n</robot>")
 
 
+def read_geometry(path: Path) -> GeometryModel:
+    """Return the model in a file.
+
+    Raises
+    ------
+    SchemaError
+        If it does not fit its schema, or its arrays do not fit its robot.
+    RobotError
+        If the robot in it cannot be used.
+    FileAccessError
+        If it cannot be read.
+    """
+    found = read_json(path, GeometryModel)
+    with refusals_naming(path):
+        joints = len(found.robot.joint_names)
+    wanted = {
+        "place": (found.place, (joints, len(KINDS))),
+        "motion": (found.motion, (joints, len(MOTION))),
+        "markers": (found.markers, (*found.markers.shape[:1], 3)),
+        **{f"stations.{name}": (T, (4, 4)) for name, T in found.stations.items()},
+    }
+    for name, (values, shape) in wanted.items():
+        if values.shape != shape:
+            raise SchemaError(f"{path}: {name} has shape {values.shape}, not {shape}")
+    return found
+
+
 def geometry_model(
-    problem: GeometryProblem, found: GeometryLadder, provenance: str
+    problem: GeometryProblem,
+    found: GeometryLadder,
+    provenance: str,
+    markers: FloatArray | None = None,
 ) -> GeometryModel:
-    """Return the model that a ladder has found."""
+    """Return the model that a ladder has found.
+
+    Parameters
+    ----------
+    problem : GeometryProblem
+        What was fitted.
+    found : GeometryLadder
+        What was found.
+    provenance : str
+        What it was made from, in words.
+    markers : ndarray, shape (marker, 3), optional
+        Where on the tool the markers are known to be, in the tcp, in m: what the positions say
+        otherwise is an error of the tcp.
+
+    Raises
+    ------
+    GeometryError
+        If markers are known of another number than were measured.
+    """
     robot, data, state = problem.robot, problem.data, found.fit.state
+    T_tcp_built = None if markers is None else _tcp_as_built(state.markers, markers)
     low, high = interval(found.draws)
     free = set(found.fit.free.tolist())
     parameters = tuple(
@@ -178,7 +294,23 @@ def geometry_model(
         blunders=tuple(sorted(set(problem.row[~found.fit.used].tolist()))),
         positions=len(problem),
         provenance=provenance,
+        findings=findings(problem, found.fit),
+        T_tcp_built=T_tcp_built,
     )
+
+
+def _tcp_as_built(fitted: FloatArray, known: FloatArray) -> FloatArray:
+    """Return the tcp in which markers are where they are known to be, shape (4, 4), in m."""
+    if known.shape != fitted.shape:
+        raise GeometryError(
+            f"places of {counted(len(known), 'marker')} are given, positions are of {len(fitted)}"
+        )
+    there, here, T = fitted.mean(axis=0), known.mean(axis=0), np.eye(4)
+    if np.linalg.matrix_rank(known - here, tol=_LINE) > 1:
+        # Markers that are not in line say how the tool is turned, too.
+        T[:3, :3] = Rotation.align_vectors(fitted - there, known - here)[0].as_matrix()
+    T[:3, 3] = there - T[:3, :3] @ here
+    return T
 
 
 def _figures(distance: FloatArray) -> DistanceFigures:

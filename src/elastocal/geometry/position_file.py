@@ -1,7 +1,8 @@
-"""Read a table of absolute positions: joints, markers, station, payload, force."""
+"""Read absolute positions: joints, markers, station, payload, force; a table or its NetCDF twin."""
 
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, UnitError, nearest
 from elastocal.geometry.positions import LEAST_READINGS, Positions
+from elastocal.records import read_arrays
 from elastocal.robot import Robot
 from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
 from elastocal.units import factor, split_column
@@ -25,7 +27,7 @@ _BEYOND = 0.1
 
 
 def read_positions(path: Path, robot: Robot) -> Positions:
-    """Return the rows of a CSV file.
+    """Return the rows of a CSV file, or of a NetCDF file of the same columns.
 
     Parameters
     ----------
@@ -33,7 +35,8 @@ def read_positions(path: Path, robot: Robot) -> Positions:
         Columns ``<joint>[deg|rad|mm|m]``, ``marker_x[mm] …`` (or ``marker1_x[mm] …`` of several),
         optional ``station``, ``campaign``, ``pose``, ``payload[kg]`` with its centre
         ``payload_x[mm] …`` in the tcp, ``force_x[N] …`` on the robot in base. A marker that was
-        hidden is empty.
+        hidden is empty. ``.nc``: variables of these names along one dimension, their unit in the
+        attribute ``units``.
     robot : Robot
         Whose joints they are.
 
@@ -46,14 +49,35 @@ def read_positions(path: Path, robot: Robot) -> Positions:
         If the file cannot be read.
     """
     try:
-        with opened_table(path) as table:
-            header, rows = table.layout.header, table.rows()
+        header, rows = _netcdf(path) if path.suffix == ".nc" else _table(path)
         uneven = rows.uneven(len(header))
         if uneven is not None:
             raise GeometryError(f"row {uneven[0]} has {uneven[1]} cells, the header {len(header)}")
         return _positions(header, rows, robot)
     except (GeometryError, TableError, UnitError) as error:
         raise GeometryError(f"{path}: {error}") from error
+
+
+def _table(path: Path) -> tuple[Sequence[str], TableRows]:
+    with opened_table(path) as table:
+        return table.layout.header, table.rows()
+
+
+def _netcdf(path: Path) -> tuple[Sequence[str], TableRows]:
+    """Return the variables of a file as a table would hold them: a number is its shortest text."""
+    arrays = read_arrays(path)
+    flat = {name: each for name, each in arrays.variables.items() if len(each.dims) == 1}
+    dims = Counter(each.dims[0] for each in flat.values())
+    if not dims:
+        raise GeometryError("no variable has one dimension: the columns of a table are expected")
+    row = dims.most_common(1)[0][0]
+    columns = {}
+    for name, each in flat.items():
+        if each.dims == (row,) and name != row:
+            unit = each.attributes.get("units", "")
+            columns[f"{name}[{unit}]" if unit else name] = map(str, each.values.tolist())
+    cells = [list(cells) for cells in zip(*columns.values(), strict=True)]
+    return tuple(columns), TableRows(cells, list(range(len(cells))))
 
 
 class _Columns:

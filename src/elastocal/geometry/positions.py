@@ -15,6 +15,16 @@ LEAST_READINGS = 4
 """Fewer rows say nothing."""
 
 
+@dataclass(frozen=True)
+class Payload:
+    """A mass at the tool, beyond what the robot's description has."""
+
+    mass: float = 0.0
+    """In kg."""
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """In the tcp, in m."""
+
+
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Positions:
@@ -38,6 +48,21 @@ class Positions:
     """Process force on the robot at the tcp, in base, shape (row, 3), in N."""
     lines: tuple[int, ...] = ()
     """Line of the file that each row stands on."""
+
+    @classmethod
+    def unloaded(cls, q: FloatArray, payload: Payload) -> "Positions":
+        """Return poses at which nobody looks and nothing presses, with a payload."""
+        rows = len(q)
+        return cls(
+            q=q,
+            markers=np.empty((rows, 0, 3)),
+            station=np.full(rows, ""),
+            pose=np.arange(rows),
+            campaign=np.full(rows, ""),
+            payload=np.full(rows, payload.mass),
+            payload_centre=np.tile(np.array(payload.centre), (rows, 1)),
+            force=np.zeros((rows, 3)),
+        )
 
     def __len__(self) -> int:
         """Return the number of rows."""

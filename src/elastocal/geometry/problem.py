@@ -1,13 +1,13 @@
 """One least-squares problem of frames, markers, and all errors of an arm."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, ArmFrames, derivatives, frames
+from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, ArmFrames, frames, screws
 from elastocal.geometry.positions import Positions, joint_torques
 from elastocal.results import brief_repr
 from elastocal.robot import ChainJoint, Robot
@@ -71,50 +71,58 @@ class GeometryProblem:
         # Joint and kind of each error of place and of motion, in the order of their columns.
         self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)
         self._moving = tuple(np.array(_moving(joints), dtype=np.intp).T)
+        # The same of both, counted as `screws` does.
+        moving = self._moving[0], self._moving[1] + len(KINDS)
+        self._errors = np.concatenate([self._placed, moving], axis=1)
 
     def __len__(self) -> int:
         """Return the number of seen markers."""
         return len(self.row)
 
-    def linearise(self, at: State) -> tuple[FloatArray, FloatArray]:
-        """Return residuals, shape (point, 3), in m, and derivatives, shape (point, 3, unknown).
+    def residual(self, at: State) -> FloatArray:
+        """Return how far markers were measured from where they are expected, shape (point, 3), m.
 
-        Derivatives are of the prediction, so that ``J x = residual`` is the next step.
+        In base, as all derivatives are; distances are the stations'.
         """
+        return self._expected(at)[0]
+
+    def linearise(self, at: State) -> tuple[FloatArray, FloatArray]:
+        """Return residuals, and derivatives of what is expected, shape (point, 3, unknown).
+
+        ``J x = residual`` is the next step.
+        """
+        residual, arm, points, R = self._expected(at)
+        stations, markers = len(self.data.stations), len(at.markers)
+        start = 6 * stations + 3 * markers
+        J = np.zeros((len(self), 3, len(self.unknowns)))
+        each, tool = np.arange(len(self)), arm.T_base_tcp[self.row]
+        for axis in range(3):
+            unit = R[:, axis]  # an axis of the station in base
+            J[each, :, 6 * self.station + axis] = unit
+            J[each, :, 6 * self.station + 3 + axis] = np.cross(unit, points)
+            J[each, :, 6 * stations + 3 * self.marker + axis] = tool[:, :3, axis]
+        J[:, :, start:] = self._arm_columns(arm, points)
+        return residual, J
+
+    def _expected(self, at: State) -> tuple[FloatArray, ArmFrames, FloatArray, FloatArray]:
+        """Return residuals, frames, and by marker: places in base, directions of its station."""
         arm = frames(self.robot, self.data.q, self.torque, at.errors)
         T = arm.T_base_tcp[self.row]
         points = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], at.markers[self.marker])
         R, t = at.T_station_base[self.station, :3, :3], at.T_station_base[self.station, :3, 3]
-        predicted = t + np.einsum("nij,nj->ni", R, points)
-        J = np.zeros((len(self), 3, len(self.unknowns)))
-        stations, markers = len(self.data.stations), at.markers.shape[0]
-        each = np.arange(len(self))
-        turned = predicted - t
-        for axis in range(3):
-            unit = np.zeros(3)
-            unit[axis] = 1.0
-            J[each, axis, 6 * self.station + axis] = 1.0
-            J[each, :, 6 * self.station + 3 + axis] = np.cross(unit, turned)
-            J[each, :, 6 * stations + 3 * self.marker + axis] = np.einsum(
-                "nij,nj->ni", R, T[:, :3, axis]
-            )
-        start = 6 * stations + 3 * markers
-        J[:, :, start:] = self._arm_columns(arm, points, R)
-        return self.measured - predicted, J
+        return np.einsum("nji,nj->ni", R, self.measured - t) - points, arm, points, R
 
-    def _arm_columns(self, arm: ArmFrames, points: FloatArray, R: FloatArray) -> FloatArray:
-        """Return how the points move by the errors of the arm, in their stations' frames."""
-        own = replace(
-            arm,
-            rotation=arm.rotation[:, self.row],
-            origin=arm.origin[:, self.row],
-            axis=arm.axis[:, self.row],
-        )
-        q, torque = self.data.q[self.row], self.torque[self.row]
-        place, motion = derivatives(self.robot, own, q, torque, points)
-        (joint, kind), (moving, error) = self._placed, self._moving
-        columns = np.concatenate([place[:, :, joint, kind], motion[:, :, moving, error]], axis=2)
-        return np.asarray(np.einsum("nij,njk->nik", R, columns))
+    def _arm_columns(self, arm: ArmFrames, points: FloatArray) -> FloatArray:
+        """Return how the points move by errors of the arm, shape (point, 3, error)."""
+        joint, kind = self._errors
+        twist = screws(self.robot, arm, self.data.q, self.torque)[:, :, joint, kind]
+        x, y, z = points.T
+        moves = np.zeros((len(points), 3, 6))
+        moves[:, [0, 1, 2], [0, 1, 2]] = 1.0
+        moves[:, 0, 4], moves[:, 0, 5] = z, -y
+        moves[:, 1, 3], moves[:, 1, 5] = -z, x
+        moves[:, 2, 3], moves[:, 2, 4] = y, -x
+        return np.asarray(moves @ twist[self.row])
 
     def moved(self, at: State, step: FloatArray) -> State:
         """Return the state after a step of all unknowns, shape (unknown,)."""

@@ -16,6 +16,8 @@ _DEPENDENT = 1e-7
 """Part of a weighed column that is new beside those before it, below which nothing is."""
 _STEPS, _ROBUST_STEPS = 40, 5
 """Most steps of a fit, and how many of the first weigh far positions less."""
+_LINEAR = 1e-2
+"""Move of a marker, in m, from which derivatives are taken anew."""
 _DONE = 1e-7
 """Largest move of a marker by a step that ends the iteration, in m."""
 _BLUNDER = 7.0
@@ -155,8 +157,12 @@ def fit(
     chosen: tuple[IndexArray, Sequence[Fixed]],
     start: State,
     used: BoolArray | None = None,
+    J: FloatArray | None = None,
 ) -> GeometryFit:
     """Return the fit of a rung by least squares, blunders left out.
+
+    Derivatives are taken anew only when markers have moved by a centimetre: until then they change
+    by some thousandths, and so does what is left after each step.
 
     Parameters
     ----------
@@ -169,6 +175,8 @@ def fit(
     used : ndarray of bool, shape (point,), optional
         Positions to use; by default the first steps weigh by Huber's loss, and what is then more
         than 6 standard deviations away is left out, again after each step.
+    J : ndarray, shape (point, 3, unknown), optional
+        Derivatives near the start, where they are known.
 
     Raises
     ------
@@ -176,13 +184,14 @@ def fit(
         If there are fewer positions than unknowns, or the fit does not settle.
     """
     at, (free, fixed) = start, chosen
-    r, J = problem.linearise(at)
     if 3 * len(problem) < len(free) + 3:
         raise GeometryError(
             f"{len(problem)} positions of markers cannot tell {len(free)} unknowns: measure more"
             " poses"
         )
-    size = np.array([each.size for each in problem.unknowns])[free]
+    r, J = problem.linearise(at) if J is None else (problem.residual(at), J)
+    size, gone = np.array([each.size for each in problem.unknowns])[free], 0.0
+    columns = J[:, :, free] * size
     keep = np.ones(len(problem), dtype=bool) if used is None else used
     for step in range(_STEPS):
         distance = np.linalg.norm(r, axis=1)
@@ -190,18 +199,30 @@ def fit(
         robust = used is None and step < _ROBUST_STEPS
         weight = np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)) if robust else 1.0
         now = distance < _BLUNDER * sigma if used is None and step >= _ROBUST_STEPS else keep
-        root = np.sqrt(np.where(now, weight, 0.0))[:, None]
-        A = (J[:, :, free] * (size * root[:, None])).reshape(-1, len(free))
-        G = A.T @ A + np.diag(np.full(len(free), (sigma / PRIOR_WIDTH) ** 2))
-        x = np.zeros(J.shape[2])
-        x[free] = size * np.linalg.solve(G, A.T @ (r * root).ravel())
+        scaled = _step(columns, r, np.where(now, weight, 0.0), (sigma / PRIOR_WIDTH) ** 2)
         same, keep = bool((now == keep).all()), now
+        x = np.zeros(len(problem.unknowns))
+        x[free] = size * scaled
         at = problem.moved(at, x)
-        step_length = float(np.abs(np.einsum("nik,k->ni", J[:, :, free], x[free])).max())
-        r, J = problem.linearise(at)
+        step_length = float(np.abs(columns @ scaled).max())
+        gone += step_length
+        if gone > _LINEAR:
+            (r, J), gone = problem.linearise(at), 0.0
+            columns = J[:, :, free] * size
+        else:
+            r = problem.residual(at)
         if step >= (0 if used is not None else _ROBUST_STEPS) and same and step_length < _DONE:
             return GeometryFit(at, r, J, free, tuple(fixed), keep, sigma)
     raise GeometryError(
         f"the fit does not settle: after {_STEPS} steps the markers still move by"
         f" {1e3 * step_length:.3g} mm; are joints, units or frames mistaken?"
     )
+
+
+def _step(columns: FloatArray, r: FloatArray, weight: FloatArray, ridge: float) -> FloatArray:
+    """Return the least-squares step of weighed points, shape (column,)."""
+    root = np.sqrt(weight)
+    A = (columns * root[:, None, None]).reshape(-1, columns.shape[2])
+    G = A.T @ A
+    G[np.diag_indices_from(G)] += ridge
+    return np.asarray(np.linalg.solve(G, A.T @ (r * root[:, None]).ravel()))

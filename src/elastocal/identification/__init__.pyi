@@ -21,7 +21,6 @@ from .calibrated import (
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
-    with_knowledge as with_knowledge,
 )
 from .conventions import (
     POOR_FIT as POOR_FIT,
@@ -61,19 +60,12 @@ from .frames import (
     frame_columns as frame_columns,
     frame_summaries as frame_summaries,
 )
+from .knowledge import DriveCompliances as DriveCompliances, with_knowledge as with_knowledge
 from .ladder import (
-    AUTO as AUTO,
-    RUNGS as RUNGS,
     Choice as Choice,
     Climbed as Climbed,
-    Rung as Rung,
-    allowed_rungs as allowed_rungs,
     choose_model as choose_model,
     climb as climb,
-    gears as gears,
-    has_levels as has_levels,
-    low_loads as low_loads,
-    rung_of as rung_of,
     take_simplest as take_simplest,
     try_rung as try_rung,
     usable_for_choice as usable_for_choice,
@@ -117,6 +109,13 @@ from .paired import (
     judge_models as judge_models,
     paired_difference as paired_difference,
 )
+from .prediction_doubt import (
+    DOUBT_ROWS as DOUBT_ROWS,
+    PredictionDoubt as PredictionDoubt,
+    ProductionForecast as ProductionForecast,
+    ProductionRows as ProductionRows,
+    expected_errors as expected_errors,
+)
 from .problem import (
     MINIMUM_BLOCKS as MINIMUM_BLOCKS,
     Problem as Problem,
@@ -129,12 +128,10 @@ from .problem import (
     unit_columns as unit_columns,
 )
 from .production import (
-    DOUBT_ROWS as DOUBT_ROWS,
     ENOUGH as ENOUGH,
     JOINT_REACH as JOINT_REACH,
     RAIL_REACH as RAIL_REACH,
     CoveredRows as CoveredRows,
-    PredictionDoubt as PredictionDoubt,
     ProductionCoverage as ProductionCoverage,
     covered_rows as covered_rows,
     near_postures as near_postures,
@@ -146,6 +143,17 @@ from .reproduction import (
     UnseenErrors as UnseenErrors,
     reproduce_calibration as reproduce_calibration,
     unseen_errors as unseen_errors,
+)
+from .rungs import (
+    AUTO as AUTO,
+    NO_LEVELS as NO_LEVELS,
+    RUNGS as RUNGS,
+    Rung as Rung,
+    allowed_rungs as allowed_rungs,
+    gears as gears,
+    has_levels as has_levels,
+    low_loads as low_loads,
+    rung_of as rung_of,
 )
 from .solve import (
     Factored as Factored,

@@ -26,10 +26,10 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Gear, Spring
 from elastocal.identification.displacement import reference_joints
-from elastocal.identification.ladder import RUNGS, has_levels
 from elastocal.identification.options import FitOptions
 from elastocal.identification.paired import Overlap, corrected_mean
 from elastocal.identification.problem import Problem, build
+from elastocal.identification.rungs import RUNGS, has_levels
 from elastocal.identification.solve import solve
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_poses_out

@@ -16,13 +16,8 @@ from elastocal.elastic import ElasticModel, check_vectors
 from elastocal.errors import RobotError, SpringError
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
 from elastocal.identification.observability import Observability
-from elastocal.identification.production import (
-    DOUBT_ROWS,
-    CoveredRows,
-    PredictionDoubt,
-    ProductionCoverage,
-    covered_rows,
-)
+from elastocal.identification.prediction_doubt import PredictionDoubt, ProductionRows
+from elastocal.identification.production import CoveredRows, ProductionCoverage, covered_rows
 from elastocal.identification.uncertainty import interval
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -243,11 +238,10 @@ class CalibratedModel:
         force, moment : ndarray, shape (row, 3)
             On the robot at the tcp in base, in N and N·m; rows without a load say nothing.
         """
-        loaded = np.flatnonzero(np.linalg.norm(force, axis=1) > 0.0)
-        if not len(loaded):
+        few = ProductionRows(q, force, moment).few()
+        if not len(few):
             return None
-        few = loaded[np.unique(np.linspace(0, len(loaded) - 1, DOUBT_ROWS).astype(np.intp))]
-        found = self.predict(q[few], force[few], None if moment is None else moment[few])
+        found = self.predict(few.joint_position, few.force, few.moment)
         return PredictionDoubt(
             float(np.linalg.norm(found.deflection, axis=1).mean()),
             float(np.linalg.norm(found.high - found.low, axis=1).mean() / 2.0),

@@ -5,7 +5,7 @@ model is what the compensation and every prediction work with.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, KnownSpring
+from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
@@ -25,7 +25,7 @@ from elastocal.identification.observability import (
     find_faint,
     observability,
 )
-from elastocal.identification.options import MEDIAN_NORM, FitOptions, Prior, bounds
+from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, force_offset, screen
@@ -258,74 +258,3 @@ def _unsettled(solution: Solution, loss: str) -> list[str]:
         f"the {loss} loss had not settled when reweighting ended: its weights, and so the springs,"
         " depend on where it stopped"
     ]
-
-
-def with_knowledge(
-    options: FitOptions,
-    known: Sequence[KnownSpring],
-    model: ElasticModel,
-    readings: Readings,
-    marker_offset: ArrayLike | None = None,
-) -> FitOptions:
-    """Return options of a fit that uses what is known of springs.
-
-    A prior is weighed against the noise of one component of a deflection: the robust residual of a
-    fit without it.
-
-    Parameters
-    ----------
-    options : FitOptions
-        What else was chosen.
-    known : sequence of KnownSpring
-        What is known; the options as they are without any.
-    model : ElasticModel
-        Robot and springs.
-    readings : Readings
-        Measurements, joints in the robot's order.
-    marker_offset : array_like, shape (3,), optional
-        Marker in the tcp frame, in m.
-
-    Raises
-    ------
-    IdentificationError
-        If a spring is not the model's, or bounds contradict those of the options.
-    """
-    if not known:
-        return options
-    names = list(model.parameter_names)
-    natural = [parameter.lower for parameter in model.parameters]
-    lower, upper = (np.array(each) for each in bounds(options, len(names), natural))
-    rows, mean, sigma = (
-        np.zeros((len(known), len(names))),
-        np.zeros(len(known)),
-        np.ones(len(known)),
-    )
-    sigma *= np.inf
-    for number, each in enumerate(known):
-        columns = _columns_of(each, model)
-        rows[number, columns] = 1.0 if each.weights is None else each.weights
-        if each.weights is None:
-            lower[columns] = np.maximum(lower[columns], -np.inf if each.low is None else each.low)
-            upper[columns] = np.minimum(upper[columns], np.inf if each.high is None else each.high)
-        if each.compliance is not None and each.sigma is not None:
-            mean[number], sigma[number] = each.compliance, each.sigma
-    bounded = replace(options, lower=lower, upper=upper, prior=None)
-    if not np.isfinite(sigma).any():
-        return bounded
-    problem = build(model, readings, bounded, marker_offset)
-    residual = np.linalg.norm(problem.residuals(solve(problem, "huber").compliance), axis=1)
-    # Readings without any noise leave a prior no part, but not none at all.
-    smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
-    noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
-    return replace(bounded, prior=Prior(mean, sigma, noise, rows))
-
-
-def _columns_of(known: KnownSpring, model: ElasticModel) -> list[int]:
-    """Return the parameters that something is known of: all of a gear, or the one of that name."""
-    names = list(model.parameter_names)
-    if known.weights is None and known.name in names:
-        return [names.index(known.name)]
-    springs = {spring.name: spring for spring in model.springs}
-    if known.weights is None or known.name not in springs:
-        raise IdentificationError(f"the model has no spring {known.name!r} to know anything of")
-    return [names.index(parameter.name) for parameter in springs[known.name].parameters]

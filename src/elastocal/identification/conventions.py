@@ -5,7 +5,8 @@ a solvable system; only the fit is worse. So the usual mistakes are undone one b
 data are explained far better without one of them, the fit is refused with that message
 (docs/decisions/0006-conventions-verdict.md).
 
-A new mistake is a function that undoes it and an entry in `_MISTAKES`.
+A new mistake is a function that undoes it and an entry in `_MISTAKES`; of the joints, an entry in
+`elastocal.robot.JOINT_READINGS`.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,7 @@ from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.options import FitOptions, FreeFrame
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
-from elastocal.robot import Robot
+from elastocal.robot import JointReading, Robot, other_joint_readings
 
 POOR_FIT = 0.35
 """Part of the median deflection that may stay unexplained without a warning."""
@@ -115,14 +116,12 @@ class _Mistake:
     message: str
     undo: _Undo
     """Returns the readings as they would be if the mistake had been made."""
-    six_axes: bool = False
-    """Whether it concerns joints by number and so arms of six axes or more."""
 
 
 def _mistakes_of(robot: Robot) -> tuple[_Mistake, ...]:
     """Return the mistakes that are possible with a robot, the likeliest first."""
-    six = len(robot.joint_names) >= 6
-    return tuple(mistake for mistake in _MISTAKES if six or not mistake.six_axes)
+    joints = (_Mistake(each.message, _reading_joints(each)) for each in other_joint_readings(robot))
+    return (*_MISTAKES, *joints)
 
 
 def _turn_force(_: Robot, readings: Readings) -> Readings:
@@ -146,23 +145,11 @@ def _rotated(readings: Readings, R: FloatArray) -> Readings:
     return replace(readings, force=force, moment=turned)
 
 
-def _turn_roll_joints(robot: Robot, readings: Readings) -> Readings:
-    """Turn the sign of the first, fourth and sixth joint of the arm."""
-    signs = np.ones(len(robot.joint_names))
-    signs[[robot.external_axes + index for index in (0, 3, 5) if index < len(signs)]] = -1.0
-    return replace(readings, joint_position=readings.joint_position * signs)
+def _reading_joints(reading: JointReading) -> _Undo:
+    def undo(robot: Robot, readings: Readings) -> Readings:
+        return replace(readings, joint_position=reading.read(robot, readings.joint_position))
 
-
-def _uncouple(robot: Robot, readings: Readings, sign: float) -> Readings:
-    """Return joints whose third one was recorded relative to the horizontal."""
-    q = readings.joint_position.copy()
-    second, third = robot.external_axes + 1, robot.external_axes + 2
-    q[:, third] = sign * q[:, third] - q[:, second]
-    return replace(readings, joint_position=q)
-
-
-def _reverse_joints(_: Robot, readings: Readings) -> Readings:
-    return replace(readings, joint_position=readings.joint_position[:, ::-1])
+    return undo
 
 
 def _both(first: _Undo, second: _Undo) -> _Undo:
@@ -185,25 +172,8 @@ _MISTAKES = (
         "the forces are in the sensor (last link) frame with their sign turned",
         _both(_from_last_link_frame, _turn_force),
     ),
-    _Mistake(
-        "joints 1, 4 and 6 of the arm turn the other way round than in the URDF (KUKA's A1, A4,"
-        " A6 turn clockwise)",
-        _turn_roll_joints,
-        six_axes=True,
-    ),
-    _Mistake(
-        "the third joint is coupled to the second as on FANUC controllers: use -(q2 + q3)",
-        lambda robot, readings: _uncouple(robot, readings, -1.0),
-        six_axes=True,
-    ),
-    _Mistake(
-        "the third joint is measured against the horizontal: use q3 - q2",
-        lambda robot, readings: _uncouple(robot, readings, 1.0),
-        six_axes=True,
-    ),
-    _Mistake("the joints are in reverse order", _reverse_joints, six_axes=True),
 )
-"""Every mistake that is tried, the likeliest first."""
+"""Mistakes of forces, the likeliest first; those of joints come after them."""
 
 
 def check_joints(robot: Robot, readings: Readings) -> tuple[str, ...]:

@@ -107,6 +107,11 @@ class RungSummary:
     """What it is judged by: its error at left-out poses and left-out low load, against the best."""
     parameters: int
     chosen: bool
+    production_error: float | None = None
+    """Error that is expected on production, in m; none where production is not known, or where the
+    left-out poses show another rung to be better."""
+    backed: bool = True
+    """Whether it is sure enough of production to correct by; also where that is not known."""
 
 
 @record()
@@ -190,7 +195,8 @@ def summary(
     known: Sequence[KnownSpring] = (),
 ) -> CalibrationSummary:
     """Return the figures of a calibration that was made with these settings, and this knowledge."""
-    expected = {each.name for each in known if each.compliance is not None}
+    # That a spring is of no more than its drive's size is no stiffness known of it.
+    expected = {each.name for each in known if each.compliance}
     calibrated = calibration.calibrated
     seen = calibrated.observability
     residual, deflection = calibration.residual_norm, calibration.deflection_norm
@@ -320,6 +326,8 @@ def rung_summary(rung: Climbed) -> RungSummary:
         difference=DifferenceSummary(rung.difference, rung.low, rung.high),
         parameters=len(rung.model.parameters),
         chosen=rung.chosen,
+        production_error=rung.production_error if np.isfinite(rung.production_error) else None,
+        backed=rung.is_backed,
     )
 
 
@@ -346,6 +354,14 @@ def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
             f"{taken.springs} is taken, the simplest within one standard error of the best at"
             f" left-out poses, {best.springs}: worse by {by(taken)}"
         )
+    if taken.production_error is not None:
+        text = (
+            f"{taken.springs} is taken: of the rungs within one standard error of the best at"
+            f" left-out poses it is expected to err least on production,"
+            f" by {um(taken.production_error)}"
+        )
+    if unsure := [each.springs for each in ladder if not each.backed]:
+        text += f"; too unsure of production to be taken: {', '.join(unsure)}"
     if worse:
         listed = ", ".join(f"{each.springs} by {by(each)}" for each in worse)
         text += f"; shown to be worse than the best: {listed}"

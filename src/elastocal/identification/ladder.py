@@ -4,10 +4,12 @@ More springs always fit better; whether they predict better is seen at poses tha
 seen, and at a low load that it has not seen, where there is one. (A refit without the full load, or
 without a pose that stands alone, would have to extrapolate, which no rung is asked to.) The rung
 taken is the simplest that is not worse than the best by more than one standard error of their
-paired difference, which counts that the refits overlap (`elastocal.identification.paired`).
+paired difference, which counts that the refits overlap (`elastocal.identification.paired`). Where
+production is known, it decides between rungs that the poses do not tell apart
+(`elastocal.identification.prediction_doubt`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,59 +17,34 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import (
-    ElasticModel,
-    Gear,
-    Spring,
-    actuated,
-    bearing,
-    bearing_ends,
-    layout,
-    links,
-    tensor,
-)
+from elastocal.elastic import ElasticModel, KnownSpring, bearing
 from elastocal.errors import IdentificationError
 from elastocal.identification.displacement import reference_joints
+from elastocal.identification.knowledge import DriveCompliances, with_knowledge
 from elastocal.identification.options import FitOptions
-from elastocal.identification.paired import Overlap, judge_models
+from elastocal.identification.paired import Judgement, Overlap, judge_models
+from elastocal.identification.prediction_doubt import (
+    ProductionForecast,
+    ProductionRows,
+    expected_errors,
+)
 from elastocal.identification.problem import Problem, build, pose_blocks
 from elastocal.identification.production import poses_in_company
+from elastocal.identification.rungs import (
+    AUTO,
+    NO_LEVELS,
+    RUNGS,
+    Rung,
+    allowed_rungs,
+    low_loads,
+    rung_of,
+)
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import HeldOut, leave_poses_out
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-
-AUTO = "auto"
-"""Asks for the rung that the readings carry."""
-_KNEES = (0.3, 1.0, 3.0)
-"""Knees of the gears, in typical load torques of the joint: one below, at and above it."""
-_KNEES_OF_PLAYS = (0.5, 2.0)
-"""Knees of gears with friction, whose elements are knees as well."""
-_SLIPS = (0.15, 0.3, 0.6, 1.5)
-"""Limits of the friction elements, likewise: from what barely matters to gears that stick."""
-_SLIDES = 0.6
-"""Part of the joint's largest load torque up to which a friction element is fitted. One that slid
-little or never has a column near zero, and a compliance that says nothing of the arm: where
-production loads the joint a little more it would bend by millimetres."""
-_LOADED = 0.01
-"""Part of the largest typical torque below which a joint counts as never loaded."""
-_LOW_LEVEL = 0.6
-"""A load case is of low load below this part of the largest force at its pose."""
-_NO_LEVELS = f"no load case has less than {_LOW_LEVEL:.0%} of the largest force at its pose"
-
-
-@brief_repr
-@dataclass(frozen=True)
-class Rung:
-    """A model of the ladder."""
-
-    name: str
-    springs: Callable[[Robot, Readings], tuple[Spring, ...]]
-    """Makes its springs for a robot, scaled to the loads of the readings."""
-    needs_levels: bool = False
-    """Whether it needs load cases of low and full load."""
 
 
 @brief_repr
@@ -97,62 +74,21 @@ class Climbed:
     apart: float = float("nan")
     """Root mean square distance of its predictions at left-out poses from those of the chosen
     rung, in m; NaN where it was not to choose from."""
+    known: tuple[KnownSpring, ...] = ()
+    """What its fits were told of its springs."""
+    forecast: ProductionForecast | None = None
+    """What it predicts on production, where that is known."""
+    production_error: float = float("nan")
+    """Error that is expected on production, in m; NaN where it was not to be known, as for rungs
+    that left-out poses show to be worse."""
 
+    @property
+    def is_backed(self) -> bool:
+        """Whether it is as sure of production as a correction has to be; also where none is known.
 
-def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tuple[Spring, ...]:
-    """Return the layout `links` with gears for axial springs.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot; joints that slide keep linear springs.
-    readings : Readings
-        Their median torque about each joint scales its gear; joints that they do not load keep
-        linear springs.
-    slips : tuple of float
-        Limits of friction elements, in that torque; none without. Those that no load made slide
-        by far are left out.
-    """
-    springs = links(robot)
-    model = ElasticModel(robot, actuated(robot))
-    torque = model.load_torques(readings.joint_position, readings.force, readings.moment)
-    typical = dict(zip(robot.joint_names, np.median(np.abs(torque), axis=0), strict=True))
-    largest = dict(zip(robot.joint_names, np.abs(torque).max(axis=0), strict=True))
-    least = _LOADED * max(typical.values())
-
-    def geared(spring: Spring, axial: bool) -> Spring:
-        axis = spring.axes[0]
-        size = float(typical[spring.joint])
-        if not (axial and axis.revolute and size > least):
-            return spring
-        slides = [size * part for part in slips if size * part <= _SLIDES * largest[spring.joint]]
-        parts = _KNEES_OF_PLAYS if slides else _KNEES
-        knees = tuple(_rounded(size * part) for part in parts)
-        limits = tuple(map(_rounded, slides))
-        place = (spring.name, spring.joint, axis.axis)
-        return Gear(*place, knees=knees, slips=limits, plays=bool(limits))
-
-    count = len(robot.joint_names)
-    return tuple(geared(spring, index < count) for index, spring in enumerate(springs))
-
-
-RUNGS: dict[str, Rung] = {
-    rung.name: rung
-    for rung in (
-        Rung("actuated", lambda robot, _: actuated(robot)),
-        Rung("bearing", lambda robot, _: bearing(robot)),
-        Rung("bearing-ends", lambda robot, _: bearing_ends(robot)),
-        Rung("links", lambda robot, _: links(robot)),
-        Rung("tensor", lambda robot, _: tensor(robot)),
-        Rung("gears", gears),
-        Rung(
-            "gears+friction",
-            lambda robot, readings: gears(robot, readings, _SLIPS),
-            needs_levels=True,
-        ),
-    )
-}
-"""Rungs by name, the simplest first."""
+        See `PredictionDoubt.is_small`.
+        """
+        return self.forecast is None or self.forecast.doubt.is_small
 
 
 @brief_repr
@@ -167,26 +103,16 @@ class Choice:
     @property
     def taken(self) -> str:
         """Name of the chosen rung."""
-        return next(each.name for each in self.ladder if each.chosen)
+        return self._taken.name
 
+    @property
+    def known(self) -> tuple[KnownSpring, ...]:
+        """What a fit of the chosen rung is told of its springs."""
+        return self._taken.known
 
-def allowed_rungs(springs: str) -> tuple[str, ...]:
-    """Return the names of the rungs that a user's word for springs leaves to choose from."""
-    return {AUTO: tuple(RUNGS), "gears": ("gears", "gears+friction")}.get(springs, (springs,))
-
-
-def rung_of(robot: Robot, name: str) -> Rung:
-    """Return a rung, or a layout beside the ladder as one.
-
-    Raises
-    ------
-    SpringError
-        If the name is neither a rung, nor a layout, nor a spring file.
-    """
-    if name in RUNGS:
-        return RUNGS[name]
-    springs = layout(robot, name, beside=(AUTO, *RUNGS))
-    return Rung(name, lambda *_: springs)
+    @property
+    def _taken(self) -> Climbed:
+        return next(each for each in self.ladder if each.chosen)
 
 
 @one_blas_thread()
@@ -197,6 +123,7 @@ def choose_model(
     options: FitOptions,
     marker_offset: ArrayLike | None = None,
     beside: Sequence[str] = (),
+    production: ProductionRows | None = None,
 ) -> Choice:
     """Return the elastic model that a user asks for.
 
@@ -215,6 +142,9 @@ def choose_model(
         Marker in the tcp frame, in m.
     beside : sequence of str
         Other layouts or spring files to judge with the ladder; none of them is taken.
+    production : ProductionRows, optional
+        Where the model is to predict. Rungs to choose from are then fitted with what the drives say
+        of other springs (`DriveCompliances`), and chosen by production: see `take_simplest`.
 
     Raises
     ------
@@ -228,7 +158,9 @@ def choose_model(
     rungs = tuple(rung_of(robot, name) for name in names if name != AUTO)
     options = replace(options, prior=None)
     readings = usable_for_choice(robot, readings, options, marker_offset)
-    return climb(robot, readings, rungs, allowed, options, marker_offset)
+    if len(allowed) == 1:
+        production = None
+    return climb(robot, readings, rungs, allowed, options, marker_offset, production)
 
 
 def usable_for_choice(
@@ -260,6 +192,7 @@ def climb(
     allowed: Sequence[str],
     options: FitOptions,
     marker_offset: ArrayLike | None = None,
+    production: ProductionRows | None = None,
 ) -> Choice:
     """Return the simplest of the allowed rungs that is not worse than the best of them.
 
@@ -277,14 +210,18 @@ def climb(
         Bounds and weights.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
+    production : ProductionRows, optional
+        As for `choose_model`.
 
     Raises
     ------
     IdentificationError
         If the readings allow none of them.
     """
+    rows = None if production is None else production.few()
+    drives = DriveCompliances.of(robot, readings, options, marker_offset) if rows else None
     tried: list[Climbed] = []
-    low, reason = low_loads(readings), _NO_LEVELS
+    low, reason = low_loads(readings), NO_LEVELS
     # The frame of a load case that is left out is not known, so it cannot be judged.
     judged = low & (options.free_frame != "load_case")
     counted = poses_in_company(robot, readings.joint_position, pose_blocks(readings))
@@ -293,8 +230,12 @@ def climb(
             continue
         model = ElasticModel(robot, rung.springs(robot, readings))
         try:
-            problem = build(model, readings, options, marker_offset)
-            tried.append(replace(try_rung(rung.name, model, problem, judged), counted=counted))
+            known = drives.known_springs(model) if drives else ()
+            fit = with_knowledge(options, known, model, readings, marker_offset)
+            problem = build(model, readings, fit, marker_offset)
+            forecast = ProductionForecast.of(model, problem, rows) if rows else None
+            found = try_rung(rung.name, model, problem, judged)
+            tried.append(replace(found, counted=counted, known=known, forecast=forecast))
         except IdentificationError as error:
             reason = str(error)
     if not any(each.name in allowed for each in tried):
@@ -304,6 +245,9 @@ def climb(
 
 def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
     """Return the simplest of the allowed rungs that is not worse than the best of them.
+
+    Where production is known, a rung that is not sure of it is not taken while there is one that
+    is, and of those that are not worse the one that is expected to err least on production.
 
     Parameters
     ----------
@@ -319,10 +263,15 @@ def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
     """
     may = np.array([each.name in allowed for each in tried])
     if not np.any(may):
-        raise IdentificationError(f"springs {', '.join(allowed)} were not tried: {_NO_LEVELS}")
+        raise IdentificationError(f"springs {', '.join(allowed)} were not tried: {NO_LEVELS}")
+    backed = may & [each.is_backed for each in tried]
+    may = backed if np.any(backed) else may
     score = np.stack([each.score for each in tried], axis=1)
     score = score if tried[0].counted is None else score[tried[0].counted]
     found = judge_models(score, may, Overlap.leaving_one_out(len(score)))
+    on_production = _errors_on_production(tried, found)
+    known = np.isfinite(on_production).any()
+    chosen = int(np.nanargmin(on_production)) if known else found.chosen
     each = found.difference
     figures = (each.mean, each.low, each.high, np.nan_to_num(each.standard_error))
     ladder = tuple(
@@ -332,27 +281,22 @@ def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
             low=float(low),
             high=float(high),
             standard_error=float(error),
-            chosen=number == found.chosen,
-            apart=_distance(rung, tried[found.chosen]) if may[number] else float("nan"),
+            chosen=number == chosen,
+            production_error=float(on_production[number]),
+            apart=_distance(rung, tried[chosen]) if may[number] else float("nan"),
         )
         for number, (rung, mean, low, high, error) in enumerate(zip(tried, *figures, strict=True))
     )
-    return Choice(ladder[found.chosen].model, ladder)
+    return Choice(ladder[chosen].model, ladder)
 
 
-def has_levels(readings: Readings) -> bool:
-    """Return whether load cases of low load stand beside those of full load."""
-    # The largest force at a pose is never low beside itself.
-    return bool(np.any(low_loads(readings)))
-
-
-def low_loads(readings: Readings) -> BoolArray:
-    """Return whether each reading is of low load beside others at its pose, shape (reading,)."""
-    force = np.linalg.norm(readings.force, axis=1)
-    labels, pose = np.unique(readings.pose, return_inverse=True)
-    largest = np.zeros(len(labels))
-    np.maximum.at(largest, pose, force)
-    return np.asarray(force < _LOW_LEVEL * largest[pose])
+def _errors_on_production(tried: Sequence[Climbed], found: Judgement) -> FloatArray:
+    """Return what the near rungs are expected to err on production, shape (rung,), in m, or NaN."""
+    errors = np.full(len(tried), np.nan)
+    forecasts = [each for number in found.near if (each := tried[number].forecast) is not None]
+    if forecasts:
+        errors[found.near] = expected_errors(forecasts)
+    return errors
 
 
 def try_rung(name: str, model: ElasticModel, problem: Problem, low: BoolArray) -> Climbed:
@@ -393,8 +337,3 @@ def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:
     rest = PoseGrams.of(problem.take(~rows))
     compliance = rest.refit(np.ones((1, len(rest))))[0]
     return np.asarray(np.linalg.norm(problem.take(rows).residuals(compliance), axis=1))
-
-
-def _rounded(torque: float) -> float:
-    """Return a torque of two digits, which is all that its choice deserves."""
-    return float(f"{torque:.2g}")

@@ -142,6 +142,8 @@ class Judgement:
     """Error of each model minus that of the best allowed one, arrays of shape (model,), in m."""
     chosen: int
     """Number of the simplest allowed model that is not worse by more than a standard error."""
+    near: IndexArray
+    """Numbers of all of those."""
 
 
 def judge_models(errors: FloatArray, allowed: BoolArray, overlap: Overlap) -> Judgement:
@@ -159,5 +161,6 @@ def judge_models(errors: FloatArray, allowed: BoolArray, overlap: Overlap) -> Ju
     mean = np.where(allowed, errors.mean(axis=0), np.inf)
     best = int(np.argmin(mean))
     difference = paired_difference(errors, errors[:, [best]], overlap)
-    near = difference.mean <= np.nan_to_num(difference.standard_error)
-    return Judgement(difference, int(np.flatnonzero(allowed & near)[0]))
+    within = difference.mean <= np.nan_to_num(difference.standard_error)
+    near = np.flatnonzero(allowed & within)
+    return Judgement(difference, int(near[0]), near)

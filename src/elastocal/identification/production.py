@@ -136,38 +136,6 @@ class ProductionCoverage:
         return f"up to {self.level:.2f} times that calibrated"
 
 
-DOUBT_ROWS = 100
-"""Rows by which predictions along a path are judged."""
-_LARGEST_DOUBT = 0.5
-"""Half-width of the 95 % interval, as a share of what is predicted, beyond which a correction may
-do more harm than good."""
-
-
-@dataclass(frozen=True)
-class PredictionDoubt:
-    """How sure the predictions along a path are."""
-
-    deflection: float
-    """Mean predicted deflection, in m."""
-    half_width: float
-    """Mean half-width of its 95 % interval, in m."""
-
-    @property
-    def is_small(self) -> bool:
-        """Whether the interval is narrow enough to correct by the prediction."""
-        return self.half_width <= _LARGEST_DOUBT * self.deflection
-
-    @property
-    def sentence(self) -> str:
-        """What a person should know."""
-        return (
-            f"on production the model predicts {1e3 * self.deflection:.3g} mm on average with a"
-            f" 95 % interval of ± {1e3 * self.half_width:.3g} mm: it does not know what it"
-            " predicts, a correction may do harm; press in the directions of production, or take"
-            " fewer springs (--springs bearing)"
-        )
-
-
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class CoveredRows:

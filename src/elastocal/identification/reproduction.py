@@ -13,8 +13,9 @@ from numpy.random import Generator
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Dataset, without
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.calibration import Calibration, calibrate, with_knowledge
+from elastocal.identification.calibration import Calibration, calibrate
 from elastocal.identification.figures import CalibrationSummary
+from elastocal.identification.knowledge import with_knowledge
 from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.recertification import Estimate
 from elastocal.identification.uncertainty import interval

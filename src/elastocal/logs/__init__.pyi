@@ -1,3 +1,4 @@
+from .bounded import read_bounded as read_bounded
 from .clocks import (
     ClockFit as ClockFit,
     align as align,

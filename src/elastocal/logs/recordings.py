@@ -7,10 +7,10 @@ is a table: ``/tf:tool0``.
 """
 
 import json
-import sqlite3
-import struct
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +18,16 @@ import numpy as np
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, make_reader
 from mcap.summary import Summary
+from zstandard import ZstdError
 
 from elastocal.errors import FileAccessError, LogError, nearest
-from elastocal.files import require_file
+from elastocal.logs.bounded import read_bounded
 from elastocal.logs.table import LogTable
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
+_WHAT = "recording"
 RECORDINGS = (".mcap", ".bag", ".db3")
 _NANOSECONDS = 1e-9
 _LONGEST_ARRAY = 64
@@ -51,6 +53,11 @@ def read_topics(path: Path) -> dict[str, int]:
     FileAccessError
         If it cannot be read, or rosbags is not installed.
     """
+    _require_rosbags(path)
+    return read_bounded(path, _WHAT, partial(_topics, path))
+
+
+def _topics(path: Path) -> dict[str, int]:
     if _is_json(path):
         with _mcap(path) as reader:
             summary = _summary(path, reader)
@@ -77,7 +84,12 @@ def read_recording(path: Path, topic: str | None) -> LogTable:
     FileAccessError
         If it cannot be read, or rosbags is not installed.
     """
-    known = read_topics(path)
+    _require_rosbags(path)
+    return read_bounded(path, _WHAT, partial(_recording, path, topic))
+
+
+def _recording(path: Path, topic: str | None) -> LogTable:
+    known = _topics(path)
     name, _, frame = (topic or "").partition(":")
     if topic is None and len(known) == 1:
         name = next(iter(known))
@@ -184,18 +196,27 @@ def _bag_messages(path: Path, topic: str) -> Iterator[_Row]:
 @contextmanager
 def _mcap(path: Path) -> Iterator[McapReader]:
     """Yield the reader of an MCAP file; what goes wrong meanwhile is one of our errors."""
-    require_file(path)
     try:
         with Path(path).open("rb") as file:
             yield make_reader(file, validate_crcs=True)
-    except (McapError, struct.error, ValueError, KeyError, RecursionError, EOFError) as error:
-        if isinstance(error, LogError):
-            raise
+    except (McapError, ZstdError) as error:
         raise _damaged(path, error) from error
-    except OSError as error:
-        if isinstance(error, FileAccessError):
-            raise
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def _require_rosbags(path: Path) -> None:
+    """Refuse a bag where rosbags is not installed; import it here, or each child does it anew."""
+    if Path(path).suffix.lower() == ".mcap":
+        return  # most of ours need none
+    try:
+        import rosbags.highlevel  # noqa: F401
+    except ImportError as error:
+        raise _absent(path) from error
+
+
+def _absent(path: Path) -> FileAccessError:
+    return FileAccessError(
+        f"cannot read {path}: ROS bags need rosbags: pip install 'elastocal[logs]'"
+    )
 
 
 @contextmanager
@@ -208,21 +229,17 @@ def _bag(path: Path) -> Iterator["AnyReader"]:
         from rosbags.serde import SerdeError
         from rosbags.typesys import Stores, TypesysError, get_typestore
     except ImportError as error:
-        raise FileAccessError(
-            f"cannot read {path}: ROS bags need rosbags: pip install 'elastocal[logs]'"
-        ) from error
-    damage = (AnyReaderError, BagOneError, BagTwoError, SerdeError, TypesysError, sqlite3.Error)
+        raise _absent(path) from error
+    # The database is apsw's, of older versions sqlite3's: none is imported but by rosbags.
+    databases = (sys.modules[name].Error for name in ("apsw", "sqlite3") if name in sys.modules)
+    damage = (AnyReaderError, BagOneError, BagTwoError, SerdeError, TypesysError, *databases)
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
             yield bag
-    except (*damage, struct.error, ValueError, KeyError, AssertionError) as error:
-        if isinstance(error, LogError):
-            raise
+    except damage as error:
         raise _damaged(path, error) from error
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def _damaged(path: Path, error: BaseException) -> LogError:
     reason = " ".join(str(error).split()) or type(error).__name__
-    return LogError(f"{path} is no recording, or damaged: {reason}")
+    return LogError(f"{path} is no {_WHAT}, or damaged: {reason}")

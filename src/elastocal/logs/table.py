@@ -13,14 +13,15 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
+from functools import partial
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import FileAccessError, LogError, nearest
 from elastocal.files import require_file
+from elastocal.logs.bounded import read_bounded
 from elastocal.results import brief_repr
 
 LARGEST_LOG = 2 * 1024**3
@@ -205,16 +206,18 @@ def read_workbook(path: Path, sheet: str | None = None) -> LogTable:
         If it cannot be read, or openpyxl is not installed.
     """
     try:
-        from openpyxl import load_workbook
+        import openpyxl  # noqa: F401 - here, or the child would do it anew
     except ImportError as error:
         raise FileAccessError(
             f"cannot read {path}: Excel needs openpyxl: pip install 'elastocal[logs]'"
         ) from error
-    require_file(path)
-    try:
-        book = load_workbook(path, read_only=True, data_only=True)
-    except (OSError, ValueError, KeyError, BadZipFile) as error:
-        raise LogError(f"{path} is no Excel workbook: {error}") from error
+    return read_bounded(path, "Excel workbook", partial(_sheet, path, sheet))
+
+
+def _sheet(path: Path, sheet: str | None) -> LogTable:
+    from openpyxl import load_workbook
+
+    book = load_workbook(path, read_only=True, data_only=True)
     try:
         if sheet is not None and sheet not in book.sheetnames:
             raise LogError(f"{path}: there is no sheet {sheet!r} ({', '.join(book.sheetnames)})")

@@ -66,7 +66,7 @@ class ContactRecord:
     axis_override: float
     """Part of the axes' largest speeds that the times of moves are estimated for."""
     contact_speed: float
-    """Fastest straight motion of the KRL program between approach pose and contact, in m/s."""
+    """Fastest straight motion of the robot program between approach pose and contact, in m/s."""
     load_cases: dict[str, Vector]
     """Force on the robot in the tcp frame, in N, in the order in which they are applied; what
     belongs to the reference (`CellFile.presses`) among them."""

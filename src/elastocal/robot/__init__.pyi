@@ -18,6 +18,11 @@ from .identity import (
     tcp_gap as tcp_gap,
     tool_gap as tool_gap,
 )
+from .joint_readings import (
+    JOINT_READINGS as JOINT_READINGS,
+    JointReading as JointReading,
+    other_joint_readings as other_joint_readings,
+)
 from .mounting import (
     Rail as Rail,
     on_rail as on_rail,

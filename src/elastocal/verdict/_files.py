@@ -47,7 +47,7 @@ def content_hash(path: Path) -> tuple[str, str]:
     if path.suffix in _STAMPED:
         try:
             return _content(path), CONTENT
-        except (ElastocalError, ValueError):
+        except (ElastocalError, ValueError, RecursionError):
             # What is damaged has no content to speak of.
             return file_sha256(path), BYTES
     return file_sha256(path), BYTES

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.cell import Cell, fingerprint
+from elastocal.cell import SIMULATED, Cell, fingerprint
 from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
@@ -162,11 +162,10 @@ class Evidence:
     @property
     def simulated(self) -> bool:
         """Whether the devices of the cell are simulated ones."""
-        return self.cell is not None and "simulated" in (
-            self.cell.file.devices.arm,
-            self.cell.file.devices.sensor,
-            self.cell.file.devices.metrology,
-        )
+        if self.cell is None:
+            return False
+        choices = self.cell.file.devices.by_kind.values()
+        return any(choice.driver == SIMULATED for choice in choices)
 
     @property
     def run_record(self) -> RunRecord | None:

@@ -11,10 +11,13 @@ __all__ = [
     "guess_map",
     "import_logs",
     "init",
+    "krc_config",
+    "measure_delay",
     "plan",
     "predict",
     "report",
     "run",
+    "simulate",
     "simulate_process",
     "stiffness",
     "study",
@@ -25,12 +28,14 @@ __all__ = [
 from ._file_kinds import FileDescription as FileDescription
 from ._inputs import NewTool as NewTool, find_robot as find_robot
 from ._operator_and_devices import (
-    KINDS as KINDS,
-    SOURCES as SOURCES,
-    DeviceSource as DeviceSource,
+    GROUP as GROUP,
     Operator as Operator,
+    Rig as Rig,
     Supervision as Supervision,
     Unattended as Unattended,
+    driver_names as driver_names,
+    find_driver as find_driver,
+    rig_of as rig_of,
 )
 from .calibrate import (
     CalibrateResult as CalibrateResult,
@@ -85,6 +90,17 @@ from .import_logs import (
     import_logs as import_logs,
 )
 from .init import InitResult as InitResult, InitSettings as InitSettings, init as init
+from .krc_config import (
+    KrcConfigResult as KrcConfigResult,
+    KrcConfigSettings as KrcConfigSettings,
+    krc_config as krc_config,
+    kuka_settings as kuka_settings,
+)
+from .measure_delay import (
+    MeasureDelayResult as MeasureDelayResult,
+    MeasureDelaySettings as MeasureDelaySettings,
+    measure_delay as measure_delay,
+)
 from .plan import (
     ComparedSpread as ComparedSpread,
     PlanFigures as PlanFigures,
@@ -122,6 +138,12 @@ from .run import (
     RunSettings as RunSettings,
     dry_run as dry_run,
     run as run,
+)
+from .simulate import (
+    Ports as Ports,
+    SimulateResult as SimulateResult,
+    SimulateSettings as SimulateSettings,
+    simulate as simulate,
 )
 from .simulate_process import (
     PROGRAMMED as PROGRAMMED,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal import planning, procedure
+from elastocal import logs, planning, procedure
 from elastocal.cell import load_cell
 from elastocal.codec import (
     ARRAYS_SCHEMA,
@@ -22,14 +22,17 @@ from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
 from elastocal.dataset import require_joint_names
+from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
+from elastocal.geometry import read_geometry
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
-from elastocal.records import read_json, schema_of
+from elastocal.records import read_json, read_yaml_data, schema_of
 from elastocal.robot import (
     Robot,
+    catalogue,
     leaf_links,
     parse_urdf,
     read_urdf,
@@ -37,6 +40,7 @@ from elastocal.robot import (
     tip_links,
 )
 from elastocal.verdict import read_signature
+from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._table_kinds import dataset_file
 
 FileDescription = tuple[str, dict[str, object]]
@@ -56,6 +60,7 @@ def cell_file(path: Path) -> FileDescription:
         the search technique, the place of the surface, or a collision at HOME.
     """
     cell = load_cell(path)
+    rig_of(cell)
     search = cell.file.search
     planning.require_possible_search(cell)
     surface = planning.cell_surface(cell)
@@ -175,6 +180,39 @@ def springs_file(path: Path) -> FileDescription:
     return "spring file", {"schema": "elastocal.springs/1", **facts}
 
 
+def catalogue_file(path: Path) -> FileDescription:
+    """Describe a catalogue of robots; the URDF of each is made and loaded."""
+    robots = catalogue.read_table(read_yaml_data(path), str(path))
+    with refusals_naming(path):
+        for entry in robots.values():
+            Robot.from_urdf(catalogue.urdf_of(entry), "flange")
+    return "catalogue of robots", {"schema": catalogue.SCHEMA, "robots": list(robots)}
+
+
+def log_map_file(path: Path) -> FileDescription:
+    """Describe a map of logs; the cell or robot that it names is read, too."""
+    found = logs.read_map(path)
+    place = logs.site(path, found)
+    return "map of logs", {
+        "schema": logs.SCHEMA,
+        "robot": place.robot.name,
+        "logs": [each.log for each in found.logs],
+        "load_cases": list(found.load_cases),
+    }
+
+
+def geometry_file(path: Path) -> FileDescription:
+    """Describe a calibrated geometry."""
+    found = read_geometry(path)
+    return "calibrated geometry", {
+        "schema": schema_of(type(found)),
+        "robot": found.robot.name,
+        "positions": found.positions,
+        "blunders": len(found.blunders),
+        "held_out_mean_m": found.held_out.chosen.mean,
+    }
+
+
 def model_file(path: Path) -> FileDescription:
     """Describe a calibrated model."""
     calibrated = read_model(path)
@@ -232,6 +270,16 @@ def signature_file(path: Path) -> FileDescription:
     return "signature", {
         "schema": "elastocal.signature/1",
         **_picked(found, "of", "sha256", "made", "key"),
+    }
+
+
+def commissioning_file(path: Path) -> FileDescription:
+    """Describe the record of a delay from command to motion."""
+    found = read_json(path, CommissioningRecord)
+    return "commissioning record", {
+        "schema": "elastocal.commissioning/1",
+        **_picked(found, "cell", "robot", "controller", "made", "cycle", "delay"),
+        "line": found.link.sentence(),
     }
 
 

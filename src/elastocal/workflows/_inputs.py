@@ -4,7 +4,7 @@ Also that a model fits the cell, and how far it carries.
 """
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset, require_joint_names
-from elastocal.errors import ElastocalError, RobotError, UnitError
+from elastocal.errors import ElastocalError, GeometryError, RobotError, UnitError
 from elastocal.identification import (
     CalibratedModel,
     attainable_rank,
@@ -154,6 +154,38 @@ class NewTool:
         if centre is not None:
             _require_near("centre of mass", centre, "its tcp")
         return calibrated.with_tool(T_tcp_tool, mass, centre)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmAsBuilt:
+    """Settings of every command that may know where the unloaded arm truly stands."""
+
+    geometry: Path | None = None
+    """Model file of `geometry` of the same arm: its errors and sag are corrected too."""
+    payload: str | None = None
+    """What the tool weighs beyond the description in that model, with its unit."""
+    payload_centre: str | None = None
+    """Its centre in that model's tcp, ``"x, y, z"`` with units."""
+
+    def unloaded(self, robot: Robot) -> Callable[[FloatArray], FloatArray] | None:
+        """Return where the robot as built stands; none where its geometry is not known.
+
+        Raises
+        ------
+        GeometryError
+            If the geometry is of another arm, or a payload has none.
+        UnitError
+            If a unit is missing or wrong.
+        """
+        if self.geometry is None:
+            if self.payload is not None or self.payload_centre is not None:
+                raise GeometryError("a payload needs the arm that it bends: give --geometry")
+            return None
+        from elastocal.geometry import Payload, read_geometry
+
+        mass = 0.0 if self.payload is None else parse_quantity(self.payload, "mass")
+        x, y, z = (0.0,) * 3 if self.payload_centre is None else parse_point(self.payload_centre)
+        return read_geometry(self.geometry).tool_of(robot, Payload(mass, (x, y, z)))
 
 
 def _require_near(what: str, point: ArrayLike, origin: str) -> None:

@@ -1,20 +1,36 @@
 """The operator and the devices that a run needs.
 
-The person at the cell is an argument, never a question asked from below. `SOURCES` is the only
+The person at the cell is an argument, never a question asked from below. `find_driver` is the only
 place that picks simulator or driver.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from importlib.metadata import entry_points
+from typing import Any, Protocol, cast
 
-from elastocal.cell import SIMULATED, Cell, DeviceNames, Devices
-from elastocal.errors import DeviceError, ProcedureError, nearest
+from elastocal import drivers
+from elastocal.cell import (
+    KINDS,
+    LOOPBACK,
+    SIMULATED,
+    Cell,
+    Clock,
+    Devices,
+    DeviceSet,
+    DeviceSettings,
+    Driver,
+    RigContext,
+    WallClock,
+)
+from elastocal.errors import DeviceError, ElastocalError, ProcedureError, nearest
 from elastocal.procedure import Progress as RunProgress
-
-KINDS = tuple(DeviceNames.model_fields)
-"""Kinds of device that a run needs."""
+from elastocal.records import validate
+from elastocal.results import brief_repr
 
 
 @dataclass(frozen=True)
@@ -62,44 +78,161 @@ class Unattended:
         yield Supervision(lambda _step: None, lambda: False)
 
 
-@dataclass(frozen=True)
-class DeviceSource:
-    """Where devices come from."""
-
-    make: Callable[[Cell, int, float], Devices]
-    """From cell, seed and the time at which the clock starts, in s."""
-    real: bool
-    """Whether something moves that can hurt: a person is asked first."""
+GROUP = "elastocal.drivers"
+"""Group of entry points that name drivers."""
 
 
-def _simulated(cell: Cell, seed: int, start: float) -> Devices:
-    from elastocal.sim.workcell import simulated_devices
+def driver_names() -> tuple[str, ...]:
+    """Return the names of all drivers: ours, then those of packages that are installed here."""
+    found = pkgutil.iter_modules(drivers.__path__)
+    # What several drivers share is a module beside their packages.
+    own = [SIMULATED, *sorted(module.name for module in found if module.ispkg)]
+    others = {entry.name for entry in entry_points(group=GROUP)} - set(own)
+    return (*own, *sorted(others))
 
-    return simulated_devices(cell, seed, start)
 
+def find_driver(name: str) -> Driver:
+    """Return the driver of a name.
 
-SOURCES: dict[str, DeviceSource] = {SIMULATED: DeviceSource(_simulated, real=False)}
-"""Sources by name. A source makes arm, sensor and metrology, as they share a clock."""
-
-
-def device_source(cell: Cell) -> DeviceSource:
-    """Return the source of the devices that a cell names.
+    Ours are found in the source tree too, where nothing is installed.
 
     Raises
     ------
     DeviceError
-        If a name is not known, or the devices are of different sources.
+        If there is none, or it lacks a package that it needs.
     """
-    named = {kind: getattr(cell.file.devices, kind) for kind in KINDS}
-    for kind, name in named.items():
-        if name not in SOURCES:
-            raise DeviceError(
-                f"{cell.path}: devices.{kind}: {name!r} is not configured"
-                f"{nearest(name, SOURCES)} (known: {', '.join(SOURCES)})"
-            )
-    if len(set(named.values())) > 1:
-        parts = ", ".join(f"{kind} is {name!r}" for kind, name in named.items())
-        raise DeviceError(
-            f"{cell.path}: devices must be of one source, as they share a clock; {parts}"
+    known = driver_names()
+    if name not in known:
+        listed = f"{nearest(name, known)} (known: {', '.join(known)})"
+        raise DeviceError(f"{name!r} is not configured{listed}")
+    try:
+        if name == SIMULATED:
+            return cast("Driver", importlib.import_module("elastocal.sim").DRIVER)
+        if importlib.util.find_spec(f"{drivers.__name__}.{name}") is not None:
+            return cast("Driver", importlib.import_module(f"{drivers.__name__}.{name}").DRIVER)
+        (entry,) = entry_points(group=GROUP, name=name)
+        return cast("Driver", entry.load())
+    except ImportError as error:
+        raise DeviceError(f"driver {name!r} cannot be loaded: {error}") from error
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Drivers that together make the devices of a cell, each with what is wanted of it."""
+
+    cell: Cell
+    drivers: Mapping[str, Driver]
+    """By name, in the order in which they are asked: sensors first, the arm last."""
+    wanted: Mapping[str, Mapping[str, DeviceSettings]]
+    """Settings by kind of device, by name of the driver."""
+
+    @property
+    def real(self) -> bool:
+        """Whether something moves that can hurt: a person is asked first."""
+        return any(driver.real for driver in self.drivers.values())
+
+    def connect(self, seed: int, start: float) -> Devices:
+        """Return the devices.
+
+        Parameters
+        ----------
+        seed : int
+            Of simulated devices.
+        start : float
+            What the clock shows at the beginning, in s.
+
+        Raises
+        ------
+        ElastocalError
+            If a device cannot be used; those that were made before are closed.
+        """
+        clock: Clock = WallClock(start, self.cell.file.devices.clock_rate)
+        made: list[DeviceSet] = []
+        try:
+            feed = None
+            for name, driver in self.drivers.items():
+                context = RigContext(clock, seed, start, feed)
+                made.append(driver.connect(self.cell, self.wanted[name], context))
+                feed = feed or made[-1].feed
+            clocks = [each.clock for each in made if each.clock is not None]
+            if clocks and len(made) > 1:
+                raise DeviceError(f"{self.cell.path}: devices: a driver with a clock of its own")
+            arm, sensor, metrology = (self._only(kind, made) for kind in KINDS)
+        except BaseException:
+            _refusals_to_close(made)
+            raise
+        running = clocks[0] if clocks else clock
+        return Devices(arm, sensor, metrology, running, lambda: _close(made))
+
+    def _only(self, kind: str, made: Sequence[DeviceSet]) -> Any:
+        (device,) = (
+            getattr(each, kind)
+            for name, each in zip(self.drivers, made, strict=True)
+            if kind in self.wanted[name]
         )
-    return SOURCES[named["arm"]]
+        if device is None:
+            driver = self.cell.file.devices.by_kind[kind].driver
+            raise DeviceError(f"{self.cell.path}: devices.{kind}: driver {driver!r} made none")
+        return device
+
+
+def _close(made: Sequence[DeviceSet]) -> None:
+    for refusal in _refusals_to_close(made):
+        raise refusal
+
+
+def _refusals_to_close(made: Sequence[DeviceSet]) -> list[Exception]:
+    """Close all, the arm first, whatever one of them says."""
+    refusals: list[Exception] = []
+    for each in reversed(made):
+        try:
+            each.close()
+        except (ElastocalError, OSError) as error:
+            refusals.append(error)
+    return refusals
+
+
+def rig_of(cell: Cell) -> Rig:
+    """Return the rig that a cell file describes; nothing is connected.
+
+    Raises
+    ------
+    DeviceError
+        If a driver is not known or does not make such a device.
+    SchemaError
+        If what stands under a device does not fit its driver.
+    """
+    choices = cell.file.devices
+    found: dict[str, Driver] = {}
+    wanted: dict[str, dict[str, DeviceSettings]] = {}
+    # What may give a feed comes before what may need one.
+    for kind in ("sensor", "metrology", "arm"):
+        choice, place = choices.by_kind[kind], f"{cell.path}: devices.{kind}"
+        try:
+            driver = found.get(choice.driver) or find_driver(choice.driver)
+        except DeviceError as error:
+            raise DeviceError(f"{place}: {error}") from error
+        if kind not in driver.kinds:
+            makes = ", ".join(sorted(driver.kinds))
+            raise DeviceError(f"{place}: driver {choice.driver!r} makes none (it makes: {makes})")
+        found[choice.driver] = driver
+        settings = validate(dict(choice.told), driver.settings(kind), place)
+        wanted.setdefault(choice.driver, {})[kind] = settings
+    order = [name for name in wanted if name != choices.arm.driver] + [choices.arm.driver]
+    rig = Rig(cell, {name: found[name] for name in order}, wanted)
+    _require_real_time(rig)
+    return rig
+
+
+def _require_real_time(rig: Rig) -> None:
+    """Refuse a clock that is not the wall's where a device is on another machine."""
+    rate = rig.cell.file.devices.clock_rate
+    for kinds in rig.wanted.values():
+        for kind, settings in kinds.items():
+            address = getattr(settings, "address", LOOPBACK)
+            if rate != 1.0 and address != LOOPBACK:
+                raise DeviceError(
+                    f"{rig.cell.path}: devices.clock_rate is {rate:g}, for simulators on this"
+                    f" machine alone; devices.{kind} is at {address}"
+                )

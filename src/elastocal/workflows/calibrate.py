@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal import identification
-from elastocal.cell import ProcessFile, read_production
+from elastocal.cell import ProcessFile, ProductionPath, read_production
 from elastocal.dataset import Dataset, content_sha256, merge, read, without
 from elastocal.elastic import known_springs
 from elastocal.errors import DatasetError
@@ -18,6 +18,7 @@ from elastocal.identification import (
     FitSettings,
     PredictionDoubt,
     ProductionCoverage,
+    ProductionRows,
     check_loads,
     choose_model,
     error_budget,
@@ -27,6 +28,7 @@ from elastocal.identification import (
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 from elastocal.robot.inverse import nearest_zero_posture
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
@@ -52,7 +54,8 @@ class CalibrateSettings(FitSettings):
     budget: bool = False
     """State also what the error at left-out poses is made of."""
     process: Path | None = None
-    """Path of production, ``.csv``: state also how much of it the readings cover."""
+    """Path of production, ``.csv``: ``auto`` chooses for it, and how much of it the readings cover
+    is stated."""
     force: bool = False
     """Replace a file that is no former output of this command."""
 
@@ -94,8 +97,10 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
-    choice = choose_model(arm, readings, settings.springs, options, marker)
-    known = known_springs(arm, settings.springs)
+    path = None if settings.process is None else _production(settings.process, arm)
+    rows = None if path is None else _rows(path)
+    choice = choose_model(arm, readings, settings.springs, options, marker, production=rows)
+    known = known_springs(arm, settings.springs) or choice.known
     options = with_knowledge(options, known, choice.model, readings, marker)
     calibration = identification.calibrate(
         choice.model,
@@ -112,8 +117,8 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         figures = replace(figures, check=check_loads(calibration, kept_out, marker))
     if settings.budget:
         figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
-    if settings.process is not None:
-        coverage, doubt = _on_production(settings.process, calibration.calibrated)
+    if path is not None:
+        coverage, doubt = _on_production(path, calibration.calibrated)
         told = () if doubt is None or doubt.is_small else (doubt.sentence,)
         figures = replace(figures, production=coverage, warnings=(*figures.warnings, *told))
     result = replace(CalibrateResult.of(calibration.calibrated, figures), made_from=made_from)
@@ -122,16 +127,23 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     return result
 
 
-def _on_production(
-    path: Path, calibrated: CalibratedModel
-) -> tuple[ProductionCoverage | None, PredictionDoubt | None]:
-    """Return how much of a production path the calibration covers, and how sure it is there."""
-    robot = calibrated.model.robot
+def _production(path: Path, robot: Robot) -> ProductionPath:
+    """Return the path of production as the arm runs it."""
     start = nearest_zero_posture(robot)
     held = start[None, : robot.external_axes]
-    found = read_production(path, ProcessFile(file=path.name), robot, start, held)
-    loads = found.joint_position, found.force, found.moment
-    return calibrated.coverage(*loads, found.course), calibrated.doubt(*loads)
+    return read_production(path, ProcessFile(file=path.name), robot, start, held)
+
+
+def _rows(path: ProductionPath) -> ProductionRows:
+    return ProductionRows(path.joint_position, path.force, path.moment)
+
+
+def _on_production(
+    path: ProductionPath, calibrated: CalibratedModel
+) -> tuple[ProductionCoverage | None, PredictionDoubt | None]:
+    """Return how much of a production path the calibration covers, and how sure it is there."""
+    loads = path.joint_position, path.force, path.moment
+    return calibrated.coverage(*loads, path.course), calibrated.doubt(*loads)
 
 
 def _measured(found: Sequence[tuple[Path, Dataset]]) -> tuple[Dataset, str]:

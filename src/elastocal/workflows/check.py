@@ -36,8 +36,10 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.study_samples": kinds.study_samples,
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
+    "elastocal.commissioning": kinds.commissioning_file,
     "elastocal.model": kinds.model_file,
     "elastocal.signature": kinds.signature_file,
+    "elastocal.geometry": kinds.geometry_file,
 }
 """JSON files by the schema that they state, without its version."""
 _NETCDF_KINDS: dict[str, _Describe] = {
@@ -50,6 +52,8 @@ _YAML_KINDS: dict[str, _Describe] = {
     "elastocal.cell": kinds.cell_file,
     "elastocal.compensator": kinds.compensator_file,
     "elastocal.springs": kinds.springs_file,
+    "elastocal.log-map": kinds.log_map_file,
+    "elastocal.catalogue": kinds.catalogue_file,
 }
 """YAML files likewise."""
 

@@ -19,6 +19,7 @@ from elastocal.records import record
 from elastocal.results import Result
 from elastocal.robot import Robot
 from elastocal.workflows._inputs import (
+    ArmAsBuilt,
     NewTool,
     coverage_notes,
     parse_frame,
@@ -29,7 +30,7 @@ from elastocal.workflows._workflow import workflow
 
 
 @dataclass(frozen=True)
-class CompensateSettings(NewTool):
+class CompensateSettings(NewTool, ArmAsBuilt):
     """Which model corrects which path."""
 
     model: str | PathLike[str]
@@ -112,7 +113,8 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         raise FileAccessError(f"--forces and --base are for KUKA programs (.src), not for {path}")
     calibrated = settings.read_model(Path(settings.model))
     robot = calibrated.model.robot
-    how = CorrectionSettings(parse_posture(robot, settings.start), settings.largest)
+    start = parse_posture(robot, settings.start)
+    how = CorrectionSettings(start, settings.largest, settings.unloaded(robot))
     if is_program:
         if forces is None:
             raise FileAccessError(f"{path} has no forces: name a table of them with --forces")
@@ -123,10 +125,11 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         summary = compensate_path(calibrated, path, settings.out, how, progress)
         notes = _path_notes(summary, robot, settings.start)
     figures = summary.figures()
+    further = (*_force_notes(summary), *_covered(summary))
     return CompensateResult(
         **{each.name: getattr(figures, each.name) for each in fields(figures)},
         tool=calibrated.tool_name,
-        notes=(*coverage_notes(calibrated), *notes, *_force_notes(summary), *_covered(summary)),
+        notes=(*_built(settings), *coverage_notes(calibrated), *notes, *further),
         coverage=summary.coverage,
     )
 
@@ -146,6 +149,12 @@ def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> 
             " posture deflects otherwise, give --start if it is another"
         )
     return tuple(notes)
+
+
+def _built(settings: CompensateSettings) -> tuple[str, ...]:
+    if settings.geometry is None:
+        return ()
+    return (f"deviations hold the errors of the arm as built and its sag, of {settings.geometry}",)
 
 
 def _covered(summary: CorrectionSummary) -> tuple[str, ...]:

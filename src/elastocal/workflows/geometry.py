@@ -18,6 +18,7 @@ from elastocal.geometry import (
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result, brief_repr
+from elastocal.units import parse_point
 from elastocal.wording import counted
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
@@ -40,6 +41,9 @@ class GeometrySettings:
     """Model file to write; none: the model is only returned."""
     urdf: Path | None = None
     """Calibrated URDF to write."""
+    markers: tuple[str, ...] = ()
+    """Where on the tool each marker is, ``"x, y, z"`` in the tcp with units, where that is known:
+    then an error of the tcp is found too."""
     draws: int = 200
     """Draws of the bootstrap over blocks of poses."""
     seed: int = 0
@@ -65,6 +69,7 @@ class GeometryResult(Result):
             ("calibrated", _phrase(after.mean, after.p95, after.max)),
             ("model", next(each.rung for each in model.ladder if each.chosen)),
             ("errors of the arm", f"{known} known of {len(model.parameters)} fitted"),
+            *(("warning", each) for each in model.findings),
         )
 
 
@@ -92,7 +97,10 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     robot = find_robot(settings.robot, settings.tcp, None)
     problem = GeometryProblem(robot, read_positions(path, robot))
     found = climb(problem, settings.draws, np.random.default_rng(settings.seed), progress)
-    model = geometry_model(problem, found, f"elastocal geometry {path.name}")
+    markers = (
+        np.array([parse_point(each) for each in settings.markers]) if settings.markers else None
+    )
+    model = geometry_model(problem, found, f"elastocal geometry {path.name}", markers)
     if settings.out is not None:
         write_json(settings.out, model)
     if settings.urdf is not None:

@@ -7,14 +7,16 @@ from pathlib import Path
 
 from elastocal import planning
 from elastocal.cell import Cell, fingerprint, load_cell
+from elastocal.compensation.programs import ProgramWriter, choose_writer, write_plan_program
 from elastocal.errors import PlanningError
 from elastocal.files import filling
 from elastocal.planning import PLAN, PlanResult, ProductionRecord, SpreadRecord
-from elastocal.planning.export import PLAN_TABLE, check_name, takes_krl, write_krl, write_table
+from elastocal.planning.export import PLAN_TABLE, write_table
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report import write_plan_figure, write_plan_page
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 from elastocal.workflows._workflow import workflow
 
 __all__ = ["PlanFigures", "PlanResult", "PlanSettings", "plan", "plan_figures"]
@@ -34,7 +36,7 @@ class PlanSettings:
     """Search technique to lay beside the cell's, or ``none``; by default ``ioops`` beside
     ``cover``, else ``cover``."""
     program: str = "calib"
-    """Name of the KRL program."""
+    """Name of the robot program."""
     jobs: int | None = None
     """Processes for large pools; by default all cores."""
     force: bool = False
@@ -43,6 +45,8 @@ class PlanSettings:
     """Make the plan, and write nothing."""
     poses: int | None = None
     """Number of poses in place of the cell's ``search.poses``."""
+    language: str | None = None
+    """Language of the robot program, or ``none``; by default that of the robot's maker."""
 
 
 @record()
@@ -87,6 +91,8 @@ class PlanFigures:
     findings: tuple[str, ...]
     production: ProductionRecord | None = None
     """Coverage of production and the error to expect there; none where the cell names none."""
+    program: str = ""
+    """Language of the robot program, and why it is that one or none."""
 
 
 @workflow(PlanSettings)
@@ -107,8 +113,10 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     FileAccessError
         If a file cannot be read or written, or the folder holds files.
     """
-    check_name(settings.program)
     cell = _wanted_cell(settings)
+    writer, _ = choose_writer(cell.robot, settings.language)
+    if writer is not None:
+        writer.check_name(settings.program)
     compare = settings.compare
     if compare is None:
         compare = "cover" if cell.technique != "cover" else "ioops"
@@ -122,7 +130,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
             own = fingerprint(load_cell(Path(settings.cell)))
             record = replace(planned.plan.cell, fingerprint=own)
             planned = replace(planned, plan=replace(planned.plan, cell=record))
-        _write_folder(folder, cell, planned, settings.program)
+        _write_folder(folder, cell, planned, writer, settings.program)
     return planned.plan
 
 
@@ -137,11 +145,16 @@ def _wanted_cell(settings: PlanSettings) -> Cell:
     return replace(cell, file=cell.file.model_copy(update={"search": search}))
 
 
-def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:
+def plan_figures(
+    found: PlanResult, folder: Path, program: str, language: str | None = None
+) -> PlanFigures:
     """Return the key figures of a plan that was written into a folder."""
+    robot = Robot.from_urdf(found.robot.urdf, found.robot.tcp, found.robot.base)
+    writer, reason = choose_writer(robot, language)
+    programs = () if writer is None else writer.paths(folder, program)
     search, other = found.search, found.comparison
     seeing = Counter(pose.seen_by for pose in found.poses if pose.seen_by is not None)
-    names = (PLAN, planning.POOL, PLAN_TABLE, f"{program}.src", f"{program}.dat", _PAGE, _FIGURE)
+    names = (PLAN, planning.POOL, PLAN_TABLE, *(each.name for each in programs), _PAGE, _FIGURE)
     return PlanFigures(
         folder=str(folder),
         files=tuple(name for name in names if (folder / name).is_file()),
@@ -160,16 +173,23 @@ def plan_figures(found: PlanResult, folder: Path, program: str) -> PlanFigures:
         time=PlanTimes(found.travel_time, found.total_time),
         findings=found.findings,
         production=found.production,
+        program=reason,
     )
 
 
-def _write_folder(folder: Path, cell: Cell, planned: planning.PlanAndPool, program: str) -> None:
-    """Write every file of a plan; no KRL program for an arm whose axes KRL cannot name."""
+def _write_folder(
+    folder: Path,
+    cell: Cell,
+    planned: planning.PlanAndPool,
+    writer: ProgramWriter | None,
+    program: str,
+) -> None:
+    """Write every file of a plan; no robot program where the robot has no language of ours."""
     found, pool, surface = planned.plan, planned.pool, planned.surface
     planning.write_plan(folder, found)
     planning.write_pool(folder, pool)
     write_table(folder, found)
-    if takes_krl(cell.robot):
-        write_krl(folder, found, program)
+    if writer is not None:
+        write_plan_program(folder, found, writer, program)
     write_plan_page(folder / _PAGE, cell, surface, found, pool)
     write_plan_figure(folder / _FIGURE, surface, found, pool)

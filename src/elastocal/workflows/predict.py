@@ -12,12 +12,12 @@ from elastocal.identification import CoveredRows, DeflectionSummary, Prediction,
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._inputs import NewTool, coverage_notes
+from elastocal.workflows._inputs import ArmAsBuilt, NewTool, coverage_notes
 from elastocal.workflows._workflow import workflow
 
 
 @dataclass(frozen=True)
-class PredictSettings(NewTool):
+class PredictSettings(NewTool, ArmAsBuilt):
     """Which model predicts which rows."""
 
     model: str | PathLike[str]
@@ -100,15 +100,20 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     model, rows = Path(settings.model), Path(settings.rows)
     calibrated = settings.read_model(model)
     robot = calibrated.model.robot
+    unloaded = settings.unloaded(robot)
     with in_file(rows):
         table = PathTable.open(rows, lambda header: find_columns(header, robot, poses=False))
         loads = table.rows()
-        wrench = loads.wrench_in_base(robot.forward(loads.joints))
+        T_base_tcp = robot.forward(loads.joints)
+        wrench = loads.wrench_in_base(T_base_tcp)
         prediction = calibrated.predict(loads.joints, *wrench, loads.names("visit"))
         misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
         covered = calibrated.covered_rows(loads.joints, *wrench)
         if settings.out is not None:
             added = _columns(prediction, covered, misfit is not None)
+            if unloaded is not None:
+                off = unloaded(loads.joints) - T_base_tcp[:, :3, 3]
+                added |= {f"arm_error_{axis}[m]": off[:, i] for i, axis in enumerate("xyz")}
             with new_rows(settings.out, table, tuple(added)) as write:
                 write(loads, np.column_stack([*added.values()]), ())
     norms = np.linalg.norm(prediction.deflection, axis=1)

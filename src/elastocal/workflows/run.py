@@ -4,6 +4,7 @@ Nothing moves before cell, plan, folder and devices have been found to fit toget
 that a person must look at first moves before the operator has agreed.
 """
 
+import contextlib
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -25,10 +26,10 @@ from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.verdict import OF_RUN, public_key, read_private_key, sign, write_signature
 from elastocal.workflows._operator_and_devices import (
-    DeviceSource,
     Operator,
+    Rig,
     Unattended,
-    device_source,
+    rig_of,
 )
 from elastocal.workflows._workflow import workflow
 
@@ -163,7 +164,7 @@ class _Job:
     plan: PlanResult
     plan_folder: Path
     settings: procedure.RunSettings
-    source: DeviceSource
+    rig: Rig
     record: procedure.RunRecord
     folder: RunFolder
     warnings: tuple[str, ...]
@@ -201,14 +202,15 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
         if not entries:
             procedure.fill_folder(job.folder, job.cell, job.plan_folder)
         known = procedure.last_known(entries) if entries else None
-        devices = job.source.make(job.cell, job.record.seed, known.entry.time if known else 0.0)
-        _confirm(job, known, devices, settings)
-        session = _session(job, known, devices)
-        if known is None:
-            journal.write(devices.clock.now(), Event.START, run=job.record)
-        else:
-            journal.write(devices.clock.now(), Event.RESUME)
-        result = _carry_out(session, devices, journal, settings.operator, progress)
+        devices = job.rig.connect(job.record.seed, known.entry.time if known else 0.0)
+        with contextlib.closing(devices):
+            _confirm(job, known, devices, settings)
+            session = _session(job, known, devices)
+            if known is None:
+                journal.write(devices.clock.now(), Event.START, run=job.record)
+            else:
+                journal.write(devices.clock.now(), Event.RESUME)
+            result = _carry_out(session, devices, journal, settings.operator, progress)
     if job.key is not None:
         vouched = sign(job.key, OF_RUN, procedure.file_sha256(journal_file), _now())
         write_signature(job.folder.signature, vouched)
@@ -255,7 +257,7 @@ def _prepare(settings: RunSettings) -> _Job:
         read,
         folder,
         carried_out,
-        device_source(loaded),
+        rig_of(loaded),
         stated,
         place,
         procedure.registration_warnings(read),
@@ -368,5 +370,5 @@ def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: Run
     if known is not None:
         contact = "in contact" if devices.arm.state().in_contact else "not in contact"
         settings.operator.warn((*known.lines, f"the arm says that it is {contact}"))
-    if (known or job.source.real) and not settings.confirmed:
+    if (known or job.rig.real) and not settings.confirmed:
         settings.operator.confirm()

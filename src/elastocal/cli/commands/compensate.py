@@ -29,6 +29,9 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
     tool: options.NewTool = None,
     tool_mass: options.ToolMass = None,
     tool_centre: options.ToolCentre = None,
+    geometry: options.Geometry = None,
+    payload: options.Payload = None,
+    payload_centre: options.PayloadCentre = None,
     force: options.Force = False,
     as_json: options.Figures = False,
 ) -> None:
@@ -50,6 +53,9 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
         tool_frame=tool,
         tool_mass=tool_mass,
         tool_centre=tool_centre,
+        geometry=geometry,
+        payload=payload,
+        payload_centre=payload_centre,
         force=force,
     )
     with output.progress_bars() as progress:

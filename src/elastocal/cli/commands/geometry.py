@@ -16,6 +16,13 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
     robot: Annotated[str | None, typer.Option(help="URDF file or catalogue name.")] = None,
     tcp: Annotated[str | None, typer.Option(help="Link that carries the markers.")] = None,
     urdf: Annotated[Path | None, typer.Option(help="Calibrated URDF to write.")] = None,
+    marker: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Where a marker is known to be in the tcp, 'x, y, z' with units; repeatable, one"
+            " for each: then the error of the tcp is found too."
+        ),
+    ] = None,
     draws: Annotated[int, typer.Option(min=40, help="Draws of the bootstrap.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Of these draws.")] = 0,
     force: options.Force = False,
@@ -25,7 +32,15 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
     from elastocal.records import to_data
 
     given = workflows.GeometrySettings(
-        positions, robot=robot, tcp=tcp, out=out, urdf=urdf, draws=draws, seed=seed, force=force
+        positions,
+        robot=robot,
+        tcp=tcp,
+        out=out,
+        urdf=urdf,
+        markers=tuple(marker or ()),
+        draws=draws,
+        seed=seed,
+        force=force,
     )
     with output.progress_bars() as progress:
         result = workflows.geometry(given, progress)

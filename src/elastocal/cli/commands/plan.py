@@ -25,7 +25,14 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         int | None,
         typer.Option(min=1, help="Number of poses; default: search.poses of the cell file."),
     ] = None,
-    program: Annotated[str, typer.Option(help="Name of the KRL program.")] = "calib",
+    program: Annotated[str, typer.Option(help="Name of the robot program.")] = "calib",
+    language: Annotated[
+        str | None,
+        typer.Option(
+            help="Language of the robot program: krl, rapid, fanuc, urscript or none."
+            " Default: that of the robot's maker."
+        ),
+    ] = None,
     jobs: Annotated[
         int | None,
         typer.Option(min=1, max=1024, help="Processes for large pools; default: all cores."),
@@ -44,10 +51,12 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     """Choose calibration poses on the tooling, check them, and put them in order."""
     from elastocal.planning.export import pose_lines
 
-    settings = workflows.PlanSettings(cell, out, compare, program, jobs, force, dry_run, poses)
+    settings = workflows.PlanSettings(
+        cell, out, compare, program, jobs, force, dry_run, poses, language
+    )
     with output.progress_bars() as progress:
         found = workflows.plan(settings, progress)
-    figures = workflows.plan_figures(found, out, program)
+    figures = workflows.plan_figures(found, out, program, language)
     if dry_run:
         figures = replace(figures, files=())
     if as_json:

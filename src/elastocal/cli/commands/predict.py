@@ -9,7 +9,7 @@ from elastocal import workflows
 from elastocal.cli import options, output
 
 
-def _predict(
+def _predict(  # noqa: PLR0913 (a command has as many options as it has)
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     rows: Annotated[Path, typer.Argument(help="CSV: joint columns, force_x[N] …, moment_x[N*m] …")],
     out: Annotated[Path, typer.Option(help="CSV to write.")],
@@ -17,6 +17,9 @@ def _predict(
     tool: options.NewTool = None,
     tool_mass: options.ToolMass = None,
     tool_centre: options.ToolCentre = None,
+    geometry: options.Geometry = None,
+    payload: options.Payload = None,
+    payload_centre: options.PayloadCentre = None,
     force: options.Force = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as one JSON object.")
@@ -30,6 +33,9 @@ def _predict(
         tool_frame=tool,
         tool_mass=tool_mass,
         tool_centre=tool_centre,
+        geometry=geometry,
+        payload=payload,
+        payload_centre=payload_centre,
         force=force,
     )
     if as_json:

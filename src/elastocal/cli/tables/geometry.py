@@ -5,6 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from elastocal.cli.output import yellow
 from elastocal.geometry import GeometryModel, GeometryParameter
 from elastocal.wording import counted
 
@@ -35,12 +36,17 @@ def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
     for parameter in model.parameters:
         table.add_row(*_cells(parameter))
     console.print(table)
+    for finding in model.findings:
+        console.print(f"{yellow('warning:')} {finding}", soft_wrap=True)
     blunders = model.blunders
     if blunders:
         named = ", ".join(map(str, blunders[:_MOST_ROWS]))
         more = " …" if len(blunders) > _MOST_ROWS else ""
         count = counted(len(blunders), "row")
         console.print(f"{count} left out as blunders (counted from 0): {named}{more}")
+    if model.T_tcp_built is not None:
+        x, y, z = 1e3 * model.T_tcp_built[:3, 3]
+        console.print(f"tcp: {x:.3f}, {y:.3f}, {z:.3f} mm from where it is described")
     fixed = counted(len(model.fixed), "error")
     written = f"{fixed} not told apart from others; wrote {out}"
     console.print(written, soft_wrap=True)

@@ -8,21 +8,21 @@ by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)
 out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
 three digits. The first step alone is what is usually done; its residual is reported.
 
+Where the arm is known as it was built (`elastocal.geometry`), ``p(q)`` is where its tool then
+stands without force, under weight and payload; ``R(q)`` stays the controller's: errors of a mrad
+move no tcp.
+
 Rows follow in time: gears with friction remember; a row without load is air, which frees them.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PathError
-from elastocal.identification import (
-    CalibratedModel,
-    CoveredRows,
-    ProductionCoverage,
-)
-from elastocal.records import record
+from elastocal.identification import CalibratedModel, CoveredRows
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import (
@@ -43,6 +43,8 @@ _DAMPING = 1e-6
 """Damping of the Newton step, so that a straight wrist does not stop the rows beside it."""
 _SMALL_TURN = 1.0
 """Largest step of a joint (rad or m) that still is one of a correction."""
+Unloaded = Callable[[FloatArray], FloatArray]
+"""Where the tool truly stands without process force, in base, shape (row, 3), in m, by joints."""
 
 
 @brief_repr
@@ -61,7 +63,8 @@ class PathCorrection:
     high: FloatArray
     """Upper ends, shape (row, 3), in m."""
     uncorrected: FloatArray
-    """Predicted deflection at the programmed row, shape (row, 3), in m."""
+    """How far the tool is predicted from where it is programmed, shape (row, 3), in m: deflection,
+    and where the arm as built is known, its errors too."""
     first_order: FloatArray
     """Distance that one step would leave, predicted, shape (row,), in m."""
     residual: FloatArray
@@ -85,6 +88,7 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     may_turn: bool = False,
     largest: float = LARGEST_DEFLECTION,
     memory: FloatArray | None = None,
+    unloaded: Unloaded | None = None,
 ) -> PathCorrection:
     """Return the corrected rows of a path.
 
@@ -109,6 +113,8 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
         Largest deflection that is taken for one, in m.
     memory : ndarray, shape (element,), optional
         What friction remembers of the rows before; by default it is free before the first row.
+    unloaded : callable, optional
+        Where the arm as built stands; by default where the controller believes.
 
     Raises
     ------
@@ -118,12 +124,13 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     """
     robot = calibrated.model.robot
     check_limits(robot, q, where, "is programmed")
-    load = _Load(calibrated, *wrench, memory).along(q)
+    load = _Load(calibrated, *wrench, memory, unloaded).along(q)
     deflection = load.deflection(q, np.arange(len(q)))
     _check_size(deflection, largest, where)
-    first = uncorrected = deflection.copy()
     q, reached = q.copy(), T_base_tcp.copy()
-    error = _error(T_base_tcp, deflection, T_base_tcp)
+    off = deflection + load.misplaced(q, reached)
+    first = uncorrected = off.copy()
+    error = _error(reached, off, T_base_tcp)
     for step in range(_STEPS):
         open_rows = np.flatnonzero(~_small(error))
         if not len(open_rows):
@@ -134,19 +141,22 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
             # Friction sees the corrected rows, all of them in their order.
             load, open_rows = load.along(q), np.arange(len(q))
         deflection[open_rows] = load.deflection(q[open_rows], open_rows)
-        error[open_rows] = _error(reached[open_rows], deflection[open_rows], T_base_tcp[open_rows])
+        off[open_rows] = deflection[open_rows] + load.misplaced(q[open_rows], reached[open_rows])
+        error[open_rows] = _error(reached[open_rows], off[open_rows], T_base_tcp[open_rows])
         if step == 0:
-            first = deflection.copy()
+            first = off.copy()
     for row in np.flatnonzero(~_small(error)).tolist():
         q[row] = _by_solver(solver, load, q_start=q[row], T=T_base_tcp[row], row=row, where=where)
-        reached[row] = robot.forward(q[row])
-        deflection[row] = load.deflection(q[row : row + 1], np.array([row]))[0]
+        own = slice(row, row + 1)
+        reached[own] = robot.forward(q[own])
+        deflection[own] = load.deflection(q[own], np.array([row]))
+        off[own] = deflection[own] + load.misplaced(q[own], reached[own])
     if may_turn:
         q = turned_inside(robot, q)
     check_limits(robot, q, where, "would be corrected")
     commanded = T_base_tcp.copy()
     commanded[:, :3, 3] = reached[:, :3, 3]
-    residual = reached[:, :3, 3] + deflection - T_base_tcp[:, :3, 3]
+    residual = reached[:, :3, 3] + off - T_base_tcp[:, :3, 3]
     predicted = calibrated.predict(q, *wrench, friction=load.borne)
     along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], wrench[0])
     return PathCorrection(
@@ -171,6 +181,8 @@ class _Load:
     moment: FloatArray | None
     memory: FloatArray | None
     """What friction remembers of the rows before the first."""
+    unloaded: Unloaded | None = None
+    """Where the arm as built stands."""
     borne: FloatArray | None = None
     """What each friction element bears in each row, in N·m."""
     after: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -204,6 +216,12 @@ class _Load:
             borne = None if self.borne is None else self.borne[rows]
             return model.deflection(c, q, self.force[rows], moment, borne)
 
+    def misplaced(self, q: FloatArray, T_base_tcp: FloatArray) -> FloatArray:
+        """Return how far the unloaded tool stands from where joints should bring it, (row, 3)."""
+        if self.unloaded is None:
+            return np.zeros((len(q), 3))
+        return np.asarray(self.unloaded(q) - T_base_tcp[:, :3, 3])
+
 
 def _check_size(deflection: FloatArray, largest: float, where: RowName) -> None:
     """Refuse deflections that cannot be meant."""
@@ -218,9 +236,9 @@ def _check_size(deflection: FloatArray, largest: float, where: RowName) -> None:
         )
 
 
-def _error(T: FloatArray, deflection: FloatArray, T_wanted: FloatArray) -> FloatArray:
+def _error(T: FloatArray, off: FloatArray, T_wanted: FloatArray) -> FloatArray:
     loaded = T.copy()
-    loaded[:, :3, 3] += deflection
+    loaded[:, :3, 3] += off
     return pose_error(loaded, T_wanted)
 
 
@@ -258,9 +276,9 @@ def _by_solver(
         if not len(options):
             break
         q = options[largest_move(robot, options - q).argmin()]
-        deflection = load.deflection(q[None], np.array([row]))[0]
+        off = load.deflection(q[None], np.array([row])) + load.misplaced(q[None], wanted[None])
         before, wanted = wanted, T.copy()
-        wanted[:3, 3] -= deflection
+        wanted[:3, 3] -= off[0]
         if np.linalg.norm(wanted[:3, 3] - before[:3, 3]) <= _TOLERANCE:
             return np.asarray(q, dtype=float)
     x, y, z = 1e3 * wanted[:3, 3]
@@ -268,126 +286,3 @@ def _by_solver(
         f"{where(row)}: no posture reaches the corrected position ({x:.1f}, {y:.1f}, {z:.1f}) mm"
         " within the joint limits"
     )
-
-
-@record()
-class LengthStatistics:
-    """A length over the rows, in m."""
-
-    mean: float
-    max: float
-    at: str
-    """Name of the row with the largest."""
-
-
-@record()
-class CorrectionFigures:
-    """Figures of a whole correction, predicted by the model."""
-
-    rows: int
-    deviation: LengthStatistics
-    """Deviation of the path as programmed."""
-    first_order: LengthStatistics
-    """Deviation that one first-order step would leave."""
-    residual: LengthStatistics
-    """Deviation that the correction leaves."""
-    correction: LengthStatistics
-    """Distance between programmed and corrected position."""
-    posture_jumps: int
-    """Rows at which the posture changes from the row before."""
-    first_jump: str
-    """Name of the first of them."""
-    pulled: int
-    """Rows at which the force draws the tool out, which a surface cannot."""
-
-
-@dataclass(frozen=True)
-class _LengthSum:
-    """Sum and largest of a length over the rows so far, in m."""
-
-    total: float = 0.0
-    largest: float = 0.0
-    at: str = ""
-    """Name of the row with the largest."""
-
-    def plus(self, lengths: FloatArray, labels: list[str]) -> "_LengthSum":
-        """Return the sum with further rows."""
-        worst = int(lengths.argmax())
-        largest, at = self.largest, self.at
-        if float(lengths[worst]) > largest or not at:
-            largest, at = float(lengths[worst]), labels[worst]
-        return _LengthSum(self.total + float(lengths.sum()), largest, at)
-
-
-@brief_repr
-@dataclass(frozen=True)
-class CorrectionSummary:
-    """Figures of a correction over the rows so far, predicted by the model."""
-
-    rows: int = 0
-    lengths: tuple[_LengthSum, ...] = (_LengthSum(),) * 4
-    """Deviation as programmed, deviation that one first-order step would leave, deviation that the
-    correction leaves, distance of the corrected from the programmed position."""
-    jumps: int = 0
-    """Rows at which the posture changes from the row before."""
-    first_jump: str = ""
-    pulled: int = 0
-    """Rows at which the force draws the tool out, which a surface cannot."""
-    start: tuple[float, ...] = ()
-    """Joints that were found for the first row of a path of poses, in rad or m."""
-    coverage: ProductionCoverage | None = None
-    """How much of the rows was calibrated; none where the model does not know where that was."""
-
-    def plus(
-        self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]
-    ) -> "CorrectionSummary":
-        """Return the summary with further rows.
-
-        Parameters
-        ----------
-        correction : PathCorrection
-            Of these rows.
-        shift : ndarray, shape (row, 3)
-            Corrected minus programmed position, in m.
-        labels : list of str
-            Names of the rows.
-        jumps : list of int
-            Rows among them at which the posture changes.
-        """
-        further = (
-            np.linalg.norm(correction.uncorrected, axis=1),
-            correction.first_order,
-            correction.residual,
-            np.linalg.norm(shift, axis=1),
-        )
-        coverage = self.coverage
-        if correction.covered is not None:
-            found = correction.covered.figures(name=labels.__getitem__)
-            coverage = found if coverage is None else coverage.plus(found)
-        pairs = zip(self.lengths, further, strict=True)
-        return replace(
-            self,
-            rows=self.rows + len(labels),
-            lengths=tuple(sums.plus(new, labels) for sums, new in pairs),
-            jumps=self.jumps + len(jumps),
-            first_jump=self.first_jump or (labels[jumps[0]] if jumps else ""),
-            pulled=self.pulled + int(correction.pulled.sum()),
-            coverage=coverage,
-        )
-
-    def figures(self) -> CorrectionFigures:
-        """Return the figures over all rows so far."""
-        rows = max(self.rows, 1)
-        deviation, first_order, residual, correction = (
-            LengthStatistics(each.total / rows, each.largest, each.at) for each in self.lengths
-        )
-        return CorrectionFigures(
-            rows=self.rows,
-            deviation=deviation,
-            first_order=first_order,
-            residual=residual,
-            correction=correction,
-            posture_jumps=self.jumps,
-            first_jump=self.first_jump,
-            pulled=self.pulled,
-        )

@@ -8,10 +8,11 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.offline.correct import (
     LARGEST_DEFLECTION,
-    CorrectionSummary,
     PathCorrection,
+    Unloaded,
     correct_rows,
 )
+from elastocal.compensation.offline.summary import CorrectionSummary
 from elastocal.dataset import PathRows, PathTable, find_columns, in_file, new_rows
 from elastocal.errors import FileAccessError, PathError
 from elastocal.files import require_file
@@ -45,6 +46,8 @@ class CorrectionSettings:
     """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
     largest: float = LARGEST_DEFLECTION
     """Largest deflection that is taken for one, in m."""
+    unloaded: Unloaded | None = None
+    """Where the arm as built stands; by default where its controller believes."""
 
 
 def compensate_path(
@@ -93,6 +96,7 @@ def compensate_path(
                     may_turn=table.columns.by_pose,
                     largest=settings.largest,
                     memory=memory,
+                    unloaded=settings.unloaded,
                 )
                 turned: list[int] = []
                 if table.columns.by_pose:

@@ -1,7 +1,9 @@
-"""Programs of robot controllers, corrected offline.
+"""Programs of robot controllers: written by brand, and corrected offline.
 
-`program` is the protocol of a controller's program, `correct` corrects any of them, `krl` is the
-one of KUKA.
+`writer` is a program in no language and what a language makes of it; `krl_writer`, `rapid_writer`,
+`fanuc_writer` and `urscript_writer` are the languages, `languages` chooses one, `plan_program` is
+what a plan says in any of them. `program` is the protocol of a program that is read, `correct`
+corrects any of them, `krl` reads those of KUKA.
 """
 
 import lazy_loader

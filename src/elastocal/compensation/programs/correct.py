@@ -106,7 +106,7 @@ def compensate_program(
         targets = _targets(program, table, forces)
         postures, assumed = follower.postures(targets, settings.start)
     with in_file(data):
-        found, summary = _corrected(calibrated, follower, table, postures, settings.largest)
+        found, summary = _corrected(calibrated, follower, table, postures, settings)
     T_frame_base = inverse_transform(placed)
     arm = slice(calibrated.model.robot.external_axes, None)
     corrected = {
@@ -179,7 +179,7 @@ def _corrected(
     follower: "_PostureFollower",
     table: _PointForces,
     postures: dict[str, FloatArray],
-    largest: float,
+    settings: CorrectionSettings,
 ) -> tuple[PathCorrection, CorrectionSummary]:
     points = [follower.program.points[name] for name in postures]
     q = np.array(list(postures.values()))
@@ -199,7 +199,8 @@ def _corrected(
         (force[rows], None if moment is None else moment[rows]),
         labels.__getitem__,
         may_turn=frames,
-        largest=largest,
+        largest=settings.largest,
+        unloaded=settings.unloaded,
     )
     shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
     return found, CorrectionSummary().plus(found, shift, labels, [])

@@ -1,4 +1,4 @@
-"""Plans for people and controllers: a table for spreadsheets, a program for KUKA robots."""
+"""Plans for people: a table for spreadsheets, lines for a console."""
 
 import lazy_loader
 

@@ -6,6 +6,7 @@ in rad, a time in s. None stands for a number that is not known.
 
 from pathlib import Path
 
+from elastocal.errors import SchemaError
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder
 from elastocal.records import read_json, record
@@ -250,4 +251,11 @@ def read_summary(path: Path) -> RunSummary:
     FileAccessError
         If it cannot be read.
     """
-    return read_json(path, RunSummary)
+    found = read_json(path, RunSummary)
+    for each in found.registration.stations:
+        if len(each.residual) != len(each.poses):
+            raise SchemaError(
+                f"{path}: station {each.station!r} has {len(each.residual)} residuals for"
+                f" {len(each.poses)} poses"
+            )
+    return found

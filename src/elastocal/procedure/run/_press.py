@@ -55,6 +55,7 @@ def aim(a: Attempt) -> StepResult:
     """Wait for the beam; take the sensor's reading and the marker's place at the approach pose."""
     s, procedure = a.supervisor, a.settings.procedure
     s.aim(a.station)
+    s.ask(_what(a))
     # A station that measured the pose before may still deliver: its points are not ours.
     _wait_for_beam(a, a.station)
     forces, points = RecentSamples(), RecentSamples()
@@ -87,6 +88,8 @@ def unloaded(a: Attempt) -> StepResult:
     s, procedure = a.supervisor, a.settings.procedure
     begin, noisy = s.now, ""
     _stand_still(a)
+    if _ask(a):
+        begin = s.now
     while s.now - begin <= procedure.timeout + TIME_SLACK:
         start, breaks, forces, points = s.now, s.watchdog.breaks, RecentSamples(), RecentSamples()
         for seen in s.stay(a.guard(), procedure.unloaded_average):
@@ -168,6 +171,7 @@ def settle(a: Attempt) -> StepResult:
 def average(a: Attempt) -> StepResult:
     """Take one reading, or find that it cannot be taken."""
     s, (name, force), procedure = a.supervisor, a.load, a.settings.procedure
+    _ask(a)
     start, breaks, forces, points = s.now, s.watchdog.breaks, RecentSamples(), RecentSamples()
     if a.jump is not None:
         a.jump.forget()
@@ -232,11 +236,25 @@ def _wait_for_beam(a: Attempt, station: str | None = None) -> None:
     """Wait until the marker is seen; with a station, until it is this one that sees it."""
 
     def found(seen: Snapshot) -> bool:
+        if a.in_force_control:
+            _watch_hold(a, seen)
         ours = station is None or seen.points.station == station
         return a.supervisor.watchdog.sees and len(seen.points) > 0 and ours
 
     limit = a.settings.procedure.beam_timeout + 1.0
     a.supervisor.wait(a.guard(), found, limit, f"{a.station}: looking for the marker")
+
+
+def _ask(a: Attempt) -> bool:
+    """Have the standing marker measured, where that is a person's work; return whether it is."""
+    is_asked = a.supervisor.ask(_what(a))
+    if is_asked:
+        _wait_for_beam(a)
+    return is_asked
+
+
+def _what(a: Attempt) -> str:
+    return f"pose {a.pose.id}, {a.load_case or a.step.value}"
 
 
 def _stand_still(a: Attempt, *, beam: bool = True) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Devices, PointBlock, WrenchBlock
+from elastocal.cell import ArmState, AskedMetrology, Devices, PointBlock, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.procedure.record import Action, Logbook, StreamRecorder
 from elastocal.procedure.run._watchdog import (
@@ -101,6 +101,14 @@ class Supervisor:
         self.station = self.watchdog.station = station
         self.devices.metrology.look(station)
         self.watchdog.expect_points(self.now)
+
+    def ask(self, what: str) -> bool:
+        """Have the marker measured, where that is a person's work; return whether it is."""
+        metrology = self.devices.metrology
+        if not isinstance(metrology, AskedMetrology):
+            return False
+        metrology.ask(what)
+        return True
 
     def cycle(self, guard: Guard) -> Snapshot:
         """Let one cycle pass and return what the devices say.

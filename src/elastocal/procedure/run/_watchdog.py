@@ -154,7 +154,7 @@ class Watchdog:
             return True
         if not now - self._lost_at <= self._beam_timeout:
             text = f"{block.station} sees no marker for {now - self._lost_at:.1f} s"
-            raise FaultError(Fault.BEAM_LOST, text)
+            raise FaultError(Fault.BEAM_LOST, f"{text}: {block.note}" if block.note else text)
         if now - self._looked_at >= _LOOK_AGAIN:
             self._looked_at = now
             return True

@@ -1,6 +1,6 @@
-"""The robot catalogue: dimensions, limits and masses of KUKA robots, each with its source.
+"""The robot catalogue: dimensions, limits and masses of robots, each with its source.
 
-The table `kuka.yaml` beside this file is the only copy of the numbers; the URDF is made from it
+The table `robots.yaml` beside this file is the only copy of the numbers; the URDF is made from it
 on demand. What has no source says so in `Robot.assumptions`.
 """
 

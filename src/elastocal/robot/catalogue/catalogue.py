@@ -1,6 +1,6 @@
-"""The robot catalogue: dimensions, limits and masses of KUKA robots, each with its source.
+"""The robot catalogue: dimensions, limits and masses of robots, each with its source.
 
-The table `kuka.yaml` beside this file is the only copy of the numbers; the URDF is made from it
+The table `robots.yaml` beside this file is the only copy of the numbers; the URDF is made from it
 on demand. What has no source says so in `Robot.assumptions`.
 """
 
@@ -11,20 +11,31 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
+from pydantic import Field
 
 from elastocal.errors import RobotError, SchemaError
-from elastocal.records import check_schema, validate
+from elastocal.records import StrictModel, from_data, read_yaml_data, validate
+from elastocal.robot.catalogue.arm_urdf import urdf_of
 from elastocal.robot.catalogue.record import (
     CatalogueEntry,
     Dimensions,
+    Maker,
+    ParallelEntry,
+    WristEntry,
     inertias_like,
-    urdf_of,
 )
 from elastocal.robot.robot import Robot
 
-_FILE = "kuka.yaml"
+_FILE = "robots.yaml"
 SCHEMA = "elastocal.catalogue/1"
+_MAKERS: Mapping[Maker, re.Pattern[str]] = {
+    "KUKA": re.compile(r"\b(kuka|kr ?\d+|lbr)\b", re.IGNORECASE),
+    "ABB": re.compile(r"\b(abb|irb ?\d*)\b", re.IGNORECASE),
+    "FANUC": re.compile(r"\b(fanuc|(r|m|lr) ?(mate )?\d+ ?i[a-d])", re.IGNORECASE),
+    "Staeubli": re.compile(r"\b(sta?eubli|staubli|stäubli|(rx|tx)2?[ -]?\d+)", re.IGNORECASE),
+    "Universal Robots": re.compile(r"\b(universal robots?|ur ?\d{1,2}e?)\b", re.IGNORECASE),
+}
+"""How makers name their robots, in words."""
 _SUGGESTED = 3
 """Most names that are proposed for one that is not known."""
 _ALIKE = 0.4
@@ -60,8 +71,26 @@ def entry(name: str) -> CatalogueEntry:
     return table[known]
 
 
+def maker_of(name: str) -> Maker | None:
+    """Return the maker of a robot by its name, in the catalogue or as its maker names others.
+
+    >>> maker_of("my_irb_4600"), maker_of("arm")
+    ('ABB', None)
+
+    Parameters
+    ----------
+    name : str
+        Of the robot, as its URDF has it.
+    """
+    for known, robot in _entries().items():
+        if _key(known) == _key(name):
+            return robot.maker
+    words = re.sub(r"[\s_./-]+", " ", name)
+    return next((maker for maker, how in _MAKERS.items() if how.search(words)), None)
+
+
 def urdf(name: str) -> str:
-    """Return the URDF of a robot; see `elastocal.robot.catalogue.record`."""
+    """Return the URDF of a robot; see `elastocal.robot.catalogue.arm_urdf`."""
     return urdf_of(entry(name))
 
 
@@ -86,13 +115,21 @@ def load(name: str, tip: str = "flange") -> Robot:
     return Robot.from_urdf(urdf(name), tip)
 
 
-def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
-    """Return the robots of a table text by name.
+class _CatalogueTable(StrictModel):
+    """All keys of a table but ``schema``."""
+
+    sources: dict[str, str] = Field(default_factory=dict)
+    """Texts to refer to by aliases."""
+    robots: tuple[dict[str, Any], ...]
+
+
+def read_table(data: object, what: str) -> dict[str, CatalogueEntry]:
+    """Return the robots of a table by name.
 
     Parameters
     ----------
-    text : str
-        YAML: `schema`, free `sources` to refer to, and the list `robots`.
+    data : object
+        What its YAML holds: `schema`, free `sources` to refer to, and the list `robots`.
     what : str
         Name of the table, for messages.
 
@@ -102,10 +139,9 @@ def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
         If the table has another schema, a robot does not fit `CatalogueEntry`, two have the
         same name, or an inertia is ``like`` a robot that has no inertia of its own.
     """
-    data = yaml.safe_load(text)
-    check_schema(data.get("schema"), SCHEMA, what)
-    by_name = {str(robot["name"]): robot for robot in data["robots"]}
-    if len(by_name) != len(data["robots"]):
+    robots = from_data(_CatalogueTable, data, what, SCHEMA).robots
+    by_name = {str(robot.get("name")): robot for robot in robots}
+    if len(by_name) != len(robots):
         raise SchemaError(f"{what}: two robots have the same name")
     return {name: _entry(name, by_name, what) for name in by_name}
 
@@ -113,26 +149,34 @@ def read_table(text: str, what: str) -> dict[str, CatalogueEntry]:
 @functools.cache
 def _entries() -> dict[str, CatalogueEntry]:
     """Return the robots of the package by name, in the order of the table."""
-    text = importlib.resources.files(__package__).joinpath(_FILE).read_text(encoding="utf-8")
-    return read_table(text, _FILE)
+    with importlib.resources.as_file(importlib.resources.files(__package__) / _FILE) as path:
+        return read_table(read_yaml_data(path), _FILE)
 
 
 def _entry(name: str, by_name: Mapping[str, Mapping[str, Any]], what: str) -> CatalogueEntry:
     """Return one robot; masses that are ``like`` a sister's are estimated from hers."""
     robot = by_name[name]
-    sister_name = robot.get("inertia", {}).get("like")
+    sister_name = _inertia(robot).get("like")
     if sister_name is not None:
-        if "links" not in by_name.get(sister_name, {}).get("inertia", {}):
+        if "links" not in _inertia(by_name.get(str(sister_name), {})):
             raise SchemaError(
                 f"{what}: inertia of {name} is like {sister_name!r}, which has none of its own"
             )
-        arm = validate(robot["dimensions"], Dimensions, f"{what}: {name}")
-        robot = {**robot, "inertia": inertias_like(_entry(sister_name, by_name, what), arm)}
-    return validate(robot, CatalogueEntry, f"{what}: {name}")
+        arm = validate(robot.get("dimensions"), Dimensions, f"{what}: {name}")
+        sister = validate(by_name[str(sister_name)], WristEntry, f"{what}: {sister_name}")
+        robot = {**robot, "inertia": inertias_like(sister, arm)}
+    dimensions = robot.get("dimensions")
+    parallel = isinstance(dimensions, Mapping) and "d6" in dimensions
+    return validate(robot, ParallelEntry if parallel else WristEntry, f"{what}: {name}")
+
+
+def _inertia(robot: Mapping[str, Any]) -> Mapping[str, Any]:
+    found = robot.get("inertia")
+    return found if isinstance(found, Mapping) else {}
 
 
 def _key(name: str) -> str:
-    return re.sub(r"[\s_-]+", "", name).casefold()
+    return re.sub(r"[\s_./-]+", "", name).casefold()
 
 
 def _suggestion(name: str, by_key: dict[str, str]) -> str:

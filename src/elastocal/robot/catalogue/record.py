@@ -1,20 +1,9 @@
-"""A robot of the catalogue: numbers in groups, each with its source or its excuse, and its URDF.
+"""A robot of the catalogue: numbers in groups, each with its source or its excuse.
 
 The masses of a robot may be estimated from those of a sister with sourced ones.
-
-Zero pose and signs of the URDF are those of the KUKA pendant: all angles zero is the arm stretched
-forward along x, A2 at zero is horizontal, positive A1, A4 and A6 turn clockwise about the axis that
-points out of the robot. Pendant angles can therefore be used as they stand.
-
-Boxes and cylinders stand for the links until real meshes are given. Sized from the dimensions so
-that they look and collide plausibly, they are assumptions, not drawings: whoever checks collisions
-close to the arm brings the maker's meshes.
 """
 
 import math
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, FiniteFloat, model_validator
@@ -44,7 +33,18 @@ class Group(StrictModel):
         return self
 
 
-class Dimensions(Group):
+Maker = Literal["ABB", "FANUC", "KUKA", "Staeubli", "Universal Robots"]
+"""Maker of a robot, whose pendant's zeros and signs its joints have."""
+
+
+class ArmDimensions(Group):
+    """Lengths of an arm of any kind, in m."""
+
+    published_reach: _Length | None = None
+    """Largest distance of the wrist centre from the first axis according to the maker."""
+
+
+class Dimensions(ArmDimensions):
     """Lengths of an ortho-parallel arm with a spherical wrist, in m (OPW parameters, b = 0).
 
     Reference: Brandstötter, Angerer, Hofbaur, "An analytical solution of the inverse kinematics
@@ -64,8 +64,30 @@ class Dimensions(Group):
     """From the A3 axis along the forearm to the wrist centre."""
     c4: _Length
     """From the wrist centre to the flange."""
-    published_reach: _Length | None = None
-    """Largest distance of the wrist centre from the A1 axis according to the maker."""
+
+
+class ParallelDimensions(ArmDimensions):
+    """Lengths of an arm whose axes 2, 3 and 4 are parallel, in m: Denavit-Hartenberg of the maker.
+
+    ``a2`` and ``a3`` are negative, as Universal Robots publishes them.
+    """
+
+    d1: _Length
+    """From the foot up to axis 2."""
+    a2: FiniteFloat
+    """Along the upper arm from axis 2 to axis 3."""
+    a3: FiniteFloat
+    """Along the forearm from axis 3 to axis 4."""
+    d4: _Length
+    """Along axis 4 from the middle of the arm to axis 5."""
+    d5: _Length
+    """Along axis 5 from axis 4 to axis 6."""
+    d6: _Length
+    """Along axis 6 from axis 5 to the flange."""
+    shoulder: _Length
+    """How far the upper arm lies beside the foot, along axis 2; for shapes alone."""
+    elbow: _Length
+    """The same of the forearm."""
 
 
 class PositionLimits(Group):
@@ -111,14 +133,23 @@ class Inertias(Group):
 
 
 class CatalogueEntry(StrictModel):
-    """A robot of the catalogue, in the units a person reads (m, deg, deg/s, N·m, kg)."""
+    """A robot of the catalogue, in the units a person reads (m, deg, deg/s, N·m, kg).
+
+    Which kind of arm it is, its dimensions say: `WristEntry` or `ParallelEntry`.
+    """
 
     name: str
-    dimensions: Dimensions
+    maker: Maker = "KUKA"
+    dimensions: ArmDimensions
     position: PositionLimits
     velocity: Maxima
     effort: Maxima
     inertia: Inertias
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of the wrist centre from the first axis, in m."""
+        raise NotImplementedError
 
     @property
     def groups(self) -> dict[str, Group]:
@@ -141,20 +172,38 @@ class CatalogueEntry(StrictModel):
         """Why each group that is not fact is not; see `elastocal.robot.urdf.Assumption`."""
         return {field: group.assumption for field, group in self.groups.items() if group.assumption}
 
+
+class WristEntry(CatalogueEntry):
+    """An arm with a spherical wrist."""
+
+    dimensions: Dimensions
+
     @property
     def reach(self) -> float:
         """Largest distance of the wrist centre from the A1 axis, in m.
 
-        ``a1 + c2 cos(A2) + hypot(c3, a2)`` with A2 as near to the horizontal as its limits let
-        it; gives the reach that KUKA publishes to a millimetre.
+        ``a1 + c2 cos(A2) + hypot(c3, a2)`` with A2, counted from the horizontal, as near to it as
+        its limits let it; gives the reach that KUKA publishes to a millimetre.
         """
+        level = 0.0 if self.maker == "KUKA" else 90.0
         lower, upper = self.position.lower[1], self.position.upper[1]
-        nearest_to_horizontal = math.radians(min(max(0.0, lower), upper))
+        nearest_to_horizontal = math.radians(min(max(level, lower), upper) - level)
         arm = self.dimensions
         return arm.a1 + arm.c2 * math.cos(nearest_to_horizontal) + math.hypot(arm.c3, arm.a2)
 
 
-def inertias_like(sister: CatalogueEntry, arm: Dimensions) -> Inertias:
+class ParallelEntry(CatalogueEntry):
+    """An arm with three parallel axes, and no spherical wrist."""
+
+    dimensions: ParallelDimensions
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of axis 4 from the A1 axis in the plane of the arm, in m."""
+        return -self.dimensions.a2 - self.dimensions.a3
+
+
+def inertias_like(sister: WristEntry, arm: Dimensions) -> Inertias:
     """Return a sister's mass properties with the centres of mass moved along the links.
 
     Masses and tensors stay: castings and motors of a family differ less than their lengths. The
@@ -162,7 +211,7 @@ def inertias_like(sister: CatalogueEntry, arm: Dimensions) -> Inertias:
 
     Parameters
     ----------
-    sister : CatalogueEntry
+    sister : WristEntry
         Robot of about the same size whose masses have a source.
     arm : Dimensions
         Of the robot that the estimate is for.
@@ -187,177 +236,3 @@ def inertias_like(sister: CatalogueEntry, arm: Dimensions) -> Inertias:
 def _moved(link: LinkInertia, x: float, z: float) -> LinkInertia:
     centre = (link.centre[0] * x, link.centre[1], link.centre[2] * z)
     return link.model_copy(update={"centre": centre})
-
-
-_REASON = "boxes and cylinders sized from the dimensions, not from drawings"
-_AXES = ((0, 0, -1), (0, 1, 0), (0, 1, 0), (-1, 0, 0), (0, 1, 0), (-1, 0, 0))
-"""Axes of A1 to A6 at the zero pose, in the sense of the pendant."""
-_UNTURNED = (0.0, 0.0, 0.0)
-_FLANGE_RPY = (0.0, math.pi / 2, 0.0)
-"""KUKA's $FLANGE at the zero pose: z out of the flange, x down."""
-_CYLINDER_RPY = {"x": (0.0, math.pi / 2, 0.0), "y": (math.pi / 2, 0.0, 0.0), "z": _UNTURNED}
-"""Turns the z axis, along which URDF draws cylinders, to the named one."""
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """A box or a cylinder in the frame of its link, in m and rad."""
-
-    kind: Literal["box", "cylinder"]
-    size: dict[str, float | Sequence[float]]
-    centre: Sequence[float]
-    rpy: Sequence[float] = _UNTURNED
-
-
-def urdf_of(entry: CatalogueEntry) -> str:
-    """Return the URDF of a robot, with its sources and its assumptions.
-
-    Links ``base_link``, ``link_1`` … ``link_6``, ``flange``; joints ``joint_a1`` … ``joint_a6``.
-    An unknown velocity or effort is written as 0, which `elastocal.robot.urdf` reads as unknown.
-
-    Parameters
-    ----------
-    entry : CatalogueEntry
-        The robot.
-    """
-    root = ElementTree.Element("robot", name=entry.name)
-    lines = [f"{entry.name}: made by elastocal from its robot catalogue. Sources:"]
-    lines += [f"{field}: {source}" for field, source in entry.sources.items()]
-    root.append(ElementTree.Comment("\n    ".join(["", *lines]) + "\n  "))
-    for field, reason in {**entry.assumptions, "shape": _REASON}.items():
-        _add(root, "assumption", field=field, reason=reason)
-    shapes = _link_shapes(entry.dimensions)
-    for name in LINKS:
-        _add_link(root, name, entry.inertia.links[name], shapes[name])
-    _add(root, "link", name="flange")
-    for index in range(6):
-        _add_axis(root, index, entry)
-    flange = (entry.dimensions.c4, 0.0, 0.0)
-    _add_joint(root, "flange_joint", "fixed", ("link_6", "flange"), flange, _FLANGE_RPY)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def _add_link(
-    root: ElementTree.Element, name: str, inertia: LinkInertia, shapes: Iterable[_Shape]
-) -> None:
-    link = _add(root, "link", name=name)
-    if inertia.mass > 0:
-        element = _add(link, "inertial")
-        _add(element, "origin", xyz=inertia.centre, rpy=_UNTURNED)
-        _add(element, "mass", value=inertia.mass)
-        names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-        _add(element, "inertia", **dict(zip(names, inertia.tensor, strict=True)))
-    for kind in ("visual", "collision"):
-        for shape in shapes:
-            element = _add(link, kind)
-            _add(element, "origin", xyz=shape.centre, rpy=shape.rpy)
-            _add(_add(element, "geometry"), shape.kind, **shape.size)
-
-
-def _add_axis(root: ElementTree.Element, index: int, entry: CatalogueEntry) -> None:
-    """Add joint A1 to A6 (``index`` 0 to 5)."""
-    arm = entry.dimensions
-    x = (0.0, arm.a1, arm.c2, arm.c3, 0.0, 0.0)[index]
-    z = (arm.c1, 0.0, 0.0, -arm.a2, 0.0, 0.0)[index]
-    links = (LINKS[index], LINKS[index + 1])
-    joint = _add_joint(root, f"joint_a{index + 1}", "revolute", links, (x, 0.0, z))
-    _add(joint, "axis", xyz=_AXES[index])
-    velocity, effort = entry.velocity.maximum, entry.effort.maximum
-    _add(
-        joint,
-        "limit",
-        lower=math.radians(entry.position.lower[index]),
-        upper=math.radians(entry.position.upper[index]),
-        velocity=math.radians(velocity[index]) if velocity else 0.0,
-        effort=effort[index] if effort else 0.0,
-    )
-
-
-def _add_joint(
-    root: ElementTree.Element,
-    name: str,
-    kind: str,
-    links: tuple[str, str],
-    xyz: Sequence[float],
-    rpy: Sequence[float] = _UNTURNED,
-) -> ElementTree.Element:
-    joint = _add(root, "joint", name=name, type=kind)
-    _add(joint, "parent", link=links[0])
-    _add(joint, "child", link=links[1])
-    _add(joint, "origin", xyz=xyz, rpy=rpy)
-    return joint
-
-
-def _add(
-    parent: ElementTree.Element, tag: str, **attributes: str | float | Sequence[float]
-) -> ElementTree.Element:
-    """Add an element, its numbers written so that they read back as the same floats."""
-    return ElementTree.SubElement(parent, tag, {k: _text(v) for k, v in attributes.items()})
-
-
-def _text(value: str | float | Sequence[float]) -> str:
-    if isinstance(value, str):
-        return value
-    numbers = (value,) if isinstance(value, int | float) else value
-    return " ".join(repr(float(number)) for number in numbers)
-
-
-def _link_shapes(arm: Dimensions) -> dict[str, tuple[_Shape, ...]]:
-    """Return the shapes of each link at the zero pose, in the frame of its joint.
-
-    Links that are not neighbours keep clear of each other at the transport pose and at both ends
-    of A5.
-
-    Parameters
-    ----------
-    arm : Dimensions
-        Lengths of the robot.
-    """
-    wrist = 0.2 * arm.c3 + 0.95 * arm.c4
-    """Length of the part in front of the forearm that turns with A4."""
-    return {
-        "base_link": (_cylinder("z", 0.6 * arm.c1, 0.4 * arm.c1, (0.0, 0.0, 0.2 * arm.c1)),),
-        "link_1": _carousel(arm),
-        "link_2": (_along_x(0.12 * arm.c2, 0.0, arm.c2),),
-        "link_3": (
-            _cylinder("y", 0.14 * arm.c2, 0.4 * arm.c2, (0.0, 0.0, 0.0)),
-            _along_x(0.13 * arm.c3, -0.2 * arm.c3, arm.c3 - wrist, z=-arm.a2),
-        ),
-        "link_4": (_along_x(0.09 * arm.c3, -wrist, -0.95 * arm.c4), *_fork(arm.c4)),
-        "link_5": (_cylinder("y", 0.35 * arm.c4, 0.86 * arm.c4, (0.0, 0.0, 0.0)),),
-        "link_6": (_along_x(0.4 * arm.c4, 0.5 * arm.c4, arm.c4),),
-    }
-
-
-def _carousel(arm: Dimensions) -> tuple[_Shape, ...]:
-    """Return the rotating column, its arm out to A2, and the A2 bearing across."""
-    height = 0.6 * arm.c1
-    return (
-        _cylinder("z", 0.5 * arm.c1, height, (0.0, 0.0, -height / 2)),
-        _box((arm.a1, 0.36 * arm.c2, 0.4 * arm.c1), (arm.a1 / 2, 0.0, -0.2 * arm.c1)),
-        _cylinder("y", 0.18 * arm.c2, 0.5 * arm.c2, (arm.a1, 0.0, 0.0)),
-    )
-
-
-def _fork(c4: float) -> tuple[_Shape, ...]:
-    """Return the two cheeks that hold A5; the flange passes between them."""
-    return tuple(
-        _box((1.15 * c4, 0.12 * c4, 0.5 * c4), (-0.375 * c4, side * 0.5 * c4, 0.0))
-        for side in (-1.0, 1.0)
-    )
-
-
-def _along_x(radius: float, start: float, end: float, z: float = 0.0) -> _Shape:
-    return _cylinder("x", radius, end - start, ((start + end) / 2, 0.0, z))
-
-
-def _cylinder(
-    axis: Literal["x", "y", "z"], radius: float, length: float, centre: Sequence[float]
-) -> _Shape:
-    """Return a cylinder along a coordinate axis of the link's frame."""
-    return _Shape("cylinder", {"radius": radius, "length": length}, centre, _CYLINDER_RPY[axis])
-
-
-def _box(size: Sequence[float], centre: Sequence[float]) -> _Shape:
-    return _Shape("box", {"size": size}, centre)

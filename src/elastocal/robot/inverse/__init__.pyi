@@ -16,6 +16,12 @@ from .opw import (
     derive_opw as derive_opw,
     opw_branches as opw_branches,
 )
+from .parallel import (
+    NotParallelError as NotParallelError,
+    ParallelGeometry as ParallelGeometry,
+    ParallelInverse as ParallelInverse,
+    derive_parallel as derive_parallel,
+)
 from .path_joints import (
     RowName as RowName,
     check_limits as check_limits,

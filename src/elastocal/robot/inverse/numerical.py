@@ -8,6 +8,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
 from elastocal.robot.inverse.arm import nearest_zero
 from elastocal.robot.inverse.opw import NotOrthoParallelError, OpwInverse
+from elastocal.robot.inverse.parallel import NotParallelError, ParallelInverse
 from elastocal.robot.inverse.solver import InverseKinematics, distinct, pose_error, reaches
 from elastocal.robot.robot import Robot
 from elastocal.robot.singularity import characteristic_length
@@ -32,13 +33,17 @@ def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
 
     Returns
     -------
-    OpwInverse or NumericalInverse
-        The latter's ``reason`` says what the closed form failed on.
+    OpwInverse, ParallelInverse or NumericalInverse
+        The last one's ``reason`` says what the closed forms failed on.
     """
     try:
         return OpwInverse(robot)
     except NotOrthoParallelError as error:
-        return NumericalInverse(robot, seed=seed, reason=str(error))
+        reason = str(error)
+    try:
+        return ParallelInverse(robot)
+    except NotParallelError as error:
+        return NumericalInverse(robot, seed=seed, reason=f"{reason}; {error}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

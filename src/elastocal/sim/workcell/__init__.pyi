@@ -15,3 +15,4 @@ from .cell import (
     SimulatedCell as SimulatedCell,
     simulated_devices as simulated_devices,
 )
+from .follower import PoseFollower as PoseFollower

@@ -1,0 +1,224 @@
+"""The rig of a cell: which driver makes arm, sensor and metrology, and what a driver has to do.
+
+A driver is one package, found by its name: an entry point of the group ``elastocal.drivers``. Arm,
+sensor and metrology of different drivers make one rig. What stands under a device in the cell file
+is checked by the driver's own settings; which drivers there are is known to `elastocal run`.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
+
+from pydantic import (
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+
+from elastocal.arrays import FloatArray
+from elastocal.cell.devices import (
+    Clock,
+    ForceSensor,
+    Metrology,
+    RobotArm,
+    SensorStatus,
+    close_nothing,
+)
+from elastocal.errors import DeviceError
+from elastocal.records import StrictModel
+from elastocal.results import brief_repr
+
+if TYPE_CHECKING:
+    from elastocal.cell.cell import Cell
+
+SIMULATED = "simulated"
+"""Name of the driver of each kind that needs no hardware."""
+LOOPBACK = "127.0.0.1"
+"""Address of this machine for itself, and the default of every device's `address`."""
+KINDS = ("arm", "sensor", "metrology")
+"""Kinds of device that a run needs."""
+
+
+class DeviceChoice(StrictModel):
+    """Which driver makes a device: its name, or a mapping with what that driver is told besides."""
+
+    model_config = ConfigDict(extra="allow")
+
+    driver: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_name(cls, data: Any) -> Any:
+        return {"driver": data} if isinstance(data, str) else data
+
+    @model_serializer(mode="wrap")
+    def _as_written(self, dump: SerializerFunctionWrapHandler) -> Any:
+        return dump(self) if self.told else self.driver
+
+    @property
+    def told(self) -> Mapping[str, object]:
+        """The other keys, as they stand in the cell file; the driver's settings check them."""
+        return self.model_extra or {}
+
+    def __str__(self) -> str:
+        return self.driver
+
+
+_Simulated = Field(default_factory=lambda: DeviceChoice(driver=SIMULATED))
+
+
+class DeviceChoices(StrictModel):
+    """Section ``devices`` of the cell file."""
+
+    arm: DeviceChoice = _Simulated
+    sensor: DeviceChoice = _Simulated
+    """Force/torque sensor."""
+    metrology: DeviceChoice = _Simulated
+    """Laser trackers."""
+    clock_rate: Annotated[FiniteFloat, Field(gt=0.0, le=1000.0)] = 1.0
+    """Seconds of the run a second of the wall; for simulators that run as fast. Of no meaning where
+    everything is `SIMULATED`: that cell has a clock of its own, which waits for nothing."""
+
+    @property
+    def by_kind(self) -> Mapping[str, DeviceChoice]:
+        """The choice of each of `KINDS`."""
+        return {kind: getattr(self, kind) for kind in KINDS}
+
+
+class DeviceSettings(StrictModel):
+    """Base of what stands under a device in the cell file, beside the name of its driver."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class WrenchSample:
+    """One sample of a force sensor: raw, in the sensor's frame, bias and tool weight in."""
+
+    time: float
+    """In s of the clock."""
+    force: FloatArray
+    """Shape (3,), in N."""
+    moment: FloatArray
+    """About the sensor's origin, shape (3,), in N·m."""
+    status: SensorStatus
+
+
+class WrenchFeed(Protocol):
+    """The newest wrench, for an arm whose force control runs on the PC.
+
+    A second tap beside `ForceSensor.read`: neither takes samples away from the other.
+    """
+
+    def newest(self) -> WrenchSample | None:
+        """Return the newest sample, whoever has seen it before; None before the first."""
+
+
+@dataclass(frozen=True)
+class RigContext:
+    """What all drivers of a rig share."""
+
+    clock: Clock
+    seed: int
+    """Of simulated devices."""
+    start: float
+    """What the clock showed when the rig was made, in s: later than all of a run that goes on."""
+    feed: WrenchFeed | None
+    """Of another driver of the rig; None where none has one."""
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceSet:
+    """What one driver made: at least what was wanted of it."""
+
+    arm: RobotArm | None = None
+    sensor: ForceSensor | None = None
+    metrology: Metrology | None = None
+    feed: WrenchFeed | None = None
+    """Of a sensor that can be read beside `ForceSensor.read`."""
+    clock: Clock | None = None
+    """Takes the place of the rig's; only where one driver makes everything."""
+    close: Callable[[], None] = close_nothing
+    """Gives lines and threads back; called once."""
+
+
+class Driver(Protocol):
+    """Makes devices of one family. An entry point of the group ``elastocal.drivers`` names it."""
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Those of `KINDS` that it makes."""
+
+    @property
+    def real(self) -> bool:
+        """Whether something moves that can hurt: a person is asked before each run."""
+
+    def settings(self, kind: str) -> type[DeviceSettings]:
+        """Return the model of what stands under a device of a kind in the cell file."""
+
+    def connect(
+        self, cell: "Cell", wanted: Mapping[str, DeviceSettings], context: RigContext
+    ) -> DeviceSet:
+        """Make the devices that are wanted of it; called once a rig.
+
+        Parameters
+        ----------
+        cell : Cell
+            The cell.
+        wanted : mapping
+            Settings by kind, as `settings` has checked them.
+        context : RigContext
+            What the drivers share.
+
+        Raises
+        ------
+        DeviceError
+            If a device cannot be reached, or is not as it has to be.
+        """
+
+
+class WallClock:
+    """The time of the wall, from a start, at a rate; see `elastocal.cell.devices.Clock`."""
+
+    def __init__(
+        self,
+        start: float = 0.0,
+        rate: float = 1.0,
+        *,
+        monotonic: Callable[[], float] = time.monotonic,
+        pause: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Show ``start`` s now.
+
+        Parameters
+        ----------
+        start : float
+            In s.
+        rate : float
+            Seconds that it shows a second of the wall.
+        monotonic, pause : callable, optional
+            Of the wall.
+        """
+        self.rate = rate
+        self._start, self._monotonic, self._pause = start, monotonic, pause
+        self._origin = monotonic()
+
+    def now(self) -> float:
+        """Return the time in s."""
+        return self._start + self.rate * (self._monotonic() - self._origin)
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass.
+
+        Raises
+        ------
+        DeviceError
+            If the time is negative or not finite.
+        """
+        if not 0.0 <= seconds < math.inf:
+            raise DeviceError(f"sleep of {seconds!r} s: must be 0 or more, and finite")
+        self._pause(seconds / self.rate)

@@ -1,0 +1,77 @@
+"""Languages of robot controllers, and which one a robot is programmed in."""
+
+from collections.abc import Mapping
+
+from elastocal.compensation.programs.fanuc_writer import FanucWriter
+from elastocal.compensation.programs.krl_writer import KrlWriter
+from elastocal.compensation.programs.rapid_writer import RapidWriter
+from elastocal.compensation.programs.urscript_writer import UrScriptWriter
+from elastocal.compensation.programs.writer import ProgramWriter
+from elastocal.errors import PlanningError, nearest
+from elastocal.robot import Robot
+from elastocal.robot.catalogue import maker_of
+
+PROGRAM_WRITERS: Mapping[str, ProgramWriter] = {
+    writer.language: writer
+    for writer in (KrlWriter(), RapidWriter(), FanucWriter(), UrScriptWriter())
+}
+"""Writers of programs by their language."""
+NO_PROGRAM = "none"
+"""Asks for no program, where a language is asked for."""
+_LANGUAGES = {"KUKA": "krl", "ABB": "rapid", "FANUC": "fanuc", "Universal Robots": "urscript"}
+"""Language of each maker."""
+
+
+def writer_named(language: str) -> ProgramWriter:
+    """Return the writer of a language.
+
+    Raises
+    ------
+    PlanningError
+        If there is none, with those that there are.
+    """
+    writer = PROGRAM_WRITERS.get(language.casefold())
+    if writer is None:
+        known = ", ".join((*PROGRAM_WRITERS, NO_PROGRAM))
+        raise PlanningError(
+            f"no programs are written in {language!r}: the languages are {known}"
+            f"{nearest(language, (*PROGRAM_WRITERS, NO_PROGRAM))}"
+        )
+    return writer
+
+
+def choose_writer(robot: Robot, language: str | None = None) -> tuple[ProgramWriter | None, str]:
+    """Return the writer for a robot, and in words why it is that one or none.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its maker is known by its name.
+    language : str, optional
+        Takes the place of the maker's; ``none``: no program.
+
+    Raises
+    ------
+    PlanningError
+        If there is no such language, or it was asked for and cannot program the robot.
+    """
+    if language is not None:
+        if language.casefold() == NO_PROGRAM:
+            return None, "no program: none was asked for"
+        writer = writer_named(language)
+        writer.require_robot(robot)
+        return writer, f"{writer.title}, as asked for"
+    maker = maker_of(robot.name)
+    if maker is None:
+        return None, (
+            f"no program: the maker of robot {robot.name!r} is not known by its name; give"
+            f" --language {'|'.join(PROGRAM_WRITERS)}"
+        )
+    if maker not in _LANGUAGES:
+        return None, f"no program: none is written for robots of {maker}"
+    writer = PROGRAM_WRITERS[_LANGUAGES[maker]]
+    try:
+        writer.require_robot(robot)
+    except PlanningError as error:
+        return None, f"no program: {error}"
+    return writer, f"{writer.title}, for a robot of {maker}"

@@ -1,0 +1,353 @@
+"""A robot program without a language, and what the writer of a language makes of it.
+
+A further language is a file with a `ProgramWriter` beside `krl_writer`, a text for its head in
+``templates``, and its line in `languages.PROGRAM_WRITERS`.
+"""
+
+import contextlib
+import re
+import textwrap
+import unicodedata
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+from xml.etree import ElementTree
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import PlanningError
+from elastocal.files import replacing
+from elastocal.robot import Robot, T_from_xyzabc, parse_urdf
+from elastocal.robot.inverse import arm_base
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+_ARM_AXES = 6
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_LONGEST_TEXT = 80
+
+
+@dataclass(frozen=True)
+class AxisMove:
+    """A move of all axes to joint positions, at the program's part of their speeds."""
+
+    name: str
+    q: FloatArray
+    """External axes first, shape (joint,), in rad or m."""
+
+
+@dataclass(frozen=True)
+class StraightMove:
+    """A move of the tool along a straight line, in the posture in which it begins."""
+
+    name: str
+    T_base_tcp: FloatArray
+    """Where it ends, shape (4, 4), in m."""
+    q: FloatArray
+    """Joints there, shape (joint,), in rad or m."""
+    speed: float
+    """In m/s."""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A sentence for whoever reads the program."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The robot stands until a person lets it go on."""
+
+    reason: str
+    """What is done meanwhile."""
+
+
+Step = AxisMove | StraightMove | Remark | Stop
+
+
+@dataclass(frozen=True)
+class Block:
+    """Steps that belong together."""
+
+    title: str
+    """For a person; empty: none."""
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class RobotProgram:
+    """A program in no language: what moves where, in order."""
+
+    name: str
+    robot: Robot
+    axis_percent: int
+    """Speed of moves of axes, in percent of the axes' largest speeds."""
+    blocks: tuple[Block, ...]
+    facts: tuple[str, ...]
+    """Paragraphs that say where it comes from."""
+    motions: tuple[str, ...]
+    """Paragraphs that say what it does."""
+
+    @property
+    def targets(self) -> tuple[AxisMove | StraightMove, ...]:
+        """Every position once, in the order in which they are first reached."""
+        steps = (step for block in self.blocks for step in block.steps)
+        moves = (step for step in steps if isinstance(step, AxisMove | StraightMove))
+        return tuple({move.name: move for move in moves}.values())
+
+    def tool(self) -> tuple[str, FloatArray]:
+        """Return the link that the tcp is fixed to, and the tcp in it, shape (4, 4), in m."""
+        for joint in parse_urdf(self.robot.urdf).findall("joint"):
+            child, parent = joint.find("child"), joint.find("parent")
+            if child is None or parent is None or child.get("link") != self.robot.tip:
+                continue
+            if joint.get("type") == "fixed":
+                return parent.get("link", ""), _origin_of(joint)
+        return self.robot.tip, np.eye(4)
+
+
+def _origin_of(joint: ElementTree.Element) -> FloatArray:
+    origin = joint.find("origin")
+    if origin is None:
+        return np.eye(4)
+    xyz, rpy = (map(float, origin.get(key, "0 0 0").split()) for key in ("xyz", "rpy"))
+    return T_from_xyzabc(*xyz, *reversed([*rpy]))
+
+
+@dataclass(frozen=True)
+class ProgramWords:
+    """A controller's words for what every program does."""
+
+    axis_move: str
+    straight_move: str
+    stop: str
+    start: str
+    """What a person presses to go on."""
+    slow_mode: str
+    """The mode in which a program is tried."""
+    posture: str
+    """Sentence: how straight moves keep the posture."""
+
+
+class ProgramWriter(ABC):
+    """Writes programs in one language: what it allows, and how it says each step."""
+
+    language: ClassVar[str]
+    """As an option names it."""
+    title: ClassVar[str]
+    """As a person does."""
+    suffixes: ClassVar[tuple[str, ...]]
+    """Of the files of a program, the main one first."""
+    longest_name: ClassVar[int]
+    reserved: ClassVar[frozenset[str]]
+    """Words in capitals that cannot name a program."""
+    most_external: ClassVar[int]
+    """Number of external axes that a target can name."""
+    width: ClassVar[int]
+    """Of a comment, in characters."""
+    words: ClassVar[ProgramWords]
+    axis_names: ClassVar[tuple[str, str]]
+    """Beginnings of the names of the arm's and of the external axes."""
+
+    @abstractmethod
+    def texts(self, program: RobotProgram, head: Sequence[str]) -> tuple[bytes, ...]:
+        """Return the contents of the files, in the order of ``suffixes``.
+
+        Parameters
+        ----------
+        program : RobotProgram
+            A program that was checked.
+        head : sequence of str
+            Lines that a person has to read first, no longer than ``width``.
+        """
+
+    @abstractmethod
+    def frame_text(self, T: FloatArray) -> str:
+        """Return a frame, shape (4, 4) in m, as the language writes it."""
+
+    def axis_speed_text(self, robot: Robot, percent: int) -> str:  # noqa: ARG002 - of some languages
+        """Return how fast axes move, in words that follow on the name of the motion."""
+        return f"at {percent} percent"
+
+    def slowest(self) -> float:
+        """Return the slowest straight motion that the language can say, in m/s."""
+        return 0.0
+
+    def takes(self, robot: Robot) -> bool:
+        """Return whether targets of the language can name all joints of a robot."""
+        with contextlib.suppress(PlanningError):
+            self.require_robot(robot)
+            return True
+        return False
+
+    def require_robot(self, robot: Robot) -> None:
+        """Refuse a robot that cannot be programmed in this language.
+
+        Raises
+        ------
+        PlanningError
+            If the arm has not six revolute joints, or there are too many external axes.
+        """
+        arm = robot.revolute[robot.external_axes :]
+        refused = f"robot {robot.name!r} cannot be programmed in {self.title}"
+        if len(arm) != _ARM_AXES or not all(arm):
+            raise PlanningError(
+                f"{refused}: its arm must have {_ARM_AXES} revolute joints, it has {sum(arm)}"
+                f" ({', '.join(robot.joint_names)})"
+            )
+        if robot.external_axes > self.most_external:
+            raise PlanningError(
+                f"{refused}: {robot.external_axes} external axes, allowed are {self.most_external}"
+            )
+
+    def check_name(self, name: str, taken: frozenset[str] = frozenset()) -> None:
+        """Refuse a name that a controller would.
+
+        Parameters
+        ----------
+        name : str
+            Of the program, and of its files without suffix.
+        taken : frozenset of str
+            Names that the program uses itself, in capitals.
+
+        Raises
+        ------
+        PlanningError
+            If it is no name of the language, too long, or has a meaning already.
+        """
+        refused = f"{name!r} cannot name a {self.title} program"
+        if not _NAME.fullmatch(name) or len(name) > self.longest_name:
+            raise PlanningError(
+                f"{refused}: allowed are 1 to {self.longest_name} of the characters A-Z a-z 0-9 _,"
+                " not beginning with a digit"
+            )
+        if name.upper() in self.reserved | taken:
+            raise PlanningError(f"{refused}: the word has a meaning in it")
+
+    def paths(self, folder: Path, name: str) -> tuple[Path, ...]:
+        """Return the files of a program in a folder, the main one first."""
+        return tuple(Path(folder) / f"{name}{suffix}" for suffix in self.suffixes)
+
+    def write(self, folder: Path, program: RobotProgram) -> tuple[Path, ...]:
+        """Write the files of a program into a folder, all or none; return their paths.
+
+        Raises
+        ------
+        PlanningError
+            If the language allows the name, the robot or a speed not.
+        FileAccessError
+            If a file cannot be written.
+        """
+        self.require_robot(program.robot)
+        self.check_name(program.name, frozenset(each.name for each in program.targets))
+        for move in program.targets:
+            if isinstance(move, StraightMove) and not move.speed >= self.slowest():
+                raise PlanningError(
+                    f"{move.name} at {1e3 * move.speed:.4g} mm/s cannot be programmed in"
+                    f" {self.title}: the slowest is {1e3 * self.slowest():.4g} mm/s"
+                )
+        files = self.paths(folder, program.name)
+        texts = self.texts(program, self.head(program))
+        with contextlib.ExitStack() as stack:
+            for path, text in zip(files, texts, strict=True):
+                stack.enter_context(replacing(path)).write_bytes(text)
+        return files
+
+    def head(self, program: RobotProgram) -> list[str]:
+        """Return the lines that stand first: what has to hold on the controller."""
+        robot, external = program.robot, program.robot.external_axes
+        parent, T_parent_tcp = program.tool()
+        text = _environment().get_template(f"{self.language}.txt")
+        rendered = text.render(
+            program=program,
+            robot=robot,
+            words=self.words,
+            axes=self._axes(robot),
+            frame=self.frame_text,
+            tool_parent=parent,
+            T_parent_tcp=T_parent_tcp,
+            T_base_foot=arm_base(robot, np.zeros(external)) if external else None,
+            T_world=np.eye(4),
+        )
+        paragraphs = re.split(r"\n\s*\n", rendered.strip())
+        return [line for each in paragraphs for line in self.wrapped(" ".join(each.split()))]
+
+    def wrapped(self, text: str) -> list[str]:
+        """Return a text as lines that fit into a comment."""
+        return textwrap.wrap(text, self.width)
+
+    def _axes(self, robot: Robot) -> list[str]:
+        """Return each axis with its joint, in words."""
+        arm, external = self.axis_names
+        rails = [plain(name) for name in robot.joint_names[: robot.external_axes]]
+        names = [plain(name) for name in robot.joint_names[robot.external_axes :]]
+        axes = [f"{arm}{i} {name}" for i, name in enumerate(names, start=1)]
+        for i, name in enumerate(rails):
+            axes.append(f"{external}{i + 1} {name} in {'deg' if robot.revolute[i] else 'mm'}")
+        return axes
+
+
+def in_shown_units(robot: Robot, q: FloatArray) -> tuple[list[float], list[float]]:
+    """Return the joints of the arm in deg, and the external axes in deg or mm."""
+    external = robot.external_axes
+    scale = np.where(robot.revolute, 180.0 / np.pi, 1e3)
+    shown = (scale * np.asarray(q, dtype=float)).tolist()
+    return shown[external:], shown[:external]
+
+
+def number(value: float, decimals: int) -> str:
+    """Return a decimal number without exponent, never -0.
+
+    >>> number(-1e-9, 3)
+    '0.000'
+    """
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+def plain(text: str) -> str:
+    r"""Return a text that may stand in a comment: ASCII, one line, without fold parameters.
+
+    >>> plain("Höhe 5 %\nneu")
+    'Hohe 5 ? neu'
+    """
+    folded = unicodedata.normalize("NFKD", text)
+    folded = "".join(sign for sign in folded if not unicodedata.combining(sign))
+    line = " ".join(folded.encode("ascii", "replace").decode("ascii").split())
+    # In the title of a KRL fold a percent sign begins its hidden parameters.
+    line = "".join(sign if sign.isprintable() and sign != "%" else "?" for sign in line)
+    return line[:_LONGEST_TEXT]
+
+
+def render_text(template: str, values: Mapping[str, object]) -> Iterator[str]:
+    """Yield the paragraphs of a text of this package, each one line."""
+    rendered = _environment().get_template(template).render(values)
+    for paragraph in re.split(r"\n\s*\n", rendered.strip()):
+        yield " ".join(paragraph.split())
+
+
+def controller_text(lines: Sequence[str], end: str = "\r\n") -> bytes:
+    """Return lines as the bytes of a file: ASCII, by default with the line ends of Windows."""
+    return "".join(f"{line}{end}" for line in lines).encode("ascii")
+
+
+@cache
+def _environment() -> "Environment":
+    # Takes long to import, and few commands write programs.
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("elastocal.compensation.programs"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"plain": plain}
+    return environment

@@ -1,0 +1,93 @@
+from .arm import (
+    KukaArm as KukaArm,
+)
+from .commissioning import (
+    AnswerRecorder as AnswerRecorder,
+    CommissioningRecord as CommissioningRecord,
+    DelayEstimate as DelayEstimate,
+    Excitation as Excitation,
+    chirp as chirp,
+    estimate_delay as estimate_delay,
+)
+from .controller_files import (
+    LONGEST_NAME as LONGEST_NAME,
+    PROGRAMS as PROGRAMS,
+    SHEET as SHEET,
+    ControllerSet as ControllerSet,
+    controller_files as controller_files,
+    write_controller_files as write_controller_files,
+)
+from .corrections import (
+    CorrectionGuard as CorrectionGuard,
+    CorrectionSource as CorrectionSource,
+    PathCorrections as PathCorrections,
+    as_millimetres as as_millimetres,
+)
+from .driver import (
+    DRIVER as DRIVER,
+    KukaRsiDriver as KukaRsiDriver,
+    connect_arm as connect_arm,
+)
+from .ethernet_file import (
+    MODES as MODES,
+    EthernetChannel as EthernetChannel,
+    EthernetFile as EthernetFile,
+    check_ethernet_file as check_ethernet_file,
+)
+from .force_control import (
+    CollisionWatch as CollisionWatch,
+    ForceLaw as ForceLaw,
+    ForceReader as ForceReader,
+    overshoot as overshoot,
+)
+from .link import (
+    Arrival as Arrival,
+    Handler as Handler,
+    IpocWatch as IpocWatch,
+    LinkAddress as LinkAddress,
+    LinkStatistics as LinkStatistics,
+    RsiLink as RsiLink,
+)
+from .messages import (
+    MOST_BYTES as MOST_BYTES,
+    NO_CORRECTION as NO_CORRECTION,
+    Answerer as Answerer,
+    MoveTarget as MoveTarget,
+    Order as Order,
+    ProgramState as ProgramState,
+    RobMessage as RobMessage,
+    SenMessage as SenMessage,
+    Six as Six,
+    is_overture as is_overture,
+    read_rob as read_rob,
+    write_sen as write_sen,
+)
+from .motions import (
+    ContactGuard as ContactGuard,
+    Cycle as Cycle,
+    Motion as Motion,
+    Pace as Pace,
+    Press as Press,
+    Step as Step,
+    approach as approach,
+    free_move as free_move,
+    hold as hold,
+    play as play,
+    release as release,
+    require_force as require_force,
+    retract as retract,
+)
+from .posture import (
+    PostureReader as PostureReader,
+)
+from .settings import (
+    CORRECTIONS as CORRECTIONS,
+    CYCLES as CYCLES,
+    FASTEST as FASTEST,
+    HOLD_ON as HOLD_ON,
+    LATE_DELAY as LATE_DELAY,
+    Bounds as Bounds,
+    RsiSettings as RsiSettings,
+    bounds_of as bounds_of,
+    require_pair as require_pair,
+)

@@ -1,0 +1,395 @@
+"""A KUKA arm over RSI; see `elastocal.cell.RobotArm` for the contract.
+
+Two threads meet here: that of the link, which wants an answer at once, and the caller's, whose
+commands only note what is to be done. Joint moves are the controller's (``PTP``); approach, hold,
+release and retract are relative corrections from here, so that the tool keeps its orientation. The
+PC is no safety function: what bounds the motion in the end are POSCORR, POSCORRMON, axis limits and
+SafeOperation of the controller.
+"""
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
+from elastocal.drivers.kuka_rsi._commands import (
+    StraightMoveRules,
+    check_joint_move,
+    check_line,
+    check_vector,
+    require,
+)
+from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
+from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
+from elastocal.drivers.kuka_rsi.force_control import CollisionWatch, ForceLaw, ForceReader
+from elastocal.drivers.kuka_rsi.link import Arrival, RsiLink
+from elastocal.drivers.kuka_rsi.messages import (
+    MoveTarget,
+    Order,
+    ProgramState,
+    RobMessage,
+    SenMessage,
+)
+from elastocal.drivers.kuka_rsi.motions import (
+    ContactGuard,
+    Cycle,
+    Motion,
+    Pace,
+    Press,
+    Step,
+    approach,
+    free_move,
+    hold,
+    play,
+    release,
+    retract,
+)
+from elastocal.drivers.kuka_rsi.posture import PostureReader
+from elastocal.drivers.kuka_rsi.settings import RsiSettings, bounds_of
+from elastocal.errors import DeviceError
+from elastocal.robot import inverse_transform
+
+_SOURCE = "kuka_rsi"
+_SILENT = 0.25
+"""Time without a message after which the arm counts as stopped, in s."""
+_EDGE_AGAIN = 25
+"""Cycles for which a program stays guided against its order before STOP rises again."""
+_RESTING = (MotionState.DISARMED, MotionState.STOPPED)
+_STANDING = (MotionState.IDLE,)
+_FORCED = (MotionState.IDLE, MotionState.HOLDING, MotionState.RELEASING)
+_LET_GO = 0.3
+"""Part of the contact force below which the tool has left the surface at the end of a retract."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A command that is being carried out."""
+
+    state: MotionState
+    begin: Callable[[Cycle], Motion]
+    done: Callable[[Cycle], None] | None = None
+
+
+class KukaArm:
+    """A KUKA arm whose controller runs ``elcal_run`` with RSI."""
+
+    def __init__(
+        self, cell: Cell, settings: RsiSettings, clock: Clock, feed: WrenchFeed | None
+    ) -> None:
+        """Take an arm, drives off; `step` has to be called with each message of the controller.
+
+        Raises
+        ------
+        DeviceError
+            If it is to press, and there is no force to press by.
+        """
+        self._cell, self._settings, self._clock = cell, settings, clock
+        self.joint_names = cell.robot.joint_names
+        self.bounds = bounds_of(cell, settings)
+        delay = settings.motion_delay(cell)
+        self._pace = Pace(settings.cycle, delay, settings.acceleration, settings.correction_speed)
+        stiffness, speed = settings.contact_stiffness, settings.force_speed
+        self.law = ForceLaw.design(stiffness, delay, settings.cycle, speed)
+        self._rules = StraightMoveRules(self.bounds, self.law, delay + 2.0 * settings.cycle)
+        self._postures = PostureReader(cell.robot, settings.signs)
+        self._guard = CorrectionGuard(self.bounds, settings.cycle, delay)
+        self._reader, self._watch = self._feeling(feed)
+        self._lock = threading.RLock()
+        self._cycle: Cycle | None = None
+        self._problem: str | None = None
+        self._state = MotionState.DISARMED
+        self._fault: str | None = None
+        self._task: _Task | None = None
+        self._running: Motion | None = None
+        self._number = 0
+        self._touched: ContactGuard | None = None
+        self._touched_at: FloatArray = np.zeros(3)
+        self._disobeyed = 0
+        self.link: RsiLink | None = None
+        """Line to the controller; its failure is raised at the next call."""
+
+    def _feeling(self, feed: WrenchFeed | None) -> tuple[ForceReader | None, CollisionWatch | None]:
+        T_sensor_tcp = self._cell.T_sensor_tcp
+        if self._settings.mode != "contact":
+            return None, None
+        if feed is None or T_sensor_tcp is None:
+            raise DeviceError(
+                f"{self._cell.path}: devices.arm: mode contact needs a force sensor whose driver"
+                " feeds the arm (section sensor, and devices.sensor)"
+            )
+        reader = ForceReader(feed, inverse_transform(T_sensor_tcp), self._settings.cycle)
+        weight = self._cell.file.tool.mass * self._cell.gravity_base
+        return reader, CollisionWatch(weight, self._settings.collision_force)
+
+    def state(self) -> ArmState:
+        """Return the newest state."""
+        self._require_link()
+        with self._lock:
+            cycle = self._newest()
+            silent = self._clock.now() - cycle.time
+            if silent > _SILENT and self._state not in _RESTING:
+                self._break_down(f"nothing from the controller for {silent:.2f} s: RSI has ended")
+            return ArmState(
+                time=cycle.time,
+                q=cycle.q.copy(),
+                T_base_tcp=cycle.T_base_tcp.copy(),
+                motion=self._state,
+                in_contact=self._touched is not None,
+                fault=self._fault,
+                source=_SOURCE,
+            )
+
+    def enable(self) -> None:
+        """Release the arm for motion; it then is idle. Refused while a fault stands."""
+        self._require_link()
+        with self._lock:
+            cycle = self._newest()
+            self._require_ready(cycle)
+        self._postures.require_model(cycle, self._settings.model_tolerance)  # link goes on
+        with self._lock:
+            self._fault = None
+            if self._state in _RESTING:
+                self._state = MotionState.IDLE
+                self._guard.restart(cycle.offset)
+
+    def disable(self) -> None:
+        """Take the release back; the arm stands."""
+        with self._lock:
+            self._drop(MotionState.DISARMED)
+
+    def stop(self) -> None:
+        """Stop at once: no correction from now on, and the channel of the STOP object."""
+        with self._lock:
+            if self._state is not MotionState.DISARMED:
+                self._drop(MotionState.STOPPED)
+
+    def move_joints(self, q: FloatArray, speed: float) -> None:
+        """Start a joint move; see `RobotArm.move_joints`."""
+        target = check_joint_move(self._cell.robot, q, speed)
+        with self._lock:
+            self._allow("move_joints", _STANDING)
+            if self._touched is not None:
+                raise DeviceError(
+                    f"{_SOURCE} refuses move_joints: the tool is at the surface, retract"
+                )
+            self._number += 1
+            percent = min(max(1.0, 100.0 * speed), float(self._settings.ptp_percent))
+            axes, external = self._postures.as_told(target)
+            told = MoveTarget(self._number, axes, external, percent)
+            motion = partial(free_move, target=told, q=target, pace=self._pace)
+            self._start(_Task(MotionState.MOVING, motion))
+
+    def approach(
+        self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
+    ) -> None:
+        """Start a guarded straight move; see `RobotArm.approach`."""
+        direction = check_line("approach", direction_base, distance, speed)
+        require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
+        with self._lock:
+            self._allow("approach", _STANDING, in_contact=False)
+            way, cycle = distance * direction, self._newest()
+            self._rules.require_room("approach", cycle.offset + way, speed)
+            self._rules.require_bent_wrist(cycle.q)
+            self._rules.require_gentle(speed, contact_force)
+            assert self._reader is not None
+            limit = self.bounds.force
+            guard = ContactGuard(self._reader, direction, contact_force, limit)
+            motion = partial(approach, way=way, speed=speed, guard=guard, pace=self._pace)
+            self._start(_Task(MotionState.APPROACHING, motion, partial(self._touch, guard)))
+
+    def hold(self, force_tcp: FloatArray, rate: float) -> None:
+        """Start to build up a force and hold it; see `RobotArm.hold`."""
+        wanted = check_vector("force", force_tcp, 3)
+        require(wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press")
+        size, most = float(np.linalg.norm(wanted)), self.bounds.force
+        require(size <= most, "force", size, f"at most {most:g} N, the force limit")
+        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        with self._lock:
+            self._allow("hold", _FORCED, in_contact=True)
+            motion = partial(hold, press=self._press(wanted, rate), pace=self._pace)
+            self._start(_Task(MotionState.HOLDING, motion))
+
+    def release(self, rate: float) -> None:
+        """Start to ramp the force to zero; see `RobotArm.release`."""
+        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        with self._lock:
+            self._allow("release", _FORCED, in_contact=True)
+            press, stiffness = self._press(np.zeros(3), rate), self._settings.contact_stiffness
+            motion = partial(release, press=press, pace=self._pace, stiffness=stiffness)
+            self._start(_Task(MotionState.RELEASING, motion))
+
+    def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
+        """Start a straight move away from the surface; see `RobotArm.retract`."""
+        direction = check_line("retract", direction_base, distance, speed)
+        with self._lock:
+            self._allow("retract", _FORCED)
+            touched = self._touched
+            if touched is not None and not float(direction @ touched.direction) < 0.0:
+                raise DeviceError(
+                    f"{_SOURCE}: retract direction {direction.tolist()} leads into the surface,"
+                    f" which was approached along {np.round(touched.direction, 4).tolist()}"
+                )
+            way = distance * direction
+            self._rules.require_room("retract", self._newest().offset + way, speed)
+            motion = partial(retract, way=way, speed=speed, pace=self._pace)
+            self._start(_Task(MotionState.RETRACTING, motion, self._leave))
+
+    def excite(self, places: FloatArray) -> AnswerRecorder:
+        """Start to follow places, shape (cycle, 3), base, in m, from where the tool stands.
+
+        Returns
+        -------
+        AnswerRecorder
+            Has command and answer along the places when it is over.
+        """
+        with self._lock:
+            self._allow("excite", _STANDING, in_contact=False)
+            recorder = AnswerRecorder(places, self._newest().offset, self._pace.cycle)
+            motion = partial(play, places=places, heard=recorder.hear)
+            self._start(_Task(MotionState.MOVING, motion))
+        return recorder
+
+    def step(self, message: RobMessage, arrival: Arrival, now: float) -> SenMessage | None:
+        """Return the answer to a message; see `elastocal.drivers.kuka_rsi.Handler`."""
+        with self._lock:
+            try:
+                cycle = self._postures.read(message, now, self._settings.mode)
+            except DeviceError as error:
+                self._problem = str(error)
+                self._break_down(str(error))
+                return self._message(Step(order=Order.HOLD))
+            self._cycle, self._problem = cycle, None
+            if arrival in (Arrival.FIRST, Arrival.JUMPED):
+                self._number = cycle.command
+            if self._settings.mode == "measure":
+                return None
+            self._look(cycle, arrival)
+            step = self._next(cycle)
+            disobeys = step.order is not Order.GUIDE and cycle.state == ProgramState.GUIDED
+            self._disobeyed = self._disobeyed + 1 if disobeys else 0
+            return self._message(step)
+
+    def _next(self, cycle: Cycle) -> Step:
+        """Return the next step of what is being carried out."""
+        task = self._task
+        if task is None:
+            return Step(order=Order.HOLD if self._state in _RESTING else Order.GUIDE)
+        try:
+            if self._running is None:
+                self._guard.restart(cycle.offset)
+                self._running = task.begin(cycle)
+                step = next(self._running)
+            else:
+                step = self._running.send(cycle)
+            if cycle.state == ProgramState.GUIDED:
+                self._guard.bounded(step.shift, cycle.offset)
+            return step
+        except StopIteration:
+            self._task = self._running = None
+            self._state = MotionState.IDLE
+            if task.done is not None:
+                task.done(cycle)
+            return Step()
+        except DeviceError as error:
+            self._break_down(str(error))
+            return Step(order=Order.HOLD)
+
+    def _look(self, cycle: Cycle, arrival: Arrival) -> None:
+        """Stop where the controller, or the force, says that something is wrong."""
+        if self._reader is not None:
+            self._reader.look(cycle.time)
+        if self._state in _RESTING:
+            return
+        if arrival is Arrival.JUMPED:
+            self._break_down("IPOC has jumped: the controller's program was started anew")
+        elif cycle.state in (ProgramState.ABSENT, ProgramState.ENDED):
+            self._break_down("the program elcal_run on the controller is not in its loop any more")
+        elif self._state is MotionState.MOVING and self._watch is not None:
+            assert self._reader is not None
+            R_base_sensor = cycle.T_base_tcp[:3, :3] @ self._reader.R_tcp_sensor
+            hit = self._watch.look(cycle.time, self._reader.raw, R_base_sensor)
+            if hit is not None:
+                self._break_down(hit)
+
+    def _message(self, step: Step) -> SenMessage:
+        target = step.target or MoveTarget(self._number)
+        shift = as_millimetres(step.shift)
+        # The edge of STOP may have come before RSI_MOVECORR began: then it comes once more.
+        again = self._disobeyed % _EDGE_AGAIN == _EDGE_AGAIN - 1
+        return SenMessage(shift, step.order, target, self._settings.sentype, again)
+
+    def _start(self, task: _Task) -> None:
+        self._task, self._running, self._state = task, None, task.state
+        if self._watch is not None:
+            self._watch.restart()
+
+    def _drop(self, state: MotionState) -> None:
+        """Stand where the arm is."""
+        self._task = self._running = None
+        self._state = state
+
+    def _break_down(self, fault: str) -> None:
+        if self._state is not MotionState.DISARMED:
+            self._fault = fault
+            self._drop(MotionState.STOPPED)
+
+    def _touch(self, guard: ContactGuard, cycle: Cycle) -> None:
+        if guard.felt:
+            self._touched, self._touched_at = guard, cycle.offset
+
+    def _leave(self, _: Cycle) -> None:
+        if self._touched is None or self._reader is None:
+            return
+        left = float(np.linalg.norm(self._reader.force_tcp))
+        if left <= _LET_GO * self._touched.contact_force or self._reader.problem() is not None:
+            self._touched = None
+
+    def _press(self, wanted: FloatArray, rate: float) -> Press:
+        assert self._reader is not None
+        bounds = self.bounds
+        limits = (self._touched_at, bounds.travel, bounds.force)
+        return Press(self._reader, self.law, wanted, rate, *limits)
+
+    def _require_link(self) -> None:
+        if self.link is not None:
+            self.link.require()
+
+    def _newest(self) -> Cycle:
+        if self._problem is not None:
+            raise DeviceError(f"{_SOURCE}: {self._problem}")
+        if self._cycle is None:
+            raise DeviceError(f"{_SOURCE}: the controller has sent nothing yet")
+        return self._cycle
+
+    def _require_ready(self, cycle: Cycle) -> None:
+        """Refuse to be enabled while anything stands against it."""
+        why = None
+        silent = self._clock.now() - cycle.time
+        if self._settings.mode != "contact":
+            why = f"mode {self._settings.mode} moves nothing: devices.arm.mode must be contact"
+        elif not silent <= _SILENT:
+            why = f"no message from the controller for {silent:.2f} s"
+        elif cycle.state in (ProgramState.ABSENT, ProgramState.ENDED):
+            why = "the program elcal_run on the controller is not in its loop: select and start it"
+        elif self._reader is not None:
+            why = self._reader.problem()
+        if why is not None:
+            raise DeviceError(f"{_SOURCE} cannot be enabled: {why}")
+
+    def _allow(
+        self, command: str, states: tuple[MotionState, ...], *, in_contact: bool | None = None
+    ) -> None:
+        """Refuse a command that does not fit what the arm is doing."""
+        if self._state not in states:
+            allowed = ", ".join(state.value for state in states)
+            raise DeviceError(
+                f"{_SOURCE} refuses {command}: it is {self._state.value} (allowed when {allowed})"
+            )
+        if in_contact is not None and in_contact is not (self._touched is not None):
+            what = "only in contact" if in_contact else "not in contact: retract first"
+            raise DeviceError(f"{_SOURCE} refuses {command}: allowed {what}")

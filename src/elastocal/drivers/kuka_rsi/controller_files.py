@@ -1,0 +1,176 @@
+"""The files for the controller: ETHERNET files, KRL programs, and the sheet to be signed.
+
+What of the RSI contexts is known is on the sheet: their objects are set and wired by hand in
+RSIVisual or WorkVisual. Nothing here was tried on a controller; the programs say so.
+"""
+
+import hashlib
+import math
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.drivers.kuka_rsi.ethernet_file import MODES, EthernetFile, check_ethernet_file
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, overshoot
+from elastocal.drivers.kuka_rsi.settings import Bounds, RsiSettings, bounds_of
+from elastocal.files import filling
+from elastocal.robot import xyzabc_from_T
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+PROGRAMS = {"measure": "elcal_meas", "contact": "elcal_run", "compensation": "elcal_comp"}
+"""Name of program, RSI context and ETHERNET file of each mode."""
+SHEET = "SIGN-OFF.md"
+LONGEST_NAME = 24
+"""Of a file on the controller, with its suffix; not verified on one."""
+_PRECISION = 6
+"""Decimals that the controller sends; its default is 1, a tenth of a millimetre."""
+
+
+@dataclass(frozen=True)
+class ControllerSet:
+    """What the templates of one mode are filled with."""
+
+    mode: str
+    name: str
+    ethernet: EthernetFile
+    bounds: Bounds
+    ipo: str
+    """``#IPO_FAST`` or ``#IPO``."""
+
+
+def controller_files(cell: Cell, settings: RsiSettings) -> dict[str, bytes]:
+    """Return the contents of all files by name, the sheet last.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    settings : RsiSettings
+        Those of its arm.
+
+    Raises
+    ------
+    DeviceError, FileAccessError, SchemaError
+        If the commissioning record that the settings name cannot be used.
+    """
+    sets = [_set_of(cell, settings, mode) for mode in MODES]
+    files: dict[str, bytes] = {}
+    for each in sets:
+        text = _render("ethernet.xml", ethernet=each.ethernet)
+        check_ethernet_file(text, each.mode)
+        files[f"{each.name}.xml"] = _controller_bytes(text)
+        for suffix in ("src", "dat"):
+            text = _render(f"{each.name}.{suffix}", each=each, settings=settings)
+            files[f"{each.name}.{suffix}"] = _controller_bytes(text)
+    assert all(len(name) <= LONGEST_NAME for name in files)
+    files[SHEET] = _sheet(cell, settings, sets, files).encode("utf-8")
+    return files
+
+
+def write_controller_files(
+    folder: Path, files: dict[str, bytes], force: bool = False
+) -> tuple[str, ...]:
+    """Write files into a folder, all or none; return their names.
+
+    Raises
+    ------
+    FileAccessError
+        If one cannot be written, or is there and ``force`` is not given.
+    """
+    with filling(folder, SHEET, force) as temporary:
+        for name, contents in files.items():
+            (temporary / name).write_bytes(contents)
+    return tuple(files)
+
+
+def _set_of(cell: Cell, settings: RsiSettings, mode: str) -> ControllerSet:
+    own = settings.largest_correction if mode == settings.mode else None
+    pair = {"correction": None, "hold_on": None, "largest_correction": own}
+    bounds = bounds_of(cell, settings.model_copy(update={"mode": mode, **pair}))
+    external = cell.robot.external_axes > 0
+    ipo = "#IPO_FAST" if settings.cycle < 0.01 else "#IPO"
+    return ControllerSet(
+        mode, PROGRAMS[mode], EthernetFile.of(settings, mode, external), bounds, ipo
+    )
+
+
+def _sheet(
+    cell: Cell, settings: RsiSettings, sets: list[ControllerSet], files: dict[str, bytes]
+) -> str:
+    delay = settings.motion_delay(cell)
+    stiffness = settings.contact_stiffness
+    law = ForceLaw.design(stiffness, delay, settings.cycle, settings.force_speed)
+    further = overshoot(cell.file.procedure.contact_speed, stiffness, delay + 2.0 * settings.cycle)
+    return _render(
+        SHEET,
+        cell=cell,
+        settings=settings,
+        sets={each.mode: each for each in sets},
+        delay=delay,
+        delay_from=_provenance(settings),
+        law=law,
+        margin=math.degrees(law.phase_margin(stiffness)),
+        further=further,
+        T_flange_tcp=cell.T_flange_tcp,
+        precision=_PRECISION,
+        hashes={name: hashlib.sha256(contents).hexdigest() for name, contents in files.items()},
+    )
+
+
+def _provenance(settings: RsiSettings) -> str:
+    if settings.commissioning is not None:
+        return f"measured, {settings.commissioning}"
+    return "as the cell file says" if settings.delay is not None else "ASSUMED: measure it"
+
+
+def _controller_bytes(text: str) -> bytes:
+    return text.replace("\n", "\r\n").encode("ascii")
+
+
+def _frame(T: FloatArray) -> str:
+    xyzabc = xyzabc_from_T(T)
+    values = [*(1e3 * xyzabc[:3]), *np.degrees(xyzabc[3:])]
+    parts = (f"{key} {round(v, 3) + 0.0:.3f}" for key, v in zip("XYZABC", values, strict=True))
+    return f"{{{', '.join(parts)}}}"
+
+
+def _plain(text: str) -> str:
+    """Return a text for a comment on the controller: one line of ASCII without %."""
+    line = " ".join(text.encode("ascii", "replace").decode("ascii").split())
+    return line.replace("%", "?")[:80]
+
+
+def _millimetres(metres: float) -> str:
+    return f"{1e3 * metres:.1f}"
+
+
+def _render(template: str, **values: object) -> str:
+    return _environment().get_template(template).render(values)
+
+
+@cache
+def _environment() -> "Environment":
+    # Takes long to import, and no run writes programs.
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("elastocal.drivers.kuka_rsi"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {
+        "frame": _frame,
+        "plain": _plain,
+        "mm": _millimetres,
+        "deg": lambda radians: f"{math.degrees(radians):.1f}",
+    }
+    return environment

@@ -1,0 +1,71 @@
+"""The driver of KUKA arms, as `elastocal run` finds it by its name ``kuka_rsi``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from elastocal.cell import Cell, Clock, DeviceSet, DeviceSettings, RigContext, WrenchFeed
+from elastocal.drivers.kuka_rsi.arm import KukaArm
+from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
+from elastocal.drivers.kuka_rsi.settings import RsiSettings
+from elastocal.errors import DeviceError
+from elastocal.results import brief_repr
+
+
+def connect_arm(
+    cell: Cell, settings: RsiSettings, clock: Clock, feed: WrenchFeed | None
+) -> KukaArm:
+    """Return the arm of a cell once its controller has spoken; its `link` is to be closed.
+
+    Raises
+    ------
+    DeviceError
+        If the port cannot be had, or the controller sends nothing in time.
+    """
+    if settings.mode == "compensation":
+        raise DeviceError(
+            f"{cell.path}: devices.arm.mode is compensation: such an arm follows its own program,"
+            " and carries out no procedure; mode must be measure or contact"
+        )
+    arm = KukaArm(cell, settings, clock, feed)
+    place = LinkAddress(
+        settings.address, settings.port, settings.robot, settings.cycle, settings.mode != "measure"
+    )
+    link = RsiLink(place, arm, clock)
+    arm.link = link
+    link.start()
+    if not link.wait(settings.wait):
+        statistics = link.statistics()
+        link.close()
+        raise DeviceError(
+            f"kuka_rsi: nothing from {settings.robot} at {settings.address}:{link.port} for"
+            f" {settings.wait:g} s ({statistics.malformed} malformed datagrams,"
+            f" {statistics.foreign} from elsewhere): start the program on the controller now,"
+            " while elastocal listens"
+        )
+    return arm
+
+
+@brief_repr
+@dataclass(frozen=True)
+class KukaRsiDriver:
+    """Makes arms; see `elastocal.cell.Driver`."""
+
+    kinds: frozenset[str] = frozenset({"arm"})
+    real: bool = True
+
+    def settings(self, kind: str) -> type[DeviceSettings]:  # noqa: ARG002 - there is one kind
+        """Return the model of what stands under an arm."""
+        return RsiSettings
+
+    def connect(
+        self, cell: Cell, wanted: Mapping[str, DeviceSettings], context: RigContext
+    ) -> DeviceSet:
+        """Return the arm."""
+        settings = wanted["arm"]
+        assert isinstance(settings, RsiSettings)
+        arm = connect_arm(cell, settings, context.clock, context.feed)
+        assert arm.link is not None
+        return DeviceSet(arm=arm, close=arm.link.close)
+
+
+DRIVER = KukaRsiDriver()

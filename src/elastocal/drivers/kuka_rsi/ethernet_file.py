@@ -1,0 +1,178 @@
+"""The file that tells a controller's ETHERNET object what to send and to expect: made, and checked.
+
+Channels of the controller's own (``DEF_RIst``) are known by their names, all others by the number
+of the input or output of the object that they are wired to in the RSI context; with a point in the
+name they are attributes of one element. Written after kroshu/kuka-external-control-sdk and
+ros-industrial/kuka_experimental; not tried on a controller.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from xml.etree import ElementTree
+
+from elastocal.drivers.kuka_rsi.settings import CORRECTIONS, HOLD_ON, RsiSettings, require_pair
+from elastocal.errors import DeviceError
+from elastocal.results import brief_repr
+
+MODES = ("measure", "contact", "compensation")
+_MOST_CHANNELS = 64
+_MOST_CHARACTERS = 65_536
+_OWN = ("RIst", "RSol", "AIPos", "EIPos", "Delay")
+"""Channels of the controller's own that are sent."""
+_CORRECTION = tuple(f"RKorr.{axis}" for axis in "XYZABC")
+_STOP = "Stop"
+
+
+@dataclass(frozen=True)
+class EthernetChannel:
+    """One numbered channel."""
+
+    tag: str
+    kind: str
+    """``BOOL``, ``LONG`` or ``DOUBLE``."""
+    number: int
+    """Of the output (received) or input (sent) of the ETHERNET object, from 1."""
+    wired_to: str
+    """Object of the RSI context, with its input or index."""
+    hold_on: int | None = None
+    """Of a received channel."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class EthernetFile:
+    """What the ETHERNET object of one RSI context sends and receives."""
+
+    mode: str
+    address: str
+    """Of the PC."""
+    port: int
+    sentype: str
+    own: tuple[str, ...]
+    """Names without ``DEF_`` of the controller's own channels that are sent."""
+    sent: tuple[EthernetChannel, ...] = ()
+    received: tuple[EthernetChannel, ...] = field(default_factory=tuple)
+
+    @property
+    def only_send(self) -> bool:
+        """Whether the controller hears nothing."""
+        return self.mode == "measure"
+
+    @classmethod
+    def of(cls, settings: RsiSettings, mode: str, external: bool) -> "EthernetFile":
+        """Return the file of a mode.
+
+        Parameters
+        ----------
+        settings : RsiSettings
+            Addresses.
+        mode : str
+            One of `MODES`.
+        external : bool
+            Whether there are external axes.
+        """
+        own = tuple(name for name in _OWN if external or name != "EIPos")
+        place = (mode, settings.address, settings.port, settings.sentype, own)
+        if mode == "measure":
+            return cls(*place)
+        hold = HOLD_ON[CORRECTIONS[mode]]
+        received = [(_STOP, "BOOL", "STOP.In1", 1)]
+        received += [(tag, "DOUBLE", f"POSCORR.Corr{tag[-1]}", hold) for tag in _CORRECTION]
+        if mode == "compensation":
+            return cls(*place, (), _numbered(received))
+        received += [
+            ("Cmd.N", "LONG", "MAP2SEN_PINT 1", 1),
+            ("Cmd.Op", "LONG", "MAP2SEN_PINT 2", 1),
+        ]
+        received += [("Cmd.V", "DOUBLE", "MAP2SEN_PREA 13", 1)]
+        targets = [f"Ax.A{k}" for k in range(1, 7)] + [f"Ex.E{k}" for k in range(1, 7)]
+        received += [(t, "DOUBLE", f"MAP2SEN_PREA {k}", 1) for k, t in enumerate(targets, start=1)]
+        sent = [("Krl.N", "LONG", "SEN_PINT 11", None), ("Krl.State", "LONG", "SEN_PINT 12", None)]
+        return cls(*place, _numbered(sent), _numbered(received))
+
+
+def _numbered(rows: Sequence[tuple[str, str, str, int | None]]) -> tuple[EthernetChannel, ...]:
+    return tuple(
+        EthernetChannel(tag, kind, number, wired_to, hold_on)
+        for number, (tag, kind, wired_to, hold_on) in enumerate(rows, start=1)
+    )
+
+
+def check_ethernet_file(text: str, mode: str) -> None:
+    """Refuse an ETHERNET file that does not do what a mode needs, or pairs HOLDON wrongly.
+
+    Parameters
+    ----------
+    text : str
+        Its contents.
+    mode : str
+        One of `MODES`.
+
+    Raises
+    ------
+    DeviceError
+        With the channel that is wrong.
+    """
+    root = _parsed(text)
+    only_send = _text(root, "CONFIG/ONLYSEND").upper() == "TRUE"
+    if only_send != (mode == "measure"):
+        raise DeviceError(f"ONLYSEND is {only_send!s}: mode {mode} needs {not only_send!s}".upper())
+    sent = [_attribute(each, "TAG") for each in root.findall("SEND/ELEMENTS/ELEMENT")]
+    received = {_attribute(each, "TAG"): each for each in root.findall("RECEIVE/ELEMENTS/ELEMENT")}
+    for what, count in (("SEND", len(sent)), ("RECEIVE", len(received))):
+        if count > _MOST_CHANNELS:
+            raise DeviceError(f"{what} has {count} channels: at most {_MOST_CHANNELS}")
+    needed = ["DEF_RIst", "DEF_AIPos"] + ([] if mode == "measure" else ["DEF_RSol"])
+    needed += ["Krl.N", "Krl.State"] if mode == "contact" else []
+    _require_tags("SEND", needed, sent)
+    if mode == "measure":
+        return
+    _require_tags("RECEIVE", [_STOP, *_CORRECTION[:3]], received)
+    for tag in _CORRECTION:
+        if tag in received:
+            _check_hold_on(tag, _attribute(received[tag], "HOLDON"), mode)
+
+
+def _check_hold_on(tag: str, text: str, mode: str) -> None:
+    if text not in ("0", "1"):
+        raise DeviceError(f"{tag}: HOLDON is {text!r}: must be 0 or 1")
+    try:
+        require_pair(CORRECTIONS[mode], int(text))
+    except ValueError as error:
+        raise DeviceError(f"{tag}: {error}") from error
+
+
+def _require_tags(section: str, needed: list[str], given: list[str] | Mapping[str, object]) -> None:
+    for tag in needed:
+        if tag not in given:
+            raise DeviceError(f"{section} has no element {tag}")
+
+
+def _parsed(text: str) -> ElementTree.Element:
+    if len(text) > _MOST_CHARACTERS:
+        raise DeviceError(
+            f"{len(text)} characters: an ETHERNET file has at most {_MOST_CHARACTERS}"
+        )
+    if "<!" in text.replace("<!--", ""):
+        raise DeviceError("a document type or entities: an ETHERNET file has none")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise DeviceError(f"no XML: {error}") from error
+    if root.tag != "ROOT":
+        raise DeviceError(f"its root is <{root.tag:.20}>: must be <ROOT>")
+    return root
+
+
+def _text(root: ElementTree.Element, path: str) -> str:
+    found = root.findtext(path)
+    if found is None:
+        raise DeviceError(f"it has no {path}")
+    return found.strip()
+
+
+def _attribute(element: ElementTree.Element, name: str) -> str:
+    found = element.get(name)
+    if found is None:
+        raise DeviceError(f"an ELEMENT has no {name}")
+    return found

@@ -1,0 +1,235 @@
+"""Force control on the PC: a bounded admittance law, its stability, and the watch for collisions.
+
+The tool's commanded speed is proportional to the missing force, in the tcp frame, each axis alike:
+
+    v = g (F - F_wanted),   |v| <= v_max
+
+with ``F`` the force on the robot. Against a contact of stiffness ``K`` (arm, tool and tooling in
+series) the force answers a commanded movement ``x`` with ``dF/dt = -K dx/dt`` after a delay ``T``:
+the controller's delay from command to motion, and what sensor, filter and cycle add. The open loop
+is ``g K exp(-s T) / s``, an integrator with delay, so that
+
+    phase margin = 90° - g K T,   gain margin = pi / (2 g K T)
+
+(K. J. Åström and R. M. Murray, "Feedback Systems", 2nd ed., Princeton 2021, sections 10.2, 10.3). A
+product ``g K T`` of 1/e is the fastest without overshoot; here it is 0.25, for the stiffest contact
+that is expected: 75.7° and 6.3. A softer contact has more of both and is slower.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import SensorStatus, WrenchFeed
+from elastocal.errors import DeviceError
+
+_PRODUCT = 0.25
+"""Gain times stiffness times delay."""
+_FILTER = 0.01
+"""Time constant of the force that is controlled, in s."""
+_HESITATE, _SILENT = 0.03, 0.15
+"""Age of the newest force at which force control stands still, and at which it gives up, in s."""
+_TARE_SAMPLES = 10
+_TARE_TIME = 0.2
+"""Samples and time over which the zero of the force is taken, in s."""
+_COLLISION_WINDOW = 0.05
+"""Time over which the change of a force is looked at, in s."""
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """The law, designed for a contact and a delay; make one with `design`."""
+
+    gain: float
+    """In m/s per N."""
+    delay: float
+    """Of the whole loop, in s."""
+    largest_speed: float
+    """In m/s."""
+    stiffness: float
+    """Of the stiffest contact that is expected, in N/m."""
+
+    @classmethod
+    def design(
+        cls, stiffness: float, motion_delay: float, cycle: float, largest_speed: float
+    ) -> "ForceLaw":
+        """Return the law for the stiffest contact that is expected.
+
+        Parameters
+        ----------
+        stiffness : float
+            Of arm, tool and tooling in series, in N/m.
+        motion_delay : float
+            From command to motion, as it was measured, in s.
+        cycle : float
+            Of the controller, in s: a correction holds for one, and its force is as old as one.
+        largest_speed : float
+            In m/s.
+        """
+        delay = motion_delay + 2.0 * cycle + _FILTER
+        return cls(_PRODUCT / (stiffness * delay), delay, largest_speed, stiffness)
+
+    def phase_margin(self, stiffness: float) -> float:
+        """Return the phase margin against a contact, in rad; 0 or less: unstable."""
+        return 0.5 * math.pi - self.gain * stiffness * self.delay
+
+    def gain_margin(self, stiffness: float) -> float:
+        """Return by how much stiffer a contact may be before the loop is unstable."""
+        return 0.5 * math.pi / (self.gain * stiffness * self.delay)
+
+    def settling(self, stiffness: float) -> float:
+        """Return the time in which a missing force falls to a hundredth, in s, without limits."""
+        return self.delay + math.log(100.0) / (self.gain * stiffness)
+
+    def speed(self, missing: FloatArray) -> FloatArray:
+        """Return the speed of the tool, shape (3,), in m/s, tcp frame.
+
+        Parameters
+        ----------
+        missing : ndarray, shape (3,)
+            Force on the robot less the wanted one, tcp frame, in N.
+        """
+        wanted = self.gain * missing
+        size = float(np.linalg.norm(wanted))
+        return wanted if size <= self.largest_speed else wanted * (self.largest_speed / size)
+
+
+def overshoot(speed: float, stiffness: float, delay: float) -> float:
+    """Return by how much a guarded move presses more than the force at which it stops, in N.
+
+    Parameters
+    ----------
+    speed : float
+        In m/s.
+    stiffness : float
+        Of the contact, in N/m.
+    delay : float
+        From force to standstill, in s.
+    """
+    return speed * stiffness * delay
+
+
+class ForceReader:
+    """The force of a feed as force control wants it: in the tcp frame, zeroed, filtered.
+
+    The tool keeps its orientation from the zero on, so that its weight and the sensor's bias are
+    in the zero.
+    """
+
+    def __init__(self, feed: WrenchFeed, T_tcp_sensor: FloatArray, cycle: float) -> None:
+        self._feed = feed
+        self.R_tcp_sensor: FloatArray = T_tcp_sensor[:3, :3]
+        """Axes of the sensor in the tcp frame, shape (3, 3)."""
+        self._share = cycle / (_FILTER + cycle)
+        self._zero, self._sums, self._count = np.zeros(3), np.zeros(3), 0
+        self._since: float | None = None
+        self._newest = -math.inf
+        self._smooth: FloatArray | None = None
+        self.age = math.inf
+        """Of the newest sample, in s."""
+        self.status = SensorStatus.OK
+        self.raw: FloatArray = np.zeros(3)
+        """Newest force, sensor frame, as measured, shape (3,), in N."""
+
+    def look(self, now: float) -> None:
+        """Take the newest sample."""
+        sample = self._feed.newest()
+        if sample is None:
+            return
+        self.age, self.status = now - sample.time, sample.status
+        if sample.time == self._newest:
+            return
+        self._newest, self.raw = sample.time, sample.force
+        if self._smooth is None:
+            self._smooth = sample.force
+        self._smooth = self._smooth + self._share * (sample.force - self._smooth)
+        if self._since is not None:
+            self._sums, self._count = self._sums + sample.force, self._count + 1
+
+    def begin_zero(self, now: float) -> None:
+        """Begin to average the zero; the tool stands free meanwhile."""
+        self._sums, self._count, self._since = np.zeros(3), 0, now
+
+    def is_zeroed(self, now: float) -> bool:
+        """Return whether the zero is had; from then on the force counts from it."""
+        if self._since is None:
+            return True
+        if self._count < _TARE_SAMPLES or not now - self._since >= _TARE_TIME:
+            return False
+        self._zero, self._since = self._sums / self._count, None
+        return True
+
+    @property
+    def force_tcp(self) -> FloatArray:
+        """Force on the robot since the zero, filtered, tcp frame, shape (3,), in N."""
+        return self._in_tcp(self.raw if self._smooth is None else self._smooth)
+
+    @property
+    def quick_force_tcp(self) -> FloatArray:
+        """The same of the newest sample alone."""
+        return self._in_tcp(self.raw)
+
+    def _in_tcp(self, force: FloatArray) -> FloatArray:
+        turned: FloatArray = self.R_tcp_sensor @ (force - self._zero)
+        return turned
+
+    @property
+    def hesitates(self) -> bool:
+        """Whether the force is too old to move by."""
+        return not self.age <= _HESITATE
+
+    def problem(self) -> str | None:
+        """Return why the force cannot be trusted; None if it can."""
+        if not self.age <= _SILENT:
+            silent = "has sent nothing" if math.isinf(self.age) else f"silent for {self.age:.2f} s"
+            return f"force sensor {silent}"
+        if self.status is not SensorStatus.OK:
+            return f"force sensor says {self.status.value}"
+        return None if np.isfinite(self.raw).all() else "force sensor says NaN"
+
+
+class CollisionWatch:
+    """Finds that a tool which moves freely has hit something.
+
+    In free air the sensor feels the tool's weight, which turns with the tool, and a bias, which
+    stays. What is left when both are taken off hardly changes while the arm moves slowly: a change
+    of it within 50 ms by more than the limit is a collision. Accelerating the tool counts too, so
+    that the limit must be above mass times acceleration of the fastest free move.
+    """
+
+    def __init__(self, weight_base: FloatArray, limit: float) -> None:
+        if not limit > 0.0:
+            raise DeviceError(f"kuka_rsi: collision force is {limit:g} N: must be above 0 N")
+        self._weight_base, self._limit = weight_base, limit
+        self._rest: deque[tuple[float, FloatArray]] = deque()
+
+    def restart(self) -> None:
+        """Forget what was felt before: something else moves now."""
+        self._rest.clear()
+
+    def look(self, time: float, force_sensor: FloatArray, R_base_sensor: FloatArray) -> str | None:
+        """Return what was hit, in words; None when nothing was.
+
+        Parameters
+        ----------
+        time : float
+            In s.
+        force_sensor : ndarray, shape (3,)
+            As measured, in N.
+        R_base_sensor : ndarray, shape (3, 3)
+            Orientation of the sensor.
+        """
+        rest = R_base_sensor @ force_sensor - self._weight_base
+        while self._rest and time - self._rest[0][0] > _COLLISION_WINDOW:
+            self._rest.popleft()
+        self._rest.append((time, rest))
+        change = float(np.linalg.norm(rest - self._rest[0][1]))
+        if change <= self._limit:
+            return None
+        return (
+            f"collision: the force changed by {change:.0f} N within"
+            f" {1e3 * _COLLISION_WINDOW:.0f} ms while moving freely, limit {self._limit:.0f} N"
+        )

@@ -1,0 +1,346 @@
+"""Motions of the arm, cycle by cycle: free moves by the controller, straight moves by the PC.
+
+A motion is a generator: it takes the state of each cycle and yields what is to be done until the
+next. It ends when it is done; what goes wrong is a `DeviceError`. Straight moves are corrections;
+they begin and end at standstill, and what the controller has really moved, RIst less RSol, is
+looked at then: an answer that was lost has taken its part of the movement with it.
+"""
+
+import math
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
+from elastocal.drivers.kuka_rsi.messages import MoveTarget, Order, ProgramState
+from elastocal.errors import DeviceError
+from elastocal.results import brief_repr
+
+_EXACT = 2e-5
+"""How near to its goal a straight move has to end, in m."""
+_AMISS = 1e-3
+"""How far from it the arm may be left, in m; more, and the controller did not follow."""
+_TRIES = 4
+_QUIET = 0.05
+"""Time beyond the delay after which the arm stands, in s."""
+_ANSWERS = 3.0
+"""Time in which the program on the controller does as it is told, and a sensor speaks, in s."""
+_AT_JOINTS = 2e-3
+"""How far from its target a joint may be after a ``PTP``, in rad or m: RIst and AIPos may be sent
+with one decimal of a degree."""
+_RELEASED = 0.02
+"""Part of the force that was held from which on a release is over."""
+_LEAST_FORCE = 3.0
+"""Force that counts as none at the end of a release, in N."""
+_RELEASE_SETTLINGS = 3.0
+"""Settling times of the force control that a release waits for the last of the force."""
+
+
+def _zero() -> FloatArray:
+    return np.zeros(3)
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """State of the arm in one cycle, in SI."""
+
+    time: float
+    """In s of the clock."""
+    q: FloatArray
+    """Shape (joint,), in rad or m."""
+    T_base_tcp: FloatArray
+    """Shape (4, 4)."""
+    offset: FloatArray
+    """Correction that is in effect, RIst less RSol, base, shape (3,), in m."""
+    state: int
+    """A `ProgramState`."""
+    command: int
+    """Number of the last ``PTP`` that is over."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What is to be done until the next cycle."""
+
+    shift: FloatArray = field(default_factory=_zero)
+    """Movement of the tool, base, shape (3,), in m."""
+    order: Order = Order.GUIDE
+    target: MoveTarget | None = None
+
+
+Motion = Generator[Step, Cycle, None]
+_Phase = Generator[Step, Cycle, Cycle]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How straight moves go."""
+
+    cycle: float
+    """In s."""
+    delay: float
+    """From command to motion, in s."""
+    acceleration: float
+    """In m/s²."""
+    speed: float
+    """Of a way that nobody asked for: back to where the correction is zero, in m/s."""
+
+
+def free_move(cycle: Cycle, target: MoveTarget, q: FloatArray, pace: Pace) -> Motion:
+    """Yield the steps of a joint move: the controller's ``PTP``, with the correction at zero.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        State at the beginning.
+    target : MoveTarget
+        What the controller is told.
+    q : ndarray, shape (joint,)
+        The same in rad or m.
+    pace : Pace
+        How the correction is taken back before.
+    """
+    cycle = yield from _guided(cycle)
+    if float(np.linalg.norm(cycle.offset)) > _EXACT:
+        cycle = yield from _shift(cycle, np.zeros(3), pace.speed, pace)
+    told = cycle.time
+    while cycle.command != target.number or cycle.state not in _OVER:
+        if cycle.state != ProgramState.MOVING and cycle.time - told > _ANSWERS:
+            raise _does_not_answer("PTP", cycle)
+        cycle = yield Step(order=Order.MOVE, target=target)
+    if cycle.state == ProgramState.BRAKED:
+        raise DeviceError("the program on the controller gave the PTP up on the way")
+    away = float(np.abs(cycle.q - q).max())
+    if not away <= _AT_JOINTS:
+        raise DeviceError(f"the PTP ended {away:.3g} (rad or m) away from its target")
+    yield from _guided(cycle)
+
+
+_OVER = (ProgramState.ARRIVED, ProgramState.BRAKED)
+
+
+def approach(
+    cycle: Cycle, way: FloatArray, speed: float, guard: "ContactGuard", pace: Pace
+) -> Motion:
+    """Yield the steps of a guarded straight move; `ContactGuard.felt` tells how it ended.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        State at the beginning.
+    way : ndarray, shape (3,)
+        To go if nothing is felt, base, in m.
+    speed : float
+        In m/s.
+    guard : ContactGuard
+        Feels the contact; its force is zeroed first.
+    pace : Pace
+        How.
+    """
+    cycle = yield from _guided(cycle)
+    reader, began = guard.reader, cycle.time
+    reader.begin_zero(began)
+    while not reader.is_zeroed(cycle.time):
+        if cycle.time - began > _ANSWERS:
+            raise DeviceError(reader.problem() or "force sensor: too few samples for a zero")
+        cycle = yield Step()
+    yield from _shift(cycle, cycle.offset + way, speed, pace, guard)
+
+
+def retract(cycle: Cycle, way: FloatArray, speed: float, pace: Pace) -> Motion:
+    """Yield the steps of a straight move that nothing stops; see `approach`."""
+    cycle = yield from _guided(cycle)
+    yield from _shift(cycle, cycle.offset + way, speed, pace)
+
+
+def play(cycle: Cycle, places: FloatArray, heard: Callable[[FloatArray], None]) -> Motion:
+    """Yield the steps through given places, one a cycle, from where the tool stands.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        State at the beginning.
+    places : ndarray, shape (cycle, 3)
+        Places from the first one on, base, in m.
+    heard : callable
+        Takes the correction that is in effect in every cycle that follows a step.
+    """
+    cycle = yield from _guided(cycle)
+    for shift in np.diff(places, axis=0, prepend=np.zeros((1, 3))):
+        cycle = yield Step(shift)
+        heard(cycle.offset)
+
+
+@brief_repr
+@dataclass
+class ContactGuard:
+    """Ends a straight move where a force against it is felt."""
+
+    reader: ForceReader
+    direction: FloatArray
+    """Of the move, base, shape (3,)."""
+    contact_force: float
+    """In N; infinite: never."""
+    force_limit: float
+    """Force that faults, in N."""
+    felt: bool = False
+
+    def look(self, cycle: Cycle) -> bool:
+        """Return whether the move has to end here.
+
+        Raises
+        ------
+        DeviceError
+            If the force is too large or cannot be trusted.
+        """
+        require_force(self.reader, self.force_limit)
+        force_base = cycle.T_base_tcp[:3, :3] @ self.reader.quick_force_tcp
+        self.felt |= float(-force_base @ self.direction) >= self.contact_force
+        return self.felt
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Press:
+    """A force to be built up and held."""
+
+    reader: ForceReader
+    law: ForceLaw
+    wanted: FloatArray
+    """Force on the robot, tcp frame, shape (3,), in N."""
+    rate: float
+    """Fastest change of the force, in N/s."""
+    touched: FloatArray
+    """Correction where the tool touched, base, shape (3,), in m."""
+    travel_limit: float
+    """How far from there it may go, in m."""
+    force_limit: float
+    """In N."""
+
+
+def hold(cycle: Cycle, press: Press, pace: Pace) -> Motion:
+    """Yield the steps of force control; it does not end."""
+    cycle = yield from _guided(cycle)
+    yield from _controlled(cycle, press, pace, math.inf)
+
+
+def release(cycle: Cycle, press: Press, pace: Pace, stiffness: float) -> Motion:
+    """Yield the steps of force control until the force is gone."""
+    cycle = yield from _guided(cycle)
+    size = float(np.linalg.norm(press.reader.force_tcp))
+    slack = size / press.rate + _RELEASE_SETTLINGS * press.law.settling(stiffness)
+    press = replace(press, wanted=np.zeros(3))
+    yield from _controlled(cycle, press, pace, cycle.time + slack)
+
+
+def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> _Phase:
+    """Follow the wanted force; return once it is zero and reached, or at a time."""
+    reader, reference = press.reader, press.reader.force_tcp
+    releases = not np.any(press.wanted)
+    gone = max(_RELEASED * float(np.linalg.norm(reference)), _LEAST_FORCE)
+    while cycle.time < ends:
+        require_force(reader, press.force_limit)
+        reference = _toward(reference, press.wanted, press.rate * pace.cycle)
+        velocity = press.law.speed(reader.force_tcp - reference)
+        left = float(np.linalg.norm(reader.force_tcp))
+        if releases and not np.any(reference) and left <= gone:
+            break
+        went = float(np.linalg.norm(cycle.offset - press.touched))
+        if not went <= press.travel_limit:
+            raise DeviceError(
+                f"force control gave up: the tool went {1e3 * went:.1f} mm from where it touched,"
+                f" limit {1e3 * press.travel_limit:g} mm"
+            )
+        still = reader.hesitates
+        turned = cycle.T_base_tcp[:3, :3] @ velocity
+        cycle = yield Step() if still else Step(pace.cycle * turned)
+    return cycle
+
+
+def require_force(reader: ForceReader, limit: float) -> None:
+    """Refuse to go on by a force that is too large or cannot be trusted.
+
+    Raises
+    ------
+    DeviceError
+        With what is wrong.
+    """
+    problem = reader.problem()
+    if problem is not None:
+        raise DeviceError(problem)
+    size = float(np.linalg.norm(reader.quick_force_tcp))
+    if not size <= limit:
+        raise DeviceError(f"force limit exceeded: {size:.0f} N, limit {limit:.0f} N")
+
+
+def _guided(cycle: Cycle) -> _Phase:
+    """Wait until corrections act."""
+    told = cycle.time
+    while cycle.state != ProgramState.GUIDED:
+        if not cycle.time - told <= _ANSWERS:
+            raise _does_not_answer("RSI_MOVECORR", cycle)
+        cycle = yield Step()
+    return cycle
+
+
+def _does_not_answer(what: str, cycle: Cycle) -> DeviceError:
+    known = [state.name.lower() for state in ProgramState if state == cycle.state]
+    return DeviceError(
+        f"the program on the controller does not begin {what}: it is"
+        f" {known[0] if known else cycle.state} for {_ANSWERS:g} s"
+    )
+
+
+def _shift(
+    cycle: Cycle,
+    goal: FloatArray,
+    speed: float,
+    pace: Pace,
+    guard: ContactGuard | None = None,
+) -> _Phase:
+    """Bring the correction to a goal, straight, or to where a guard ends it; stand there."""
+    missing = math.inf
+    for _ in range(_TRIES):
+        at, now = cycle.offset, 0.0
+        while np.any(goal != at):
+            if guard is not None and guard.reader.hesitates:
+                # Blind: it stands until the force comes again, or its silence is a fault.
+                now, cycle = 0.0, (yield Step())
+                if guard.look(cycle):
+                    break
+                continue
+            left = goal - at
+            distance = float(np.linalg.norm(left))
+            gains = pace.acceleration * pace.cycle
+            brakes = max(math.sqrt(2.0 * pace.acceleration * distance), gains)
+            now = min(speed, now + gains, brakes)
+            piece = left if distance <= now * pace.cycle else left * (now * pace.cycle / distance)
+            at = goal if piece is left else at + piece
+            cycle = yield Step(piece)
+            if guard is not None and guard.look(cycle):
+                break
+        stands_at = cycle.time + pace.delay + _QUIET
+        while cycle.time < stands_at:
+            cycle = yield Step()
+            if guard is not None:
+                guard.look(cycle)
+        missing = float(np.linalg.norm(goal - cycle.offset))
+        if missing <= _EXACT or (guard is not None and guard.felt):
+            return cycle
+    if missing > _AMISS:
+        raise DeviceError(
+            f"correction not followed: the arm stands {1e3 * missing:.2f} mm from where it was"
+            " corrected to: is POSCORR's limit below the one of the cell file?"
+        )
+    return cycle
+
+
+def _toward(start: FloatArray, end: FloatArray, most: float) -> FloatArray:
+    """Return the next value of a straight ramp."""
+    way = end - start
+    length = float(np.linalg.norm(way))
+    return end if length <= most else start + way * (most / length)

@@ -1,0 +1,238 @@
+"""Points of tracker stations, from the thread of a line to `elastocal.cell.Metrology`.
+
+A thread puts in what its line says: points, a beam that breaks or is found, a fault. The
+supervision cycle takes out what has come, at once. Between them stand the checks that any
+instrument needs: its clock (`elastocal.drivers.device_clock`), the unit of its lengths by the range
+of the station in the cell file, a bound on what is kept.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import BeamState, Cell, Clock, PointBlock, Tracker
+from elastocal.drivers.device_clock import DeviceClock
+from elastocal.errors import DeviceError, nearest
+from elastocal.units import factor
+
+NEWEST = 500
+"""Points that are kept for a caller that does not look; older ones are lost."""
+_OUTSIDE = 10
+"""Points one after another outside the station's range: no blunder, but another unit or frame."""
+_ROUGHLY = 2.0
+"""How many times beyond its range a marker may be: the range is a planner's figure."""
+_UNITS = ("m", "mm", "um", "in")
+
+
+class StationFeed:
+    """What one station says; filled by a thread, emptied by the supervision cycle.
+
+    Parameters
+    ----------
+    tracker : Tracker
+        The station in the cell file.
+    source : str
+        Device and address, for messages.
+    clock : Clock
+        Of the rig.
+    silence : float
+        A station that has said nothing for longer counts as one whose beam is broken, in s.
+    unit : str
+        Unit in which the device states lengths, for messages.
+    own_frame : bool
+        Whether points are in the station's own frame, so that they lie within its range.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        source: str,
+        clock: Clock,
+        *,
+        silence: float = 0.2,
+        unit: str = "m",
+        own_frame: bool = True,
+    ) -> None:
+        self.tracker, self.source, self.unit = tracker, source, unit
+        self._clock, self._silence, self._own_frame = clock, silence, own_frame
+        self._lock = threading.Lock()
+        self._stamps = DeviceClock(f"{source}: {tracker.name}")
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=NEWEST)
+        self._beam, self._note, self._fault = BeamState.BROKEN, "no point has come yet", ""
+        self._heard = -np.inf
+        self._outside = 0
+
+    @property
+    def clock(self) -> DeviceClock:
+        """The station's clock as it is estimated."""
+        return self._stamps
+
+    def point(self, position: FloatArray, sigma: FloatArray, stamp: float | None = None) -> None:
+        """Take a point; the beam then holds.
+
+        Parameters
+        ----------
+        position, sigma : ndarray, shape (3,)
+            In m; sigma NaN where it is not known.
+        stamp : float, optional
+            By the device's clock, in s; without it the point is of now.
+        """
+        now = self._clock.now()
+        with self._lock:
+            try:
+                time = now if stamp is None else self._stamps.rig_time(stamp, now)
+                self._require_in_range(position)
+            except DeviceError as error:
+                self._fault = self._fault or str(error)
+                return
+            self._rows.append((time, *position.tolist(), *sigma.tolist()))
+            self._heard, self._beam, self._note = now, BeamState.LOCKED, ""
+
+    def beam_broken(self, why: str) -> None:
+        """Take note that the marker is not seen, and why."""
+        with self._lock:
+            self._beam, self._note = BeamState.BROKEN, why
+            self._rows.clear()
+
+    def fail(self, why: str) -> None:
+        """Take note of a fault; the next call of `take` raises it, and all after it."""
+        with self._lock:
+            self._fault = self._fault or f"{self.source}: {why}"
+
+    def forget(self) -> None:
+        """Drop what has come and nobody has taken."""
+        with self._lock:
+            self._rows.clear()
+
+    def take(self) -> PointBlock:
+        """Return the points since the last call; none while the beam is broken.
+
+        Raises
+        ------
+        DeviceError
+            If something is wrong with the station or its line.
+        """
+        now = self._clock.now()
+        with self._lock:
+            if self._fault:
+                raise DeviceError(self._fault)
+            if self._beam is BeamState.LOCKED and not now - self._heard <= self._silence:
+                self._beam, self._note = BeamState.BROKEN, "it says nothing"
+            beam, note = self._beam, self._note
+            rows = np.array(self._rows, dtype=float).reshape(-1, 7)
+            self._rows.clear()
+        if beam is BeamState.BROKEN:
+            rows = rows[:0]
+        return PointBlock(
+            time=rows[:, 0],
+            position=rows[:, 1:4],
+            sigma=rows[:, 4:],
+            beam=beam,
+            station=self.tracker.name,
+            source=self.source,
+            note=note,
+        )
+
+    def _require_in_range(self, position: FloatArray) -> None:
+        """Refuse a marker that is outside the station's range time after time."""
+        nearest_marker, farthest = self.tracker.range
+        distance = float(np.linalg.norm(position))
+        if not self._own_frame or nearest_marker / _ROUGHLY <= distance <= _ROUGHLY * farthest:
+            self._outside = 0
+            return
+        self._outside += 1
+        if self._outside < _OUTSIDE:
+            return
+        raw = distance / factor(self.unit, "length")
+        fitting = (
+            unit
+            for unit in _UNITS
+            if nearest_marker <= raw * factor(unit, "length") <= farthest and unit != self.unit
+        )
+        unit = next(fitting, None)
+        guess = (
+            f"the numbers, {raw:.4g}, look like {unit}, not {self.unit}: state the right unit"
+            if unit
+            else "are its points in another frame than the station's own?"
+        )
+        raise DeviceError(
+            f"{self.source}: marker {distance:.4g} m from {self.tracker.name}, whose range is"
+            f" {nearest_marker:g} m to {farthest:g} m: {guess}"
+        )
+
+
+class StationsMetrology:
+    """One or several stations; fulfils `elastocal.cell.Metrology`.
+
+    Parameters
+    ----------
+    feeds : mapping of str to StationFeed
+        By the stations' names, in the order of the cell file.
+    rate : float
+        Nominal number of points a second.
+    on_look : callable
+        Called with the name of the station that is to find the marker; returns at once.
+    """
+
+    def __init__(
+        self, feeds: Mapping[str, StationFeed], rate: float, on_look: Callable[[str], None]
+    ) -> None:
+        self._feeds, self._on_look = feeds, on_look
+        self.rate = rate
+        self.stations = tuple(feeds)
+        self._station = self.stations[0]
+
+    def look(self, station: str) -> None:
+        """Measure with this station from now on, and find the marker again if it was lost.
+
+        Raises
+        ------
+        DeviceError
+            If there is no such station.
+        """
+        require_station(station, self.stations)
+        if station != self._station:
+            self._feeds[station].forget()
+        self._station = station
+        self._on_look(station)
+
+    def read(self) -> PointBlock:
+        """Return the points since the last call; none while the beam is broken.
+
+        Raises
+        ------
+        DeviceError
+            If something is wrong with the station that measures, or its line.
+        """
+        return self._feeds[self._station].take()
+
+
+def require_station(station: str, stations: tuple[str, ...]) -> None:
+    """Refuse a station that is not there.
+
+    Raises
+    ------
+    DeviceError
+        With the nearest and all names.
+    """
+    if station not in stations:
+        raise DeviceError(
+            f"there is no station {station!r}{nearest(station, stations)}"
+            f" (stations: {', '.join(stations)})"
+        )
+
+
+def require_trackers(cell: Cell) -> tuple[Tracker, ...]:
+    """Return the stations of a cell.
+
+    Raises
+    ------
+    DeviceError
+        If it has none.
+    """
+    if not cell.file.trackers:
+        raise DeviceError(f"{cell.path}: a tracker to connect to stands under the key 'trackers'")
+    return cell.file.trackers

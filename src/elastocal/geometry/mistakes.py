@@ -1,0 +1,173 @@
+"""What people and trackers do wrong with absolute positions, found from what a fit leaves."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.errors import GeometryError
+from elastocal.geometry.problem import GeometryProblem, State
+from elastocal.geometry.solve import GeometryFit, register
+from elastocal.robot import JointReading, Robot, other_joint_readings
+from elastocal.wording import counted
+
+_ODD = 0.02
+"""Median distance of markers from a nominal arm, in m, that is no arm's own error."""
+_FAR_BETTER = 0.2
+"""Part of that distance that another reading of the joints has to leave at most."""
+_NEAR = 0.02
+"""Farther positions, in m, are broken beams and say nothing of where a station stands."""
+_LEAST_ROWS = 6
+"""Positions before and after a move of a station."""
+_STRONG = 40.0
+"""Value of F from which a station is said to have moved: the best of all splits is far lower
+where none has."""
+_SHIFT = 2.0
+"""Shift in standard deviations of a coordinate below which nobody needs to know of it."""
+_SIGMAS = 7.0
+"""Distance within which a swapped marker is where another one is expected."""
+_MOST_NAMED = 8
+
+
+def require_own_joints(problem: GeometryProblem, start: State) -> None:
+    """Refuse joints that are those of the arm only when they are read otherwise.
+
+    Parameters
+    ----------
+    problem : GeometryProblem
+        As stated.
+    start : State
+        Its registration.
+
+    Raises
+    ------
+    GeometryError
+        If the nominal arm is far off, and far less with another sign, order or coupling.
+    """
+    stated = _median_distance(problem, start)
+    if stated <= _ODD:
+        return
+    found = []
+    for reading in (*other_joint_readings(problem.robot), *_single_signs(problem.robot)):
+        q = reading.read(problem.robot, problem.data.q)
+        other = GeometryProblem(problem.robot, replace(problem.data, q=q))
+        found.append((_median_distance(other, register(other)), reading.message))
+    best, message = min(found)
+    if best <= _FAR_BETTER * stated and best <= _ODD:
+        raise GeometryError(
+            f"{message}: read that way the nominal arm is {1e3 * best:.3g} mm off (median), as"
+            f" stated {1e3 * stated:.3g} mm"
+        )
+
+
+def _median_distance(problem: GeometryProblem, at: State) -> float:
+    return float(np.median(np.linalg.norm(problem.residual(at), axis=1)))
+
+
+def _single_signs(robot: Robot) -> list[JointReading]:
+    """Return readings that turn one joint the other way round."""
+
+    def turned(joint: int) -> Callable[[Robot, FloatArray], FloatArray]:
+        return lambda _, q: np.where(np.arange(q.shape[1]) == joint, -q, q)
+
+    return [
+        JointReading(f"{name} turns the other way round than in the URDF", turned(joint))
+        for joint, name in enumerate(robot.joint_names)
+    ]
+
+
+def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[str, ...]:
+    """Return what a person should know of positions, a sentence each."""
+    notes = []
+    if not problem.robot.has_masses:
+        notes.append(
+            f"the description of {problem.robot.name} has no masses: what the arm yields to its own"
+            " weight is not told from its geometry"
+        )
+    return (*notes, *_swapped_markers(problem, fit), *_moved_stations(problem, fit))
+
+
+def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
+    """Return which markers were taken for one another, by rows whose positions were left out."""
+    at, sigma, seen = fit.state, fit.sigma, problem.data.seen
+    measured = np.full((*seen.shape, 3), np.nan)
+    expected = measured.copy()
+    R, t = at.T_station_base[problem.station, :3, :3], at.T_station_base[problem.station, :3, 3]
+    in_base = np.einsum("nji,nj->ni", R, problem.measured - t)
+    measured[problem.row, problem.marker] = in_base
+    expected[problem.row, problem.marker] = in_base - fit.residual
+    notes = []
+    for a, b in combinations(range(seen.shape[1]), 2):
+        apart = [
+            np.linalg.norm(measured[:, one] - expected[:, other], axis=1)
+            for one, other in ((a, b), (b, a), (a, a))
+        ]
+        swapped = (apart[0] < _SIGMAS * sigma) & (apart[1] < _SIGMAS * sigma)
+        rows = np.flatnonzero(swapped & (apart[2] > _SIGMAS * sigma))
+        if len(rows):
+            notes.append(
+                f"marker {a + 1} and marker {b + 1} are swapped in {counted(len(rows), 'row')}"
+                f" (counted from 0: {_named(rows)}); they were left out"
+            )
+    return notes
+
+
+def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
+    """Return which stations stood elsewhere from some row on.
+
+    What is left of the fit is explained by one rigid motion of the station, or by two with the
+    best split between them; F says by how much better two are (E. S. Page, "A test for a change in
+    a parameter occurring at an unknown point", Biometrika 42, 1955).
+    """
+    notes = []
+    for index, name in enumerate(problem.data.stations):
+        own = (problem.station == index) & (np.linalg.norm(fit.residual, axis=1) < _NEAR)
+        points = np.flatnonzero(own)
+        if len(points) < 2 * _LEAST_ROWS:
+            continue
+        split, F, shift = _best_split(problem, fit, points)
+        if F > _STRONG and shift > _SHIFT * fit.sigma:
+            row = int(problem.row[points[split]])
+            notes.append(
+                f"station {name!r} seems to have moved by {1e3 * shift:.2g} mm before row {row}"
+                " (counted from 0): give the rows from there on a name of their own in the column"
+                " 'station'"
+            )
+    return notes
+
+
+def _best_split(
+    problem: GeometryProblem, fit: GeometryFit, points: IndexArray
+) -> tuple[int, float, float]:
+    """Return where a station's positions part best, F, and the shift between the parts, in m."""
+    columns = slice(6 * problem.station[points[0]], 6 * problem.station[points[0]] + 6)
+    A, r = fit.J[points, :, columns], fit.residual[points]
+    G = np.cumsum(np.einsum("nki,nkj->nij", A, A), axis=0)
+    h = np.cumsum(np.einsum("nki,nk->ni", A, r), axis=0)
+    total = float((r**2).sum())
+    last = np.arange(_LEAST_ROWS - 1, len(points) - _LEAST_ROWS)
+    # A row's markers were seen at once.
+    last = last[problem.row[points[last]] != problem.row[points[last + 1]]]
+    if not len(last):
+        return 0, 0.0, 0.0
+    before, after = _solved(G[last], h[last]), _solved(G[-1] - G[last], h[-1] - h[last])
+    explained = (before * h[last]).sum(axis=1) + (after * (h[-1] - h[last])).sum(axis=1)
+    alone = float(_solved(G[-1:], h[-1:])[0] @ h[-1])
+    best = int(explained.argmax())
+    freedom = 3 * len(points) - 12
+    left = max(total - float(explained[best]), np.finfo(float).tiny)
+    F = (float(explained[best]) - alone) / 6.0 / (left / freedom)
+    moved = np.einsum("nki,i->nk", A, after[best] - before[best])
+    return int(last[best]) + 1, F, float(np.sqrt((moved**2).sum(axis=1).mean()))
+
+
+def _solved(G: FloatArray, h: FloatArray) -> FloatArray:
+    """Return solutions of small systems that few positions may leave open, shape (split, 6)."""
+    return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(G, hermitian=True, rcond=1e-9), h))
+
+
+def _named(rows: IndexArray) -> str:
+    more = " …" if len(rows) > _MOST_NAMED else ""
+    return ", ".join(map(str, rows[:_MOST_NAMED].tolist())) + more

@@ -1,0 +1,148 @@
+"""What is known of springs before the data, and what the drives say of all others.
+
+A spring file states stiffnesses and bounds. An arm says something by itself: a bearing, a housing
+or a link that yields more than the drive beside it would be a defect. Where poses and loads hardly
+turn a spring, a fit with bounds alone gives it whatever the noise asks for, and where production
+turns it the arm would bend by millimetres. So a compliance is expected to be of the size of the
+compliance of its joint's drive or below: a normal prior about zero of that width, for all springs
+alike. What the data determine it leaves alone. See docs/decisions/0066-ladder.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from elastocal.arrays import FloatArray
+from elastocal.dataset import Readings
+from elastocal.elastic import ElasticModel, KnownSpring, actuated
+from elastocal.errors import IdentificationError
+from elastocal.identification.options import MEDIAN_NORM, FitOptions, Prior, bounds
+from elastocal.identification.problem import build
+from elastocal.identification.solve import solve
+from elastocal.identification.uncertainty import leave_poses_out
+from elastocal.results import brief_repr
+from elastocal.robot import Robot
+
+_SURE = 2.0
+"""Standard errors above zero from which the compliance of a drive is known."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class DriveCompliances:
+    """How compliant the drive of each joint is, which no other spring of an arm exceeds by far."""
+
+    joints: tuple[str, ...]
+    softness: FloatArray
+    """Compliance of the drive over what is usual for its kind, that of the softest where the
+    readings do not tell or the joint slides, shape (joint,)."""
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        readings: Readings,
+        options: FitOptions,
+        marker_offset: ArrayLike | None = None,
+    ) -> "DriveCompliances | None":
+        """Return those that a spring at each joint alone finds; None where readings tell of none.
+
+        Parameters
+        ----------
+        robot, readings, options, marker_offset
+            As for `elastocal.identification.choose_model`.
+        """
+        model = ElasticModel(robot, actuated(robot))
+        problem = build(model, readings, replace(options, prior=None), marker_offset)
+        c = solve(problem).compliance[problem.springs]
+        left = leave_poses_out(problem).compliance[:, problem.springs]
+        folds = len(left)
+        error = np.sqrt((folds - 1) / folds * np.sum(np.square(left - c), axis=0))
+        softness = c / np.array([parameter.scale for parameter in model.parameters])
+        known = c > _SURE * error
+        if not known.any():
+            return None
+        own = known & np.array(robot.revolute)
+        softest = float(softness[known].max())
+        return cls(tuple(robot.joint_names), np.where(own, softness, softest))
+
+    def known_springs(self, model: ElasticModel) -> tuple[KnownSpring, ...]:
+        """Return what that says of every parameter of a model of the arm."""
+        softness = dict(zip(self.joints, self.softness.tolist(), strict=True))
+        return tuple(
+            KnownSpring(each.name, compliance=0.0, sigma=softness[each.joint] * each.scale)
+            for each in model.parameters
+        )
+
+
+def with_knowledge(
+    options: FitOptions,
+    known: Sequence[KnownSpring],
+    model: ElasticModel,
+    readings: Readings,
+    marker_offset: ArrayLike | None = None,
+) -> FitOptions:
+    """Return options of a fit that uses what is known of springs.
+
+    A prior is weighed against the noise of one component of a deflection: the robust residual of a
+    fit without it.
+
+    Parameters
+    ----------
+    options : FitOptions
+        What else was chosen.
+    known : sequence of KnownSpring
+        What is known; the options as they are without any.
+    model : ElasticModel
+        Robot and springs.
+    readings : Readings
+        Measurements, joints in the robot's order.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m.
+
+    Raises
+    ------
+    IdentificationError
+        If a spring is not the model's, or bounds contradict those of the options.
+    """
+    if not known:
+        return options
+    names = list(model.parameter_names)
+    natural = [parameter.lower for parameter in model.parameters]
+    lower, upper = (np.array(each) for each in bounds(options, len(names), natural))
+    rows, mean, sigma = (
+        np.zeros((len(known), len(names))),
+        np.zeros(len(known)),
+        np.ones(len(known)),
+    )
+    sigma *= np.inf
+    for number, each in enumerate(known):
+        columns = _columns_of(each, model)
+        rows[number, columns] = 1.0 if each.weights is None else each.weights
+        if each.weights is None:
+            lower[columns] = np.maximum(lower[columns], -np.inf if each.low is None else each.low)
+            upper[columns] = np.minimum(upper[columns], np.inf if each.high is None else each.high)
+        if each.compliance is not None and each.sigma is not None:
+            mean[number], sigma[number] = each.compliance, each.sigma
+    bounded = replace(options, lower=lower, upper=upper, prior=None)
+    if not np.isfinite(sigma).any():
+        return bounded
+    problem = build(model, readings, bounded, marker_offset)
+    residual = np.linalg.norm(problem.residuals(solve(problem, "huber").compliance), axis=1)
+    # Readings without any noise leave a prior no part, but not none at all.
+    smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
+    noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
+    return replace(bounded, prior=Prior(mean, sigma, noise, rows))
+
+
+def _columns_of(known: KnownSpring, model: ElasticModel) -> list[int]:
+    """Return the parameters that something is known of: all of a gear, or the one of that name."""
+    names = list(model.parameter_names)
+    if known.weights is None and known.name in names:
+        return [names.index(known.name)]
+    springs = {spring.name: spring for spring in model.springs}
+    if known.weights is None or known.name not in springs:
+        raise IdentificationError(f"the model has no spring {known.name!r} to know anything of")
+    return [names.index(parameter.name) for parameter in springs[known.name].parameters]

@@ -1,0 +1,132 @@
+"""How sure predictions on production are, and which of some models is expected to err least there.
+
+What production asks of a model need not be what its readings decide: rungs that left-out poses do
+not tell apart may predict otherwise where production runs, or not know what they predict. Along
+production each model has a variance, seen when poses are left out, and a bias. Of the richest the
+bias is taken for nil; what another predicts differs from it by its own bias and by chance, and the
+mean square of chance is the difference of the variances (J. A. Hausman, "Specification tests in
+econometrics", Econometrica 46, 1978), so that
+
+    error² = max(0, |p - p_richest|² - (v_richest - v)) + v,
+
+the focused information criterion with the deflections of production for its focus (G. Claeskens,
+N. L. Hjort, "The focused information criterion", J. American Statistical Association 98, 2003).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from elastocal.arrays import FloatArray
+from elastocal.elastic import ElasticModel
+from elastocal.identification.problem import Problem
+from elastocal.identification.solve import solve
+from elastocal.identification.uncertainty import CONFIDENCE, leave_poses_out
+from elastocal.results import brief_repr
+
+DOUBT_ROWS = 100
+"""Rows by which predictions along a path are judged."""
+_LARGEST_DOUBT = 0.5
+"""Half-width of the 95 % interval, as a share of what is predicted, beyond which a correction may
+do more harm than good."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ProductionRows:
+    """Postures and loads of production."""
+
+    joint_position: FloatArray
+    """Shape (row, joint), in rad or m."""
+    force: FloatArray
+    """On the robot at the tcp in base, shape (row, 3), in N."""
+    moment: FloatArray | None = None
+    """On the robot about the tcp in base, shape (row, 3), in N·m."""
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.joint_position)
+
+    def few(self) -> "ProductionRows":
+        """Return at most `DOUBT_ROWS` of the rows with a load, from the first to the last."""
+        loaded = np.flatnonzero(np.linalg.norm(self.force, axis=1) > 0.0)
+        if len(loaded):
+            loaded = loaded[np.unique(np.linspace(0, len(loaded) - 1, DOUBT_ROWS).astype(np.intp))]
+        moment = None if self.moment is None else self.moment[loaded]
+        return ProductionRows(self.joint_position[loaded], self.force[loaded], moment)
+
+
+@dataclass(frozen=True)
+class PredictionDoubt:
+    """How sure the predictions along a path are."""
+
+    deflection: float
+    """Mean predicted deflection, in m."""
+    half_width: float
+    """Mean half-width of its 95 % interval, in m."""
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the interval is narrow enough to correct by the prediction."""
+        return self.half_width <= _LARGEST_DOUBT * self.deflection
+
+    @property
+    def sentence(self) -> str:
+        """What a person should know."""
+        return (
+            f"on production the model predicts {1e3 * self.deflection:.3g} mm on average with a"
+            f" 95 % interval of ± {1e3 * self.half_width:.3g} mm: it does not know what it"
+            " predicts, a correction may do harm; press in the directions of production, or take"
+            " fewer springs (--springs bearing)"
+        )
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ProductionForecast:
+    """What a fit predicts along production, and how much that changes with the poses."""
+
+    deflection: FloatArray
+    """Shape (row, 3), in m."""
+    variance: float
+    """Mean square by which the poses move a prediction (jackknife), in m²."""
+    folds: int
+    """Refits that it is from."""
+
+    @classmethod
+    def of(
+        cls, model: ElasticModel, problem: Problem, rows: ProductionRows
+    ) -> "ProductionForecast":
+        """Return what the fit of a problem predicts of rows with a load, each pressed from rest."""
+        n = problem.springs
+        c, left = solve(problem).compliance[n], leave_poses_out(problem).compliance[:, n]
+        blocks = model.observation_blocks(rows.joint_position, rows.force, rows.moment)
+        moved = np.einsum("rin,fn->fri", blocks, left - c)
+        jackknife = (len(left) - 1) * np.mean(np.sum(np.square(moved), axis=2))
+        return cls(blocks @ c, float(jackknife), len(left))
+
+    @property
+    def doubt(self) -> PredictionDoubt:
+        """How sure it is."""
+        student = float(stdtrit(self.folds - 1, 0.5 * (1.0 + CONFIDENCE)))
+        size = float(np.linalg.norm(self.deflection, axis=1).mean())
+        return PredictionDoubt(size, student * float(np.sqrt(self.variance)))
+
+
+def expected_errors(forecasts: Sequence[ProductionForecast]) -> FloatArray:
+    """Return how far each of some models is expected to err on production, shape (model,), in m.
+
+    Parameters
+    ----------
+    forecasts : sequence of ProductionForecast
+        Of the same rows, the richest model last.
+    """
+    richest = forecasts[-1]
+    squares = []
+    for each in forecasts:
+        apart = np.sum(np.square(each.deflection - richest.deflection), axis=1).mean()
+        chance = richest.variance - each.variance
+        squares.append(max(0.0, float(apart) - chance) + each.variance)
+    return np.sqrt(squares)

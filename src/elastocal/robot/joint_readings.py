@@ -1,0 +1,61 @@
+"""Other ways in which controllers count the joints of an arm, that a log is mistaken for ours."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.robot.robot import Robot
+
+_ROLL = (0, 3, 5)
+"""First, fourth and sixth joint of an arm."""
+
+
+@dataclass(frozen=True)
+class JointReading:
+    """A way of reading joints that differs from the URDF's."""
+
+    message: str
+    """What the joints then are, as a sentence without its end."""
+    read: Callable[[Robot, FloatArray], FloatArray]
+    """From joints as recorded, shape (row, joint), to those of the URDF."""
+
+
+def _turn_roll(robot: Robot, q: FloatArray) -> FloatArray:
+    signs = np.ones(q.shape[1])
+    signs[[robot.external_axes + index for index in _ROLL if index < len(signs)]] = -1.0
+    return q * signs
+
+
+def _uncoupled(sign: float) -> Callable[[Robot, FloatArray], FloatArray]:
+    def read(robot: Robot, q: FloatArray) -> FloatArray:
+        free = q.copy()
+        second, third = robot.external_axes + 1, robot.external_axes + 2
+        free[:, third] = sign * q[:, third] - q[:, second]
+        return free
+
+    return read
+
+
+JOINT_READINGS = (
+    JointReading(
+        "joints 1, 4 and 6 of the arm turn the other way round than in the URDF (KUKA's A1, A4,"
+        " A6 turn clockwise)",
+        _turn_roll,
+    ),
+    JointReading(
+        "the third joint is coupled to the second as on FANUC controllers: use -(q2 + q3)",
+        _uncoupled(-1.0),
+    ),
+    JointReading(
+        "the third joint is measured against the horizontal: use q3 - q2", _uncoupled(1.0)
+    ),
+    JointReading("the joints are in reverse order", lambda _, q: q[:, ::-1]),
+)
+"""Those of arms of six axes or more, the likeliest first."""
+
+
+def other_joint_readings(robot: Robot) -> tuple[JointReading, ...]:
+    """Return the other ways in which joints of a robot may have been recorded."""
+    return JOINT_READINGS if len(robot.joint_names) >= 6 else ()

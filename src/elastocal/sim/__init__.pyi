@@ -1,0 +1,1 @@
+from .driver import DRIVER as DRIVER, SimulatedDriver as SimulatedDriver

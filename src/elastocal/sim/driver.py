@@ -1,0 +1,43 @@
+"""The driver of the simulated cell: all devices in a time of their own, or some in the rig's."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from elastocal.cell import KINDS, Cell, DeviceSet, DeviceSettings, RigContext
+from elastocal.sim.wire import LiveCell
+from elastocal.sim.workcell import simulated_devices
+
+
+@dataclass(frozen=True)
+class SimulatedDriver:
+    """Makes devices that need no hardware; see `elastocal.cell.Driver`."""
+
+    kinds = frozenset(KINDS)
+    real = False
+
+    def settings(self, kind: str) -> type[DeviceSettings]:  # noqa: ARG002 - the protocol's form
+        """Return settings without a key: the sections ``simulation`` and ``faults`` say it all."""
+        return DeviceSettings
+
+    def connect(
+        self, cell: Cell, wanted: Mapping[str, DeviceSettings], context: RigContext
+    ) -> DeviceSet:
+        """Make the devices of a simulated cell.
+
+        Where all are wanted, time passes when somebody sleeps, and results are the same to the last
+        bit. Beside devices of others the cell goes on with the clock of the rig.
+        """
+        if wanted.keys() == self.kinds:
+            all_of_it = simulated_devices(cell, context.seed, context.start)
+            arm, sensor, metrology = all_of_it.arm, all_of_it.sensor, all_of_it.metrology
+            return DeviceSet(arm, sensor, metrology, clock=all_of_it.clock)
+        live = LiveCell(cell, context.seed, context.clock)
+        return DeviceSet(
+            arm=live.arm() if "arm" in wanted else None,
+            sensor=live.sensor() if "sensor" in wanted else None,
+            metrology=live.metrology() if "metrology" in wanted else None,
+            feed=live if "sensor" in wanted else None,
+        )
+
+
+DRIVER = SimulatedDriver()

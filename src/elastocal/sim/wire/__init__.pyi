@@ -1,0 +1,27 @@
+from ._rsi_robot import PosCorrLimits as PosCorrLimits, RsiContext as RsiContext
+from .emscon import EmsconServer as EmsconServer
+from .line_stream import LineStreamServer as LineStreamServer
+from .live_cell import LiveCell as LiveCell
+from .net_ft import (
+    NetFtBox as NetFtBox,
+    NetFtServer as NetFtServer,
+    net_ft_server as net_ft_server,
+)
+from .rsi import (
+    IPOC_START as IPOC_START,
+    SENTYPE as SENTYPE,
+    RsiFault as RsiFault,
+    RsiServer as RsiServer,
+    RsiStatistics as RsiStatistics,
+    ethernet_config as ethernet_config,
+    rsi_server as rsi_server,
+)
+from .servers import (
+    SERVERS as SERVERS,
+    MakeServer as MakeServer,
+    Told as Told,
+    WireServer as WireServer,
+    bound as bound,
+    serves as serves,
+    wire_servers as wire_servers,
+)

@@ -1,0 +1,208 @@
+"""The messages of RSI over Ethernet as the controller sends and reads them, by its own config file.
+
+The file (``<ROOT>``) names the channels: ``DEF_…`` with ``INDX="INTERNAL"`` are the controller's
+own (poses, axes, count of late answers), the others are ports of the ETHERNET object, whose tags
+are free; ``a.b`` becomes the attribute ``b`` of an element ``a``. A channel of the answer that does
+not come keeps its last value (``HOLDON="1"``) or falls to 0.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from elastocal.errors import DeviceError
+
+LARGEST = 65536
+"""Longest datagram that the controller reads, in bytes."""
+_CHANNELS = 64
+"""Most channels each way."""
+_KINDS = ("BOOL", "STRING", "LONG", "DOUBLE")
+_POSE = ("X", "Y", "Z", "A", "B", "C")
+_ARM = tuple(f"A{n}" for n in range(1, 7))
+_EXTERNAL = tuple(f"E{n}" for n in range(1, 7))
+_INTERNAL = {
+    "RIst": _POSE, "RSol": _POSE, "AIPos": _ARM, "ASPos": _ARM, "EIPos": _EXTERNAL,
+    "ESPos": _EXTERNAL, "MACur": _ARM, "MECur": _EXTERNAL, "Delay": ("D",),
+    **{f"Tech.{kind}{n}": tuple(f"{kind}{n}{k}" for k in range(1, 11))
+       for kind in "CT" for n in range(1, 7)},
+}  # fmt: skip
+"""Attributes of the channels that the controller fills in itself."""
+Values = Mapping[str, float | Sequence[float]]
+"""Values by tag, the internal ones without ``DEF_``; a channel that is not there is 0."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One ``<ELEMENT>``."""
+
+    tag: str
+    kind: str
+    """BOOL, STRING, LONG or DOUBLE."""
+    internal: bool
+    hold: bool
+    """Whether it keeps its value when no answer comes."""
+
+    @property
+    def name(self) -> str:
+        """The tag without ``DEF_``."""
+        return self.tag.removeprefix("DEF_") if self.internal else self.tag
+
+
+@dataclass(frozen=True)
+class EthernetConfig:
+    """The config file of an ETHERNET object."""
+
+    address: str
+    """Of the PC."""
+    port: int
+    sentype: str
+    only_send: bool
+    send: tuple[Channel, ...]
+    receive: tuple[Channel, ...]
+
+    @classmethod
+    def from_xml(cls, text: str) -> "EthernetConfig":
+        """Return the config of a file's text, as the controller reads it at RSI_CREATE.
+
+        Raises
+        ------
+        DeviceError
+            If it would refuse it.
+        """
+        try:
+            root = ElementTree.fromstring(text)
+        except ElementTree.ParseError as error:
+            raise DeviceError(f"RSI_CREATE: the config is no XML: {error}") from error
+        entries = {key: _text(root, key) for key in ("IP_NUMBER", "PORT", "SENTYPE", "ONLYSEND")}
+        if root.tag != "ROOT" or not entries["PORT"].isdigit():
+            raise DeviceError("RSI_CREATE: the config has no <ROOT><CONFIG> with a PORT")
+        return cls(
+            entries["IP_NUMBER"],
+            int(entries["PORT"]),
+            entries["SENTYPE"],
+            entries["ONLYSEND"].upper() == "TRUE",
+            _channels(root, "SEND"),
+            _channels(root, "RECEIVE"),
+        )
+
+    @classmethod
+    def read(cls, path: Path) -> "EthernetConfig":
+        """Return the config in a file; see `from_xml`."""
+        try:
+            return cls.from_xml(path.read_text(encoding="utf-8-sig"))
+        except OSError as error:
+            raise DeviceError(f"RSI_CREATE: {path}: {error.strerror}") from error
+
+
+def _text(root: ElementTree.Element, key: str) -> str:
+    return (root.findtext(f"CONFIG/{key}") or "").strip()
+
+
+def _channels(root: ElementTree.Element, section: str) -> tuple[Channel, ...]:
+    """Return the channels of a section.
+
+    Raises
+    ------
+    DeviceError
+        If one is not as it must be.
+    """
+    found, ports = [], set()
+    for element in root.findall(f"{section}/ELEMENTS/ELEMENT"):
+        tag, kind, index = (element.get(key, "") for key in ("TAG", "TYPE", "INDX"))
+        internal = index == "INTERNAL"
+        known = tag.removeprefix("DEF_") in (*_INTERNAL, "EStr") if internal else index.isdigit()
+        if not (known and kind in _KINDS and tag.startswith("DEF_") == internal):
+            raise DeviceError(f"RSI_CREATE: {section}: element {tag!r} {kind!r} INDX {index!r}")
+        if not internal and (index in ports or not 1 <= int(index) <= _CHANNELS):
+            raise DeviceError(f"RSI_CREATE: Invalid index - signal output: {tag!r} INDX {index}")
+        ports.add(index)
+        found.append(Channel(tag, kind, internal, element.get("HOLDON", "0") == "1"))
+    return tuple(found)
+
+
+class RobWriter:
+    """Writes ``<Rob>`` datagrams."""
+
+    def __init__(self, channels: Sequence[Channel], precision: int) -> None:
+        """Write such channels with so many decimals."""
+        self._fields: list[tuple[str, int, bool]] = []
+        elements: dict[str, list[tuple[str, str]]] = {}
+        for channel in channels:
+            number = f"{{:.{precision}f}}" if channel.kind == "DOUBLE" else "{:.0f}"
+            attributes = _INTERNAL.get(channel.name) if channel.internal else None
+            element, _, attribute = channel.name.partition(".")
+            names = attributes or (attribute,)
+            elements.setdefault(element, []).extend((name, number) for name in names)
+            self._fields.append((channel.name, len(names), attributes is not None))
+        body = "".join(_form(element, parts) for element, parts in elements.items())
+        self._form = f'<Rob Type="KUKA">{body}<IPOC>{{:d}}</IPOC></Rob>'
+        order = [name.partition(".")[0] for name, _, _ in self._fields]
+        # Attributes of one element stand together, wherever their channels are.
+        self._fields.sort(key=lambda field: order.index(field[0].partition(".")[0]))
+
+    def write(self, values: Values, ipoc: int) -> bytes:
+        """Return the datagram of a cycle."""
+        numbers: list[float] = []
+        for name, count, many in self._fields:
+            value = values.get(name, 0.0)
+            if many and isinstance(value, Sequence):
+                numbers += [*value, *[0.0] * (count - len(value))]
+            else:
+                numbers += [value] * count if not isinstance(value, Sequence) else value[:count]
+        return self._form.format(*numbers, ipoc).encode()
+
+
+def _form(element: str, parts: list[tuple[str, str]]) -> str:
+    """Return the format of an element: attributes, or a text where there is no attribute."""
+    if parts[0][0] == "":
+        return f"<{element}>{parts[0][1]}</{element}>"
+    inside = " ".join(f'{name}="{number}"' for name, number in parts)
+    return f"<{element} {inside}/>"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One ``<Sen>`` datagram."""
+
+    ipoc: int
+    values: Mapping[str, float]
+    """By tag, those that came."""
+
+
+class SenReader:
+    """Reads ``<Sen>`` datagrams as the controller does: what does not fit has not come."""
+
+    def __init__(self, channels: Sequence[Channel], sentype: str) -> None:
+        """Look for such channels, in messages of such a type."""
+        numbers = [c.tag for c in channels if not c.internal and c.kind != "STRING"]
+        self._tags = [(tag, *tag.partition(".")[::2]) for tag in numbers]
+        self._sentype = sentype
+
+    def read(self, datagram: bytes) -> Answer | None:
+        """Return what a datagram says; None where the controller does not take it."""
+        if len(datagram) > LARGEST or b"<!" in datagram:
+            return None
+        try:
+            root = ElementTree.fromstring(datagram)
+            ipoc = int(root.findtext("IPOC") or "")
+        except (ElementTree.ParseError, ValueError):
+            return None
+        if root.tag != "Sen" or root.get("Type") != self._sentype:
+            return None
+        values = {}
+        for tag, element, attribute in self._tags:
+            found = root.find(element)
+            text = None if found is None else found.get(attribute) if attribute else found.text
+            number = _number(text)
+            if number is not None:
+                values[tag] = number
+        return Answer(ipoc, values)
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        number = float(text or "")
+    except ValueError:
+        return None
+    return number if abs(number) < float("inf") else None

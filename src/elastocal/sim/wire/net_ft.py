@@ -1,0 +1,291 @@
+"""A Net F/T box of the simulated cell: RDT, its configuration page, its calibration command.
+
+One client has the stream: who asked last. The page is ``/netftapi2.xml``. Not simulated: streams to
+another address, multi-unit synchronisation, thresholds.
+"""
+
+import contextlib
+import http
+import http.server
+import math
+import socket
+import struct
+import threading
+from dataclasses import dataclass
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from elastocal.cell import LOOPBACK, Cell, SensorStatus, WrenchBlock
+from elastocal.errors import DeviceError
+from elastocal.sim.wire.live_cell import LiveCell
+from elastocal.sim.wire.servers import Told, bound, serves
+
+_PAUSE = 0.002
+"""Between two looks for samples, in s of the wall."""
+_LISTEN = 0.05
+"""Between two looks whether to go on, in s of the wall."""
+_LARGEST = (1 << 31) - 1
+_WRAP = 1 << 32
+_MAGIC = 0x1234
+_REQUEST, _RECORD = struct.Struct(">HHI"), struct.Struct(">III6i")
+_COMMAND = 20
+"""Bytes of a TCP command."""
+_SATURATED = 0x80020000
+_FORCES = {"lb": (1, 4.4482216152605), "N": (2, 1.0), "kN": (4, 1e3)}
+"""Code in the calibration reply, and size in N."""
+_TORQUES = {"lb-in": (1, 0.112984829027617), "N-m": (3, 1.0), "N-mm": (4, 1e-3)}
+"""The same in N·m."""
+_STOP, _REALTIME, _BUFFERED, _BIAS = 0x0000, 0x0002, 0x0003, 0x0042
+_BUFFER = 5
+"""Records of a datagram in buffered mode."""
+_TICKS = 70
+"""Steps of the box's own counter between two samples: it measures faster than it sends."""
+
+
+@dataclass
+class NetFtBox:
+    """How a box is set up, and what is wrong with it; may be changed while it serves."""
+
+    counts_per_force: int
+    counts_per_torque: int
+    force_unit: str = "N"
+    torque_unit: str = "N-m"
+    transform: tuple[float, ...] = (0.0,) * 6
+    rdt: bool = True
+    status: int = 0
+    lose: int = 0
+    """So many records are counted and not sent, from now on."""
+    stalled: bool = False
+    """The box's own counter stands."""
+    bias: tuple[int, ...] = (0,) * 6
+    """In counts; set by the command of software bias."""
+
+    @classmethod
+    def of(cls, cell: Cell, force_unit: str = "N", torque_unit: str = "N-m") -> "NetFtBox":
+        """Return a box for the sensor of a cell: a power of ten of counts, as the range allows."""
+        sensor = cell.file.sensor
+        if sensor is None:
+            raise DeviceError(f"cell {cell.name} has no force sensor to simulate (key 'sensor')")
+        force = max(sensor.force_range) / _FORCES[force_unit][1]
+        torque = max(sensor.moment_range) / _TORQUES[torque_unit][1]
+        return cls(_counts(force), _counts(torque), force_unit, torque_unit)
+
+    def count(self, block: WrenchBlock) -> list[list[int]]:
+        """Return the samples of a block in counts, bias taken off, shape (sample, 6)."""
+        force = block.force * (self.counts_per_force / _FORCES[self.force_unit][1])
+        torque = block.moment * (self.counts_per_torque / _TORQUES[self.torque_unit][1])
+        counts = np.rint(np.concatenate([force, torque], axis=1)) - np.array(self.bias)
+        found: list[list[int]] = np.clip(counts, -_LARGEST, _LARGEST).astype(int).tolist()
+        return found
+
+    def page(self, rate: float) -> bytes:
+        """Return the configuration page."""
+        numbers = {"cfgtfx": self.transform, "setbias": self.bias}
+        texts = {
+            "prodname": "Simulated Net F/T",
+            "setcfgsel": "0",
+            "cfgnam": "elastocal",
+            "cfgcalsel": "0",
+            "cfgcpf": str(self.counts_per_force),
+            "cfgcpt": str(self.counts_per_torque),
+            "scfgfu": self.force_unit,
+            "scfgtu": self.torque_unit,
+            **{key: ";".join(f"{each:g}" for each in values) for key, values in numbers.items()},
+            "comrdte": "Enabled" if self.rdt else "Disabled",
+            "comrdtrate": f"{rate:g}",
+            "comrdtbsiz": str(_BUFFER),
+            "runstat": f"{self.status:#010x}",
+        }
+        inner = "".join(f"<{key}>{escape(text)}</{key}>" for key, text in texts.items())
+        return f'<?xml version="1.0"?><netft>{inner}</netft>'.encode()
+
+    def calibration(self) -> bytes:
+        """Return the reply to READCALINFO."""
+        codes = _FORCES[self.force_unit][0], _TORQUES[self.torque_unit][0]
+        counts = self.counts_per_force, self.counts_per_torque
+        return struct.pack(">HBBII6H", _MAGIC, *codes, *counts, *(1,) * 6)
+
+
+def _counts(largest: float) -> int:
+    """Return counts per unit: a power of ten, at most 10^6, that can count twice the range."""
+    return int(min(10.0 ** math.floor(math.log10(_LARGEST / (2.0 * largest))), 1e6))
+
+
+class NetFtServer:
+    """A box on three ports of one address."""
+
+    def __init__(
+        self,
+        live: LiveCell,
+        port: int = 0,
+        http_port: int = 0,
+        tcp_port: int = 0,
+        *,
+        box: NetFtBox | None = None,
+        address: str = LOOPBACK,
+    ) -> None:
+        """Take the ports; 0: any that is free.
+
+        Raises
+        ------
+        DeviceError
+            If the cell has no sensor, or a port cannot be had.
+        """
+        self.box = box or NetFtBox.of(live.cell)
+        self._sensor = live.sensor()
+        self._closed = threading.Event()
+        self._udp = bound(socket.SOCK_DGRAM, port, address)
+        self._udp.setblocking(False)
+        self._tcp = bound(socket.SOCK_STREAM, tcp_port, address)
+        self._http = _PageServer(self, bound(socket.SOCK_STREAM, http_port, address))
+        self._client: tuple[str, int] | None = None
+        self._left: int | None = None
+        """Records that the client still wants; None: all."""
+        self._batch = 1
+        self._waiting: list[bytes] = []
+        self._rdt = self._ft = 0
+        self._last = [0] * 6
+        self._threads = [
+            threading.Thread(target=each, daemon=True)
+            for each in (self._stream, self._calibrate, self._serve_page)
+        ]
+
+    @property
+    def port(self) -> int:
+        """The UDP port."""
+        return int(self._udp.getsockname()[1])
+
+    @property
+    def ports(self) -> dict[str, int]:
+        """All ports, by protocol."""
+        tcp = int(self._tcp.getsockname()[1])
+        return {"udp": self.port, "tcp": tcp, "http": int(self._http.server_address[1])}
+
+    def start(self) -> None:
+        """Answer from now on."""
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        """Answer no more."""
+        self._closed.set()
+        if self._threads[0].is_alive():
+            self._http.shutdown()
+        self._http.server_close()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join(2.0)
+        self._udp.close()
+        self._tcp.close()
+
+    def restart(self) -> None:
+        """Forget counters and bias, as a box does that loses power; its client goes on to hear."""
+        self._rdt = self._ft = 0
+        self.box.bias = (0,) * 6
+
+    def page(self) -> bytes:
+        """Return the configuration page as it is now."""
+        return self.box.page(self._sensor.rate)
+
+    def _stream(self) -> None:
+        while not self._closed.wait(_PAUSE):
+            with contextlib.suppress(BlockingIOError, ConnectionError):
+                while True:
+                    self._obey(*self._udp.recvfrom(64))
+            self._send(self._sensor.read())
+
+    def _obey(self, datagram: bytes, client: tuple[str, int]) -> None:
+        if len(datagram) != _REQUEST.size:
+            return
+        magic, command, samples = _REQUEST.unpack(datagram)
+        if magic != _MAGIC:
+            return
+        if command == _STOP and client == self._client:
+            self._client = None
+        elif command in (_REALTIME, _BUFFERED):
+            # Whoever had the stream before is told nothing.
+            self._client, self._left = client, samples or None
+            self._batch = _BUFFER if command == _BUFFERED else 1
+            self._rdt, self._waiting = 0, []
+        elif command == _BIAS:
+            self.box.bias = tuple(b + c for b, c in zip(self.box.bias, self._last, strict=True))
+
+    def _send(self, block: WrenchBlock) -> None:
+        status = self.box.status
+        if block.status is SensorStatus.SATURATED:
+            status |= _SATURATED
+        for counts in self.box.count(block):
+            self._last = counts
+            self._ft += 0 if self.box.stalled else _TICKS
+            if self._client is None:
+                continue
+            self._rdt += 1
+            if self.box.lose:
+                self.box.lose -= 1
+                continue
+            ticks = self._rdt % _WRAP, self._ft % _WRAP
+            self._waiting.append(_RECORD.pack(*ticks, status, *counts))
+            self._left = None if self._left is None else self._left - 1
+            if len(self._waiting) >= self._batch or self._left == 0:
+                with contextlib.suppress(OSError):
+                    self._udp.sendto(b"".join(self._waiting), self._client)
+                self._waiting = []
+            if self._left == 0:
+                self._client = None
+
+    def _serve_page(self) -> None:
+        self._http.serve_forever(poll_interval=_LISTEN)
+
+    def _calibrate(self) -> None:
+        self._tcp.listen()
+        self._tcp.settimeout(_LISTEN)
+        while not self._closed.is_set():
+            with contextlib.suppress(OSError):
+                line, _ = self._tcp.accept()
+                with line:
+                    line.settimeout(_LISTEN)
+                    command = line.recv(_COMMAND, socket.MSG_WAITALL)
+                    if len(command) == _COMMAND and command[0] == 1:
+                        line.sendall(self.box.calibration())
+
+
+class _PageServer(http.server.ThreadingHTTPServer):
+    """Serves the configuration page, on a socket that is bound already."""
+
+    daemon_threads = True
+
+    def __init__(self, server: NetFtServer, line: socket.socket) -> None:
+        super().__init__(line.getsockname(), _PageHandler, bind_and_activate=False)
+        self.socket.close()
+        self.socket, self.box_server = line, server
+        self.server_address = line.getsockname()
+        self.server_activate()
+
+
+class _PageHandler(http.server.BaseHTTPRequestHandler):
+    """Answers one request."""
+
+    server: _PageServer
+    timeout = 2.0
+
+    def do_GET(self) -> None:
+        """Answer with the page, whatever index is asked for."""
+        if self.path.partition("?")[0] != "/netftapi2.xml":
+            self.send_error(http.HTTPStatus.NOT_FOUND)
+            return
+        page = self.server.box_server.page()
+        self.send_response(http.HTTPStatus.OK)
+        self.send_header("Content-Type", "text/xml")
+        self.send_header("Content-Length", str(len(page)))
+        self.end_headers()
+        self.wfile.write(page)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing."""
+
+
+@serves("net_ft")
+def net_ft_server(live: LiveCell, told: Told) -> NetFtServer:
+    """Return the box that a cell file describes."""
+    return NetFtServer(live, told.port(), told.port("http_port"), told.port("tcp_port"))

@@ -1,0 +1,392 @@
+"""The robot as it follows a commanded pose each cycle, and the contact force that results.
+
+A segment of the simulated cell is planned from a wanted force; a robot that is corrected from
+outside is told where to go, and what force that makes comes of the give of arm, disk and tooling.
+With the commanded pose ``p``, the twist ``t`` of the arm and the place ``c`` where the contact
+holds the tool (`elastocal.sim.workcell._contact`), the force on the robot solves
+
+    p + t(F, gears) = c(F),    torque(gears) = J_g^T F + weight
+
+by Newton's method from the force of the cycle before. The twist is *linearised* in the springs
+about the last exact equilibrium (`Quasistatics.loaded`), but for the six gears, whose laws and
+memory are followed in every cycle. The exact equilibrium is found anew when the force or the pose
+has moved away from it, and when the robot stands; a difference to what was foretold is faded in.
+
+Assumptions: the tool's turn changes nothing about the contact; the robot is at rest at every
+instant. What is random from stop to stop (error of the stop, point of attack, slip of the ring)
+comes in over the first part of the way from one standstill to the next.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Fault, Motion
+from elastocal.sim.workcell._contact import LIMIT, Contact, Hit
+from elastocal.sim.workcell._plant import Plant
+from elastocal.sim.workcell._tangent import GearCurves, Tangent, View, contact_compliance, cross
+from elastocal.sim.workcell._timeline import Knots, RobotPath, RobotState, Uniform
+
+_STANDSTILL = 20e-6
+"""A commanded pose that stays so near counts as standing, in m."""
+_SETTLE = 0.4
+"""Time that it must stay so, in s."""
+_DEPARTED = 50e-6
+"""Way from a standstill that begins another movement, in m."""
+_BLEND = 2e-4
+"""Way on which the random part of a stop comes in, in m."""
+_FORCE_STEP, _WAY_FREE, _WAY_PRESSED = 60.0, 5e-3, 1e-3
+"""Change of force in N, and of pose in m, after which the equilibrium is found anew."""
+_REFRESH_GAP = 10
+"""Fewest cycles between two exact equilibria."""
+_FADE = 0.8
+"""Part of what the exact equilibrium found otherwise that is left after a cycle."""
+_REFRESH_STANDING, _SMALL_CHANGE, _SMALL_WAY = 50, 0.2, 2e-6
+"""The same while it stands: cycles, force in N, and way in m that count as none."""
+_TURN = 2e-3
+"""Turn of the tool after which the equilibrium is found anew."""
+_SAME_PLACE = 2e-4
+"""Joints so near to where they were led to have not been moved by anything else, in rad or m."""
+_ENDS = np.array([0.0, 1.0])
+_ROUNDS = 6
+_CLOSED = 1e-3
+"""Change of force that counts as none, in N."""
+_LATERAL = 5e-4
+"""Way along the surface after which it is looked for again, in m."""
+_REACH = 0.5
+"""How far ahead the surface is looked for, in m."""
+
+
+@dataclass
+class _Chance:
+    """What differs from stop to stop, on the way from one value to the next."""
+
+    before: FloatArray
+    after: FloatArray
+    """Error of the stop in m, tilt and wander in standard deviations, slip likewise: (9,)."""
+    part: float = 1.0
+
+    @property
+    def now(self) -> FloatArray:
+        """Return the values now, shape (9,)."""
+        return self.before + self.part * (self.after - self.before)
+
+
+class PoseFollower:
+    """The robot of a plant, led by commanded poses of its tool; see the module."""
+
+    q: FloatArray
+    """Joints of the controller, shape (joint,), in rad or m."""
+    T: FloatArray
+    """Where they bring the undeformed tool, in base, shape (4, 4)."""
+    _tangent: Tangent
+    _curves: GearCurves
+    _gears: FloatArray
+    _load_now: FloatArray
+    _row: tuple[FloatArray, ...]
+
+    def __init__(self, plant: Plant) -> None:
+        """Stand ready; `begin` takes the robot over."""
+        self._plant = plant
+        self._led = False
+        self.contact: Contact | None = None
+        """What is touched."""
+        self.force: FloatArray = np.zeros(3)
+        """Force on the robot in base, shape (3,), in N."""
+        self.stopped: str | None = None
+        """Why the safety controller has stopped the arm; a fault of the cell file."""
+
+    def begin(self) -> None:
+        """Take the robot over where it stands, free; a visit begins when it sets out from there.
+
+        Where nothing else has moved it since, it goes on instead.
+        """
+        plant = self._plant
+        here = plant.segment.path.end.q
+        if self._led and np.abs(here - self.q).max() < _SAME_PLACE:
+            return
+        stands, self._statics = plant.robot_state(), plant.statics
+        free = self._statics.free(stands.q, np.zeros(3), stands.theta)
+        self.contact, self.force, self.stopped = None, np.zeros(3), None
+        # Where it stands it stays: what it is off by is the error of its last stop.
+        error = (stands.twist - free.twist)[:3]
+        values = np.concatenate([error, plant.chance.load(0), np.zeros(2)])
+        self._chance, self._load = _Chance(values, values), -1
+        self._view = View.of(self._statics)
+        self.q, self.T = free.q, self._statics.robot.forward(free.q)
+        self._rest, self._still, self._way, self._standing = self.T[:3, 3], 0.0, 0.0, True
+        self._fade: FloatArray = np.zeros(9)
+        self._ahead: tuple[FloatArray, Hit | None] | None = None
+        self._take(free)
+        self._row = self._see()
+        self._steps = ["approach", "reference", "engage"]
+        self._missed, self._led = False, True
+
+    def _begin_visit(self) -> None:
+        """Begin the visit of the posture that the arm stands in."""
+        plant = self._plant
+        plant.begin_visit()
+        self._statics = plant.statics
+        self._view = View.of(self._statics)
+        faults = plant.schedule.at(plant.visit)
+        self._missed = any(fault.kind == "contact_missed" for fault in faults)
+        self._begin_step("approach")
+
+    def follow(self, T_base_tcp: FloatArray, duration: float) -> None:
+        """Go to a commanded pose of the tool, evenly within some time.
+
+        Parameters
+        ----------
+        T_base_tcp : ndarray, shape (4, 4)
+            Of the undeformed robot; near the one before.
+        duration : float
+            In s.
+        """
+        way = T_base_tcp[:3, 3] - self.T[:3, 3]
+        self._lead(T_base_tcp)
+        self._note_standstill(duration)
+        self._fade = _FADE * self._fade
+        if self.contact is None and not self._missed:
+            self._touch(way)
+        if self.contact is not None:
+            self._balance(self.contact)
+        self._since += 1
+        if self._since >= _REFRESH_GAP and self._is_far():
+            self._refresh()
+        self._run(duration)
+
+    @property
+    def gear_torque(self) -> FloatArray:
+        """Torque of the gears, shape (gear,), in N·m."""
+        torque: FloatArray = self._tangent.torque + self._tangent.gears_torque @ self._load_now
+        return torque
+
+    def _lead(self, T_goal: FloatArray) -> None:
+        """Move the joints: one Newton step from the pose that the last one has reached."""
+        turn = T_goal[:3, :3] @ self.T[:3, :3].T
+        error = np.empty(6)
+        error[:3] = T_goal[:3, 3] - self.T[:3, 3]
+        error[3:] = (
+            0.5 * (turn[2, 1] - turn[1, 2]),
+            0.5 * (turn[0, 2] - turn[2, 0]),
+            0.5 * (turn[1, 0] - turn[0, 1]),
+        )
+        self.q = self.q + self._tangent.J_inverse @ error
+        self.T = self._statics.robot.forward(self.q)
+
+    def _note_standstill(self, duration: float) -> None:
+        """Draw anew what differs from stop to stop, each time that the robot sets out."""
+        here = self.T[:3, 3]
+        way = math.dist(here.tolist(), self._rest.tolist())
+        if self._standing:
+            if way > _DEPARTED:
+                self._standing, self._way = False, 0.0
+                self._depart()
+        elif way > _STANDSTILL:
+            self._way += way
+            self._chance.part = min(1.0, self._way / _BLEND)
+            self._rest, self._still = here, 0.0
+        else:
+            self._still += duration
+            self._standing = self._still >= _SETTLE
+            if self._standing and self.contact is None:
+                self._begin_step("reference")
+
+    def _depart(self) -> None:
+        plant, chance, slips = self._plant, self._chance, np.zeros(2)
+        if self._steps[:1] == ["approach"]:
+            self._begin_visit()
+        elif self.contact is None:
+            self._begin_step("engage")
+        if self.contact is not None:
+            # What has slipped so far stays where it is.
+            self.contact = self.contact.slipped(self._slipped(self.contact))
+            self._load += 1
+            slips = plant.slip(self._load)
+        load = plant.chance.load(max(self._load, 0))
+        chance.before = np.concatenate([chance.now[:7], np.zeros(2)])
+        chance.after, chance.part = np.concatenate([plant.stop_error(), load, slips]), 0.0
+        if self.contact is not None:
+            self._fail(self._plant.schedule.begin("hold", plant.visit, self._load, plant.now))
+
+    def _slipped(self, contact: Contact) -> FloatArray:
+        """Return how far the ring has slipped at random, tcp frame, shape (2,), in m."""
+        sigma = contact.law.slip_sigma(contact.R_base_tcp.T @ self.force)
+        slipped: FloatArray = sigma * self._chance.now[7:]
+        return slipped
+
+    def _begin_step(self, step: str) -> None:
+        """Begin a step of the visit, in its turn: the cell's faults count from there."""
+        if self._steps and self._steps[0] == step:
+            del self._steps[0]
+            plant = self._plant
+            self._fail(plant.schedule.begin(step, plant.visit, 0, plant.now))
+
+    def _fail(self, faults: list[tuple[int, Fault]]) -> None:
+        """Let faults come at their times."""
+        for time, fault in faults:
+            act = self._slip if fault.kind == "slip" else self._stop
+            self._plant.later(time, partial(act, fault.distance))
+
+    def _stop(self, _: float) -> None:
+        self.stopped = "stopped by the safety controller"
+
+    def _slip(self, distance: float) -> None:
+        """Let the contact slip against the lateral force, by so much, in m."""
+        if self.contact is not None:
+            lateral = (self.contact.R_base_tcp.T @ self.force)[:2]
+            size = float(np.linalg.norm(lateral))
+            away = -lateral / size if size > 0.0 else np.array([1.0, 0.0])
+            self.contact = self.contact.slipped(distance * away)
+
+    def _touch(self, way: FloatArray) -> None:
+        """Notice that the tool has come to the surface."""
+        tool = self.T[:3, 3] + self._twist()[:3]
+        outward = self.T[:3, 2]
+        if self._ahead is not None:
+            off = tool - self._ahead[0]
+            if np.linalg.norm(off - outward * (outward @ off)) > _LATERAL:
+                self._ahead = None
+        if self._ahead is None:
+            self._ahead = (tool, self._plant.surface.hit(tool, outward, _REACH))
+        origin, hit = self._ahead
+        if hit is None:
+            return
+        gap = float((tool - origin - hit.distance * outward) @ hit.normal)
+        if gap > 0.0:
+            return
+        steep = float(way @ hit.normal)
+        anchor = tool - gap * (way / steep if steep < 0.0 else hit.normal)
+        place = (anchor, self.T[:3, :3].copy(), hit.normal, self.q)
+        self.contact = Contact(self._plant.contact_law, *place, self._chance.now[3:7])
+        self._refresh()
+
+    def _balance(self, contact: Contact) -> None:
+        """Find the force at which robot, disk and tooling are where each holds the tool."""
+        self.contact = contact = replace(contact, chance=self._chance.now[3:7])
+        anchor = contact.anchor + contact.R_base_tcp[:, :2] @ self._slipped(contact)
+        held = replace(contact, anchor=anchor)
+        R, law, tangent, curves = contact.R_base_tcp, contact.law, self._tangent, self._curves
+        force = self.force
+        for _ in range(_ROUNDS):
+            load = self._load_change(force)
+            torque, stiffness = curves.torque(self._gears)
+            turn = (tangent.torque + tangent.gears_torque @ load - torque) / stiffness
+            self._gears = self._gears + turn
+            give = tangent.gears_twist[:3] @ (tangent.gears_torque[:, :3] / stiffness[:, None])
+            yielding = tangent.compliance[:3, :3] + give + contact_compliance(held, force)
+            self._load_now = load
+            tool = self.T[:3, 3] + self._twist()[:3]
+            step = np.linalg.solve(yielding, held.tool_position(force) - tool)
+            force = force + step
+            if max(abs(value) for value in step.tolist()) < _CLOSED:
+                break
+        force_tcp = R.T @ force
+        if force_tcp[2] >= 0.0:
+            self._lift(contact)
+            return
+        if law.effort(force_tcp) > LIMIT:
+            force = R @ law.held(force_tcp)
+        self._load_now = self._load_change(force)
+        torque, stiffness = curves.torque(self._gears)
+        demand = tangent.torque + tangent.gears_torque @ self._load_now
+        self._gears = self._gears + (demand - torque) / stiffness
+        if law.effort(force_tcp) > LIMIT:
+            # It slides: the disk comes along with the tool.
+            tool = self.T[:3, 3] + self._twist()[:3]
+            behind = R.T @ (tool - held.tool_position(force))
+            self.contact = contact.slipped(behind[:2])
+        curves.draw_along(self._gears)
+        self.force = force
+
+    def _lift(self, contact: Contact) -> None:
+        """Carry no force; let go of the surface once it is a little away."""
+        self.force, pressed = np.zeros(3), bool(np.any(self.force))
+        self._load_now = self._load_change(self.force)
+        tool = self.T[:3, 3] + self._twist()[:3]
+        gone = float((tool - contact.anchor) @ contact.normal) > _STANDSTILL
+        if gone:
+            self.contact = self._ahead = None
+        if gone or pressed:
+            self._refresh()
+
+    def _load_change(self, force: FloatArray) -> FloatArray:
+        """Return force and moment beyond those of the equilibrium, at its point, shape (6,)."""
+        load = np.zeros(6)
+        load[:3] = force - self._tangent.state.force
+        attack = self._attack(force)
+        if attack is not None:
+            load[3:] = cross(self.T[:3, :3] @ (attack - self._tangent.attack), force)
+        return load
+
+    def _attack(self, force: FloatArray) -> FloatArray | None:
+        return None if self.contact is None else self.contact.attack(force)
+
+    def _twist(self) -> FloatArray:
+        """Return the deviation of the robot now, shape (9,); see `Knots.twist`."""
+        tangent = self._tangent
+        turned = self._gears - self._gears_then
+        twist: FloatArray = tangent.state.twist + self._fade + tangent.gears_twist @ turned
+        if self.contact is not None:
+            twist = twist + tangent.compliance @ self._load_now
+        twist[:3] += self._chance.now[:3]
+        return twist
+
+    def _is_far(self) -> bool:
+        """Return whether it is time for an exact equilibrium."""
+        change = math.dist(self.force.tolist(), self._tangent.state.force.tolist())
+        way = math.dist(self.T[:3, 3].tolist(), self._tangent.point.tolist())
+        if self._standing and self._since >= _REFRESH_STANDING:
+            return change > _SMALL_CHANGE or way > _SMALL_WAY
+        turn = float(np.abs(self.T[:3, :3] - self._tangent.R).max())
+        longest = _WAY_FREE if self.contact is None else _WAY_PRESSED
+        return change > _FORCE_STEP or way > longest or turn > _TURN
+
+    def _refresh(self) -> None:
+        """Find the exact equilibrium, and fade in what it has otherwise than foretold."""
+        foretold, nothing, force = self._twist(), np.zeros(3), self.force
+        before = self._tangent.state
+        if np.any(force):
+            springs = replace(before.springs, slider=self._curves.slider)
+            before = replace(before, springs=springs)
+            attack = self._attack(force)
+            state = self._statics.loaded(before, self.q, force, nothing, attack)
+        else:
+            state = self._statics.free(self.q, nothing, before.theta)
+        self._take(state)
+        self._fade = np.zeros(9)
+        self._fade = foretold - self._twist()
+
+    def _take(self, state: RobotState) -> None:
+        attack = self._attack(state.force)
+        attack = np.zeros(3) if attack is None else attack
+        self._tangent = Tangent.at(self._statics, state, attack)
+        self._curves, self._since = GearCurves.of(state.springs), 0
+        self._gears = self._gears_then = state.theta[state.springs.gears.which]
+        self._load_now = np.zeros(6)
+
+    def _see(self) -> tuple[FloatArray, ...]:
+        """Return joints, twist, force, moment, and what instruments see; see `Knots`."""
+        twist, lever = self._twist(), self._statics.lever(self._attack(self.force))
+        moment = cross(self.T[:3, :3] @ lever, self.force)
+        return self.q, twist, self.force, moment, self._view.seen(self.T, twist, self.force, moment)
+
+    def _run(self, duration: float) -> None:
+        """Let the cell go there evenly."""
+        plant, row, memory = self._plant, self._see(), self._tangent.state
+        before, segment = self._row, plant.segment
+        if plant.now < segment.end:
+            knots, where = segment.path.knots, np.array([segment.progress(plant.now)])
+            columns = (knots.q, knots.twist, knots.force, knots.moment, knots.seen)
+            before = tuple(knots.at(column, where)[0] for column in columns)
+
+        def state(row: tuple[FloatArray, ...]) -> RobotState:
+            return replace(memory, q=row[0], twist=row[1], force=row[2], moment=row[3])
+
+        both = [np.stack(pair) for pair in zip(before, row, strict=True)]
+        path = RobotPath(Knots(_ENDS, *both), state(before), state(row))
+        plant.run(path, Uniform(duration), (Motion.IDLE, Motion.IDLE))
+        self._row = row

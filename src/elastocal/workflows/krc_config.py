@@ -1,0 +1,136 @@
+"""``krc-config``: the files for a KUKA controller, and the sheet that a person signs."""
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from elastocal.cell import LOOPBACK, Cell, load_cell
+from elastocal.drivers.kuka_rsi import (
+    SHEET,
+    Bounds,
+    RsiSettings,
+    bounds_of,
+    check_ethernet_file,
+    controller_files,
+    write_controller_files,
+)
+from elastocal.errors import DeviceError
+from elastocal.files import read_text
+from elastocal.progress import Progress
+from elastocal.records import record, validate
+from elastocal.results import Result
+from elastocal.workflows._workflow import workflow
+
+_DRIVER = "kuka_rsi"
+
+
+@dataclass(frozen=True)
+class KrcConfigSettings:
+    """Which cell's controller, and where to."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``, whose arm is a KUKA."""
+    out: Path | None = None
+    """Folder to write into."""
+    check: Path | None = None
+    """ETHERNET file of a controller, to be checked instead."""
+    force: bool = False
+    """Replace files that are there."""
+
+
+@record()
+class KrcConfigResult(Result):
+    """The files that were written or checked, and the limits that they hold."""
+
+    mode: str
+    folder: str | None
+    """None where a file was checked."""
+    files: tuple[str, ...]
+    bounds: Bounds
+    delay: float
+    """From command to motion, in s."""
+    notes: tuple[str, ...]
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        bounds = self.bounds
+        return (
+            ("mode", self.mode),
+            ("folder", self.folder or "nothing written"),
+            ("files", ", ".join(self.files)),
+            ("largest correction", f"{1e3 * bounds.correction:.1f} mm"),
+            ("POSCORR, POSCORRMON", f"{1e3 * bounds.poscorr:.1f}, {1e3 * bounds.monitor:.1f} mm"),
+            ("fastest correction", f"{1e3 * bounds.speed:g} mm/s"),
+            ("delay to motion", f"{1e3 * self.delay:.1f} ms"),
+            *(("note", text) for text in self.notes),
+        )
+
+
+@workflow(KrcConfigSettings)
+def krc_config(settings: KrcConfigSettings, progress: Progress) -> KrcConfigResult:  # noqa: ARG001 - done in an instant
+    """Write ETHERNET files, KRL programs and a sign-off sheet for a KUKA; or check a file of it.
+
+    Parameters
+    ----------
+    settings : KrcConfigSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    DeviceError
+        If the arm of the cell is none of `elastocal.drivers.kuka_rsi`, or the file that is checked
+        does not do what the arm's mode needs.
+    SchemaError
+        If what stands under the arm does not fit.
+    FileAccessError
+        If a file cannot be read or written, or is there and ``force`` is not given.
+    """
+    cell = load_cell(Path(settings.cell))
+    arm = kuka_settings(cell)
+    if (settings.out is None) is (settings.check is None):
+        raise DeviceError("krc-config: give either a folder to write into, or a file to check")
+    if settings.out is None:
+        assert settings.check is not None
+        text = read_text(settings.check)
+        try:
+            check_ethernet_file(text, arm.mode)
+        except DeviceError as error:
+            raise DeviceError(f"{settings.check}: {error}") from error
+        files: tuple[str, ...] = (settings.check.name,)
+    else:
+        files = write_controller_files(settings.out, controller_files(cell, arm), settings.force)
+    return KrcConfigResult(
+        mode=arm.mode,
+        folder=None if settings.check is not None else str(settings.out),
+        files=files,
+        bounds=bounds_of(cell, arm),
+        delay=arm.motion_delay(cell),
+        notes=_notes(arm),
+    )
+
+
+def kuka_settings(cell: Cell) -> RsiSettings:
+    """Return what stands under the arm of a cell, a KUKA.
+
+    Raises
+    ------
+    DeviceError
+        If the arm has another driver.
+    SchemaError
+        If what stands there does not fit.
+    """
+    choice, place = cell.file.devices.arm, f"{cell.path}: devices.arm"
+    if choice.driver != _DRIVER:
+        raise DeviceError(f"{place}: the driver is {choice.driver!r}: must be {_DRIVER!r}")
+    return validate(dict(choice.told), RsiSettings, place)
+
+
+def _notes(arm: RsiSettings) -> tuple[str, ...]:
+    notes = [f"nothing of this was tried on a robot: sign {SHEET} line by line before use"]
+    if arm.address == LOOPBACK:
+        notes.append(f"devices.arm.address is {LOOPBACK}: a controller cannot reach it")
+    if arm.commissioning is None and arm.delay is None:
+        notes.append("the delay from command to motion is assumed: elastocal measure-delay")
+    return tuple(notes)

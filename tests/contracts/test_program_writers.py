@@ -1,0 +1,238 @@
+"""What every writer of robot programs keeps, read back by readers that share no code with them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal.compensation.programs import (
+    PROGRAM_WRITERS,
+    TOUCH_SPEED,
+    choose_writer,
+    plan_program,
+    write_plan_program,
+    writer_named,
+)
+from elastocal.errors import PlanningError
+from elastocal.robot import Robot, catalogue
+from support import plans, urdfs
+from support.program_readers import READERS
+
+MODELS = {
+    "krl": ("KR 120 R2700 extra HA", (0.0, 0.0, 0.0)),
+    "rapid": ("IRB 6700-200/2.60", (0.0, 0.0, 0.0)),
+    "fanuc": ("R-2000iC/210F", (0.0, 0.0, 0.0)),
+    "urscript": ("UR20", (-0.85, -0.3, -0.35)),
+}
+"""A robot of each language, and how far the poses are moved to be within its reach."""
+CASES = [
+    (name, rail) for name in MODELS for rail in (False, True) if name != "urscript" or not rail
+]
+MM, DEG = 1e-3, np.radians(1e-3)
+
+
+def plan_of(language, rail=False):
+    model, shift = MODELS[language]
+    return plans.plan_for(model, rail, shift)
+
+
+@pytest.fixture(
+    scope="module", params=CASES, ids=lambda case: f"{case[0]}-{'rail' if case[1] else 'still'}"
+)
+def case(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def plan(case):
+    return plan_of(*case)
+
+
+@pytest.fixture(scope="module")
+def read(case, plan, tmp_path_factory):
+    files = write_plan_program(tmp_path_factory.mktemp("program"), plan, writer_named(case[0]))
+    return READERS[case[0]](files)
+
+
+def test_every_writer_has_a_reader_and_a_robot():
+    assert set(PROGRAM_WRITERS) == set(READERS) == set(MODELS)
+
+
+def test_the_program_has_its_name(read):
+    assert read.name == "calib"
+
+
+def test_poses_are_visited_in_order_by_axes_then_straight(read, plan):
+    for pose in plan.poses:
+        i = pose.id
+        start = read.steps.index(("axes", f"XAPP{i}"))
+        names = [step[:2] for step in read.steps[start : start + 7]]
+        assert names == [
+            ("axes", f"XAPP{i}"),
+            ("straight", f"XNEAR{i}"),
+            ("stop",),
+            ("straight", f"XCON{i}"),
+            ("stop",),
+            ("straight", f"XNEAR{i}"),
+            ("straight", f"XRET{i}"),
+        ]
+    contacts = [step[1] for step in read.steps if step[0] == "straight" and "XCON" in step[1]]
+    assert contacts == [f"XCON{pose.id}" for pose in plan.poses]
+
+
+def test_it_leaves_home_goes_by_the_via_poses_and_returns(read):
+    assert read.steps[0] == read.steps[-1] == ("axes", "XHOME")
+    via = read.steps.index(("axes", "XVIA1_1"))
+    assert read.steps[via + 1] == ("axes", "XAPP1")
+
+
+def test_every_target_moves_and_every_move_has_one(read):
+    assert {step[1] for step in read.steps if len(step) > 1} == set(read.targets)
+
+
+def test_axis_positions_are_the_plans(read, plan, case):
+    external = 1 if case[1] else 0
+    wanted = {f"XAPP{pose.id}": pose.approach_joints for pose in plan.poses}
+    wanted |= {"XHOME": plan.robot.home, "XVIA1_1": plan.moves[1].via[0]}
+    for name, q in wanted.items():
+        target = read.targets[name]
+        np.testing.assert_allclose(target.arm, q[external:], rtol=0, atol=DEG)
+        np.testing.assert_allclose(target.external[:external], np.array(q[:external]) * 1e3)
+
+
+def test_straight_moves_end_where_the_plan_has_it(read, plan, case):
+    """By frames as they stand, by joints through forward kinematics."""
+    robot = Robot.from_urdf(plan.robot.urdf, "tcp")
+    for pose in plan.poses:
+        for name, away in (("XCON", 0.0), ("XNEAR", plans.NEAR), ("XRET", plans.APPROACH)):
+            target = read.targets[f"{name}{pose.id}"]
+            wanted = pose.T_base_tcp
+            wanted[:3, 3] += away * np.array(pose.normal)
+            T = target.T
+            if T is None:
+                rail = np.array(target.external[:1]) / 1e3 if case[1] else []
+                T = robot.forward([*rail, *target.arm])
+            np.testing.assert_allclose(T[:3, 3], wanted[:3, 3], rtol=0, atol=2 * MM * MM)
+            np.testing.assert_allclose(T[:3, :3], wanted[:3, :3], rtol=0, atol=DEG)
+            if case[1]:
+                assert target.external[0] == pytest.approx(1e3 * plans.RAIL_AT, abs=1e-3)
+
+
+def test_an_external_axis_that_is_not_there_moves_nothing(read, case):
+    for target in read.targets.values():
+        assert not np.any(target.external[1 if case[1] else 0 :])
+
+
+def test_speeds_are_the_cells_and_slow_at_the_surface(read):
+    speeds = {step[1][:4]: set() for step in read.steps if step[0] == "straight"}
+    for step in read.steps:
+        if step[0] == "straight":
+            speeds[step[1][:4]].add(round(step[2], 9))
+    assert speeds["XCON"] == {TOUCH_SPEED}
+    assert speeds["XRET"] == {plans.CONTACT_SPEED}
+    assert speeds["XNEA"] == {TOUCH_SPEED, plans.CONTACT_SPEED}
+
+
+def test_axes_move_slowly(read, case):
+    most = {"krl": 10, "fanuc": 10, "rapid": 100, "urscript": np.radians(12.0) + 1e-9}
+    assert 0 < read.axes_speed <= most[case[0]]
+
+
+def test_the_tool_is_set_or_its_frame_is_told(read):
+    if read.tool is not None:
+        np.testing.assert_allclose(read.tool, plans.T_FLANGE_TCP, atol=1e-7)
+    told = " ".join(read.comments)
+    assert "the tcp in link 'flange'" in told
+    assert "150.000" in told.replace("0.1500", "150.0000")
+
+
+def test_the_head_says_that_nothing_was_tried_and_what_to_check(read, plan):
+    told = " ".join(read.comments)
+    assert "NOT TRIED ON A ROBOT" in told
+    assert "Compare before the first motion" in told
+    assert "south: -280.0, 0.0, -1100.0 N" in told
+    assert all(name in told.replace(" ", "") for name in plan.robot.joints)
+
+
+def test_lines_are_short_and_numbers_have_no_exponent(read, case):
+    assert max(map(len, read.lines)) <= 250
+    code = "\n".join(line for line in read.lines if "9E+09" not in line)
+    assert "e-0" not in code.replace("None", "")
+    assert "nan" not in code.split()
+    assert " -0.000 " not in code
+
+
+def test_names_of_people_cannot_break_out_of_a_comment(case, read, plan, tmp_path):
+    evil = 'Zelle ß\r\nPTP {A1 0}\x1b;%{E}\u2028"end\n' + 300 * "x"
+    changed = replace(
+        plan,
+        cell=replace(plan.cell, name=evil),
+        contact=replace(plan.contact, load_cases={evil: (0.0, 0.0, -1.0)}),
+        poses=tuple(replace(pose, seen_by=evil) for pose in plan.poses),
+    )
+    found = READERS[case[0]](write_plan_program(tmp_path, changed, writer_named(case[0])))
+    assert found.steps == read.steps
+
+
+@pytest.mark.parametrize("name", ["", "2nd", "a b", "naïve", "a.b", "../x", "$x", "a" * 40, "CON"])
+def test_a_name_that_the_controller_does_not_allow_is_refused(case, plan, name, tmp_path):
+    with pytest.raises(PlanningError, match=f"cannot name a {writer_named(case[0]).title} program"):
+        write_plan_program(tmp_path, plan, writer_named(case[0]), name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_arm_with_three_joints_is_refused(case):
+    robot = Robot.from_urdf(urdfs.planar_arm_urdf(), "tcp")
+    writer = writer_named(case[0])
+    assert not writer.takes(robot)
+    with pytest.raises(PlanningError, match=f"cannot be programmed in {writer.title}: its arm"):
+        writer.require_robot(robot)
+
+
+def test_the_program_is_the_same_again(case, plan, tmp_path):
+    writer = writer_named(case[0])
+    texts = []
+    for folder in (tmp_path / "a", tmp_path / "b"):
+        folder.mkdir()
+        texts.append([p.read_bytes() for p in write_plan_program(folder, plan, writer)])
+    assert texts[0] == texts[1]
+
+
+class TestChoice:
+    @pytest.mark.parametrize("language", MODELS)
+    def test_the_maker_of_the_robot_chooses(self, language):
+        writer, reason = choose_writer(catalogue.load(MODELS[language][0]))
+        assert writer.language == language
+        assert reason.startswith(writer.title)
+
+    def test_a_robot_of_another_maker_gets_no_program(self):
+        assert choose_writer(catalogue.load("RX160")) == (
+            None,
+            "no program: none is written for robots of Staeubli",
+        )
+
+    def test_a_robot_of_no_known_maker_gets_none_and_the_option_is_named(self):
+        robot = Robot.from_urdf(urdfs.opw_arm_urdf(**urdfs.KR_LIKE), "tcp")
+        writer, reason = choose_writer(robot)
+        assert writer is None
+        assert reason.endswith("give --language krl|rapid|fanuc|urscript")
+        assert choose_writer(robot, "RAPID")[0].language == "rapid"
+
+    def test_none_can_be_asked_for(self):
+        assert choose_writer(catalogue.load("UR20"), "none")[0] is None
+
+    def test_an_unknown_language_is_refused_with_the_known_ones(self):
+        with pytest.raises(PlanningError, match="krl, rapid, fanuc, urscript, none; did you mean"):
+            choose_writer(catalogue.load("UR20"), "rapit")
+
+    def test_a_language_that_cannot_program_the_robot_is_refused_when_asked_for(self):
+        robot = Robot.from_urdf(
+            plans.plan_for("UR20", False, MODELS["urscript"][1]).robot.urdf, "tcp"
+        )
+        with pytest.raises(PlanningError, match="third axis must turn against its second"):
+            choose_writer(robot, "fanuc")
+
+
+def test_the_words_of_the_head_are_those_of_the_language():
+    writer = writer_named("urscript")
+    assert "movej" in " ".join(plan_program(plan_of("urscript"), writer).motions)

@@ -1,0 +1,113 @@
+"""Bounds of corrections, and how a controller that does not follow them is found."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from elastocal.drivers.kuka_rsi import (
+    Arrival,
+    Bounds,
+    CorrectionGuard,
+    PathCorrections,
+    RobMessage,
+)
+from elastocal.errors import DeviceError
+
+CYCLE = 0.004
+BOUNDS = Bounds(0.003, 0.005, 0.006, 0.017, 0.05, 1000.0, 0.015)
+STEP = np.array([1e-4, 0.0, 0.0])
+
+
+def drive(guard: CorrectionGuard, cycles: int, clamp: float = np.inf, lost: int = 0, delay=2):
+    """Send a step each cycle; the controller clamps, and follows some cycles later."""
+    at, late = 0.0, [0.0] * delay
+    for k in range(cycles):
+        guard.bounded(STEP, np.array([late.pop(0), 0.0, 0.0]))
+        at = min(at + (STEP[0] if k >= lost else 0.0), clamp)
+        late.append(at)
+
+
+def fresh(delay: float = 0.008) -> CorrectionGuard:
+    guard = CorrectionGuard(BOUNDS, CYCLE, delay)
+    guard.restart(np.zeros(3))
+    return guard
+
+
+def test_the_largest_correction_is_the_pcs_below_the_controllers():
+    drive(fresh(), 30)
+    with pytest.raises(DeviceError, match=r"correction of 3\.10 mm .* largest is 3 mm"):
+        drive(fresh(), 31)
+
+
+def test_a_piece_faster_than_the_limit_is_refused():
+    with pytest.raises(DeviceError, match=r"0\.25 mm in one cycle: at most 0\.2 mm"):
+        fresh().bounded(np.array([0.0, 0.0, 2.5e-4]), np.zeros(3))
+
+
+def test_no_speed_is_above_a_millimetre_in_four_milliseconds():
+    guard = CorrectionGuard(Bounds(0.1, 0.2, 0.3, 0.0, 9.0, 1e3, 0.015), CYCLE, 0.008)
+    guard.restart(np.zeros(3))
+    with pytest.raises(DeviceError, match="at most 1 mm"):
+        guard.bounded(np.array([1.01e-3, 0.0, 0.0]), np.zeros(3))
+
+
+def test_a_correction_that_goes_back_is_never_refused():
+    guard = fresh()
+    guard.restart(np.array([0.004, 0.0, 0.0]))
+    guard.bounded(-STEP, np.array([0.004, 0.0, 0.0]))
+
+
+def test_a_controller_that_clamps_is_found_by_what_it_does():
+    guard = fresh()
+    with pytest.raises(DeviceError, match=r"saturated.*POSCORR clamps"):
+        follow_clamped(guard)
+
+
+def follow_clamped(guard: CorrectionGuard) -> None:
+    drive(guard, 30, clamp=2e-4)
+    for _ in range(60):
+        guard.bounded(np.zeros(3), np.array([2e-4, 0.0, 0.0]))
+
+
+def test_a_few_lost_answers_are_made_up_for_and_are_no_saturation():
+    guard = fresh()
+    drive(guard, 20, lost=3)
+    there = np.array([17e-4, 0.0, 0.0])
+    for _ in range(60):
+        guard.bounded(np.zeros(3), there)
+    for _ in range(10):
+        guard.bounded(STEP, there)
+
+
+@dataclass
+class Wants:
+    wanted: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def correction(self, _message, _now):
+        return self.wanted
+
+
+def test_corrections_of_a_path_are_absolute_bounded_and_never_jump():
+    wants = Wants(np.array([0.0, 0.002, 0.0]))
+    handler = PathCorrections(wants, BOUNDS, CYCLE, "PC")
+    sent = [handler.step(RobMessage(k), Arrival.NEXT, 0.0).correction for k in range(15)]
+    np.testing.assert_allclose([y for _, y, *_ in sent][:11], [*np.arange(0.2, 2.1, 0.2), 2.0])
+    assert all(row[3:] == (0.0, 0.0, 0.0) for row in sent)
+    wants.wanted = np.array([0.0, 0.0, np.nan])
+    assert handler.step(RobMessage(16), Arrival.NEXT, 0.0).correction == sent[-1]
+    wants.wanted = np.array([0.0, 0.09, 0.0])
+    for k in range(20):
+        last = handler.step(RobMessage(20 + k), Arrival.NEXT, 0.0)
+    assert last.correction[1] == pytest.approx(3.0)
+    assert (handler.clamped, handler.held) == (20, 1)
+    assert last.target is None
+    assert not last.stop
+
+
+def test_a_program_that_was_started_anew_begins_without_correction():
+    handler = PathCorrections(Wants(np.array([1e-3, 0.0, 0.0])), BOUNDS, CYCLE)
+    for k in range(10):
+        handler.step(RobMessage(k), Arrival.NEXT, 0.0)
+    again = handler.step(RobMessage(90), Arrival.JUMPED, 0.0)
+    assert again.correction[0] == pytest.approx(0.2)

@@ -1,0 +1,26 @@
+"""Drivers of other people: packages with an entry point, as an installation leaves them."""
+
+from pathlib import Path
+
+
+def install(folder: Path, monkeypatch, name: str, source: str) -> None:
+    """Put a package with a driver on the path; its module has an object ``DRIVER``."""
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[elastocal.drivers]\n{name} = {name}:DRIVER\n")
+    (folder / f"{name}.py").write_text(source)
+    monkeypatch.syspath_prepend(str(folder))
+
+
+REAL = '''
+"""The simulated devices, as if somebody could be hurt."""
+from elastocal.sim import SimulatedDriver
+
+
+class RealDriver(SimulatedDriver):
+    real = True
+
+
+DRIVER = RealDriver()
+'''
