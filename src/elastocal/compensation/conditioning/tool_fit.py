@@ -19,6 +19,7 @@ the last linear step with the prior as further rows, by Student's t.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -273,7 +274,7 @@ class _WeighedFit:
         for _ in range(_STEPS):
             left = fit.left() * np.repeat(fit.weights, 3)
             rows = np.concatenate([left.ravel(), -fit.values[_MATRIX][free[_MATRIX]]])
-            u, s, vt, scale, kept = fit.decomposed()
+            u, s, vt, scale, kept = fit.decomposed
             step = np.zeros(_ALL)
             step[free] = (vt[kept].T @ ((u[:, kept].T @ rows) / s[kept])) / scale
             values = fit.values + step
@@ -284,6 +285,7 @@ class _WeighedFit:
                 break
         return fit
 
+    @cached_property
     def decomposed(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
         """Return the singular value decomposition ``u s vt`` of the weighed derivatives.
 
@@ -309,7 +311,7 @@ class _WeighedFit:
 
     def left_over(self) -> FloatArray:
         """Return how many force and moment components are left over, by their leverage."""
-        u, _, _, _, kept = self.decomposed()
+        u, _, _, _, kept = self.decomposed
         rows = 6 * len(self.postures)
         taken = (u[:rows, kept] ** 2).sum(axis=1).reshape(-1, 2, 3).sum(axis=(0, 2))
         over: FloatArray = 0.5 * rows - taken
@@ -318,7 +320,7 @@ class _WeighedFit:
     def result(self, scatter: FloatArray) -> ToolFit:
         """Return tool and sensor with their intervals."""
         postures, model, values, free = self.postures, self.model, self.values, self.model.free
-        _, s, vt, scale, kept = self.decomposed()
+        _, s, vt, scale, kept = self.decomposed
         mass = float(values[0])
         centre = values[7:10] / (mass if abs(mass) > 0.0 else np.inf)
         # Rows: how each unknown moves with the independent directions, each by its deviation.
