@@ -56,12 +56,13 @@ with Writer(folder / "force", version=9) as bag:
             )
             bag.write(topic, second * 10**9 + rest, types.serialize_cdr(message, kind))
 
+# A report as PolyWorks writes one: lines of its own, names of the columns, a row of their units.
 with (folder / "tracker.txt").open("w", encoding="utf-8") as file:
-    file.write("// Collection Group Target x y z [mm], seconds\n")
+    file.write("Text report\n\nName\tX\tY\tZ\tTime\n\t[mm]\t[mm]\t[mm]\t[s]\n")
     for visit in streams:
         for time, place in zip(visit.points.time, 1e3 * visit.points.position, strict=True):
             file.write(
-                "A B p {:.4f} {:.4f} {:.4f} {:.3f}\n".format(*place, time * (1 + 40e-6) + 52.0)
+                "p\t{:.4f}\t{:.4f}\t{:.4f}\t{:.3f}\n".format(*place, time * (1 + 40e-6) + 52.0)
             )
 
 logs = [folder / name for name in ("controller.xlsx", "force", "tracker.txt")]
@@ -76,3 +77,10 @@ run = ec.read_dataset(folder / "run" / "dataset.nc")
 apart = found.dataset.marker_displacement - run.marker_displacement
 print(f"{found.figures.readings} readings, the run had {int(run.usable.sum())};", end=" ")
 print(f"marker displacements differ by {1e6 * np.sqrt(np.nanmean(apart**2)):.2f} µm")
+
+# A site without a tracker has logs of arm and force all the same.
+entries = (folder / "map.yaml").read_text(encoding="utf-8").split("  - log: ")
+kept = [entries[0], *(entry for entry in entries[1:] if not entry.startswith("tracker.txt"))]
+(folder / "no_tracker.yaml").write_text("  - log: ".join(kept), encoding="utf-8")
+bare = ec.import_logs(logs[:2], map=folder / "no_tracker.yaml", out=folder / "no_tracker.nc")
+print(f"without the tracker: {bare.figures.readings} readings; {bare.figures.warnings[-1]}")

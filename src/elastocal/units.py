@@ -132,7 +132,10 @@ def parse_number(text: str) -> float:
     plain = text.strip()
     if not plain.isascii() or "_" in plain:
         raise ValueError(f"{text!r} is not a number")
-    return float(plain)
+    try:
+        return float(plain)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a number") from None
 
 
 def largest(dimension: str) -> tuple[float, str]:

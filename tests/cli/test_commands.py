@@ -279,7 +279,7 @@ def test_check_says_what_a_good_file_is(folder, name):
         ("a.json", "[" * 100_000, "not valid JSON: its brackets are nested too deeply"),
         ("a.json", '{"a": ' + 5000 * "9" + "}", "JSON: it holds a number of thousands of digits"),
         ("a.yaml", "schema: elastocal.spring/1\n", "did you mean 'elastocal.springs'? (known: "),
-        ("a.yaml", "robot: x\n", "states no schema (known: elastocal.cell, elastocal.comp"),
+        ("a.yaml", "robot: x\n", "states no schema (known: elastocal.catalogue, elastocal.cell"),
         ("a.yaml", "a: [1\nb: 2", "while parsing a flow sequence line 1, column 4"),
         ("a.urdf", "<robot><link/></robot>", "a.urdf: URDF: link 1 of the file has no name"),
         ("a.jsonl", "no json\n", "a.jsonl: line 1: Invalid JSON"),
@@ -307,6 +307,9 @@ def test_usage_mistakes_exit_with_2():
     assert elastocal("calibrate").code == 2
     assert elastocal("calibrat").code == 2
     assert elastocal("predict", "--nonsense").code == 2
+    refused = elastocal("study", "a.yaml", "--out", "b", "--seed", "1_0")
+    assert refused.code == 2
+    assert "'1_0' is not a number" in refused.err
 
 
 def test_help_and_version_load_no_numerical_library():

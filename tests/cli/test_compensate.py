@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,21 @@ def test_it_says_what_was_left_and_what_was_assumed(folder):
     ):
         assert text in words
     assert "nearest to zero" not in run(folder, "--start", start_text()).err
+
+
+def test_a_model_that_does_not_know_what_it_predicts_is_said_to_do_harm(folder):
+    model = calibrated()
+    sure = model.draws.mean(axis=0)
+    write_model(folder / "unsure.json", replace(model, draws=np.outer(np.linspace(0, 9, 50), sure)))
+    found = elastocal(
+        "compensate", folder / "unsure.json", folder / "path.csv", "--out", folder / "o.csv"
+    )
+    assert found.code == 0, found.err
+    assert "it does not know what it predicts" in " ".join(found.err.split())
+    assert "does not know" not in run(folder).err
+    doubt = json.loads(run(folder, "--json").out)["doubt"]
+    assert doubt["rows"] == 12
+    assert 0.0 < doubt["half_width"] < 0.5 * doubt["deflection"]
 
 
 def test_the_corrected_path_with_its_deflection_is_the_programmed_one(folder):

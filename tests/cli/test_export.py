@@ -1,10 +1,11 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from elastocal.compensation.conditioning import SensorMount, choose_tool, tool_result, write_tool
-from elastocal.identification import write_model
+from elastocal.identification import PredictionDoubt, read_model, write_model
 from elastocal.records import to_data
 from elastocal.robot import Robot, catalogue, with_tool
 from support.cli import elastocal
@@ -41,6 +42,21 @@ def test_it_writes_the_files_and_says_so(tmp_path, model):
     facts = json.loads(result.out)
     assert {path.name for path in (tmp_path / "c").iterdir()} == FILES == set(facts["files"])
     assert facts["springs"] == 18
+
+
+def test_how_sure_the_model_is_on_its_production_is_said(tmp_path, model):
+    plain = elastocal("export", model, "--c", tmp_path / "c", "--json")
+    assert json.loads(plain.out)["on_production"] is None
+    for width, warned in ((0.2e-3, False), (4.5e-3, True)):
+        doubt = PredictionDoubt(3.9e-3, width, 100)
+        known = replace(made_up_summary(), doubt=doubt)
+        write_model(tmp_path / "known.json", read_model(model), known)
+        found = elastocal(
+            "export", tmp_path / "known.json", "--c", tmp_path / "d", "--json", "--force"
+        )
+        facts = json.loads(found.out)
+        assert facts["on_production"] == {"deflection": 3.9e-3, "half_width": width, "rows": 100}
+        assert any("does not know what it predicts" in note for note in facts["notes"]) is warned
 
 
 def test_nothing_is_left_to_fill_in(tmp_path, model):

@@ -25,11 +25,11 @@ import importlib.abc, os, signal, sys
 
 class Sends(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path, target=None):
-        if name == "typer":
+        if name == "{module}":
             os.kill(os.getpid(), signal.{name})
 
 sys.meta_path.insert(0, Sends())
-from elastocal.cli.main import run
+from _elastocal_program import run
 run()
 """
 
@@ -56,7 +56,8 @@ def test_one_that_comes_during_the_last_import_is_not_swallowed(name, words, mod
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_one_that_comes_while_the_command_line_is_imported_ends_it_at_once(name):
-    ended = _ended(EARLY.format(name=name), "--version")
+@pytest.mark.parametrize("module", ["lazy_loader", "elastocal.cli", "typer"])
+def test_one_that_comes_while_the_command_line_is_imported_ends_it_at_once(name, module):
+    ended = _ended(EARLY.format(name=name, module=module), "--version")
     assert ended.returncode == -getattr(signal, name)
     assert (ended.stdout, ended.stderr) == ("", "")

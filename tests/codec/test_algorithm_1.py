@@ -136,7 +136,7 @@ def test_a_pose_measured_twice_is_one_pose(readings):
 @pytest.mark.slow
 def test_thirty_one_poses_eighteen_springs_by_exchange():
     readings = Cell(rich_truth(), seed=1).readings()
-    data = cross_validate(robot(), readings, [Variant(search="ioops")])
+    data = cross_validate(robot(), readings, [Variant(search="ioops", springs="bearing")])
     sizes = (1, 2, 5, 11, 22)
     wanted = algorithm_1(robot(), readings, 31, search="ioops", sizes=sizes)
     # Conditions up to 1e6, the tolerance of the rank, times round-off.

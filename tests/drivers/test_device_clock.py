@@ -56,9 +56,17 @@ def test_a_stall_of_the_network_moves_no_later_time():
 @pytest.mark.parametrize("stamp", [0.4, 5000.0])
 def test_a_clock_that_was_set_or_started_anew_is_named(stamp):
     clock = DeviceClock("line_stream: station_1")
-    run(clock, [812.0, 812.1], [10.0, 10.1])
+    run(clock, [810.0, 811.0, 812.1], [8.0, 9.0, 10.1])
     with pytest.raises(DeviceError, match=r"station_1: its time went from 812.100 s to .* frame"):
         clock.rig_time(stamp, 10.2)
+
+
+def test_a_device_may_begin_with_what_it_has_kept():
+    clock = DeviceClock("adapter")
+    stamps = np.arange(100.0, 130.0, 0.1)
+    arrivals = np.maximum(stamps - 90.0, 20.0)
+    times = run(clock, stamps, arrivals)
+    np.testing.assert_allclose(times[101:], stamps[101:] - 90.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("scale", [1e3, 1e-3])

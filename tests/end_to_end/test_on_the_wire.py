@@ -16,9 +16,10 @@ from elastocal import workflows
 from elastocal.dataset import read_dataset
 from support.run_cells import planned_cell
 
-RATE = float(os.environ.get("ELASTOCAL_WIRE_RATE", "1"))
-"""Seconds of the cell a second of the wall: what the machine carries, 250 messages a second each
-way in each of them."""
+QUIET = min(1.0, (os.cpu_count() or 1) / max(os.getloadavg()[0], 1.0))
+RATE = float(os.environ.get("ELASTOCAL_WIRE_RATE", max(0.25, QUIET)))
+"""Seconds of the cell a second of the wall, 250 messages each way in each of them: slow motion
+where the machine has other things to do."""
 NOISE = 16e-6
 """Standard deviation of a deflection's component between two runs in process, in m: over six seeds
 of this cell and plan; stops, slips, ramps and sensors differ."""

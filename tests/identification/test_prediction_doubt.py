@@ -12,6 +12,7 @@ from elastocal.identification import (
     Choice,
     DriveCompliances,
     FitOptions,
+    PredictionDoubt,
     ProductionForecast,
     ProductionRows,
     build,
@@ -57,6 +58,21 @@ def test_a_jackknife_of_few_poses_is_a_wider_interval():
     wide, narrow = (forecast(1e-3, 1e-8, poses).doubt.half_width for poses in (8, 31))
     assert wide == pytest.approx(2.365e-4, rel=1e-3)
     assert narrow == pytest.approx(2.042e-4, rel=1e-3)
+
+
+def test_the_doubt_of_two_stretches_is_that_of_all_their_rows():
+    rng = np.random.default_rng(0)
+    deflection, low, high = rng.standard_normal((3, 30, 3))
+    first, rest, whole = (
+        PredictionDoubt.of(deflection[rows], low[rows], high[rows])
+        for rows in (slice(0, 7), slice(7, 30), slice(None))
+    )
+    assert first is not None
+    assert whole is not None
+    both = first.plus(rest).plus(PredictionDoubt.of(deflection[:0], low[:0], high[:0]))
+    assert both.rows == 30
+    assert both.deflection == pytest.approx(whole.deflection)
+    assert both.half_width == pytest.approx(whole.half_width)
 
 
 def test_production_is_judged_by_rows_with_a_load():

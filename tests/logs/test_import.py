@@ -235,3 +235,19 @@ def test_the_figures_are_one_json_object(imported, rows, tmp_path):
 
 def _short(rows: Rows) -> Rows:
     return Rows(*(getattr(rows, name)[:400] for name in rows.__dataclass_fields__))
+
+
+def test_without_a_marker_the_readings_have_forces_and_no_displacement_of_one(
+    rows, tmp_path, derived
+):
+    controller, force, _ = write_logs(rows, tmp_path)
+    path = write_map(
+        tmp_path, reported.finished() / "cell" / "cell.yaml", MAP[: MAP.index("  - log: tracker")]
+    )
+    found = ec.import_logs([controller, force], map=path, out=tmp_path / "data.nc")
+    assert "calibrate --contact" in " ".join(found.figures.warnings)
+    dataset = read_dataset(tmp_path / "data.nc")
+    assert dataset.marker_displacement is None
+    assert dataset.usable.sum() == derived.usable.sum()
+    assert _apart(dataset.force, derived.force) < 1.0
+    assert _apart(dataset.controller_displacement, derived.controller_displacement) < 10e-6

@@ -7,7 +7,7 @@ import pytest
 from openpyxl import Workbook
 
 from elastocal.errors import FileAccessError, LogError
-from elastocal.logs import read_text_log, read_workbook
+from elastocal.logs import guess_log, read_text_log, read_workbook
 
 
 def _log(folder, text, encoding="utf-8"):
@@ -121,3 +121,23 @@ def test_a_sheet_of_a_workbook_is_read(tmp_path):
     (tmp_path / "bad.xlsx").write_bytes(b"PK\x03\x04 but not")
     with pytest.raises(LogError, match="is no Excel workbook"):
         read_workbook(tmp_path / "bad.xlsx")
+
+
+POLYWORKS = """\
+PolyWorks|Inspector 2022 IR4 - Text Report
+Project: dome section
+
+Name\tX\tY\tZ\tTime
+\t[mm]\t[mm]\t[mm]\t[s]
+point 1\t2412.0710\t-310.4420\t1203.1180\t12.340
+point 2\t2412.0812\t-310.4419\t1203.1182\t12.350
+"""
+
+
+def test_a_row_of_units_under_the_names_belongs_to_them(tmp_path):
+    table = _log(tmp_path, POLYWORKS)
+    assert table.header == ("Name", "X [mm]", "Y [mm]", "Z [mm]", "Time [s]")
+    np.testing.assert_array_equal(table.numbers("X [mm]"), [2412.0710, 2412.0812])
+    columns = {each.key: each for each in guess_log("log.txt", None, table).columns}
+    assert columns["markers"].columns == ("X [mm]", "Y [mm]", "Z [mm]")
+    assert (columns["markers"].unit, columns["time"].unit) == ("mm", "s")

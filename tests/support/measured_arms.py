@@ -42,7 +42,7 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     """Return positions of markers on an arm whose joints stand and turn elsewhere than drawn."""
     rng = np.random.default_rng(seed)
     truth = Robot.from_urdf(
-        with_joint_origins(robot.urdf, {n: _small(rng, error) for n in robot.joint_names}),
+        with_joint_origins(robot.urdf, {n: random_errors(rng, error) for n in robot.joint_names}),
         robot.tip,
     )
     low, high = np.maximum(robot.limits.lower, -2.0), np.minimum(robot.limits.upper, 2.0)
@@ -89,7 +89,8 @@ def write_positions(path: Path, measured: Measured) -> Path:
     return path
 
 
-def _small(rng: np.random.Generator, error: float) -> np.ndarray:
+def random_errors(rng: np.random.Generator, error: float) -> np.ndarray:
+    """Return a small shift and turn of a joint, shape (4, 4), in m and rad."""
     T = np.eye(4)
     T[:3, :3] = Rotation.from_rotvec(rng.normal(0.0, error, 3)).as_matrix()
     T[:3, 3] = rng.normal(0.0, error, 3)

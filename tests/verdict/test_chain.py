@@ -102,6 +102,13 @@ def swap_the_codec(folder):
     write_codec(folder / "codec", replace(data, made_from={"other.nc": "0" * 64}))
 
 
+def only_other_springs(folder):
+    """Leave a codec that is sound, of springs that are not those of the calibration."""
+    data = read_codec(folder / "codec")
+    others = replace(data.variants[0], springs="tensor"), replace(data.variants[1], springs="file")
+    write_codec(folder / "codec", replace(data, variants=others))
+
+
 def edit_the_verdicts_of_the_codec(folder):
     edit(folder / "codec" / "codec.json", lambda record: record.update(sentences=["enough"]))
 
@@ -133,6 +140,8 @@ BROKEN = {
     "no tool": (remove("tool.json"), "run with a tool file that is not here"),
     "another codec": (swap_the_codec, "codec was made from another dataset .other.nc."),
     "a verdict of the codec": (edit_the_verdicts_of_the_codec, "codec/codec.json was changed"),
+    "no verdicts of the codec": (remove("codec/codec.json"), "codec/codec.json is gone"),
+    "a codec of other springs": (only_other_springs, "no codec has the springs and the loads"),
     "no codec": (remove("codec"), "whether there were enough poses was not verified"),
 }
 

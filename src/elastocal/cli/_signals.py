@@ -21,9 +21,9 @@ _waiting: set[int] = set()
 
 
 def _is_pythons(handler: object) -> bool:
-    """Return whether Ctrl-C is as Python has it, and may be set here."""
+    """Return whether Ctrl-C is as Python or `_elastocal_program` has it, and may be set here."""
     is_main = threading.current_thread() is threading.main_thread()
-    return is_main and handler is signal.default_int_handler
+    return is_main and handler in (signal.default_int_handler, signal.SIG_DFL)
 
 
 _QUIET = _is_pythons(signal.getsignal(signal.SIGINT))

@@ -12,20 +12,22 @@ import atexit
 import contextlib
 import gc
 import importlib
+import inspect
 import os
 import pkgutil
 import sys
 import warnings
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from elastocal.cli import commands
 from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
+from elastocal.units import parse_number
 
 _GARBAGE = 50_000
 """Objects made before garbage is looked for: a short command makes fewer that are any."""
@@ -47,6 +49,23 @@ class _Commands(TyperGroup):
         finally:
             for name in absent:
                 del sys.modules[name]
+
+
+class _Command(TyperCommand):
+    """A command whose numbers are written as those of every file: no ``1_000``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse what Python would take for a number and `parse_number` does not."""
+        given = self.make_parser(ctx).parse_args(args=list(args))[0]
+        hints = get_type_hints(inspect.unwrap(self.callback)) if self.callback else {}
+        for param in self.params:
+            kind, text = hints.get(str(param.name)), given.get(str(param.name))
+            if isinstance(text, str) and {int, float} & {kind, *get_args(kind)}:
+                try:
+                    parse_number(text)
+                except ValueError as error:
+                    raise typer.BadParameter(str(error), param_hint=param.opts[0]) from error
+        return super().parse_args(ctx, args)
 
 
 app = typer.Typer(
@@ -82,7 +101,7 @@ def _found_commands() -> dict[str, Callable[..., None]]:
 
 COMMANDS = _found_commands()
 for name, command in COMMANDS.items():
-    app.command(name)(command)
+    app.command(name, cls=_Command)(command)
 
 
 def _version(wanted: bool) -> None:

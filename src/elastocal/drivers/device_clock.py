@@ -89,7 +89,9 @@ class DeviceClock:
 
     def _require_going_on(self, stamp: float, arrival: float) -> None:
         ahead = stamp + self.offset + self.drift * (stamp - self._first) - arrival
-        if stamp < self._newest or not ahead <= _MOST_AHEAD:
+        # A device may begin with what it has kept: only after a window is it known how late it is.
+        is_known = len(self._least) > 0
+        if stamp < self._newest or (is_known and not ahead <= _MOST_AHEAD):
             passed = max(arrival - self._arrived, 0.0)
             raise DeviceError(
                 f"{self._source}: its time went from {self._newest:.3f} s to {stamp:.3f} s within"

@@ -28,6 +28,12 @@ from .model import (
     read_geometry as read_geometry,
 )
 from .position_file import AXES as AXES, read_positions as read_positions
+from .position_plan import (
+    PosesNeeded as PosesNeeded,
+    PositionPlan as PositionPlan,
+    PositionPose as PositionPose,
+    plan_positions as plan_positions,
+)
 from .positions import (
     LEAST_READINGS as LEAST_READINGS,
     Payload as Payload,

@@ -183,6 +183,9 @@ class CalibratedModel:
     """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
     unexplained: float = float("nan")
     """Mean error at left-out poses over the mean deflection; NaN: not known."""
+    on_production: PredictionDoubt | None = None
+    """How sure it is on the production that it was calibrated for; none: none was named, or it was
+    another tool's."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -242,10 +245,7 @@ class CalibratedModel:
         if not len(few):
             return None
         found = self.predict(few.joint_position, few.force, few.moment)
-        return PredictionDoubt(
-            float(np.linalg.norm(found.deflection, axis=1).mean()),
-            float(np.linalg.norm(found.high - found.low, axis=1).mean() / 2.0),
-        )
+        return PredictionDoubt.of(found.deflection, found.low, found.high)
 
     @property
     def tool_name(self) -> str:
@@ -280,7 +280,7 @@ class CalibratedModel:
             If the transform is not rigid, or mass and centre do not come together.
         """
         model, tool = change_tool(self.model, self.tool, T_tcp_tool, mass, centre)
-        return replace(self, model=model, tool=tool)
+        return replace(self, model=model, tool=tool, on_production=None)
 
     @property
     def calibrated_model(self) -> ElasticModel:

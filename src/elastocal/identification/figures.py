@@ -18,6 +18,7 @@ from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.load_check import LoadCheck
 from elastocal.identification.options import FitOptions, FitSettings, bounds
+from elastocal.identification.prediction_doubt import PredictionDoubt
 from elastocal.identification.production import ProductionCoverage
 from elastocal.identification.spring_sums import Term
 from elastocal.identification.suspicious import Screening
@@ -174,6 +175,8 @@ class CalibrationSummary:
     """Measured coverage of the intervals of a prediction; none in calibrations of before."""
     production: ProductionCoverage | None = None
     """How much of production the calibration covers; none where no path was named."""
+    doubt: PredictionDoubt | None = None
+    """How sure the predictions on production are; likewise."""
     spring_count: int | None = None
     """Number of springs; none in calibrations before springs of several parameters."""
     known: tuple[KnownSpring, ...] = ()

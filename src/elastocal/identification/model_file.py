@@ -153,6 +153,7 @@ class CalibrateResult(Result):
             self.tool,
             self.domain,
             float("nan") if self.calibration is None else self.calibration.unexplained,
+            None if self.calibration is None or self.tool is not None else self.calibration.doubt,
         )
 
     def facts(self) -> tuple[tuple[str, str], ...]:

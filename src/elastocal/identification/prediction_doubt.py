@@ -24,6 +24,7 @@ from elastocal.elastic import ElasticModel
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import solve
 from elastocal.identification.uncertainty import CONFIDENCE, leave_poses_out
+from elastocal.records import record
 from elastocal.results import brief_repr
 
 DOUBT_ROWS = 100
@@ -58,14 +59,40 @@ class ProductionRows:
         return ProductionRows(self.joint_position[loaded], self.force[loaded], moment)
 
 
-@dataclass(frozen=True)
+@record()
 class PredictionDoubt:
-    """How sure the predictions along a path are."""
+    """How sure the predictions along a path are; the one rule by which commands warn."""
 
     deflection: float
     """Mean predicted deflection, in m."""
     half_width: float
     """Mean half-width of its 95 % interval, in m."""
+    rows: int
+    """Rows with a load that both are means of."""
+
+    @classmethod
+    def of(
+        cls, deflection: FloatArray, low: FloatArray, high: FloatArray
+    ) -> "PredictionDoubt | None":
+        """Return it of predictions and their intervals, each (row, 3), in m; None of no rows."""
+        if not len(deflection):
+            return None
+        size, width = (np.linalg.norm(each, axis=1).mean() for each in (deflection, high - low))
+        return cls(float(size), float(width) / 2.0, len(deflection))
+
+    def plus(self, other: "PredictionDoubt | None") -> "PredictionDoubt":
+        """Return it of these rows and others."""
+        if other is None:
+            return self
+        rows = self.rows + other.rows
+        deflection, half_width = (
+            (self.rows * own + other.rows * further) / rows
+            for own, further in (
+                (self.deflection, other.deflection),
+                (self.half_width, other.half_width),
+            )
+        )
+        return PredictionDoubt(deflection, half_width, rows)
 
     @property
     def is_small(self) -> bool:
@@ -73,13 +100,22 @@ class PredictionDoubt:
         return self.half_width <= _LARGEST_DOUBT * self.deflection
 
     @property
-    def sentence(self) -> str:
-        """What a person should know."""
+    def figures(self) -> str:
+        """Both lengths, in words."""
         return (
-            f"on production the model predicts {1e3 * self.deflection:.3g} mm on average with a"
-            f" 95 % interval of ± {1e3 * self.half_width:.3g} mm: it does not know what it"
+            f"{1e3 * self.deflection:.3g} mm on average with a 95 % interval of"
+            f" ± {1e3 * self.half_width:.3g} mm"
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person has to know before a correction by it; nothing where it is small."""
+        if self.is_small:
+            return ()
+        return (
+            f"on production the model predicts {self.figures}: it does not know what it"
             " predicts, a correction may do harm; press in the directions of production, or take"
-            " fewer springs (--springs bearing)"
+            " fewer springs (--springs bearing)",
         )
 
 
@@ -112,7 +148,8 @@ class ProductionForecast:
         """How sure it is."""
         student = float(stdtrit(self.folds - 1, 0.5 * (1.0 + CONFIDENCE)))
         size = float(np.linalg.norm(self.deflection, axis=1).mean())
-        return PredictionDoubt(size, student * float(np.sqrt(self.variance)))
+        half_width = student * float(np.sqrt(self.variance))
+        return PredictionDoubt(size, half_width, len(self.deflection))
 
 
 def expected_errors(forecasts: Sequence[ProductionForecast]) -> FloatArray:

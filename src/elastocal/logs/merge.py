@@ -115,7 +115,8 @@ def import_streams(
     poses = _readings(streams, plateaus, least)
     seen = marker_readings(poses, site.robot, site.sensor.gravity, site.marker)
     registration = register(seen, site.marker)
-    rows = load_rows(poses, registration, site.sensor, conditioned=False)
+    seen_at_all = len(streams.points.time) > 0
+    rows = load_rows(poses, registration, site.sensor, conditioned=False, metrology=seen_at_all)
     dataset = _dataset(poses, rows, log_map, site, registration, files)
     progress("readings", 4, 4)
     warnings = _warnings(plateaus, rows, registration, log_map)
@@ -281,7 +282,12 @@ def _warnings(
         found.append(
             f"station {move.station} moved {1e3 * move.distance:.2g} mm before pose {move.pose}"
         )
-    if registration.undetermined_lever:
+    if not registration.stations and not registration.unregistered:
+        found.append(
+            "no log holds a marker: the dataset has no marker displacement, and springs need"
+            " `calibrate --contact`"
+        )
+    elif registration.undetermined_lever:
         axes = ", ".join(registration.undetermined_lever)
         found.append(f"the place of the marker along {axes} of the tcp is the map's")
     return tuple(found)

@@ -1,7 +1,8 @@
 """Logs of other people's instruments, each read into one table of named columns.
 
-Text files of any delimiter, with decimal points or commas, with a header or without one
-(columns are then called by their number, from 1); SpatialAnalyzer's point lists (``//`` comments,
+Text files of any delimiter, with decimal points or commas, with a header (and a row of units under
+it, as PolyWorks and data loggers have) or without one (columns are then called by their number,
+from 1); SpatialAnalyzer's point lists (``//`` comments,
 ``Collection Group Target x y z``); Excel workbooks. Recordings of middleware are read by
 `elastocal.logs.bags`. What a column means is for the map (`elastocal.logs.map`) to say.
 """
@@ -31,6 +32,9 @@ _COMMENTS = ("#", "//", "%", "!")
 _DELIMITERS = ";\t,|"
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?", re.ASCII)
 _NUMBER = re.compile(r"\s*[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?\s*", re.ASCII)
+_UNIT = re.compile(
+    r"[\[(]?\s*(?:mm|m|[uµ]m|in|s|sec|ms|us|deg|°|rad|k?N|N[*·]?m|N[*·]?mm|°C|mbar|hPa|%)\s*[\])]?"
+)
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)", re.ASCII)
 _LOOKED_AT = 200
 """Lines by which the form of a text is told."""
@@ -185,7 +189,7 @@ def read_text_log(path: Path) -> LogTable:
         (index for index, row in enumerate(rows) if len(row) == width and _is_data(row)), 1
     )
     # Lines of another program stand above the header, which stands right above the data.
-    header = tuple(_named(rows[first - 1])) if first and len(rows[first - 1]) == width else None
+    header = _header(rows[:first], width)
     body = rows[first:]
     uneven = next((n for n, row in enumerate(body) if len(row) != width), None)
     if uneven is not None:
@@ -297,6 +301,25 @@ def _is_data(row: Sequence[str]) -> bool:
     return 2 * sum(bool(_NUMBER.fullmatch(c) or _CLOCK.fullmatch(c.strip())) for c in row) >= len(
         row
     )
+
+
+def _header(above: Sequence[Sequence[str]], width: int) -> tuple[str, ...] | None:
+    """Return the names of the columns by the rows above the data; None where there are none.
+
+    A row of units may stand between names and data: the names then end in them, as ``X [mm]``.
+    """
+    if not above or len(above[-1]) != width:
+        return None
+    if len(above) > 1 and len(above[-2]) == width and _are_units(above[-1]):
+        units = [cell.strip().strip("[]()").strip() for cell in above[-1]]
+        names = _named(above[-2])
+        return tuple(f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True))
+    return tuple(_named(above[-1]))
+
+
+def _are_units(row: Sequence[str]) -> bool:
+    cells = [cell for cell in row if cell.strip()]
+    return len(cells) > 1 and all(_UNIT.fullmatch(cell.strip()) for cell in cells)
 
 
 def _numbered(width: int) -> tuple[str, ...]:

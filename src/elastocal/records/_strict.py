@@ -5,8 +5,9 @@ file, for example ``springs.2.axis``.
 """
 
 import math
+import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -28,8 +29,13 @@ class StrictModel(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_truth_for_a_number(cls, value: Any, info: ValidationInfo) -> Any:
-        # YAML reads yes, no, on, off as truth values, and Python counts those as 1 and 0.
-        if _holds_truth(value) and _takes_bare_numbers(cls, info.field_name or ""):
+        # YAML reads yes, no, on, off as truth values, and Python counts those as 1 and 0; it also
+        # takes 1_000, which `elastocal.units.parse_number` refuses everywhere.
+        kinds = _bare_kinds_of(cls, info.field_name or "")
+        if kinds & {int, float} and (
+            (bool not in kinds and _holds(value, lambda each: isinstance(each, bool)))
+            or (str not in kinds and _holds(value, _is_written_oddly))
+        ):
             raise ValueError("must be a number")
         return value
 
@@ -88,6 +94,18 @@ def _unique_mapping(loader: yaml.SafeLoader, node: yaml.MappingNode) -> dict[Any
 
 
 _UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
+_NUMBERS = {
+    "tag:yaml.org,2002:int": r"[-+]?(?:0|[1-9][0-9]*)$",
+    "tag:yaml.org,2002:float": r"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+][0-9]+)?$"
+    r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$",
+}
+"""Numbers as people write them. YAML 1.1 has others: 1_000, octal 010, 0x1F, 190:20:30."""
+_UniqueKeyLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in known if tag not in _NUMBERS]
+    for first, known in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _tag, _pattern in _NUMBERS.items():
+    _UniqueKeyLoader.add_implicit_resolver(_tag, re.compile(_pattern), list("-+.0123456789"))
 
 
 def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
@@ -126,24 +144,28 @@ def read_yaml_data(path: Path) -> Any:
     return data
 
 
-def _holds_truth(value: Any) -> bool:
-    """Return whether a value is a truth value or a list or mapping with one in it."""
+def _holds(value: Any, is_such: Callable[[Any], bool]) -> bool:
+    """Return whether a value is such a one, or a list or mapping with one in it."""
     if isinstance(value, dict):
         value = list(value.values())
     if isinstance(value, list | tuple):
-        return any(_holds_truth(inner) for inner in value)
-    return isinstance(value, bool)
+        return any(_holds(inner, is_such) for inner in value)
+    return is_such(value)
+
+
+def _is_written_oddly(value: Any) -> bool:
+    """Return whether a value is a text that only Python would take for a number."""
+    return isinstance(value, str) and ("_" in value or not value.isascii())
 
 
 @cache
-def _takes_bare_numbers(model: type[BaseModel], field: str) -> bool:
-    """Return whether a field takes numbers without unit, itself or in a list, and no truth value.
+def _bare_kinds_of(model: type[BaseModel], field: str) -> frozenset[Any]:
+    """Return the types of the values of a field, itself or in a list or mapping.
 
     What is in a section of its own is judged there.
     """
     info = model.model_fields[field]
-    kinds = set(_bare_kinds(info.annotation, info.metadata))
-    return bool(kinds & {int, float}) and bool not in kinds
+    return frozenset(_bare_kinds(info.annotation, info.metadata))
 
 
 def _bare_kinds(annotation: Any, metadata: Iterable[Any] = ()) -> set[Any]:
@@ -154,4 +176,6 @@ def _bare_kinds(annotation: Any, metadata: Iterable[Any] = ()) -> set[Any]:
         inner, *rest = get_args(annotation)
         return _bare_kinds(inner, rest)
     arguments = get_args(annotation)
+    if get_origin(annotation) is dict:
+        arguments = arguments[1:]  # keys are names
     return {annotation}.union(*(_bare_kinds(argument) for argument in arguments))

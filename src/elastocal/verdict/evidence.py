@@ -203,7 +203,10 @@ class Evidence:
 
     @property
     def saturation(self) -> Saturation | None:
-        """Saturation of the variant like the calibration; else of the most accurate one."""
+        """Saturation of the variant like the calibration; else of the most accurate one.
+
+        Of those with the calibration's springs and loads, those with the plan's search come first.
+        """
         found = [
             (variant, saturation)
             for codec in self.codecs
@@ -212,22 +215,27 @@ class Evidence:
             )
         ]
         alike = [pair for pair in found if self._is_like(pair[0])]
+        search = None if self.plan is None else self.plan.search.name
+        same = [pair for pair in alike if search in (None, pair[0].search)]
         return min(
-            (saturation for _, saturation in alike or found),
+            (saturation for _, saturation in same or alike or found),
             key=lambda each: each.last_error,
             default=None,
         )
 
+    @property
+    def has_codec_alike(self) -> bool:
+        """Whether a codec has the springs and loads of the calibration."""
+        return any(self._is_like(each) for codec in self.codecs for each in codec.data.variants)
+
     def _is_like(self, variant: Variant) -> bool:
-        """Return whether a variant has the springs, loads and search of the calibration."""
+        """Return whether a variant has the springs and loads of the calibration."""
         settings = self.figures.settings if self.figures else None
         asked = settings.springs if settings else "bearing"
         taken = (
             [rung.springs for rung in self.figures.ladder if rung.chosen] if self.figures else []
         )
-        search = self.plan.search.name if self.plan is not None else variant.search
-        alike = (variant.load_cases, variant.search) == (ALL_LOADS, search)
-        return alike and variant.springs in (asked, *taken)
+        return variant.load_cases == ALL_LOADS and variant.springs in (asked, *taken)
 
 
 _SAME_PLACE = 20e-3

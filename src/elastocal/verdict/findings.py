@@ -69,8 +69,7 @@ def _outside(evidence: Evidence) -> Iterator[Finding]:
     )
 
     doubt = evidence.doubt_on_production
-    if doubt is not None and not doubt.is_small:
-        yield Finding(doubt.sentence)
+    yield from map(Finding, doubt.warnings if doubt else ())
 
 
 def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
@@ -168,6 +167,14 @@ def codec_findings(evidence: Evidence) -> Iterator[Finding]:
         )
     if best is None:
         return
+    if evidence.figures is not None and not evidence.has_codec_alike:
+        # Or to delete the codec that counts would leave the word to one that does not.
+        yield Finding(
+            "no codec has the springs and the loads of the calibration: whether there were enough"
+            " poses was not verified for it",
+            advice="Make a codec with the calibration's springs: `elastocal codec --compare"
+            " springs=…`.",
+        )
     last = counted(best.last, "training pose")
     if not best.explains:
         yield Finding(

@@ -13,11 +13,11 @@ from pathlib import Path
 from elastocal import dataset as datasets
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
-from elastocal.codec import ARRAYS, judge, read_codec
+from elastocal.codec import ARRAYS, VERDICTS, judge, read_codec
 from elastocal.compensation.conditioning import ToolResult, read_tool
 from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
 from elastocal.dataset import Dataset
-from elastocal.errors import ElastocalError
+from elastocal.errors import CodecError, ElastocalError
 from elastocal.files import read_text
 from elastocal.identification import CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
@@ -231,6 +231,8 @@ def _codecs(
 
     def codec(path: Path) -> CodecEvidence:
         data = check_codec(read_codec(path), evidence, path)
+        if path.is_dir() and not (path / VERDICTS).is_file():
+            raise CodecError(f"{path / VERDICTS} is gone: it is written together with {ARRAYS}")
         return CodecEvidence(data, judge(data), reader.folders.shown(path))
 
     root = given or reader.folders.default(CODEC)

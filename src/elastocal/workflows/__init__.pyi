@@ -102,13 +102,17 @@ from .measure_delay import (
     measure_delay as measure_delay,
 )
 from .plan import (
+    POSITION_PLAN as POSITION_PLAN,
+    POSITION_TABLE as POSITION_TABLE,
     ComparedSpread as ComparedSpread,
     PlanFigures as PlanFigures,
+    PlanPositionsSettings as PlanPositionsSettings,
     PlanResult as PlanResult,
     PlanSettings as PlanSettings,
     PlanTimes as PlanTimes,
     plan as plan,
     plan_figures as plan_figures,
+    plan_positions as plan_positions,
 )
 from .predict import (
     PredictResult as PredictResult,

@@ -25,7 +25,7 @@ from elastocal.dataset import require_joint_names
 from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
-from elastocal.geometry import read_geometry
+from elastocal.geometry import PositionPlan, read_geometry
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
@@ -192,10 +192,9 @@ def catalogue_file(path: Path) -> FileDescription:
 def log_map_file(path: Path) -> FileDescription:
     """Describe a map of logs; the cell or robot that it names is read, too."""
     found = logs.read_map(path)
-    place = logs.site(path, found)
     return "map of logs", {
         "schema": logs.SCHEMA,
-        "robot": place.robot.name,
+        "robot": logs.site(path, found).robot.name,
         "logs": [each.log for each in found.logs],
         "load_cases": list(found.load_cases),
     }
@@ -208,8 +207,18 @@ def geometry_file(path: Path) -> FileDescription:
         "schema": schema_of(type(found)),
         "robot": found.robot.name,
         "positions": found.positions,
-        "blunders": len(found.blunders),
         "held_out_mean_m": found.held_out.chosen.mean,
+    }
+
+
+def position_plan_file(path: Path) -> FileDescription:
+    """Describe a plan of positions in free space."""
+    found = read_json(path, PositionPlan)
+    return "plan of positions", {
+        "schema": schema_of(type(found)),
+        "cell": found.cell.name,
+        "poses": len(found.poses),
+        **_picked(found, "technique", "errors"),
     }
 
 

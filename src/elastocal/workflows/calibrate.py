@@ -119,9 +119,10 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
     if path is not None:
         coverage, doubt = _on_production(path, calibration.calibrated)
-        told = () if doubt is None or doubt.is_small else (doubt.sentence,)
-        figures = replace(figures, production=coverage, warnings=(*figures.warnings, *told))
-    result = replace(CalibrateResult.of(calibration.calibrated, figures), made_from=made_from)
+        warnings = (*figures.warnings, *(doubt.warnings if doubt else ()))
+        figures = replace(figures, production=coverage, doubt=doubt, warnings=warnings)
+    found_model = replace(calibration.calibrated, on_production=figures.doubt)
+    result = replace(CalibrateResult.of(found_model, figures), made_from=made_from)
     if settings.out is not None:
         write_json(settings.out, result)
     return result

@@ -40,6 +40,7 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.model": kinds.model_file,
     "elastocal.signature": kinds.signature_file,
     "elastocal.geometry": kinds.geometry_file,
+    "elastocal.position-plan": kinds.position_plan_file,
 }
 """JSON files by the schema that they state, without its version."""
 _NETCDF_KINDS: dict[str, _Describe] = {

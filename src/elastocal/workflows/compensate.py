@@ -13,7 +13,7 @@ from elastocal.compensation.offline import (
 )
 from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
 from elastocal.errors import FileAccessError
-from elastocal.identification import ProductionCoverage
+from elastocal.identification import PredictionDoubt, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -62,6 +62,8 @@ class CompensateResult(Result, CorrectionFigures):
     coverage: ProductionCoverage | None = None
     """How much of the path was calibrated: postures, rail and loads; none where the
     model does not know where that was."""
+    doubt: PredictionDoubt | None = None
+    """How sure the predictions along the path are; none where no row has a load."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -131,6 +133,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         tool=calibrated.tool_name,
         notes=(*_built(settings), *coverage_notes(calibrated), *notes, *further),
         coverage=summary.coverage,
+        doubt=summary.doubt,
     )
 
 
@@ -158,7 +161,9 @@ def _built(settings: CompensateSettings) -> tuple[str, ...]:
 
 
 def _covered(summary: CorrectionSummary) -> tuple[str, ...]:
-    return () if summary.coverage is None else (summary.coverage.sentence(),)
+    warnings = () if summary.doubt is None else summary.doubt.warnings
+    covered = () if summary.coverage is None else (summary.coverage.sentence(),)
+    return (*warnings, *covered)
 
 
 def _force_notes(summary: CorrectionSummary) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import design
 from elastocal.errors import CompensationError
-from elastocal.identification import MOST_UNEXPLAINED
+from elastocal.identification import MOST_UNEXPLAINED, PredictionDoubt
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -53,6 +53,8 @@ class ExportResult(Result):
     """The tool that the model is for, in words."""
     notes: tuple[str, ...]
     """Sentences that a person must know."""
+    on_production: PredictionDoubt | None = None
+    """How sure the model is on the production that it was calibrated for; none: none was named."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -64,6 +66,12 @@ class ExportResult(Result):
             ("files", ", ".join(self.files)),
             ("cycle", f"{1e3 * self.cycle:g} ms"),
             ("delay of the filters", f"{1e3 * self.filter_delay:.3g} ms"),
+            (
+                "on production",
+                "not known: calibrate with --process"
+                if self.on_production is None
+                else f"the model predicts {self.on_production.figures}",
+            ),
             ("largest correction", f"{1e3 * limits.correction:g} mm, {1e3 * limits.rate:g} mm/s"),
         )
 
@@ -99,6 +107,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         numbers = design(calibrated, chosen, load)
     except CompensationError as error:
         raise CompensationError(f"{model}: {error}") from error
+    on_production = calibrated.on_production
     files = write_c(settings.out, numbers, settings.force)
     return ExportResult(
         folder=str(settings.out),
@@ -110,5 +119,9 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         filter_delay=float(np.asarray(numbers.filters.delay())),
         limits=numbers.settings.limits,
         tool=calibrated.tool_name,
-        notes=coverage_notes(calibrated) if calibrated.tool is not None else (),
+        notes=(
+            *(coverage_notes(calibrated) if calibrated.tool is not None else ()),
+            *(on_production.warnings if on_production else ()),
+        ),
+        on_production=on_production,
     )

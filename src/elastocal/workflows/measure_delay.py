@@ -20,7 +20,7 @@ from elastocal.drivers.kuka_rsi import (
 from elastocal.errors import DeviceError
 from elastocal.progress import Progress
 from elastocal.records import write_json
-from elastocal.results import Result, brief_repr
+from elastocal.results import Result
 from elastocal.units import parse_quantity
 from elastocal.workflows._operator_and_devices import Operator, Unattended, rig_of
 from elastocal.workflows._workflow import workflow
@@ -53,8 +53,7 @@ class MeasureDelaySettings:
     """Replace a file that is there."""
 
 
-@brief_repr
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class MeasureDelayResult(Result):
     """The delay, and how the arm and its line were meanwhile."""
 

@@ -5,22 +5,47 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from elastocal import planning
 from elastocal.cell import Cell, fingerprint, load_cell
-from elastocal.compensation.programs import ProgramWriter, choose_writer, write_plan_program
+from elastocal.compensation.programs import (
+    PTP_PERCENT,
+    AxisMove,
+    Block,
+    ProgramWriter,
+    RobotProgram,
+    Stop,
+    choose_writer,
+    write_plan_program,
+)
 from elastocal.errors import PlanningError
 from elastocal.files import filling
+from elastocal.geometry import PositionPlan, plan_positions as choose_positions
 from elastocal.planning import PLAN, PlanResult, ProductionRecord, SpreadRecord
-from elastocal.planning.export import PLAN_TABLE, write_table
+from elastocal.planning.export import PLAN_TABLE, write_table as write_plan_table
 from elastocal.progress import Progress
-from elastocal.records import record
+from elastocal.records import record, write_json
 from elastocal.report import write_plan_figure, write_plan_page
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
+from elastocal.tables import write_table
 from elastocal.workflows._workflow import workflow
 
-__all__ = ["PlanFigures", "PlanResult", "PlanSettings", "plan", "plan_figures"]
+__all__ = [
+    "POSITION_PLAN",
+    "POSITION_TABLE",
+    "PlanFigures",
+    "PlanPositionsSettings",
+    "PlanResult",
+    "PlanSettings",
+    "plan",
+    "plan_figures",
+    "plan_positions",
+]
 
+POSITION_PLAN, POSITION_TABLE = "positions.json", "positions.csv"
+"""Files of a plan of positions: the plan, and the table that the tracker's values go into."""
 _PAGE, _FIGURE = "plan.html", "plan.svg"
 
 
@@ -188,8 +213,106 @@ def _write_folder(
     found, pool, surface = planned.plan, planned.pool, planned.surface
     planning.write_plan(folder, found)
     planning.write_pool(folder, pool)
-    write_table(folder, found)
+    write_plan_table(folder, found)
     if writer is not None:
         write_plan_program(folder, found, writer, program)
     write_plan_page(folder / _PAGE, cell, surface, found, pool)
     write_plan_figure(folder / _FIGURE, surface, found, pool)
+
+
+@dataclass(frozen=True)
+class PlanPositionsSettings:
+    """Where in free space to measure positions for ``geometry``."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``, with marker and trackers."""
+    out: str | PathLike[str]
+    """Folder to write the plan into."""
+    poses: int = 60
+    """Number of poses."""
+    search: str = "i_optimal"
+    """Search technique."""
+    program: str = "positions"
+    """Name of the robot program."""
+    language: str | None = None
+    """Language of the robot program, or ``none``; by default that of the robot's maker."""
+    force: bool = False
+    """Replace the files of a plan that is there."""
+
+
+@workflow(PlanPositionsSettings)
+def plan_positions(settings: PlanPositionsSettings, progress: Progress) -> PositionPlan:
+    """Choose poses in free space that tell the geometry of the arm best; write plan and table.
+
+    Parameters
+    ----------
+    settings : PlanPositionsSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    PlanningError
+        If no plan can be made of this cell, or the program's name is none that a controller takes.
+    FileAccessError
+        If a file cannot be read or written, or the folder holds files.
+    """
+    cell = load_cell(Path(settings.cell))
+    writer, _ = choose_writer(cell.robot, settings.language)
+    if writer is not None:
+        writer.check_name(settings.program)
+    if not settings.poses >= 1:
+        raise PlanningError(f"--poses {settings.poses}: must be at least 1")
+    with filling(Path(settings.out), POSITION_PLAN, settings.force) as folder:
+        found = choose_positions(
+            cell, settings.poses, settings.search, cell.file.search.seed, progress
+        )
+        write_json(folder / POSITION_PLAN, found)
+        _write_positions_table(folder / POSITION_TABLE, cell.robot, found)
+        if writer is not None:
+            override = cell.file.motion.override
+            writer.write(folder, _positions_program(found, cell.robot, settings.program, override))
+    return found
+
+
+def _write_positions_table(path: Path, robot: Robot, found: PositionPlan) -> None:
+    """Write the table that ``geometry`` reads, its markers left to be filled in."""
+    joints = [
+        f"{name}[{'deg' if turns else 'mm'}]"
+        for name, turns in zip(robot.joint_names, robot.revolute, strict=True)
+    ]
+    scale = np.where(robot.revolute, 180.0 / np.pi, 1e3)
+    header = ["pose", "station", *joints, *(f"marker_{axis}[mm]" for axis in "xyz")]
+    rows = (
+        [each.id, each.station, *(scale * np.array(each.joints)).tolist(), "", "", ""]
+        for each in found.poses
+    )
+    write_table(path, header, rows)
+
+
+def _positions_program(
+    found: PositionPlan, robot: Robot, name: str, override: float
+) -> RobotProgram:
+    """Return the program that stops at every pose until its marker has been measured."""
+    home = AxisMove("XHOME", np.array(found.robot.home))
+    blocks = [Block("", (home,))]
+    ways = [
+        tuple(AxisMove(f"XVIA{index}_{n}", np.array(q)) for n, q in enumerate(move.via, start=1))
+        for index, move in enumerate(found.moves)
+    ]
+    for pose, way in zip(found.poses, ways[:-1], strict=True):
+        there = AxisMove(f"XPOS{pose.id}", np.array(pose.joints))
+        measure = Stop(f"Measure the marker by {pose.station}, then go on.")
+        title = f"POSE {pose.id} of 0 to {len(found.poses) - 1}"
+        blocks.append(Block(title, (*way, there, measure)))
+    blocks.append(Block("", (*ways[-1], home)))
+    percent = max(1, min(PTP_PERCENT, int(100.0 * override + 1e-9)))
+    return RobotProgram(
+        name=name,
+        robot=robot,
+        axis_percent=percent,
+        blocks=tuple(blocks),
+        facts=(f"Poses in free space for elastocal geometry, of cell {found.cell.name}.",),
+        motions=("Moves of the axes from pose to pose; the robot stops at each.",),
+    )

@@ -19,7 +19,7 @@ from elastocal.compensation.process import Course, ProcessRun, SimulateProcessRe
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError
 from elastocal.files import filling, read_text, sha256
-from elastocal.identification import CalibratedModel, ProductionCoverage
+from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
@@ -219,7 +219,7 @@ class _SeedRuns:
         """Return the record of all seeds."""
         settings, simulation, usual = self.settings, self.cell.file.simulation, self.loads[1.0]
         name = _direction_name(settings)
-        covered = _coverage(self.trials[0].model, self.programmed)
+        covered, doubt = _on_production(self.trials[0].model, self.programmed)
         return SimulateProcessResult(
             cell=self.cell.name,
             process=settings.kind or Path(str(settings.path)).name,
@@ -246,7 +246,10 @@ class _SeedRuns:
             path_sha256="" if settings.path is None else sha256(read_text(settings.path)),
             preset=simulation.preset,
             process_stiffness=simulation.contact.process_stiffness,
-            notes=_notes(settings, self.programmed, len(self.runs), covered),
+            notes=(
+                *_notes(settings, self.programmed, len(self.runs), covered),
+                *(doubt.warnings if doubt else ()),
+            ),
             coverage=covered,
         )
 
@@ -316,11 +319,13 @@ def _direction_name(settings: SimulateProcessSettings) -> str:
     return settings.direction if known else f"along ({settings.direction})"
 
 
-def _coverage(model: CalibratedModel, courses: tuple[Course, ...]) -> ProductionCoverage | None:
-    """Return how much of some courses the calibration of a model covers."""
+def _on_production(
+    model: CalibratedModel, courses: tuple[Course, ...]
+) -> tuple[ProductionCoverage | None, PredictionDoubt | None]:
+    """Return how much of some courses the calibration of a model covers, and how sure it is."""
     names = [course.name for course in courses for _ in course.q]
     q, force = (np.vstack(each) for each in zip(*((c.q, c.force) for c in courses), strict=True))
-    return model.coverage(q, force, course=names)
+    return model.coverage(q, force, course=names), model.doubt(q, force)
 
 
 def _notes(

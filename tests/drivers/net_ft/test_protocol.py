@@ -1,5 +1,7 @@
 """Layouts of a Net F/T box, read from bytes that no line of ours has written."""
 
+import random
+import resource
 import struct
 
 import pytest
@@ -142,3 +144,23 @@ def test_whatever_comes_is_read_or_refused(data):
 @settings(max_examples=300, deadline=None)
 def test_whatever_stands_in_a_page_is_read_or_refused(text):
     assert read_or_refused(parse_configuration, page(more=text.encode("utf-8", "replace").decode()))
+
+
+RECORD = struct.pack(">III6i", 1, 7, 0, *range(6))
+CALIBRATION = struct.pack(">HBBII6H", 0x1234, 2, 3, 100_000, 1000, *(1,) * 6)
+SEEDS = [(parse_records, RECORD)] * 5 + [(parse_calibration, CALIBRATION)] * 4
+SEEDS += [(parse_configuration, page(more="<cfgtfx>0;0;0;0;0;0</cfgtfx>"))]
+
+
+@pytest.mark.slow
+def test_a_million_damaged_messages_are_read_or_refused_and_leave_nothing_behind():
+    chance, before = random.Random(1), 0
+    for number in range(1_000_000):
+        parse, seed = SEEDS[number % len(SEEDS)]
+        data = bytearray(seed[: chance.choice((len(seed), len(seed), chance.randrange(len(seed))))])
+        for _ in range(chance.randrange(4) if data else 0):
+            data[chance.randrange(len(data))] = chance.randrange(256)
+        assert read_or_refused(parse, bytes(data)), bytes(data)
+        if number == 50_000:
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 10_000  # kB

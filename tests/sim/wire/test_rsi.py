@@ -472,9 +472,9 @@ class TestFaults:
 
     def test_what_makes_no_sense_is_no_datagram_of_a_cycle(self, wire):
         pc = Pc()
-        wire(pc, patience=0.2, faults=("malformed",))
+        wire(pc, patience=0.1, faults=("malformed", "malformed"))
         assert pc.exchange(2)[1] > 0
-        assert [pc.hear()[1] for _ in range(3)] == [-1, -1, -1]
+        assert [pc.hear()[1] for _ in range(3)] == [-1, -1, IPOC_START + 16]
 
     def test_an_answer_that_the_robot_does_not_hear_is_late(self, wire):
         pc = Pc()

@@ -1,6 +1,7 @@
 """``elastocal plan``: from a cell to an ordered, checked, executable set of poses."""
 
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,13 @@ import typer
 
 from elastocal import workflows
 from elastocal.cli import options, output, tables
+
+
+class _Purpose(StrEnum):
+    """What the poses are for."""
+
+    ELASTICITY = "elasticity"
+    GEOMETRY = "geometry"
 
 
 def _plan(  # noqa: PLR0913 - one parameter an option
@@ -21,11 +29,29 @@ def _plan(  # noqa: PLR0913 - one parameter an option
             " Default: ioops beside cover, else cover."
         ),
     ] = None,
+    purpose: Annotated[
+        _Purpose,
+        typer.Option(
+            "--for",
+            help="elasticity: presses on the tooling; geometry: positions in free space for"
+            " elastocal geometry.",
+        ),
+    ] = _Purpose.ELASTICITY,
+    search: Annotated[
+        str | None,
+        typer.Option(help="With --for geometry: search technique; default: i_optimal."),
+    ] = None,
     poses: Annotated[
         int | None,
-        typer.Option(min=1, help="Number of poses; default: search.poses of the cell file."),
+        typer.Option(
+            min=1,
+            help="Number of poses; default: search.poses of the cell file; 60 for geometry.",
+        ),
     ] = None,
-    program: Annotated[str, typer.Option(help="Name of the robot program.")] = "calib",
+    program: Annotated[
+        str | None,
+        typer.Option(help="Name of the robot program; default: calib, or positions."),
+    ] = None,
     language: Annotated[
         str | None,
         typer.Option(
@@ -49,8 +75,31 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     as_json: options.KeyFigures = False,
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
+    from elastocal.errors import PlanningError
     from elastocal.planning.export import pose_lines
 
+    if purpose is _Purpose.GEOMETRY:
+        if dry_run or compare or jobs:
+            raise PlanningError("--dry-run, --compare and --jobs are for presses, not for geometry")
+        free = workflows.PlanPositionsSettings(
+            cell,
+            out,
+            poses=poses or 60,
+            search=search or "i_optimal",
+            program=program or "positions",
+            language=language,
+            force=force,
+        )
+        with output.progress_bars() as progress:
+            positions = workflows.plan_positions(free, progress)
+        if as_json:
+            output.print_json(positions)
+        else:
+            tables.show_position_plan(output.console(), positions, out)
+        return
+    if search is not None:
+        raise PlanningError("--search is for --for geometry: the cell file names its technique")
+    program = program or "calib"
     settings = workflows.PlanSettings(
         cell, out, compare, program, jobs, force, dry_run, poses, language
     )

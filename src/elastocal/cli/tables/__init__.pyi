@@ -14,7 +14,7 @@ from .compensation import (
     show_stiffness as show_stiffness,
     show_tool as show_tool,
 )
-from .geometry import show_geometry as show_geometry
+from .geometry import show_geometry as show_geometry, show_position_plan as show_position_plan
 from .plan import (
     dry_figures as dry_figures,
     robot_facts as robot_facts,

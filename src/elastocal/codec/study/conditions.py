@@ -39,6 +39,7 @@ class Factor:
 
 
 def _count(text: str) -> int:
+    parse_number(text)
     value = int(text)
     if not value >= 1:
         raise ValueError

@@ -22,7 +22,7 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PathError
-from elastocal.identification import CalibratedModel, CoveredRows
+from elastocal.identification import CalibratedModel, CoveredRows, PredictionDoubt
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import (
@@ -75,6 +75,14 @@ class PathCorrection:
     """What friction remembers after the last row, shape (element,), in N·m."""
     covered: CoveredRows | None = None
     """Rows that were calibrated; none where the model does not know where that was."""
+
+    @property
+    def doubt(self) -> PredictionDoubt | None:
+        """How sure the predictions are; None where no row has a load."""
+        loaded = self.deflection.any(axis=1)
+        return PredictionDoubt.of(
+            *(each[loaded] for each in (self.deflection, self.low, self.high))
+        )
 
 
 def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more)

@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.offline.correct import PathCorrection
-from elastocal.identification import ProductionCoverage
+from elastocal.identification import PredictionDoubt, ProductionCoverage
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -78,6 +78,8 @@ class CorrectionSummary:
     """Joints that were found for the first row of a path of poses, in rad or m."""
     coverage: ProductionCoverage | None = None
     """How much of the rows was calibrated; none where the model does not know where that was."""
+    doubt: PredictionDoubt | None = None
+    """How sure the predictions are; none where no row has a load."""
 
     def plus(
         self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]
@@ -114,6 +116,7 @@ class CorrectionSummary:
             first_jump=self.first_jump or (labels[jumps[0]] if jumps else ""),
             pulled=self.pulled + int(correction.pulled.sum()),
             coverage=coverage,
+            doubt=correction.doubt if self.doubt is None else self.doubt.plus(correction.doubt),
         )
 
     def figures(self) -> CorrectionFigures:

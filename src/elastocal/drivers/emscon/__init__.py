@@ -7,7 +7,7 @@
 ========== ====================================================================================
 
 Verified against a simulator and the public layout, not against hardware; see
-docs/decisions/0083-emscon.md.
+docs/decisions/0082-emscon.md.
 """
 
 import lazy_loader

@@ -35,6 +35,7 @@ from .ethernet_file import (
     check_ethernet_file as check_ethernet_file,
 )
 from .force_control import (
+    SILENT as SILENT,
     CollisionWatch as CollisionWatch,
     ForceLaw as ForceLaw,
     ForceReader as ForceReader,

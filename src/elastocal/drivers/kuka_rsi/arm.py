@@ -377,7 +377,7 @@ class KukaArm:
         elif cycle.state in (ProgramState.ABSENT, ProgramState.ENDED):
             why = "the program elcal_run on the controller is not in its loop: select and start it"
         elif self._reader is not None:
-            why = self._reader.problem()
+            why = self._reader.problem(_SILENT)
         if why is not None:
             raise DeviceError(f"{_SOURCE} cannot be enabled: {why}")
 

@@ -30,8 +30,10 @@ _PRODUCT = 0.25
 """Gain times stiffness times delay."""
 _FILTER = 0.01
 """Time constant of the force that is controlled, in s."""
-_HESITATE, _SILENT = 0.03, 0.15
-"""Age of the newest force at which force control stands still, and at which it gives up, in s."""
+_HESITATE = 0.03
+"""Age of the newest force at which the arm stands still, in s."""
+SILENT = 1.0
+"""Age at which it gives up, in s: whoever supervises it has had time to take it off the surface."""
 _TARE_SAMPLES = 10
 _TARE_TIME = 0.2
 """Samples and time over which the zero of the force is taken, in s."""
@@ -126,23 +128,21 @@ class ForceReader:
         self._share = cycle / (_FILTER + cycle)
         self._zero, self._sums, self._count = np.zeros(3), np.zeros(3), 0
         self._since: float | None = None
-        self._newest = -math.inf
+        self._now = self._newest = self._good = -math.inf
         self._smooth: FloatArray | None = None
-        self.age = math.inf
-        """Of the newest sample, in s."""
-        self.status = SensorStatus.OK
+        self._status = SensorStatus.OK
         self.raw: FloatArray = np.zeros(3)
-        """Newest force, sensor frame, as measured, shape (3,), in N."""
+        """Newest force to be trusted, sensor frame, as measured, shape (3,), in N."""
 
     def look(self, now: float) -> None:
-        """Take the newest sample."""
-        sample = self._feed.newest()
-        if sample is None:
+        """Take the newest sample, if it can be trusted."""
+        self._now, sample = now, self._feed.newest()
+        if sample is None or sample.time == self._newest:
             return
-        self.age, self.status = now - sample.time, sample.status
-        if sample.time == self._newest:
+        self._newest, self._status = sample.time, sample.status
+        if sample.status is not SensorStatus.OK or not np.isfinite(sample.force).all():
             return
-        self._newest, self.raw = sample.time, sample.force
+        self._good, self.raw = sample.time, sample.force
         if self._smooth is None:
             self._smooth = sample.force
         self._smooth = self._smooth + self._share * (sample.force - self._smooth)
@@ -178,17 +178,20 @@ class ForceReader:
 
     @property
     def hesitates(self) -> bool:
-        """Whether the force is too old to move by."""
-        return not self.age <= _HESITATE
+        """Whether there is no force to move by at the moment."""
+        return not self._now - self._good <= _HESITATE
 
-    def problem(self) -> str | None:
-        """Return why the force cannot be trusted; None if it can."""
-        if not self.age <= _SILENT:
-            silent = "has sent nothing" if math.isinf(self.age) else f"silent for {self.age:.2f} s"
-            return f"force sensor {silent}"
-        if self.status is not SensorStatus.OK:
-            return f"force sensor says {self.status.value}"
-        return None if np.isfinite(self.raw).all() else "force sensor says NaN"
+    def problem(self, patience: float = SILENT) -> str | None:
+        """Return why there is no force to be trusted for a time in s; None if there is one."""
+        if self._now - self._good <= patience:
+            return None
+        if math.isinf(self._newest):
+            return "force sensor has sent nothing"
+        silent = self._now - self._newest
+        if silent > patience:
+            return f"force sensor silent for {silent:.2f} s"
+        bad = self._status is SensorStatus.OK
+        return f"force sensor says {'NaN' if bad else self._status.value}"
 
 
 class CollisionWatch:

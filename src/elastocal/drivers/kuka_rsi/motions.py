@@ -244,6 +244,11 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> _Phase:
     gone = max(_RELEASED * float(np.linalg.norm(reference)), _LEAST_FORCE)
     while cycle.time < ends:
         require_force(reader, press.force_limit)
+        if reader.hesitates:
+            if releases:
+                break  # in position control, from where it can be retracted without a force
+            cycle = yield Step()
+            continue
         reference = _toward(reference, press.wanted, press.rate * pace.cycle)
         velocity = press.law.speed(reader.force_tcp - reference)
         left = float(np.linalg.norm(reader.force_tcp))
@@ -255,9 +260,7 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> _Phase:
                 f"force control gave up: the tool went {1e3 * went:.1f} mm from where it touched,"
                 f" limit {1e3 * press.travel_limit:g} mm"
             )
-        still = reader.hesitates
-        turned = cycle.T_base_tcp[:3, :3] @ velocity
-        cycle = yield Step() if still else Step(pace.cycle * turned)
+        cycle = yield Step(pace.cycle * cycle.T_base_tcp[:3, :3] @ velocity)
     return cycle
 
 

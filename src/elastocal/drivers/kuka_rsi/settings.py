@@ -51,6 +51,9 @@ _WRONG_PAIRS = {
 }
 _LIMIT_PER_LOAD = 1.3
 """Default force limit over the largest load case, as in `elastocal run`."""
+_LAST_RESORT = 1.2
+"""Force at which the arm stops by itself over that limit: whoever supervises it goes first, and can
+take it off the surface; an arm that has stopped stays there."""
 _BELOW = 0.95
 """Largest correction of the PC over POSCORR's limit: the PC's is felt first."""
 _MONITOR = 1.2
@@ -214,6 +217,6 @@ def bounds_of(cell: Cell, settings: RsiSettings) -> Bounds:
         monitor=1e-4 * math.ceil(1e4 * _MONITOR * poscorr - 1e-6),
         turn=math.radians(1.0),
         speed=settings.correction_speed,
-        force=procedure.force_limit or _LIMIT_PER_LOAD * most,
+        force=_LAST_RESORT * (procedure.force_limit or _LIMIT_PER_LOAD * most),
         travel=procedure.travel_limit,
     )

@@ -27,10 +27,8 @@ from elastocal.cell import (
 )
 from elastocal.drivers.stations import require_station, require_trackers
 from elastocal.errors import DeviceError
-from elastocal.units import factor
+from elastocal.units import factor, parse_number
 
-RATE = 5.0
-"""Points a second by which a reading is repeated: the procedure averages what stands still."""
 LEAST_BEAM_TIMEOUT = 30.0
 """A person does not read and type in less, in s."""
 _LONGEST_ENTRY = 200
@@ -70,8 +68,6 @@ class OperatorEntry:
         Shows a person a line.
     """
 
-    rate = RATE
-
     def __init__(
         self,
         cell: Cell,
@@ -85,8 +81,10 @@ class OperatorEntry:
         self.stations = tuple(self._ranges)
         self._settings, self._clock, self._tell = settings, clock, tell
         # The mean of n points that repeat one reading is no better than the reading.
-        window = max(cell.file.procedure.average, cell.file.procedure.unloaded_average)
-        self._sigma = settings.sigma * math.sqrt(max(window * RATE, 1.0))
+        procedure = cell.file.procedure
+        window = max(procedure.average, procedure.unloaded_average)
+        self.rate = 1.0 / procedure.cycle
+        self._sigma = settings.sigma * math.sqrt(window * self.rate)
         self._lock = threading.Lock()
         self._station, self._asked, self._asked_at = self.stations[0], "", -math.inf
         self._point: tuple[float, float, float] | None = None
@@ -122,7 +120,7 @@ class OperatorEntry:
         self._tell(text)
 
     def read(self) -> PointBlock:
-        """Return the reading again, as long as it stands; at once.
+        """Return the reading again, once a call, as long as it stands; at once.
 
         Raises
         ------
@@ -133,7 +131,7 @@ class OperatorEntry:
         with self._lock:
             if self._point is None:
                 self._require_somebody(now)
-            is_due = self._point is not None and now - self._sent >= 1.0 / RATE
+            is_due = self._point is not None and now > self._sent
             rows = np.array([self._point] if is_due else [], dtype=float).reshape(-1, 3)
             self._sent = now if is_due else self._sent
             locked = self._point is not None
@@ -186,7 +184,7 @@ class OperatorEntry:
         if len(words) == 1:
             words = line.split(",")
         try:
-            x, y, z = (float(word.strip(",").replace(",", ".")) for word in words)
+            x, y, z = (parse_number(word.strip(",").replace(",", ".")) for word in words)
         except ValueError:
             return nothing, "three numbers are wanted"
         unit = self._settings.unit

@@ -59,6 +59,7 @@ def load_rows(
     tool: SensorLoad,
     *,
     conditioned: bool,
+    metrology: bool = True,
 ) -> list[LoadRow]:
     """Return every load of every pose as the dataset holds it.
 
@@ -73,13 +74,15 @@ def load_rows(
     conditioned : bool
         Whether a full press went before the reference. The dataset says so of all its poses: the
         loads of a pose at which nothing is known of that press are missing.
+    metrology : bool
+        Whether there was any; without it no reading has a marker displacement, and none lacks it.
     """
     unknown = {pose.pose for pose in poses if conditioned and pose.conditioning is None}
     why = f"nothing is known of the press before the reference ({CONDITIONING})"
     return [
         LoadRow(pose.pose, str(load.window.load_case), ReadingStatus.MISSING, why, None)
         if pose.pose in unknown
-        else _row(pose, load, registration, tool)
+        else _row(pose, load, registration if metrology else None, tool, registration.lever_arm)
         for pose in poses
         for load in pose.loads
     ]
@@ -99,17 +102,21 @@ class _LoadAndReference:
 
 
 def _row(
-    pose: PoseReadings, load: Reading, registration: Registration, tool: SensorLoad
+    pose: PoseReadings,
+    load: Reading,
+    registration: Registration | None,
+    tool: SensorLoad,
+    lever: FloatArray,
 ) -> LoadRow:
     """Return a load as the dataset holds it; without reference, station or stream it is missing."""
     window, case = load.window, str(load.window.load_case)
     pair = _pair(pose, load, registration)
     if isinstance(pair, _LoadAndReference):
-        numbers = _numbers(pair, registration.lever_arm, tool)
+        numbers = _numbers(pair, lever, tool)
         return LoadRow(pose.pose, case, window.status, window.note, numbers)
     if window.status is ReadingStatus.OK:
         return LoadRow(pose.pose, case, ReadingStatus.MISSING, pair, None)
-    pressed = _press(pose, load, registration.lever_arm, tool)
+    pressed = _press(pose, load, lever, tool)
     return LoadRow(pose.pose, case, window.status, window.note or pair, pressed)
 
 
@@ -117,17 +124,24 @@ def _press(
     pose: PoseReadings, load: Reading, lever: FloatArray, tool: SensorLoad
 ) -> LoadValues | None:
     """Return what friction in the gears felt of a press that gave no reading, if it is known."""
+    pair = _unseen(pose, load)
+    return None if pair is None else _numbers(pair, lever, tool)
+
+
+def _unseen(pose: PoseReadings, load: Reading) -> _LoadAndReference | None:
+    """Return load and reference of a marker that nobody saw; None where they are not known."""
     reference = None if pose.zero is None else pose.zero.tool
     tare = None if pose.reference is None else pose.reference.tool
     if load.tool is None or reference is None or tare is None:
         return None
     nan = np.full(3, np.nan)
     unseen = Mean(nan, nan, nan, 0, np.nan)
-    pair = _LoadAndReference(load.tool, unseen, reference, unseen, tare, np.eye(3))
-    return _numbers(pair, lever, tool)
+    return _LoadAndReference(load.tool, unseen, reference, unseen, tare, np.eye(3))
 
 
-def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _LoadAndReference | str:
+def _pair(
+    pose: PoseReadings, load: Reading, registration: Registration | None
+) -> _LoadAndReference | str:
     """Return load and reference, or why a reading has no numbers."""
     reference, unloaded, station = pose.zero, pose.reference, load.window.station
     if reference is None or unloaded is None:
@@ -135,6 +149,8 @@ def _pair(pose: PoseReadings, load: Reading, registration: Registration) -> _Loa
     for name, each in (("unloaded", unloaded), ("light contact", reference)):
         if each.window.status is not ReadingStatus.OK:
             return f"the {name} reference is {each.window.status.value}: {each.window.note}"
+    if registration is None:
+        return _unseen(pose, load) or load.window.note or "a stream says too little"
     if not station:
         return "no tracker station measured"
     if station != reference.window.station:

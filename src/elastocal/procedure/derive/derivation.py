@@ -353,11 +353,13 @@ def dataset_of(
         return values if np.all(values[ok] > 0) else None
 
     zero = unloaded_references(poses, labels, sensor)
+    displacement = array("marker_displacement")
+    is_unseen = bool(ok.any() and np.isnan(displacement[ok]).all())
     return Dataset.from_arrays(
         joint_position=array("q", len(robot.joint_names)),
         force=array("force"),
         controller_displacement=array("controller_displacement"),
-        marker_displacement=array("marker_displacement"),
+        marker_displacement=None if is_unseen else displacement,
         force_sigma=sigma("force_sigma"),
         marker_sigma=sigma("marker_sigma"),
         joint_names=robot.joint_names,

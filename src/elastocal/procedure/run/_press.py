@@ -249,6 +249,9 @@ def _ask(a: Attempt) -> bool:
     """Have the standing marker measured, where that is a person's work; return whether it is."""
     is_asked = a.supervisor.ask(_what(a))
     if is_asked:
+        # Nobody watched the way from the reading before: it is no slide.
+        if a.slide is not None:
+            a.slide.forget()
         _wait_for_beam(a)
     return is_asked
 

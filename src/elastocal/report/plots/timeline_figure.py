@@ -101,6 +101,11 @@ def _closely(
         ("marker, mm", points.time, 1e3 * points.position, True),
     )
     for axes, (name, time, values, as_norm) in zip(panels, curves, strict=True):
+        if not len(time):
+            axes.set_xlim(*span)
+            axes.set_ylabel(name)
+            axes.text(0.5, 0.5, "in no log", transform=axes.transAxes, ha="center", va="center")
+            continue
         inside = (time >= span[0]) & (time <= span[1])
         change = values[inside] - values[_during(time, own[:1])].mean(axis=0)
         if as_norm:

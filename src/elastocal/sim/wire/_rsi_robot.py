@@ -186,7 +186,7 @@ class RsiRobot:
 
     def __init__(self, live: LiveCell, receive: Sequence[Channel], context: RsiContext) -> None:
         """Stand ready; ``receive`` are the channels from the PC."""
-        self._live, self._receive, self._program = live, receive, context.program
+        self._live, self._receive, self._krl_program = live, receive, context.program
         self._cycle = context.cycle
         self._latency = max(0, round(context.delay / context.cycle) - 1)
         self._corrections = PosCorr(context.limits, context.absolute)
@@ -218,10 +218,11 @@ class RsiRobot:
         self._corrections.clear()
         self._offset = self._corrections.offset
         self._offsets = deque([self._offset] * self._latency)
-        self._q_programmed = sim.arm.state().q
+        self._program(sim.arm.state().q)
         self._corrected_by = np.zeros_like(self._q_programmed)
         self._led, self._moving, self.ended = False, False, False
-        self._steps, self._looked = self._program(self), 0
+        self._steps, self._looked = self._krl_program(self), 0
+        self._said = self._values(sim)
 
     def stop(self) -> None:
         """Stop the arm where it is."""
@@ -229,7 +230,7 @@ class RsiRobot:
 
     def values(self) -> dict[str, float | Sequence[float]]:
         """Return what the controller says now, in mm and deg."""
-        return self._live.apart(self._values)
+        return self._live.apart(self._values) if self._moving else self._said
 
     def _values(self, sim: SimulatedCell) -> dict[str, float | Sequence[float]]:
         if self._led:
@@ -237,12 +238,14 @@ class RsiRobot:
         else:
             state = sim.arm.state()
             q, T = state.q, state.T_base_tcp
-        programmed = q - self._corrected_by if self._moving else self._q_programmed
+        if self._moving:
+            self._program(q - self._corrected_by)
+        programmed = self._q_programmed
         axes, wanted = (self._unit * q).tolist(), (self._unit * programmed).tolist()
         ampere = self._follower.gear_torque / _DRIVE_CONSTANT if self._led else np.zeros(6)
         return {
             "RIst": _frame(T),
-            "RSol": _frame(self._true.forward(programmed)),
+            "RSol": _frame(self._T_programmed),
             "AIPos": axes[self._external :],
             "ASPos": wanted[self._external :],
             "EIPos": axes[: self._external],
@@ -287,6 +290,7 @@ class RsiRobot:
             self._looked = round(POLL / self._cycle)
             self.ended = next(self._steps, _OVER) is _OVER
         self._looked -= 1
+        self._said = self._values(sim)
         fault = self._follower.stopped if self._led else sim.arm.state().fault
         if fault is not None:
             raise RsiStopError(fault)
@@ -294,7 +298,7 @@ class RsiRobot:
     def _lead(self, offset: FloatArray) -> None:
         """Lead the arm to its corrected pose; refuse what its axes cannot follow."""
         before = self._follower.q
-        self._follower.follow(self._corrected(self._q_programmed, offset), self._cycle)
+        self._follower.follow(_corrected(self._T_programmed, offset), self._cycle)
         speed = np.abs(self._follower.q - before) / self._cycle / self._fastest
         if not float(speed.max()) <= 1.0:
             axis = self._live.cell.robot.joint_names[int(np.nanargmax(speed))]
@@ -302,11 +306,9 @@ class RsiRobot:
                 f"KSS00421 command velocity of {axis} is {speed.max():.0%} of the most"
             )
 
-    def _corrected(self, q: FloatArray, offset: FloatArray) -> FloatArray:
-        T = self._true.forward(q).copy()
-        T[:3, :3] = offset[1:] @ T[:3, :3]
-        T[:3, 3] += offset[0]
-        return T
+    def _program(self, q: FloatArray) -> None:
+        """Take joints as the programmed ones."""
+        self._q_programmed, self._T_programmed = q, self._true.forward(q)
 
     def move_corr(self) -> Steps:
         """RSI_MOVECORR: let corrections act until ``Stop`` rises."""
@@ -323,8 +325,9 @@ class RsiRobot:
         A correction that is still there stays on top of the target.
         """
         target = self._target()
-        T = self._corrected(target, self._offset)
-        if np.abs(T - self._true.forward(target)).max() > _NONE:
+        programmed = self._true.forward(target)
+        T = _corrected(programmed, self._offset)
+        if np.abs(T - programmed).max() > _NONE:
             found = self._true.solve(T[None], target[None])
             if not found.ok[0]:
                 raise RsiStopError("KSS01422 the corrected target is out of reach")
@@ -339,7 +342,8 @@ class RsiRobot:
                 self._arm().enable()
             yield
         q = self._arm().state().q
-        self._moving, self._q_programmed = False, q - self._corrected_by
+        self._moving = False
+        self._program(q - self._corrected_by)
         return bool(np.array_equal(q, goal))
 
     @property
@@ -362,6 +366,14 @@ class RsiRobot:
 
     def _arm(self) -> RobotArm:
         return self._live.arm()
+
+
+def _corrected(T_programmed: FloatArray, offset: FloatArray) -> FloatArray:
+    """Return a frame with a correction in base on top; see `PosCorr.offset`."""
+    T = T_programmed.copy()
+    T[:3, :3] = offset[1:] @ T[:3, :3]
+    T[:3, 3] += offset[0]
+    return T
 
 
 def _frame(T: FloatArray) -> list[float]:

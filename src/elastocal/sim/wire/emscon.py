@@ -7,13 +7,14 @@ while it measures is answered "busy".
 """
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import BeamState, PointBlock
+from elastocal.errors import DeviceError
 from elastocal.sim.wire._tcp import Peer, TcpServer, probe_orientation
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.wire.servers import Told, serves
@@ -62,7 +63,7 @@ class EmsconServer(TcpServer):
     """
 
     def __init__(self, live: LiveCell, told: Told, *, initialize_time: float = 0.5) -> None:
-        super().__init__(told.address, {"tcp": told.port()})
+        super().__init__(told.address, {"tcp": _port(told)})
         self._live, self._tracker = live, live.metrology()
         self._initialize_time = initialize_time
         point = told.settings.get("point") or (0.0, 0.0, 0.0)
@@ -241,6 +242,15 @@ class EmsconServer(TcpServer):
         values += [*sigma, np.linalg.norm(sigma)]
         lengths = [scale * float(value) for value in values]
         return _packet(2, struct.pack("<iii17d", 0, _STATIONARY, 0, *lengths, *self.weather))
+
+
+def _port(told: Told) -> int:
+    """Return the port of the only station."""
+    stations = told.settings.get("stations") or {}
+    assert isinstance(stations, Mapping)
+    if len(stations) > 1:
+        raise DeviceError(f"one emScon station is simulated, not {', '.join(stations)}")
+    return next((int(each.port) for each in stations.values()), told.port())
 
 
 def _packet(kind: int, body: bytes) -> bytes:

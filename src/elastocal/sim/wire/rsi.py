@@ -149,6 +149,7 @@ class RsiServer:
         self.statistics = RsiStatistics()
         self._faults: deque[RsiFault | None] = deque()
         self._held: bytes | None = None
+        self._malformed = deque(_MALFORMED)
         self._closing, self._reset = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="simulated RSI", daemon=True)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -220,8 +221,10 @@ class RsiServer:
             counts.cycles += 1
             answer = None
             if not self._config.only_send:
-                answer = self._await(ipoc, 0.0 if fault == "deaf" else self._window)
+                answer = self._await(ipoc, self._window)
                 answer = None if fault == "deaf" else answer
+                if self._closing.is_set():
+                    return "closed"
                 heard = heard or answer is not None
                 missed = missed + 1 if heard and answer is None else 0
                 counts.answered += answer is not None
@@ -260,7 +263,8 @@ class RsiServer:
         elif fault == "repeated":
             out *= 2
         elif fault == "malformed":
-            out = list(_MALFORMED)
+            out = [self._malformed[0]]
+            self._malformed.rotate(-1)
         elif fault == "intruder":
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
                 other.bind((self._socket.getsockname()[0], 0))

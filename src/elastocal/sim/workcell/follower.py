@@ -38,7 +38,7 @@ _DEPARTED = 50e-6
 """Way from a standstill that begins another movement, in m."""
 _BLEND = 2e-4
 """Way on which the random part of a stop comes in, in m."""
-_FORCE_STEP, _WAY_FREE, _WAY_PRESSED = 60.0, 5e-3, 1e-3
+_FORCE_STEP, _WAY_FREE, _WAY_PRESSED = 150.0, 10e-3, 2e-3
 """Change of force in N, and of pose in m, after which the equilibrium is found anew."""
 _REFRESH_GAP = 10
 """Fewest cycles between two exact equilibria."""
@@ -52,8 +52,8 @@ _SAME_PLACE = 2e-4
 """Joints so near to where they were led to have not been moved by anything else, in rad or m."""
 _ENDS = np.array([0.0, 1.0])
 _ROUNDS = 6
-_CLOSED = 1e-3
-"""Change of force that counts as none, in N."""
+_CLOSED = 1.0
+"""A Newton step below this is the last one of a cycle, in N: what it leaves is far below 0.01 N."""
 _LATERAL = 5e-4
 """Way along the surface after which it is looked for again, in m."""
 _REACH = 0.5
@@ -261,8 +261,8 @@ class PoseFollower:
         steep = float(way @ hit.normal)
         anchor = tool - gap * (way / steep if steep < 0.0 else hit.normal)
         place = (anchor, self.T[:3, :3].copy(), hit.normal, self.q)
-        self.contact = Contact(self._plant.contact_law, *place, self._chance.now[3:7])
         self._refresh()
+        self.contact = Contact(self._plant.contact_law, *place, self._chance.now[3:7])
 
     def _balance(self, contact: Contact) -> None:
         """Find the force at which robot, disk and tooling are where each holds the tool."""
@@ -286,31 +286,22 @@ class PoseFollower:
                 break
         force_tcp = R.T @ force
         if force_tcp[2] >= 0.0:
-            self._lift(contact)
-            return
-        if law.effort(force_tcp) > LIMIT:
+            force = np.zeros(3)
+        slides = force_tcp[2] < 0.0 and law.effort(force_tcp) > LIMIT
+        if slides:
             force = R @ law.held(force_tcp)
         self._load_now = self._load_change(force)
         torque, stiffness = curves.torque(self._gears)
         demand = tangent.torque + tangent.gears_torque @ self._load_now
         self._gears = self._gears + (demand - torque) / stiffness
-        if law.effort(force_tcp) > LIMIT:
-            # It slides: the disk comes along with the tool.
-            tool = self.T[:3, 3] + self._twist()[:3]
-            behind = R.T @ (tool - held.tool_position(force))
-            self.contact = contact.slipped(behind[:2])
         curves.draw_along(self._gears)
         self.force = force
-
-    def _lift(self, contact: Contact) -> None:
-        """Carry no force; let go of the surface once it is a little away."""
-        self.force, pressed = np.zeros(3), bool(np.any(self.force))
-        self._load_now = self._load_change(self.force)
-        tool = self.T[:3, 3] + self._twist()[:3]
-        gone = float((tool - contact.anchor) @ contact.normal) > _STANDSTILL
-        if gone:
+        off = self.T[:3, 3] + self._twist()[:3] - held.tool_position(force)
+        if slides:
+            # The disk comes along with the tool.
+            self.contact = contact.slipped((R.T @ off)[:2])
+        elif force_tcp[2] >= 0.0 and float(off @ contact.normal) > _STANDSTILL:
             self.contact = self._ahead = None
-        if gone or pressed:
             self._refresh()
 
     def _load_change(self, force: FloatArray) -> FloatArray:
@@ -349,7 +340,7 @@ class PoseFollower:
         """Find the exact equilibrium, and fade in what it has otherwise than foretold."""
         foretold, nothing, force = self._twist(), np.zeros(3), self.force
         before = self._tangent.state
-        if np.any(force):
+        if self.contact is not None:
             springs = replace(before.springs, slider=self._curves.slider)
             before = replace(before, springs=springs)
             attack = self._attack(force)

@@ -1,0 +1,343 @@
+"""Poses in free space at which a tracker tells the geometry of an arm best.
+
+Postures are drawn from the whole range of the joints; kept are those that a station sees, free of
+collision with the clearance that the cell asks for. Of them a search technique chooses by the
+derivatives of the arm's errors (`elastocal.geometry.problem`), as it chooses contact poses by
+their observation rows: `i_optimal` makes the mean variance of predicted positions over all of
+the pool least (G. E. P. Box, N. R. Draper, JASA 54, 1959), `ioops` the volume of the errors'
+confidence ellipsoid (D. Daney et al., IJRR 24, 2005), `cover` spreads the marker in space.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell, fingerprint
+from elastocal.errors import PlanningError
+from elastocal.geometry.arm import ArmErrors
+from elastocal.geometry.positions import Payload, Positions
+from elastocal.geometry.problem import GeometryProblem, State
+from elastocal.geometry.solve import told_apart
+from elastocal.planning import (
+    CellRecord,
+    CollisionScene,
+    Joints,
+    MoveRecord,
+    Postures,
+    RobotRecord,
+    Vector,
+    cell_surface,
+    collision_scene,
+)
+from elastocal.planning.checks import SightCheck
+from elastocal.planning.motion import Mover, Route, mover_for, plan_route, require_free_home
+from elastocal.planning.search import Candidates, SearchTechnique, technique
+from elastocal.progress import Progress, silent
+from elastocal.records import record
+from elastocal.results import brief_repr
+
+_SCHEMA = "elastocal.position-plan/1"
+_RUNG = "weight"
+"""The errors that the poses are chosen for: places and zeros of the joints, and what they yield."""
+_POOL, _BATCH, _MOST_DRAWN = 500, 1000, 60_000
+"""Postures to choose from, and how many are drawn for them, at a time and at most."""
+_CANDIDATES = "candidates"
+_OF_PROCESS = 200
+"""Postures of the pool at which predictions are to be good."""
+_FEWEST = 2
+"""Coordinates for each error of the arm, below which a plan says that they are few."""
+_REPLACEMENTS = 10
+_PRIOR = 30.0
+"""Width of the prior in likely sizes of an error, so that few poses have a figure too."""
+_FINEST = 3e-5
+"""Standard deviation of a coordinate that the prior is weighed against, in m."""
+
+
+@record()
+class PositionPose:
+    """A pose in free space, where the marker is to be measured."""
+
+    id: int
+    """From 0, in visiting order."""
+    joints: Joints
+    """In rad or m."""
+    tcp_position: Vector
+    """In base, in m."""
+    station: str
+    """Which one is to measure it."""
+
+
+@record()
+class PosesNeeded:
+    """The error to expect of a number of poses."""
+
+    poses: int
+    amplification: float
+    """Error of predicted positions over the pool, in standard deviations of a coordinate that the
+    tracker measures: root mean square over the pool of the predicted distance."""
+
+
+@brief_repr
+@record(_SCHEMA)
+class PositionPlan:
+    """Poses for `elastocal geometry`, in visiting order; also its file."""
+
+    elastocal: str
+    cell: CellRecord
+    robot: RobotRecord
+    technique: str
+    poses: tuple[PositionPose, ...]
+    moves: tuple[MoveRecord, ...]
+    drawn: int
+    """Postures that were drawn."""
+    pool: int
+    """Those of them that may be measured."""
+    refused: dict[str, int]
+    """How many were refused by sight and collision."""
+    errors: int
+    """Errors of the arm that the poses tell apart."""
+    fixed: dict[str, str]
+    """What they do not tell apart, and why."""
+    expected: tuple[PosesNeeded, ...]
+    """What a quarter, half and all of the poses give, taken in the order of the search."""
+    findings: tuple[str, ...]
+
+    @property
+    def travel_time(self) -> float:
+        """Estimated time on the way, in s."""
+        return sum(move.duration for move in self.moves)
+
+
+@dataclass(frozen=True, eq=False)
+class _FreePool:
+    """Postures that may be measured."""
+
+    q: FloatArray
+    """Shape (posture, joint), in rad or m."""
+    station: list[str]
+    drawn: int
+    refused: dict[str, int]
+
+    def postures(self, cell: Cell, index: IndexArray) -> Postures:
+        """Return some of them; a way off leads against the tool's axis."""
+        q = self.q[index]
+        T = cell.robot.forward(q)
+        return Postures(T, -T[:, :3, 2], q, q, np.arange(len(q)))
+
+
+def plan_positions(
+    cell: Cell, count: int, search: str = "i_optimal", seed: int = 0, progress: Progress = silent
+) -> PositionPlan:
+    """Return poses in free space for a geometric calibration.
+
+    Parameters
+    ----------
+    cell : Cell
+        With marker and stations.
+    count : int
+        Number of poses.
+    search : str
+        Name of the search technique.
+    seed : int
+        Of everything random.
+    progress : Progress
+        Called with stage, done and total.
+
+    Raises
+    ------
+    PlanningError
+        If the cell has no marker or station, or too few postures can be measured.
+    SurfaceError, FileAccessError
+        If the surface cannot be read.
+    """
+    wanted = technique(search)
+    rng = np.random.default_rng(seed)
+    surface = cell_surface(cell)
+    scene = collision_scene(cell, surface)
+    sight = SightCheck.of(cell, surface)
+    if sight is None:
+        raise PlanningError(
+            f"cell {cell.name} has no marker or no tracker: positions need both (keys 'marker',"
+            " 'trackers')"
+        )
+    mover = mover_for(cell, scene)
+    require_free_home(cell.home, mover)
+    pool = _free_pool(cell, scene, sight, max(_POOL, count), rng, progress)
+    if len(pool.q) < count:
+        refused = ", ".join(f"{name} {number}" for name, number in pool.refused.items())
+        raise PlanningError(
+            f"{len(pool.q)} of {pool.drawn} postures can be measured, {count} are wanted; refused"
+            f" by {refused}; {sight.advice}"
+        )
+    knowledge = _Knowledge.of(cell, pool)
+    order, route = _choose(cell, pool, knowledge, (wanted, count, rng), (mover, progress))
+    fewer = sorted({max(1, count // 4), max(1, count // 2), count})
+    return PositionPlan(
+        elastocal=__version__,
+        cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
+        robot=_robot(cell),
+        technique=wanted.name,
+        poses=_poses(cell, pool, order[route.order]),
+        moves=_moves(route),
+        drawn=pool.drawn,
+        pool=len(pool.q),
+        refused=pool.refused,
+        errors=knowledge.errors,
+        fixed=knowledge.fixed,
+        expected=tuple(PosesNeeded(n, knowledge.amplification(order[:n])) for n in fewer),
+        findings=_findings(count, knowledge.errors),
+    )
+
+
+def _free_pool(
+    cell: Cell,
+    scene: CollisionScene,
+    sight: SightCheck,
+    wanted: int,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> _FreePool:
+    """Return postures that a station sees and that keep clear of everything."""
+    limits, margin = cell.robot.limits, cell.joint_margin
+    whole_turn = np.where(cell.robot.revolute, np.pi, np.inf)
+    low = np.maximum(limits.lower + margin, -whole_turn)
+    high = np.minimum(limits.upper - margin, whole_turn)
+    kept: list[FloatArray] = []
+    stations: list[str] = []
+    drawn, refused = 0, Counter({"sight": 0, "collision": 0})
+    while len(stations) < wanted and drawn < _MOST_DRAWN:
+        q = rng.uniform(low, high, (_BATCH, len(low)))
+        drawn += len(q)
+        postures = Postures(T := cell.robot.forward(q), T[:, :3, 2], q, q, np.arange(len(q)))
+        seen_by = sight.seen_by(postures)
+        seen = np.array([each is not None for each in seen_by])
+        free = seen.copy()
+        free[seen] = scene.keeps(q[seen], cell.file.limits.clearance)
+        refused.update(sight=int((~seen).sum()), collision=int((seen & ~free).sum()))
+        kept.append(q[free])
+        stations += [seen_by[row] or "" for row in np.flatnonzero(free)]
+        progress(_CANDIDATES, min(len(stations), wanted), wanted)
+    return _FreePool(np.concatenate(kept), stations, drawn, dict(refused))
+
+
+@dataclass(frozen=True, eq=False)
+class _Knowledge:
+    """What each posture of a pool says of the arm."""
+
+    marker: FloatArray
+    """Marker in base, shape (posture, 3), in m."""
+    rows: FloatArray
+    """Derivatives of the marker by what the pool tells apart, each in its likely size, shape
+    (posture, 3, unknown), in m."""
+    errors: int
+    """How many of them are errors of the arm."""
+    fixed: dict[str, str]
+
+    @classmethod
+    def of(cls, cell: Cell, pool: _FreePool) -> "_Knowledge":
+        robot, at_tcp = cell.robot, _marker(cell)
+        T = robot.forward(pool.q)
+        marker = T[:, :3, 3] + T[:, :3, :3] @ at_tcp
+        free = Positions.unloaded(pool.q, Payload())
+        station = np.array(pool.station)
+        problem = GeometryProblem(robot, replace(free, markers=marker[:, None], station=station))
+        stands = np.tile(np.eye(4), (len(problem.data.stations), 1, 1))
+        nominal = State(stands, at_tcp[None], ArmErrors.none(pool.q.shape[1]))
+        J = problem.linearise(nominal)[1]
+        columns, fixed = told_apart(J, problem, _RUNG)
+        size = np.array([unknown.size for unknown in problem.unknowns])[columns]
+        rungs = [problem.unknowns[column].rung for column in columns.tolist()]
+        errors = sum(rung != "registration" for rung in rungs)
+        why = {each.name: each.why for each in fixed}
+        return cls(marker, J[:, :, columns] * size, errors, why)
+
+    def candidates(self, left: IndexArray) -> Candidates:
+        """Return some postures for a search that is to predict well all over the pool."""
+        spread = np.linspace(0, len(self.rows) - 1, min(_OF_PROCESS, len(self.rows)))
+        everywhere = self.rows[spread.astype(np.intp)].reshape(-1, self.rows.shape[2])
+        return Candidates(self.marker[left], self.rows[left], process=everywhere)
+
+    def amplification(self, chosen: IndexArray) -> float:
+        """Return the error of predictions of some poses; see `PosesNeeded`."""
+        unknowns = self.rows.shape[2]
+        A, all_rows = self.rows[chosen].reshape(-1, unknowns), self.rows.reshape(-1, unknowns)
+        prior = (_FINEST / _PRIOR) ** 2 * np.eye(unknowns)
+        variance = np.einsum("ru,uv,rv->r", all_rows, np.linalg.inv(A.T @ A + prior), all_rows)
+        return float(np.sqrt(variance.reshape(-1, 3).sum(axis=1).mean()))
+
+
+def _choose(
+    cell: Cell,
+    pool: _FreePool,
+    knowledge: _Knowledge,
+    search: tuple[SearchTechnique, int, np.random.Generator],
+    motion: tuple[Mover, Progress],
+) -> tuple[IndexArray, Route]:
+    """Return the postures of the best poses that free ways lead to, and the round through them."""
+    (wanted, count, rng), (mover, progress) = search, motion
+    left: IndexArray = np.arange(len(pool.q))
+    for _ in range(_REPLACEMENTS):
+        order = left[wanted.search(knowledge.candidates(left), count, rng).order]
+        route = plan_route(cell.home, pool.postures(cell, order), mover, progress)
+        if not len(route.unreachable):
+            return order, route
+        left = np.setdiff1d(left, order[route.unreachable])
+    raise PlanningError(
+        "no way without collision leads from HOME to some poses, and others in their place fared"
+        " no better: move motion.home or the fixtures"
+    )
+
+
+def _marker(cell: Cell) -> FloatArray:
+    """Return the marker in the tcp, shape (3,), in m."""
+    marker = cell.file.marker
+    assert marker is not None
+    return marker.position_tcp
+
+
+def _robot(cell: Cell) -> RobotRecord:
+    robot = cell.robot
+    home = tuple(cell.home.tolist())
+    return RobotRecord(
+        name=robot.name,
+        urdf=robot.urdf,
+        base=robot.base,
+        tcp=robot.tip,
+        joints=robot.joint_names,
+        home=home,
+    )
+
+
+def _poses(cell: Cell, pool: _FreePool, visited: IndexArray) -> tuple[PositionPose, ...]:
+    poses = []
+    for number, posture in enumerate(visited.tolist()):
+        q = pool.q[posture]
+        x, y, z = cell.robot.forward(q)[:3, 3].tolist()
+        poses.append(PositionPose(number, tuple(q.tolist()), (x, y, z), pool.station[posture]))
+    return tuple(poses)
+
+
+def _moves(route: Route) -> tuple[MoveRecord, ...]:
+    place = {int(chosen): number for number, chosen in enumerate(route.order)}
+    return tuple(
+        MoveRecord(
+            start=None if move.start is None else place[move.start],
+            end=None if move.end is None else place[move.end],
+            via=tuple(tuple(joints.tolist()) for joints in move.via),
+            duration=move.duration,
+        )
+        for move in route.moves
+    )
+
+
+def _findings(count: int, errors: int) -> tuple[str, ...]:
+    least = -(-_FEWEST * errors // 3)
+    if count >= least:
+        return ()
+    return (
+        f"{count} poses give {3 * count} coordinates for {errors} errors of the arm: plan {least}"
+        " at least",
+    )

@@ -1,0 +1,100 @@
+"""Planned positions can be measured, tell the arm's errors well, and lead to its geometry."""
+
+import csv
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from elastocal.cell import Cell, load_cell, write_example
+from elastocal.geometry import GeometryModel, PositionPlan, plan_positions
+from elastocal.planning import Postures, cell_surface, collision_scene
+from elastocal.planning.checks import SightCheck
+from elastocal.records import read_json
+from elastocal.robot import Robot, with_joint_origins
+from support.cli import elastocal
+from support.measured_arms import random_errors
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory) -> Cell:
+    return load_cell(write_example(tmp_path_factory.mktemp("cell"), "machining")[0])
+
+
+@cache
+def planned(cell: Cell, search: str) -> PositionPlan:
+    return plan_positions(cell, 24, search, seed=1)
+
+
+def test_a_station_sees_each_pose_and_nothing_collides(cell):
+    plan = planned(cell, "i_optimal")
+    q = np.array([pose.joints for pose in plan.poses])
+    T, surface = cell.robot.forward(q), cell_surface(cell)
+    sight = SightCheck.of(cell, surface)
+    assert (sight.margin(Postures(T, T[:, :3, 2], q, q, np.arange(len(q)))) > 0.0).all()
+    assert collision_scene(cell, surface).keeps(q, cell.file.limits.clearance).all()
+    assert (cell.robot.limits.margin(q) >= cell.joint_margin).all()
+    assert [pose.id for pose in plan.poses] == list(range(24))
+    assert plan.moves[0].start is None
+    assert plan.moves[-1].end is None
+
+
+def test_chosen_poses_predict_better_than_drawn_ones(cell):
+    best, drawn = (planned(cell, name).expected[-1] for name in ("i_optimal", "random"))
+    assert best.poses == drawn.poses == 24
+    assert best.amplification < 0.8 * drawn.amplification
+
+
+def test_more_poses_predict_better(cell):
+    expected = planned(cell, "i_optimal").expected
+    assert [each.poses for each in expected] == [6, 12, 24]
+    assert expected[0].amplification > expected[1].amplification > expected[2].amplification
+
+
+def test_the_filled_table_leads_to_the_geometry(tmp_path, cell):
+    out = tmp_path / "plan"
+    elastocal("plan", cell.path, "--for", "geometry", "--poses", 24, "--out", out)
+    assert (out / "positions.src").is_file()
+    checked = json.loads(elastocal("check", out / "positions.json", "--json").out)
+    assert checked["poses"] == 24
+    robot, rng = cell.robot, np.random.default_rng(3)
+    errors = {name: random_errors(rng, 5e-4) for name in robot.joint_names}
+    truth = Robot.from_urdf(with_joint_origins(robot.urdf, errors), robot.tip)
+    table = out / "positions.csv"
+    with table.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    heads = [head for head in rows[0] if head.startswith(("joint", "rail"))]
+    scale = np.where(robot.revolute, np.pi / 180.0, 1e-3)
+    q = scale * np.array([[float(row[head]) for head in heads] for row in rows])
+    T = truth.forward(q)
+    marker = T[:, :3, 3] + T[:, :3, :3] @ cell.file.marker.position_tcp
+    seen = 1e3 * (marker + rng.normal(0.0, 3e-5, marker.shape))
+    for row, point in zip(rows, seen, strict=True):
+        row |= dict(zip((f"marker_{a}[mm]" for a in "xyz"), map(repr, point.tolist()), strict=True))
+    with table.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    (tmp_path / "arm.urdf").write_text(robot.urdf, encoding="utf-8")
+    model = tmp_path / "geometry.json"
+    arm = ("--robot", tmp_path / "arm.urdf", "--tcp", robot.tip, "--draws", 40)
+    elastocal("geometry", table, *arm, "--out", model)
+    found = read_json(model, GeometryModel)
+    assert found.held_out.chosen.mean < 0.3 * found.held_out.registration.mean
+
+
+def test_what_presses_alone_know_is_refused(tmp_path, cell):
+    options = ("--for", "geometry", "--out", tmp_path / "plan")
+    assert "are for presses" in elastocal("plan", cell.path, *options, "--dry-run").reason
+    assert (
+        "unknown search technique" in elastocal("plan", cell.path, *options, "--search", "x").reason
+    )
+    bare = "--search is for --for geometry"
+    assert bare in elastocal("plan", cell.path, "--out", tmp_path / "p", "--search", "cover").reason
+
+
+def test_too_few_poses_are_said_to_be_few(cell):
+    (found,) = plan_positions(cell, 6, seed=1).findings
+    assert "plan" in found
+    assert "at least" in found
