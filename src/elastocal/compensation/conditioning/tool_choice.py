@@ -27,6 +27,7 @@ from elastocal.compensation.conditioning.tool_fit import (
     ToolFit,
     ToolModel,
     fit_tool,
+    rotation_off,
     tool_residual,
 )
 from elastocal.parallel import one_blas_thread
@@ -134,20 +135,17 @@ def choose_tool(
 def _beside_cross_talk(
     postures: StaticPostures, R_nominal: FloatArray | None, fit: ToolFit, richest: ToolModel
 ) -> ToolFit:
-    """Return a fit whose intervals count the cross-talk that a sensor may have, shown or not.
-
-    That left-out postures do not ask for a matrix says that they cannot show it, not that there is
-    none. Intervals reach to the ends of those beside a matrix with its prior.
-    """
+    """Return a fit whose intervals reach to those beside a matrix, which postures need not show."""
     if fit.model.has_matrix or not richest.cross_talk > 0.0:
         return fit
-    model = replace(fit.model, cross_talk=richest.cross_talk, lever=richest.lever)
-    beside = fit_tool(postures, R_nominal, model)
-    widths = dict(fit.half_width)
-    for k, name in enumerate(TOOL_UNKNOWNS):
-        end = abs(_values(beside)[k] - _values(fit)[k]) + beside.half_width[name]
-        # What is not determined stays so; a matrix that leaves nothing over says nothing.
-        widths[name] = max(widths[name], float(np.nan_to_num(end)))
+    matrix = replace(richest, rotation=False, drift=False)
+    beside = fit_tool(postures, R_nominal, _beside(fit.model, matrix))
+    away = np.abs(_values(beside) - _values(fit))
+    # What is not determined stays so; a matrix that leaves nothing over says nothing.
+    ends = np.nan_to_num(away + [beside.half_width[name] for name in TOOL_UNKNOWNS]).tolist()
+    widths = {
+        name: max(fit.half_width[name], end) for name, end in zip(TOOL_UNKNOWNS, ends, strict=True)
+    }
     return replace(fit, half_width=widths)
 
 
@@ -165,8 +163,7 @@ def affine_scatter(postures: StaticPostures) -> FloatArray | None:
     over = len(A) - np.linalg.matrix_rank(A)
     if over < 1:
         return None
-    scatter: FloatArray = np.sqrt((left.reshape(-1, 2, 3) ** 2).sum(axis=(0, 2)) / (3 * over))
-    return scatter
+    return np.asarray(np.sqrt((left.reshape(-1, 2, 3) ** 2).sum(axis=(0, 2)) / (3 * over)))
 
 
 def blunders(postures: StaticPostures) -> tuple[PostureSetAside, ...]:
@@ -313,14 +310,6 @@ def _mounted_rotation(
     return not np.any(np.abs(angles) > _CLEARLY * widths), f"{shown} deg"
 
 
-def rotation_off(R_nominal: FloatArray, R: FloatArray) -> FloatArray:
-    """Return the rotation vector from a nominal rotation to another, sensor axes, in rad."""
-    from scipy.spatial.transform import Rotation
-
-    vector: FloatArray = Rotation.from_matrix(R_nominal.T @ R).as_rotvec()
-    return vector
-
-
 def _left_out(
     postures: StaticPostures, R_nominal: FloatArray | None, model: ToolModel
 ) -> FloatArray:
@@ -335,8 +324,8 @@ def _left_out(
 
 
 def _root_mean(left: FloatArray) -> tuple[float, float]:
-    force, moment = np.sqrt((left.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
-    return float(force), float(moment)
+    force, moment = np.sqrt((left.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2))).tolist()
+    return force, moment
 
 
 def _wins(rich: FloatArray, plain: FloatArray) -> bool:
@@ -411,5 +400,4 @@ def _halves(
 
 def _values(fit: ToolFit) -> FloatArray:
     """Return the values of a fit in the order of `TOOL_UNKNOWNS`, the rotation as 0."""
-    turn = np.zeros(3)
-    return np.concatenate([[fit.mass], turn, fit.force_bias, fit.centre, fit.moment_bias])
+    return np.concatenate([[fit.mass], np.zeros(3), fit.force_bias, fit.centre, fit.moment_bias])

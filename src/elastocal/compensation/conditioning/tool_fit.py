@@ -241,6 +241,11 @@ def tool_residual(postures: StaticPostures, fit: ToolFit) -> tuple[FloatArray, F
     )
 
 
+def rotation_off(R_nominal: FloatArray, R: FloatArray) -> FloatArray:
+    """Return the rotation vector from a nominal rotation to another, sensor axes, in rad."""
+    return np.asarray(Rotation.from_matrix(R_nominal.T @ R).as_rotvec())
+
+
 def _rotation_between(postures: StaticPostures, nominal: FloatArray) -> FloatArray:
     """Return the rotation that best turns gravity into forces, the nominal one where open."""
     u = postures.gravity_flange - postures.gravity_flange.mean(axis=0)
