@@ -143,9 +143,7 @@ def _beside_cross_talk(
     away = np.abs(_values(beside) - _values(fit))
     # What is not determined stays so; a matrix that leaves nothing over says nothing.
     ends = np.nan_to_num(away + [beside.half_width[name] for name in TOOL_UNKNOWNS]).tolist()
-    widths = {
-        name: max(fit.half_width[name], end) for name, end in zip(TOOL_UNKNOWNS, ends, strict=True)
-    }
+    widths = {n: max(fit.half_width[n], end) for n, end in zip(TOOL_UNKNOWNS, ends, strict=True)}
     return replace(fit, half_width=widths)
 
 
