@@ -14,7 +14,6 @@ from elastocal.drivers.kuka_rsi import (
     RsiSettings,
     connect_arm,
 )
-from elastocal.errors import DeviceError
 from elastocal.sim.wire import LiveCell, RsiContext, Told, rsi_server
 from support.simulated import QUIET, example_cell, places
 
@@ -87,15 +86,7 @@ def connected():
     settings = RsiSettings(mode="contact", port=server.ports["udp"], delay="12 ms", ptp_percent=30)
     arm = connect_arm(cell, settings, clock, live)
     until(lambda: live.wrench() is not None)
-
-    def enabled():
-        try:
-            arm.enable()
-        except DeviceError:
-            return False
-        return True
-
-    until(enabled)
+    arm.enable()
     yield arm, server
     arm.link.close()
     server.close()

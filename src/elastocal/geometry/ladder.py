@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.errors import GeometryError
 from elastocal.geometry.mistakes import require_own_joints
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
 from elastocal.geometry.solve import PRIOR_WIDTH, Fixed, GeometryFit, fit, register, told_apart
@@ -85,6 +86,11 @@ def climb(
     rungs = [sums.held_out(rung, free[rung][0]) for rung in RUNGS]
     used = np.flatnonzero(reference.used)
     fold = block[used] % FOLDS
+    if len(np.unique(fold)) < FOLDS:
+        raise GeometryError(
+            f"the positions are of {len(np.unique(problem.data.pose))} poses: at least"
+            f" {FOLDS} are needed, so that some can be left out; measure more poses"
+        )
     errors = np.array([[each.distance[fold == k].mean() for each in rungs] for k in range(FOLDS)])
     overlap = Overlap(FOLDS, 0.0, 1.0 / FOLDS)
     judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)

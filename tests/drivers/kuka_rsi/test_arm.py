@@ -1,5 +1,7 @@
 """The arm against a scripted controller: states, refusals, contact, and every fault of the line."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -329,6 +331,15 @@ class TestFaultsOfTheLine:
         original, bench.peer.rob = bench.peer.rob, without
         bench.clock.sleep(0.05)
         with pytest.raises(DeviceError, match=f"does not send {element}"):
+            bench.arm.state()
+
+    def test_tenths_of_a_millimetre_are_too_coarse(self, bench):
+        def coarse():
+            return re.sub(rb'(\.\d)\d+"', rb'\1"', original())
+
+        original, bench.peer.rob = bench.peer.rob, coarse
+        bench.clock.sleep(0.05)
+        with pytest.raises(DeviceError, match=r"RIst with 1 decimals.*set Precision"):
             bench.arm.state()
 
 

@@ -61,6 +61,7 @@ _EDGE_AGAIN = 25
 """Cycles for which a program stays guided against its order before STOP rises again."""
 _RESTING = (MotionState.DISARMED, MotionState.STOPPED)
 _STANDING = (MotionState.IDLE,)
+_OUT = (ProgramState.ABSENT, ProgramState.ENDED)
 _FORCED = (MotionState.IDLE, MotionState.HOLDING, MotionState.RELEASING)
 _LET_GO = 0.3
 """Part of the contact force below which the tool has left the surface at the end of a retract."""
@@ -133,7 +134,10 @@ class KukaArm:
             cycle = self._newest()
             silent = self._clock.now() - cycle.time
             if silent > _SILENT and self._state not in _RESTING:
-                self._break_down(f"nothing from the controller for {silent:.2f} s: RSI has ended")
+                line = "" if self.link is None else f" ({self.link.statistics().sentence()})"
+                self._break_down(
+                    f"nothing from the controller for {silent:.2f} s: RSI has ended{line}"
+                )
             return ArmState(
                 time=cycle.time,
                 q=cycle.q.copy(),
@@ -307,7 +311,7 @@ class KukaArm:
             return
         if arrival is Arrival.JUMPED:
             self._break_down("IPOC has jumped: the controller's program was started anew")
-        elif cycle.state in (ProgramState.ABSENT, ProgramState.ENDED):
+        elif cycle.state in _OUT:
             self._break_down("the program elcal_run on the controller is not in its loop any more")
         elif self._state is MotionState.MOVING and self._watch is not None:
             assert self._reader is not None
@@ -359,6 +363,10 @@ class KukaArm:
         if self.link is not None:
             self.link.require()
 
+    def listens(self) -> bool:
+        """Return whether the program on the controller takes orders."""
+        return self._cycle is not None and self._cycle.state not in _OUT
+
     def _newest(self) -> Cycle:
         if self._problem is not None:
             raise DeviceError(f"{_SOURCE}: {self._problem}")
@@ -374,7 +382,7 @@ class KukaArm:
             why = f"mode {self._settings.mode} moves nothing: devices.arm.mode must be contact"
         elif not silent <= _SILENT:
             why = f"no message from the controller for {silent:.2f} s"
-        elif cycle.state in (ProgramState.ABSENT, ProgramState.ENDED):
+        elif cycle.state in _OUT:
             why = "the program elcal_run on the controller is not in its loop: select and start it"
         elif self._reader is not None:
             why = self._reader.problem(_SILENT)

@@ -1,5 +1,6 @@
 """The driver of KUKA arms, as `elastocal run` finds it by its name ``kuka_rsi``."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,6 +10,9 @@ from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.drivers.kuka_rsi.settings import RsiSettings
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
+
+_TO_THE_LOOP = 1.0
+"""From RSI_ON to the loop of the controller's program, at most, in s of the wall."""
 
 
 def connect_arm(
@@ -42,6 +46,10 @@ def connect_arm(
             f" {statistics.foreign} from elsewhere): start the program on the controller now,"
             " while elastocal listens"
         )
+    # The first messages come before the program is in its loop.
+    end = time.monotonic() + _TO_THE_LOOP
+    while settings.mode == "contact" and not arm.listens() and time.monotonic() < end:
+        time.sleep(settings.cycle)
     return arm
 
 

@@ -96,6 +96,8 @@ class RobMessage:
     """Krl.N: number of the last ``PTP`` that is over."""
     state: int | None = None
     """Krl.State: a `ProgramState`, or a number that is none."""
+    decimals: int = 0
+    """Most decimals of a number of RIst."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,8 @@ def read_rob(datagram: bytes) -> RobMessage:
         parser.Parse(datagram, True)
     except expat.ExpatError as error:
         raise DeviceError(f"RSI datagram is no XML: {error}") from error
-    vectors = {name: _numbers(name, given) for name, given in found.elements.items()}
+    given = found.elements
+    vectors = {name: _numbers(name, attributes) for name, attributes in given.items()}
     return RobMessage(
         ipoc=_ipoc("".join(found.ipoc)),
         actual=_six(vectors.get("rist")),
@@ -177,6 +180,7 @@ def read_rob(datagram: bytes) -> RobMessage:
         delay=_whole(vectors.get("delay"), 0),
         command=_whole(vectors.get("krl"), 0),
         state=_whole(vectors.get("krl"), 1),
+        decimals=max(len(text.partition(".")[2]) for text in ["", *given.get("rist", {}).values()]),
     )
 
 

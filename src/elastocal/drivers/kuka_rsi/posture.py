@@ -12,6 +12,8 @@ from elastocal.errors import DeviceError
 from elastocal.robot import Robot, T_from_xyzabc
 
 _ARM = 6
+_DECIMALS = 3
+"""Fewest decimals of RIst, in mm and deg; the controller's default is 1."""
 _TURNED = math.radians(1.0)
 """Largest angle between RIst and the tool frame of the robot's description, in rad."""
 
@@ -64,6 +66,11 @@ class PostureReader:
         axes, actual = message.axes, message.actual
         if axes is None or actual is None:
             raise _not_sent("RIst" if actual is None else "AIPos")
+        if message.decimals < _DECIMALS:
+            raise DeviceError(
+                f"the controller sends RIst with {message.decimals} decimals, at least {_DECIMALS}"
+                " are needed: set Precision of its ETHERNET object to 6"
+            )
         external = message.external or ()
         if len(external) < self._external:
             raise _not_sent(f"EIPos.E{len(external) + 1}")
