@@ -397,5 +397,4 @@ def _halves(
 
 
 def _values(fit: ToolFit) -> FloatArray:
-    """Return the values of a fit in the order of `TOOL_UNKNOWNS`, the rotation as 0."""
     return np.concatenate([[fit.mass], np.zeros(3), fit.force_bias, fit.centre, fit.moment_bias])
