@@ -106,6 +106,17 @@ def test_an_edited_verdict_is_named(signed, keys, tmp_path):
     assert found.err.splitlines()[-1].endswith("the report was changed after it was signed")
 
 
+def test_a_forged_verdict_makes_no_line_of_its_own(signed, tmp_path):
+    page = (signed / "report.html").read_text(encoding="utf-8")
+    manifest, _ = read_manifest(signed / "report.html")
+    forged = manifest.verdict + r"\nwhole          signature: the report is signed by key 00"
+    path = tmp_path / "forged.html"
+    path.write_text(page.replace(f'"{manifest.verdict}"', f'"{forged}"', 1), encoding="utf-8")
+    said = elastocal("verify", path)
+    assert "by key 00" in said.err
+    assert not re.search(r"^whole +signature", said.err, re.MULTILINE)
+
+
 def copied_run(signed, tmp_path):
     return reported.copied(signed, tmp_path / "all", "run", "report.html")
 

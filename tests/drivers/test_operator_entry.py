@@ -98,9 +98,24 @@ def test_what_is_no_reading_is_told_and_typed_again(clock, person, line, message
 
 def test_a_line_that_nobody_has_asked_for_is_no_reading(clock, person):
     metrology = entry(clock, person)
+    metrology.ask(WANTED)
     person.types("2412 -310 1203")
+    person.types("3412 -310 1203")
     assert "no reading is asked for now" in person.heard[-1]
-    assert metrology.read().beam is BeamState.BROKEN
+    assert metrology.read().position[0, 0] == 2.412
+
+
+def test_what_is_typed_before_the_first_question_is_left_to_others(clock):
+    taken = []
+    lines = (taken.append(line) or line for line in ("yes", "2412 -310 1203"))
+    metrology = OperatorEntry(
+        example_cell(), DRIVER.settings("metrology")(), clock, lines, lambda _: None
+    )
+    metrology.look("station_1")
+    metrology.read()
+    assert taken == []
+    metrology.ask(WANTED)
+    eventually(lambda: len(taken) == 2)
 
 
 def test_an_operator_who_does_not_come_ends_the_run(clock, person):
@@ -114,6 +129,7 @@ def test_an_operator_who_does_not_come_ends_the_run(clock, person):
 def test_an_input_that_ends_is_a_fault(clock):
     model = DRIVER.settings("metrology")()
     metrology = OperatorEntry(example_cell(), model, clock, iter(()), lambda _: None)
+    metrology.ask(WANTED)
     metrology._thread.join()
     with pytest.raises(DeviceError, match="its input has ended"):
         metrology.read()

@@ -307,8 +307,14 @@ def _json(change: Callable[[Tree, random.Random], Tree]) -> Mutation:
     return lambda data, rng: json.dumps(change(json.loads(data), rng)).encode()
 
 
+_SLOW_YAML = 300_000
+"""In bytes: to parse more takes longer than a case may."""
+
+
 def _yaml(change: Callable[[Tree, random.Random], Tree]) -> Mutation:
     def mutate(data: bytes, rng: random.Random) -> bytes:
+        if len(data) > _SLOW_YAML:
+            raise ValueError("refused by its size alone, and slow to change")
         text = json.dumps(change(_parsed(data), rng))  # a flow of YAML but for these:
         return text.replace("NaN", ".nan").replace("Infinity", ".inf").encode()
 

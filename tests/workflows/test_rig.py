@@ -144,3 +144,14 @@ def test_the_clock_of_the_wall_keeps_its_rate():
 def test_a_set_of_devices_gives_nothing_back_by_default():
     assert DeviceSet().close() is None
     assert {"arm", "sensor", "metrology"} == set(KINDS)
+
+
+def test_a_device_is_written_as_it_stands_in_the_cell_file(bench):
+    told = {"driver": "bench_sensor", "port": 7}
+    devices = example_cell(devices={"sensor": told}).file.model_dump(mode="json")["devices"]
+    assert devices == {
+        "arm": "simulated",
+        "sensor": told,
+        "metrology": "simulated",
+        "clock_rate": 1.0,
+    }

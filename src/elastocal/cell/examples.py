@@ -126,6 +126,7 @@ class Example:
 EXAMPLES = {
     "afp": Example("afp.yaml", {"dome.stl": dome_section}),
     "machining": Example("machining.yaml", {"block.stl": block_mesh}),
+    "ur20": Example("ur20.yaml", {"block.stl": block_mesh}),
 }
 """Fibre placement on a dome section, and machining of a block: the paper's two case studies."""
 

@@ -14,7 +14,7 @@ from elastocal.geometry.positions import LEAST_READINGS, Positions
 from elastocal.records import read_arrays
 from elastocal.robot import Robot
 from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
-from elastocal.units import factor, split_column
+from elastocal.units import factor, impossible, split_column
 
 AXES = ("x", "y", "z")
 _MARKER = re.compile(r"marker(\d*)_x")
@@ -103,7 +103,13 @@ class _Columns:
         if unit is None:
             raise GeometryError(f"column {name!r} has no unit: it is a {dimension}")
         column = Column(index, name, unit, factor(unit, dimension))
-        return self.rows.numbers(column, _or_hidden if blank else None)
+        values = self.rows.numbers(column, _or_hidden if blank else None)
+        # Joints and markers have limits of their own, and hints at their unit.
+        for line, value in zip(self.rows.lines, values.tolist(), strict=True):
+            problem = impossible(dimension, value) if dimension in ("mass", "force") else None
+            if problem is not None:
+                raise GeometryError(f"row {line}, column {name!r}: {problem}")
+        return values
 
     def vectors(self, name: str, dimension: str, *, blank: bool = False) -> FloatArray:
         """Return three columns, shape (row, 3)."""

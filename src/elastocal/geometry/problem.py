@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
+from elastocal.files import Limit
 from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, ArmFrames, frames, screws
 from elastocal.geometry.positions import Positions, joint_torques
 from elastocal.results import brief_repr
@@ -20,6 +21,9 @@ _OF_ANY_JOINT = ("offset", "scale", "compliance")
 """Errors of motion that linear axes have too."""
 _GEAR_SIZE = 2e-4
 """Of an error of a gear once or twice a turn, in rad."""
+_MOST_NUMBERS = Limit("ELASTOCAL_MAX_FIT_MB", 150, "MB of derivatives")
+"""Thirty thousand positions of two stations and three markers on six axes; a fit takes some times
+as much."""
 _FRAME_SIZE = 1e-2
 """Of what frames and markers are off by after the first registration, in m and rad."""
 
@@ -67,6 +71,11 @@ class GeometryProblem:
         self.station = np.array([index[name] for name in data.station.tolist()])[self.row]
         self.measured = data.markers[self.row, self.marker]
         self.unknowns = unknowns(robot, data)
+        stations, markers = len(data.stations), data.markers.shape[1]
+        _MOST_NUMBERS.require(
+            3e-6 * len(self) * len(self.unknowns) * np.dtype(float).itemsize,
+            f"the fit of {len(self)} positions, {stations} stations and {markers} markers",
+        )
         joints = robot.chain.joints
         # Joint and kind of each error of place and of motion, in the order of their columns.
         self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)

@@ -86,7 +86,7 @@ def make_key(path: Path) -> Path:
     known = key.public_key().public_bytes(
         serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo
     )
-    if public.exists():
+    if os.path.lexists(public):
         raise FileAccessError(f"{public} is there already: a key is never overwritten")
     _create(path, secret, 0o600)
     _create(public, known, 0o644)

@@ -4,8 +4,10 @@ The person at the cell is an argument, never a question asked from below. `find_
 place that picks simulator or driver.
 """
 
+import contextlib
 import importlib
 import importlib.util
+import ipaddress
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -225,13 +227,19 @@ def rig_of(cell: Cell) -> Rig:
     return rig
 
 
+def _is_loopback(address: str) -> bool:
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(address).is_loopback
+    return False
+
+
 def _require_real_time(rig: Rig) -> None:
     """Refuse a clock that is not the wall's where a device is on another machine."""
     rate = rig.cell.file.devices.clock_rate
     for kinds in rig.wanted.values():
         for kind, settings in kinds.items():
             address = getattr(settings, "address", LOOPBACK)
-            if rate != 1.0 and address != LOOPBACK:
+            if rate != 1.0 and not _is_loopback(address):
                 raise DeviceError(
                     f"{rig.cell.path}: devices.clock_rate is {rate:g}, for simulators on this"
                     f" machine alone; devices.{kind} is at {address}"

@@ -13,7 +13,7 @@ from elastocal.logs import ClockFit, GuessedLog, ImportedLogs
 from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
 from elastocal.records import record
-from elastocal.report.plots import write_timeline_figure
+from elastocal.report.plots import require_kinds, write_timeline_figure
 from elastocal.results import Result, brief_repr
 from elastocal.wording import counted
 from elastocal.workflows._workflow import workflow
@@ -108,6 +108,8 @@ def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsR
         If a file cannot be read or written.
     """
     files, path = _files(settings.logs), Path(settings.map)
+    if settings.picture is not None:
+        require_kinds([Path(settings.picture)])
     log_map = foreign.read_map(path)
     found = foreign.import_streams(log_map, foreign.site(path, log_map), files, progress)
     picture = settings.picture

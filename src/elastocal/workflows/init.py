@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from elastocal.cell import PROCESS_FILE, load_cell, name_process, write_example
-from elastocal.compensation.process import process_courses, write_programmed_path
+from elastocal.compensation.process import PROCESSES, process_courses, write_programmed_path
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import FileAccessError
 from elastocal.files import read_text, write_text
@@ -24,7 +24,7 @@ class InitSettings:
     out: str | PathLike[str]
     """Folder to write into."""
     kind: str = "afp"
-    """``afp`` or ``machining``."""
+    """``afp``, ``machining`` or ``ur20``."""
     force: bool = False
     """Replace files that are there."""
 
@@ -35,15 +35,15 @@ class InitResult(Result):
 
     cell: Path
     meshes: tuple[Path, ...]
-    process: Path
-    """Production path: joints and forces."""
+    process: Path | None
+    """Production path: joints and forces; none where the example has none."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what was written."""
         return (
             ("cell", str(self.cell)),
             ("meshes", ", ".join(map(str, self.meshes)) or "none"),
-            ("process", str(self.process)),
+            ("process", "none" if self.process is None else str(self.process)),
         )
 
 
@@ -71,6 +71,8 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
     if path.exists() and not settings.force:
         raise FileAccessError(f"{path} is there already: give --force to replace it")
     file, *meshes = write_example(Path(settings.out), settings.kind, settings.force)
+    if settings.kind not in PROCESSES:
+        return InitResult(file, tuple(meshes), None)
     cell = load_cell(file)
     courses = process_courses(settings.kind, cell, _SEED, None)
     units = joint_dimensions(cell.robot.joint_names, cell.robot.revolute)

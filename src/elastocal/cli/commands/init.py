@@ -12,7 +12,10 @@ from elastocal.cli import output, tables
 def _init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")],
     like: Annotated[
-        str, typer.Option(help="Which example: afp (dome on a rail) or machining (block).")
+        str,
+        typer.Option(
+            help="Which example: afp (dome on a rail), machining (block) or ur20 (force mode)."
+        ),
     ] = "afp",
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
 ) -> None:

@@ -20,7 +20,8 @@ from elastocal.workflows import DryRunResult, InitResult, PlanFigures, RunResult
 def show_example(console: Console, result: InitResult) -> None:
     """Print where an example cell was written, and what comes next."""
     cell = str(result.cell)
-    names = ", ".join(path.name for path in (*result.meshes, result.process))
+    process = () if result.process is None else (result.process,)
+    names = ", ".join(path.name for path in (*result.meshes, *process))
     console.print(
         f"wrote {bold(cell)} and {names}: edit it, then `elastocal check {cell}`",
         soft_wrap=True,

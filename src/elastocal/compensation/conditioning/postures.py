@@ -13,6 +13,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import PathTable, find_posture_columns, in_file
 from elastocal.errors import CompensationError, PathError
+from elastocal.files import Limit
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot
 
@@ -20,6 +21,9 @@ LEAST_POSTURES = 3
 """Postures; with fewer nothing is left to tell whether the numbers fit."""
 _QUATERNION = 4
 """Columns of an orientation as a quaternion."""
+
+_MOST_POSTURES = Limit("ELASTOCAL_MAX_POSTURES", 4000, "static postures")
+"""A tool is weighed at some dozen; fits of left-out ones hold a number for each pair of rows."""
 
 
 @brief_repr
@@ -153,4 +157,5 @@ def read_postures(
         postures = static_postures(T[:, :3, :3], rows.force, rows.moment, gravity)
     except CompensationError as error:
         raise CompensationError(f"{path}: {error}") from error
+    _MOST_POSTURES.require(len(postures), f"{path}: {len(postures)} rows")
     return replace(postures, quaternions=len(table.columns.orientation) == _QUATERNION)

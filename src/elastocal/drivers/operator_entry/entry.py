@@ -63,7 +63,7 @@ class OperatorEntry:
     clock : Clock
         Of the rig.
     lines : iterator of str
-        What is typed; may wait, is read by a thread of its own.
+        What is typed; may wait, is read by a thread of its own from the first question on.
     tell : callable
         Shows a person a line.
     """
@@ -89,8 +89,8 @@ class OperatorEntry:
         self._station, self._asked, self._asked_at = self.stations[0], "", -math.inf
         self._point: tuple[float, float, float] | None = None
         self._sent, self._ended = -math.inf, ""
+        # Not before the first reading: until then the terminal is asked whether the cell is clear.
         self._thread = threading.Thread(target=self._listen, args=(lines,), daemon=True)
-        self._thread.start()
 
     def look(self, station: str) -> None:
         """Take readings of this station from now on.
@@ -118,6 +118,8 @@ class OperatorEntry:
             self._point, self._asked, self._asked_at = None, what, self._clock.now()
             text = f"{what}: x y z of the marker from {self._station}, in {self._settings.unit}"
         self._tell(text)
+        if self._thread.ident is None:
+            self._thread.start()
 
     def read(self) -> PointBlock:
         """Return the reading again, once a call, as long as it stands; at once.

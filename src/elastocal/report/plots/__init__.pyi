@@ -87,6 +87,7 @@ from .style import (
     new_figure as new_figure,
     open_frame as open_frame,
     print_settings as print_settings,
+    require_kinds as require_kinds,
     tint as tint,
     variant_styles as variant_styles,
     wrapped as wrapped,

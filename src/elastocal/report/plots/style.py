@@ -7,7 +7,7 @@ needs colour to be read. The same figure has the same bytes, and says in words w
 
 import io
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -226,6 +226,21 @@ def write_figure(
     return write_kinds([path], draw, title, description)[0]
 
 
+def require_kinds(paths: Iterable[Path]) -> None:
+    """Refuse figures of other kinds than can be written, before the work for them is done.
+
+    Raises
+    ------
+    FileAccessError
+        By the first such suffix.
+    """
+    for path in paths:
+        if path.suffix.lower() not in SUFFIXES:
+            raise FileAccessError(
+                f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
+            )
+
+
 def write_kinds(
     paths: Sequence[Path], draw: Callable[[], Figure], title: str = "", description: str = ""
 ) -> list[Path]:
@@ -246,11 +261,7 @@ def write_kinds(
         If a suffix is another or a file cannot be written.
     """
     paths = [Path(path) for path in paths]
-    for path in paths:
-        if path.suffix.lower() not in SUFFIXES:
-            raise FileAccessError(
-                f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
-            )
+    require_kinds(paths)
     with matplotlib.rc_context(print_settings()), ExitStack() as files:
         temporary = [files.enter_context(replacing(path)) for path in paths]
         figure = draw()

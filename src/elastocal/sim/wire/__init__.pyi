@@ -16,6 +16,7 @@ from .rsi import (
     ethernet_config as ethernet_config,
     rsi_server as rsi_server,
 )
+from .rtde import PORTS as PORTS, RtdeServer as RtdeServer, rtde_server as rtde_server
 from .servers import (
     SERVERS as SERVERS,
     MakeServer as MakeServer,
