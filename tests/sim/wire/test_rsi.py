@@ -9,6 +9,7 @@ import pytest
 
 from elastocal.cell import WallClock
 from elastocal.errors import DeviceError
+from elastocal.sim.arm import EquilibriumError
 from elastocal.sim.wire import (
     IPOC_START,
     LiveCell,
@@ -415,6 +416,17 @@ class TestWire:
         after = re.search(rb'RIst X="([-\d.]+)"', pc.hear()[0])
         assert float(after[1]) - float(before[1]) == pytest.approx(0.1, abs=1e-5)
 
+    def test_an_arm_that_cannot_carry_its_load_stops_the_controller(self, wire, monkeypatch):
+        def fail(_robot, _heard):
+            raise EquilibriumError("too heavy")
+
+        monkeypatch.setattr(RsiRobot, "cycle", fail)
+        pc = Pc()
+        server = wire(pc, operator=0.0)
+        first = pc.exchange(1)[0]
+        assert pc.exchange(1)[0] < first
+        assert server.statistics.stops[0] == "too heavy"
+
 
 class TestServer:
     """What `elastocal simulate` starts."""
@@ -434,6 +446,7 @@ class TestServer:
         server.start()
         data, _ = pc.hear()
         assert b'<Krl N="0" State="0"/>' in data
+        assert b'E6="0.000000"' in data
         pc.answer(IPOC_START)
         assert pc.hear()[1] == IPOC_START + 12
         server.close(), pc.socket.close()

@@ -134,10 +134,8 @@ class KukaArm:
             cycle = self._newest()
             silent = self._clock.now() - cycle.time
             if silent > _SILENT and self._state not in _RESTING:
-                line = "" if self.link is None else f" ({self.link.statistics().sentence()})"
-                self._break_down(
-                    f"nothing from the controller for {silent:.2f} s: RSI has ended{line}"
-                )
+                counts = "" if self.link is None else self.link.statistics().sentence()
+                self._break_down(f"nothing from the controller for {silent:.2f} s; {counts}")
             return ArmState(
                 time=cycle.time,
                 q=cycle.q.copy(),
@@ -201,8 +199,7 @@ class KukaArm:
             self._rules.require_bent_wrist(cycle.q)
             self._rules.require_gentle(speed, contact_force)
             assert self._reader is not None
-            limit = self.bounds.force
-            guard = ContactGuard(self._reader, direction, contact_force, limit)
+            guard = ContactGuard(self._reader, direction, contact_force, self.bounds.force)
             motion = partial(approach, way=way, speed=speed, guard=guard, pace=self._pace)
             self._start(_Task(MotionState.APPROACHING, motion, partial(self._touch, guard)))
 
@@ -355,8 +352,7 @@ class KukaArm:
 
     def _press(self, wanted: FloatArray, rate: float) -> Press:
         assert self._reader is not None
-        bounds = self.bounds
-        limits = (self._touched_at, bounds.travel, bounds.force)
+        limits = (self._touched_at, self.bounds.travel, self.bounds.force)
         return Press(self._reader, self.law, wanted, rate, *limits)
 
     def _require_link(self) -> None:

@@ -11,6 +11,7 @@ answer none is late (an operator starts the program when the PC listens); where 
 keep up, the robot's time stands still between two cycles, and ``statistics.stretched`` counts them.
 """
 
+import contextlib
 import socket
 import threading
 import time
@@ -20,7 +21,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from elastocal.cell import LOOPBACK, WallClock
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, ElastocalError
 from elastocal.sim.wire._rsi_messages import LARGEST, Answer, EthernetConfig, RobWriter, SenReader
 from elastocal.sim.wire._rsi_robot import (
     RsiContext,
@@ -196,9 +197,10 @@ class RsiServer:
             try:
                 self._robot.start()
                 stop = self._session(IPOC_START - 1_000_000 * started)
-                self._robot.stop()
-            except DeviceError as error:
+            except ElastocalError as error:
                 stop = str(error)
+            with contextlib.suppress(ElastocalError):
+                self._robot.stop()
             started += 1
             if self._closing.is_set():
                 return
