@@ -39,6 +39,14 @@ def test_each_set_is_a_cover_set_of_its_own_seed_and_training_is_the_rest():
         assert sorted([*split.verification, *split.training]) == list(range(12))
 
 
+def test_a_pose_far_from_all_others_trains_and_verifies_nothing():
+    contact = np.random.default_rng(0).normal(size=(12, 3))
+    company = np.arange(12) != 5
+    splits = make_splits(contact, None, 4, company)
+    assert [split.seed_pose for split in splits] == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
+    assert all(5 in split.training and len(split.verification) == 4 for split in splits)
+
+
 @pytest.mark.parametrize("count", [0, 13, -1])
 def test_more_sets_than_poses_are_refused(count):
     with pytest.raises(CodecError, match=rf"{count} splits .* from 1 to the 12 poses"):

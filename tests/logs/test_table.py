@@ -67,6 +67,12 @@ def test_a_time_of_day_goes_on_beyond_midnight(tmp_path):
     assert np.diff(table.seconds("time")).tolist() == [2.0]
 
 
+@pytest.mark.parametrize("cell", ["\u0661\u0662", "1_000"])
+def test_digits_of_other_scripts_and_groups_of_them_are_no_numbers(tmp_path, cell):
+    with pytest.raises(LogError):
+        _log(tmp_path, f"t,x\n0.5,1\n1.5,{cell}\n2.5,3\n").numbers("x")
+
+
 def test_empty_cells_are_not_numbers_but_known(tmp_path):
     values = _log(tmp_path, "t,x\n1,\n2,nan\n3,4\n").numbers("x")
     assert np.isnan(values).tolist() == [True, True, False]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.robot import T_from_xyzabc, xyzabc_from_T
+from elastocal.robot import T_from_xyzabc, nearest_rotation, xyzabc_from_T
 
 
 def random_poses(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -53,3 +53,15 @@ def test_a_is_zero_at_the_gimbal_and_the_rotation_is_kept(b):
 def test_rotation_is_kept_close_to_the_gimbal(off):
     T = T_from_xyzabc(0.0, 0.0, 0.0, 0.7, math.pi / 2 - off, -0.4)
     np.testing.assert_allclose(T_from_xyzabc(*xyzabc_from_T(T)), T, atol=1e-12)
+
+
+def test_the_nearest_rotation_is_scipys_and_never_a_mirror_image():
+    rng = np.random.default_rng(4)
+    here, there = rng.normal(size=(2, 20, 8, 3))
+    there[10:] = here[10:] * [1.0, 1.0, -1.0]
+    found = nearest_rotation(np.einsum("smi,smj->sij", there, here))
+    for each, a, b in zip(found, here, there, strict=True):
+        expected = Rotation.align_vectors(b, a)[0].as_matrix()
+        np.testing.assert_allclose(each, expected, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(found), 1.0)
+    np.testing.assert_allclose(nearest_rotation(2.0 * found[0]), found[0], atol=1e-14)

@@ -3,8 +3,19 @@
 from typing import get_origin
 
 from elastocal.compensation.conditioning import FilterSettings, LowPass, Notch
+from elastocal.compensation.conditioning.filters import Section, lead_section
+
+
+class Lead(float):
+    """A lead in s, which the settings hold as a bare time."""
+
+    def sections(self, sample: float) -> tuple[Section, ...]:
+        """Return its section for a sampling time in s."""
+        return (lead_section(self, sample),)
+
 
 EXAMPLES = {
+    "lead": Lead(0.02),
     "low_pass": LowPass(cutoff="15 Hz"),
     "notches": Notch(frequency="50 Hz", width="5 Hz"),
 }
@@ -16,4 +27,6 @@ def filter_settings(*names: str, median: int = 1) -> FilterSettings:
     fields = FilterSettings.model_fields
     several = {name: get_origin(fields[name].annotation) is tuple for name in names}
     chosen = {name: (EXAMPLES[name],) if many else EXAMPLES[name] for name, many in several.items()}
+    if "lead" in chosen:
+        chosen["lead"] = f"{chosen['lead']} s"
     return FilterSettings(median=median, **{"low_pass": None, **chosen})

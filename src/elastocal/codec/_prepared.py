@@ -181,11 +181,13 @@ def make_entrant(
 def left_out_errors(ladder: Choice, variants: Sequence[Variant]) -> FloatArray:
     """Return the errors at left-out poses by which `calibrate` judges each variant.
 
-    Shape (variant, pose), in m; NaN for variants that train or fit otherwise than `calibrate`, or
-    whose springs have been chosen by these very errors.
+    Shape (variant, pose), in m, of the poses that it counts; NaN for variants that train or fit
+    otherwise than `calibrate`, or whose springs have been chosen by these very errors.
     """
-    scores = {each.name: each.score for each in ladder.ladder}
-    unknown = np.full(len(ladder.ladder[0].score), np.nan)
+    first = ladder.ladder[0]
+    counted = np.ones(len(first.score), dtype=bool) if first.counted is None else first.counted
+    scores = {each.name: each.score[counted] for each in ladder.ladder}
+    unknown = np.full(int(counted.sum()), np.nan)
     found = []
     for each in variants:
         choice = [name for name in allowed_rungs(each.springs) if name in scores]

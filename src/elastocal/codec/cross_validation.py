@@ -119,7 +119,8 @@ def cross_validate(
     campaign = make_campaign(compared, readings, options, marker_offset)
     check_different(variants, campaign.load_cases)
     training, verification = split_sizes(len(campaign), options.ratio)
-    splits = make_splits(campaign.contact, options.splits, verification)
+    splits = make_splits(campaign.contact, options.splits, verification, campaign.company)
+    training = max(training, len(splits[0].training))
     entrants = [
         make_entrant(each, name, models, campaign, marker_offset)
         for each, name in zip(variants, taken, strict=True)

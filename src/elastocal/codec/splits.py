@@ -20,6 +20,7 @@ from elastocal.identification import (
     check_conventions,
     check_joints,
     pose_blocks,
+    poses_in_company,
     same_configuration,
     screen,
 )
@@ -74,6 +75,8 @@ class Campaign:
     contact: FloatArray
     """Tcp positions in base, shape (pose, 3), in m: the mean over the pose's readings of the
     forward kinematics of the recorded joints."""
+    company: BoolArray
+    """Poses that may verify, shape (pose,); see `identification.poses_in_company`."""
     labels: tuple[tuple[int, ...], ...]
     """Labels of each pose in the dataset."""
     findings: tuple[str, ...]
@@ -171,7 +174,13 @@ def _group_by_pose(robot: Robot, readings: Readings, findings: list[str]) -> Cam
     labels = tuple(
         tuple(np.unique(readings.pose[pose == number]).tolist()) for number in range(len(counts))
     )
-    return Campaign(readings, pose, contact, labels, (*findings, *repeated))
+    company = poses_in_company(robot, readings.joint_position, pose)
+    lone = [
+        f"pose {', '.join(map(str, labels[number]))} is far from all others: it trains, and"
+        " verifies nothing, as it is left out of the ladder"
+        for number in np.flatnonzero(~company).tolist()
+    ]
+    return Campaign(readings, pose, contact, company, labels, (*findings, *repeated, *lone))
 
 
 def _blunders(
@@ -217,7 +226,9 @@ def split_sizes(poses: int, ratio: float = _RATIO) -> tuple[int, int]:
     return training, poses - training
 
 
-def make_splits(contact: FloatArray, count: int | None, verification: int) -> tuple[Split, ...]:
+def make_splits(
+    contact: FloatArray, count: int | None, verification: int, company: BoolArray | None = None
+) -> tuple[Split, ...]:
     """Return splits whose verification sets are COVER sets grown from different poses.
 
     Parameters
@@ -225,28 +236,27 @@ def make_splits(contact: FloatArray, count: int | None, verification: int) -> tu
     contact : ndarray, shape (pose, 3)
         Contact points, in m.
     count : int, optional
-        Number ``N_cv`` of splits, grown from the poses 0 to ``N_cv - 1``; default: as many as
-        there are poses.
+        Number ``N_cv`` of splits, grown from the first ``N_cv`` poses that may verify; default: as
+        many as there are of these.
     verification : int
-        Poses in each verification set, ``N_v``.
+        Poses in each verification set, ``N_v``; fewer where so many may not verify.
+    company : ndarray of bool, shape (pose,), optional
+        Which poses may verify; default: all. Errors at the others, far from any that trains, would
+        be those of an extrapolation.
 
     Raises
     ------
     CodecError
         If there are fewer poses than splits, or less than one split is wanted.
     """
-    pool = Candidates(contact)
-    count = len(pool) if count is None else count
-    if not 1 <= count <= len(pool):
+    able = np.arange(len(contact)) if company is None else np.flatnonzero(company)
+    count = len(able) if count is None else count
+    if not 1 <= count <= len(able):
         raise CodecError(
             f"{count} splits wanted, each grown from a pose of its own: must be from 1 to the"
-            f" {len(pool)} poses of the dataset"
+            f" {len(able)} poses of the dataset"
         )
-    return tuple(_grow_split(pool, seed, verification) for seed in range(count))
-
-
-def _grow_split(pool: Candidates, seed: int, size: int) -> Split:
-    chosen = Cover(first=seed).search(pool, size).order
-    left = np.ones(len(pool), dtype=bool)
-    left[chosen] = False
-    return Split(seed, chosen, np.flatnonzero(left))
+    pool, size = Candidates(contact[able]), min(verification, len(able) - 1)
+    chosen = [able[Cover(first=first).search(pool, size).order] for first in range(count)]
+    every = np.arange(len(contact))
+    return tuple(Split(int(each[0]), each, np.setdiff1d(every, each)) for each in chosen)

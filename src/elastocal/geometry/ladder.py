@@ -5,6 +5,7 @@ problem linear to a micrometre. The normal equations are sums over blocks of con
 that a fold, or a draw of the bootstrap, is a sum of some of them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import GeometryError
 from elastocal.geometry.mistakes import require_own_joints
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
-from elastocal.geometry.solve import PRIOR_WIDTH, GeometryFit, fit, register, told_apart
+from elastocal.geometry.solve import PRIOR_WIDTH, Fixed, GeometryFit, fit, register, told_apart
 from elastocal.identification import Overlap, judge_models
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
@@ -75,7 +76,9 @@ def climb(
     require_own_joints(problem, start)
     progress("geometry", 1, 4)
     nominal = problem.linearise(start)[1]
-    free = {rung: told_apart(nominal, problem, rung) for rung in RUNGS}
+    # Unknowns are taken rung by rung, so that the richest tells of those below it, too.
+    apart = told_apart(nominal, problem, RUNGS[-1])
+    free = {rung: _up_to(rung, problem, *apart) for rung in RUNGS}
     reference = fit(problem, free["weight"], start, J=nominal)
     progress("geometry", 2, 4)
     block = blocks(problem)
@@ -99,6 +102,16 @@ def climb(
     spread = _Sums(problem, final, block).draws(draws, rng)
     progress("geometry", 4, 4)
     return GeometryLadder(tuple(rungs), chosen, final, values, values + spread)
+
+
+def _up_to(
+    rung: str, problem: GeometryProblem, free: IndexArray, fixed: Sequence[Fixed]
+) -> tuple[IndexArray, list[Fixed]]:
+    """Return which unknowns of a rung are free and which fixed, by those of the richest."""
+    kept = RUNGS[: RUNGS.index(rung) + 1]
+    names = {each.name for each in problem.unknowns if each.rung in kept}
+    chosen = [index for index in free.tolist() if problem.unknowns[index].name in names]
+    return np.array(chosen), [each for each in fixed if each.name in names]
 
 
 def blocks(problem: GeometryProblem) -> IndexArray:

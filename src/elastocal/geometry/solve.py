@@ -10,6 +10,7 @@ from elastocal.errors import GeometryError
 from elastocal.geometry.arm import ArmErrors
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
 from elastocal.results import brief_repr
+from elastocal.robot import nearest_rotation
 
 _DEPENDENT = 1e-7
 """Part of a weighed column that is new beside those before it, below which nothing is."""
@@ -72,10 +73,8 @@ def _aligned(points: FloatArray, measured: FloatArray, weight: FloatArray) -> Fl
     """Return the transform that brings points onto measured ones (Kabsch)."""
     w = weight / weight.sum()
     a, b = w @ points, w @ measured
-    u, _, vt = np.linalg.svd(((measured - b) * w[:, None]).T @ (points - a))
-    d = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     T = np.eye(4)
-    T[:3, :3] = u @ d @ vt
+    T[:3, :3] = nearest_rotation(((measured - b) * w[:, None]).T @ (points - a))
     T[:3, 3] = b - T[:3, :3] @ a
     return T
 

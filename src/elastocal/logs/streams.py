@@ -16,7 +16,7 @@ from elastocal.logs.recordings import is_recording, read_recording
 from elastocal.logs.table import LogTable, read_text_log, read_workbook
 from elastocal.procedure.record import ArmStream, PointStream, WrenchStream
 from elastocal.results import brief_repr
-from elastocal.robot import Robot
+from elastocal.robot import Robot, nearest_rotation
 from elastocal.units import factor
 
 _WORKBOOKS = (".xlsx", ".xlsm")
@@ -391,8 +391,4 @@ def body_centre(position: FloatArray, name: str = "markers") -> FloatArray:
 
 def _rotations(model: FloatArray, points: FloatArray) -> FloatArray:
     """Return the rotations that bring centred models onto centred points, shape (sample, 3, 3)."""
-    u, _, vt = np.linalg.svd(np.einsum("smi,smj->sij", points, model))
-    mirrored = np.linalg.det(u @ vt) < 0.0
-    u[mirrored, :, 2] *= -1.0
-    rotations: FloatArray = u @ vt
-    return rotations
+    return nearest_rotation(np.einsum("smi,smj->sij", points, model))

@@ -24,17 +24,18 @@ from elastocal.errors import FileAccessError, LogError, nearest
 from elastocal.files import require_file
 from elastocal.logs.bounded import read_bounded
 from elastocal.results import brief_repr
+from elastocal.units import parse_number
 
 LARGEST_LOG = 2 * 1024**3
 """In bytes: a day of three instruments at 1 kHz."""
 _COMMENTS = ("#", "//", "%", "!")
 _DELIMITERS = ";\t,|"
-_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
-_NUMBER = re.compile(r"\s*[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?\s*")
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"\s*[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?\s*", re.ASCII)
 _UNIT = re.compile(
     r"[\[(]?\s*(?:mm|m|[uµ]m|in|s|sec|ms|us|deg|°|rad|k?N|N[*·]?m|N[*·]?mm|°C|mbar|hPa|%)\s*[\])]?"
 )
-_CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)")
+_CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)", re.ASCII)
 _LOOKED_AT = 200
 """Lines by which the form of a text is told."""
 
@@ -126,7 +127,11 @@ class LogTable:
 
     def _plain(self, cells: Sequence[object]) -> FloatArray | None:
         """Return the numbers of a column of nothing but finite ones; None: look at each cell."""
-        if not all(type(cell) is str for cell in cells) or "_" in (text := "\n".join(cells)):  # type: ignore[arg-type]
+        if not all(type(cell) is str for cell in cells):
+            return None
+        text = "\n".join(cells)  # type: ignore[arg-type]
+        # What `parse_number` takes for no number, numpy would read.
+        if "_" in text or not text.isascii():
             return None
         if self.decimal_comma:
             text = text.replace(",", ".")
@@ -143,7 +148,7 @@ class LogTable:
                 return math.nan
             if not _NUMBER.fullmatch(text):
                 return _not_finite(text)
-            return float(text.replace(",", ".") if self.decimal_comma else text)
+            return parse_number(text.replace(",", ".") if self.decimal_comma else text)
         return math.nan if cell is None else float(cell)  # type: ignore[arg-type]
 
     def _time(self, cell: object) -> float:

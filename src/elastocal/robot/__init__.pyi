@@ -49,6 +49,7 @@ from .singularity import (
 from .transforms import (
     T_from_xyzabc as T_from_xyzabc,
     inverse_transform as inverse_transform,
+    nearest_rotation as nearest_rotation,
     xyzabc_from_T as xyzabc_from_T,
 )
 from .urdf import (

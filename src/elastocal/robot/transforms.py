@@ -22,6 +22,25 @@ def inverse_transform(T: FloatArray) -> FloatArray:
     return inverse
 
 
+def nearest_rotation(M: FloatArray) -> FloatArray:
+    """Return the rotations nearest to matrices, shape (..., 3, 3): the largest ``tr(R^T M)``.
+
+    With ``M = sum b a^T`` over centred points it is the rotation that brings points ``a`` nearest
+    to ``b`` (W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
+    Crystallographica A32, 1976); a mirror image is none.
+
+    Parameters
+    ----------
+    M : ndarray, shape (..., 3, 3)
+        Any matrices.
+    """
+    u, _, vt = np.linalg.svd(M)
+    # The direction that is known least is the one to turn round.
+    u[..., 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
+    rotation: FloatArray = u @ vt
+    return rotation
+
+
 def T_from_xyzabc(
     x: ArrayLike, y: ArrayLike, z: ArrayLike, a: ArrayLike, b: ArrayLike, c: ArrayLike
 ) -> FloatArray:

@@ -90,8 +90,10 @@ def verify_chain(evidence: Evidence, files: ChainFiles) -> tuple[Link, ...]:
         links += [_signed(files.run, evidence.run_record, files), *_recorded(evidence, files)]
         broken = {link.text for link in links}
         links += _derived(evidence, files, broken)
-    links += [*_model(evidence), *_codecs(evidence), *_process(evidence)]
-    return tuple(links)
+    if evidence.dataset is not None:
+        dataset = content_sha256(evidence.dataset)
+        links += [*_model(evidence, dataset), *_codecs(evidence, dataset)]
+    return (*links, *_process(evidence))
 
 
 def _whole(name: str, text: str) -> Link:
@@ -317,35 +319,32 @@ def _is_close(a: object, b: object) -> bool:
     return abs(a - b) <= max(10.0 * _SAME * abs(b), 1e-12)
 
 
-def _model(evidence: Evidence) -> Iterator[Link]:
-    if evidence.calibrated is None or evidence.dataset is None:
+def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:
+    if evidence.calibrated is None:
         return
     stated = evidence.calibrated.made_from
-    if not stated:
-        yield _unstated(evidence, "model", "the model does not state which dataset it is made from")
-    elif content_sha256(evidence.dataset) not in stated.values():
-        yield _broken(
-            "model", f"the model was made from another dataset ({', '.join(stated)}) than this one"
-        )
-    elif len(stated) > 1:
+    if len(stated) > 1 and dataset in stated.values():
         others = f"the model was made from {len(stated)} datasets, of which only one is here"
         yield Link("model", LinkState.UNSTATED, others)
     else:
-        yield _whole("model", "the model was made from this dataset")
+        yield _made_of(evidence, dataset, "model", "the model", stated)
 
 
-def _codecs(evidence: Evidence) -> Iterator[Link]:
-    for codec in evidence.codecs if evidence.dataset is not None else ():
-        stated, name = codec.data.made_from, codec.name or "codec"
-        if not stated:
-            text = f"{name} does not state which dataset it is made from"
-            yield _unstated(evidence, "codec", text)
-        elif content_sha256(evidence.dataset) not in stated.values():  # type: ignore[arg-type]
-            yield _broken(
-                "codec", f"{name} was made from another dataset ({', '.join(stated)}) than this one"
-            )
-        else:
-            yield _whole("codec", f"{name} was made from this dataset")
+def _codecs(evidence: Evidence, dataset: str) -> Iterator[Link]:
+    for codec in evidence.codecs:
+        yield _made_of(evidence, dataset, "codec", codec.name or "codec", codec.data.made_from)
+
+
+def _made_of(
+    evidence: Evidence, dataset: str, name: str, what: str, stated: Mapping[str, str]
+) -> Link:
+    """Return whether a part was made from the dataset of this hash."""
+    if not stated:
+        return _unstated(evidence, name, f"{what} does not state which dataset it is made from")
+    if dataset not in stated.values():
+        text = f"{what} was made from another dataset ({', '.join(stated)}) than this one"
+        return _broken(name, text)
+    return _whole(name, f"{what} was made from this dataset")
 
 
 def _process(evidence: Evidence) -> Iterator[Link]:

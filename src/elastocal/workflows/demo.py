@@ -14,6 +14,7 @@ from elastocal.cell import PROCESS_FILE, require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError
 from elastocal.files import write_text
+from elastocal.parallel import process_count, process_pool
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
@@ -277,10 +278,22 @@ def _chapter(
             words += [word for word in (flag, "" if each is True else str(each)) if word]
 
     def work(progress: Progress, operator: Operator) -> Result:
-        watched = {"operator": operator} if workflow is run else {}
-        return workflow(source, progress, **options, **watched)
+        if workflow is not run:
+            return workflow(source, progress, **options)
+        with _processes_get_ready():
+            return workflow(source, progress, operator=operator, **options)
 
     return Chapter(title, tuple(words), work)
+
+
+def _processes_get_ready() -> AbstractContextManager[object]:
+    """Let the processes of later chapters start while the arm moves, which takes one core."""
+    cores = process_count()
+    return process_pool(cores, _find_workflows) if cores > 1 else nullcontext()
+
+
+def _find_workflows() -> None:
+    """Do nothing: a process that finds this function has imported all workflows with it."""
 
 
 def begin(out: Path, kind: str, force: bool) -> None:

@@ -11,6 +11,7 @@ from elastocal.compensation.conditioning import (
     ToolModel,
     blunders,
     choose_tool,
+    fit_tool,
     refuse_mistakes,
     rotation_off,
 )
@@ -53,6 +54,42 @@ def test_the_weight_is_known_to_the_noise_although_the_matrix_is_not():
     left = (fit.matrix @ weight - sensor.matrix @ truth) * 9.80665
     assert np.abs(left[:3]).max() < 1.0
     assert np.abs(left[3:]).max() < 0.1
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_without_a_matrix_intervals_reach_as_far_as_beside_its_prior(seed):
+    # Few postures, hardly turned: they cannot show a cross-talk of 1 %, and do not ask for it.
+    rng = np.random.default_rng(seed)
+    postures = TOOL.raw(turned(7, rng, 0.3), rng)
+    without = choose_tool(postures, None, ToolModel(drift=True)).fit.half_width
+    found = choose_tool(postures).fit
+    beside = fit_tool(postures, None, ToolModel(cross_talk=0.01))
+    assert not found.model.has_matrix
+    for name, value, other in (
+        ("mass", found.mass, beside.mass),
+        ("centre of mass z", found.centre[2], beside.centre[2]),
+    ):
+        assert found.half_width[name] >= abs(value - other) + beside.half_width[name]
+        assert found.half_width[name] > without[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "angle"), [(8, 0.4), (8, 1.0), (14, 0.4), (31, 1.0)])
+def test_intervals_cover_the_tool_under_a_cross_talk_of_one_percent(count, angle):
+    names = [name for name in TOOL_UNKNOWNS if "rotation" not in name]
+    covered = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        tool = replace(TOOL, matrix=TOOL.cross_talk(0.01, rng))
+        fit = choose_tool(tool.raw(turned(count, rng, angle), rng)).fit
+        off = [
+            [fit.mass - tool.mass],
+            fit.force_bias - tool.force_bias,
+            fit.centre - tool.centre,
+            fit.moment_bias - tool.moment_bias,
+        ]
+        covered.append(np.abs(np.concatenate(off)) <= [fit.half_width[name] for name in names])
+    assert 0.90 <= np.mean(covered) <= 0.99
 
 
 def test_a_weight_determines_at_most_eighteen_directions_of_the_matrix():

@@ -53,7 +53,9 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
     ] = False,
     process: Annotated[
         Path | None,
-        typer.Option(help="Path of production (.csv): state also how much of it is covered."),
+        typer.Option(
+            help="Path of production (.csv): springs are chosen for it; how much of it is covered."
+        ),
     ] = None,
     draws: Annotated[int, typer.Option(max=100_000, help="Bootstrap draws.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstrap.")] = 0,

@@ -34,13 +34,13 @@ from .tool_choice import (
     affine_scatter as affine_scatter,
     blunders as blunders,
     choose_tool as choose_tool,
-    rotation_off as rotation_off,
 )
 from .tool_fit import (
     TOOL_UNKNOWNS as TOOL_UNKNOWNS,
     ToolFit as ToolFit,
     ToolModel as ToolModel,
     fit_tool as fit_tool,
+    rotation_off as rotation_off,
     tool_derivatives as tool_derivatives,
     tool_residual as tool_residual,
     tool_wrenches as tool_wrenches,

@@ -8,6 +8,7 @@
   other, each only if it foretells left-out postures better by a paired interval that counts the
   overlap of the training sets (Nadeau and Bengio 2003). A rotation must also be larger than its
   interval beside a matrix with its prior: cross-talk looks like a rotation.
+* **Cross-talk.** Where the matrix is not freed, the intervals are still those beside it.
 * **Order.** Residuals that resemble their neighbours' are no independent readings. Where shuffling
   the postures shows that, intervals grow by ``sqrt((1 + r) / (1 - r))``; and where a half of the
   postures, first or last, disagrees with all of them, they reach to what it says.
@@ -26,6 +27,7 @@ from elastocal.compensation.conditioning.tool_fit import (
     ToolFit,
     ToolModel,
     fit_tool,
+    rotation_off,
     tool_residual,
 )
 from elastocal.parallel import one_blas_thread
@@ -125,9 +127,24 @@ def choose_tool(
     used[[each.posture - 1 for each in aside]] = False
     good = postures.chosen(used)
     model, ladder, notes = _climb(good, R_nominal, richest)
-    fit = fit_tool(good, R_nominal, model)
+    fit = _beside_cross_talk(good, R_nominal, fit_tool(good, R_nominal, model), richest)
     fit, correlation, more = _in_order(good, R_nominal, fit)
     return ToolChoice(fit, used, aside, ladder, correlation, (*notes, *more))
+
+
+def _beside_cross_talk(
+    postures: StaticPostures, R_nominal: FloatArray | None, fit: ToolFit, richest: ToolModel
+) -> ToolFit:
+    """Return a fit whose intervals reach to those beside a matrix, which postures need not show."""
+    if fit.model.has_matrix or not richest.cross_talk > 0.0:
+        return fit
+    matrix = replace(richest, rotation=False, drift=False)
+    beside = fit_tool(postures, R_nominal, _beside(fit.model, matrix))
+    away = np.abs(_values(beside) - _values(fit))
+    # What is not determined stays so; a matrix that leaves nothing over says nothing.
+    ends = np.nan_to_num(away + [beside.half_width[name] for name in TOOL_UNKNOWNS]).tolist()
+    widths = {n: max(fit.half_width[n], end) for n, end in zip(TOOL_UNKNOWNS, ends, strict=True)}
+    return replace(fit, half_width=widths)
 
 
 def affine_scatter(postures: StaticPostures) -> FloatArray | None:
@@ -144,8 +161,7 @@ def affine_scatter(postures: StaticPostures) -> FloatArray | None:
     over = len(A) - np.linalg.matrix_rank(A)
     if over < 1:
         return None
-    scatter: FloatArray = np.sqrt((left.reshape(-1, 2, 3) ** 2).sum(axis=(0, 2)) / (3 * over))
-    return scatter
+    return np.asarray(np.sqrt((left.reshape(-1, 2, 3) ** 2).sum(axis=(0, 2)) / (3 * over)))
 
 
 def blunders(postures: StaticPostures) -> tuple[PostureSetAside, ...]:
@@ -292,14 +308,6 @@ def _mounted_rotation(
     return not np.any(np.abs(angles) > _CLEARLY * widths), f"{shown} deg"
 
 
-def rotation_off(R_nominal: FloatArray, R: FloatArray) -> FloatArray:
-    """Return the rotation vector from a nominal rotation to another, sensor axes, in rad."""
-    from scipy.spatial.transform import Rotation
-
-    vector: FloatArray = Rotation.from_matrix(R_nominal.T @ R).as_rotvec()
-    return vector
-
-
 def _left_out(
     postures: StaticPostures, R_nominal: FloatArray | None, model: ToolModel
 ) -> FloatArray:
@@ -314,8 +322,8 @@ def _left_out(
 
 
 def _root_mean(left: FloatArray) -> tuple[float, float]:
-    force, moment = np.sqrt((left.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
-    return float(force), float(moment)
+    force, moment = np.sqrt((left.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2))).tolist()
+    return force, moment
 
 
 def _wins(rich: FloatArray, plain: FloatArray) -> bool:
@@ -389,5 +397,4 @@ def _halves(
 
 
 def _values(fit: ToolFit) -> FloatArray:
-    turn = np.zeros(3)
-    return np.concatenate([[fit.mass], turn, fit.force_bias, fit.centre, fit.moment_bias])
+    return np.concatenate([[fit.mass], np.zeros(3), fit.force_bias, fit.centre, fit.moment_bias])

@@ -19,6 +19,7 @@ the last linear step with the prior as further rows, by Student's t.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -27,6 +28,7 @@ from scipy.special import stdtrit
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.compensation.conditioning.postures import StaticPostures
 from elastocal.results import brief_repr
+from elastocal.robot import nearest_rotation
 
 TOOL_UNKNOWNS = (
     "mass",
@@ -239,16 +241,19 @@ def tool_residual(postures: StaticPostures, fit: ToolFit) -> tuple[FloatArray, F
     )
 
 
+def rotation_off(R_nominal: FloatArray, R: FloatArray) -> FloatArray:
+    """Return the rotation vector from a nominal rotation to another, sensor axes, in rad."""
+    return np.asarray(Rotation.from_matrix(R_nominal.T @ R).as_rotvec())
+
+
 def _rotation_between(postures: StaticPostures, nominal: FloatArray) -> FloatArray:
     """Return the rotation that best turns gravity into forces, the nominal one where open."""
     u = postures.gravity_flange - postures.gravity_flange.mean(axis=0)
     F = postures.force - postures.force.mean(axis=0)
-    U, s, Vt = np.linalg.svd(u.T @ F)
+    s = np.linalg.svd(u.T @ F, compute_uv=False)
     if not s[1] > _LOADING * max(s[0], np.finfo(float).tiny):
         return nominal
-    turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
-    rotation: FloatArray = U @ turn @ Vt
-    return rotation
+    return nearest_rotation(u.T @ F)
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +279,7 @@ class _WeighedFit:
         for _ in range(_STEPS):
             left = fit.left() * np.repeat(fit.weights, 3)
             rows = np.concatenate([left.ravel(), -fit.values[_MATRIX][free[_MATRIX]]])
-            u, s, vt, scale, kept = fit.decomposed()
+            u, s, vt, scale, kept = fit.decomposed
             step = np.zeros(_ALL)
             step[free] = (vt[kept].T @ ((u[:, kept].T @ rows) / s[kept])) / scale
             values = fit.values + step
@@ -285,6 +290,7 @@ class _WeighedFit:
                 break
         return fit
 
+    @cached_property
     def decomposed(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
         """Return the singular value decomposition ``u s vt`` of the weighed derivatives.
 
@@ -310,7 +316,7 @@ class _WeighedFit:
 
     def left_over(self) -> FloatArray:
         """Return how many force and moment components are left over, by their leverage."""
-        u, _, _, _, kept = self.decomposed()
+        u, _, _, _, kept = self.decomposed
         rows = 6 * len(self.postures)
         taken = (u[:rows, kept] ** 2).sum(axis=1).reshape(-1, 2, 3).sum(axis=(0, 2))
         over: FloatArray = 0.5 * rows - taken
@@ -319,7 +325,7 @@ class _WeighedFit:
     def result(self, scatter: FloatArray) -> ToolFit:
         """Return tool and sensor with their intervals."""
         postures, model, values, free = self.postures, self.model, self.values, self.model.free
-        _, s, vt, scale, kept = self.decomposed()
+        _, s, vt, scale, kept = self.decomposed
         mass = float(values[0])
         centre = values[7:10] / (mass if abs(mass) > 0.0 else np.inf)
         # Rows: how each unknown moves with the independent directions, each by its deviation.

@@ -19,7 +19,14 @@ from elastocal.procedure.derive.tool import RawWrench, UnloadedWrenches
 from elastocal.procedure.record import SAME_TIME, PoseLog, ReadingStatus, Streams, Window
 from elastocal.procedure.registration import UnloadedReadings
 from elastocal.results import brief_repr
-from elastocal.robot import ChainJoint, InsertedJoint, Robot, build_model, evaluate_jacobian
+from elastocal.robot import (
+    ChainJoint,
+    InsertedJoint,
+    Robot,
+    build_model,
+    evaluate_jacobian,
+    nearest_rotation,
+)
 
 LEAST_SAMPLES = 5
 """Fewer good samples than this make no reading: their scatter says nothing."""
@@ -169,8 +176,7 @@ def _inflation(centred: FloatArray) -> FloatArray:
 def _mean_pose(T: FloatArray) -> FloatArray:
     """Return the mean of poses that hardly differ: mean position, nearest rotation."""
     mean: FloatArray = T.mean(axis=0)
-    u, _, vt = np.linalg.svd(mean[:3, :3])
-    mean[:3, :3] = u @ vt
+    mean[:3, :3] = nearest_rotation(mean[:3, :3])
     return mean
 
 

@@ -13,6 +13,7 @@ Numbers have 12 digits: finer than any instrument, and nearly three times as qui
 import json
 import math
 import struct
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -25,8 +26,8 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import CRCValidationError, StreamReader, get_chunk_data_stream
+from mcap.records import Channel, Chunk, DataEnd, Metadata
+from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 from mcap.writer import Writer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -46,10 +47,6 @@ _CHUNK = 512 * 1024
 
 _RECORD, _MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 """Opcode and length of a record; of a message: channel, sequence, log time, publish time."""
-_DESCRIPTIONS: dict[int, type[Schema] | type[Channel]] = {
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-}
 _MOST_UNPACKED = Limit("ELASTOCAL_MAX_STREAM_MB", 256, "MB")
 """An hour of a pose, at the rates of the simulated devices, takes a tenth."""
 _MEGABYTE = 1_000_000
@@ -154,7 +151,7 @@ def read_mcap(path: Path) -> Contents:
     if not data.endswith(_MAGIC) or len(data) == len(_MAGIC):
         raise SchemaError(f"{path} is cut off: it does not end with the MCAP signature")
     try:
-        return _contents(_records(data))
+        return _contents(data)
     except _DAMAGE as error:
         wrong_sum = isinstance(error, CRCValidationError)
         reason = "its checksum is wrong" if wrong_sum else " ".join(str(error).split())
@@ -162,22 +159,70 @@ def read_mcap(path: Path) -> Contents:
         raise SchemaError(f"{path} is a damaged MCAP file: {reason}") from error
 
 
-def _records(data: bytes) -> Iterator[McapRecord]:
-    """Yield the records of a file, those within its chunks too."""
+def _contents(data: bytes) -> Contents:
+    """Return what a file holds, in its chunks and beside them."""
+    metadata: dict[str, Mapping[str, str]] = {}
+    topics: dict[str, Messages] = {}
+    channels: dict[int, Messages] = {}
+    for part in _unpacked(data):
+        for opcode, begin, end in _framed(part):
+            if opcode == Opcode.MESSAGE:
+                number, _, time, _ = _MESSAGE.unpack_from(part, begin)
+                if number not in channels:
+                    raise ValueError(
+                        f"a message is of channel {number}, which is not described before it"
+                    )
+                channels[number].time.append(time)
+                channels[number].data.append(part[begin + _MESSAGE.size : end])
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(_stream(part, begin, end))
+                channels[channel.id] = topics.setdefault(channel.topic, Messages())
+            elif opcode == Opcode.METADATA:
+                found = Metadata.read(_stream(part, begin, end))
+                metadata[found.name] = found.metadata
+    return Contents(metadata, {name: _in_order(each) for name, each in topics.items()})
+
+
+def _unpacked(data: bytes) -> Iterator[bytes]:
+    """Yield the records of a file in pieces: what its chunks hold, and each of the others."""
     # Chunks stay packed until the checksum of all of them is known to be right: a damaged one may
     # ask for more memory than there is. Tools that do not make a checksum write 0; it passes.
-    reader = StreamReader(BytesIO(data), emit_chunks=True, validate_crcs=True)
-    records = list(reader.records)
-    if not any(isinstance(record, DataEnd) for record in records):
+    inside = memoryview(data)[len(_MAGIC) : -len(_MAGIC)]
+    records = list(_framed(inside))
+    ends = [each for each in records if each[0] == Opcode.DATA_END]
+    if not ends:
         raise ValueError("its data have no end")
+    for _, begin, end in ends:
+        stated = DataEnd.read(_stream(inside, begin, end))
+        actual = zlib.crc32(data[: len(_MAGIC) + begin - _RECORD.size])
+        if stated.data_section_crc not in (0, actual):
+            raise CRCValidationError(stated.data_section_crc, actual, stated)
     unpacked = 0.0
-    for record in records:
-        if isinstance(record, Chunk):
-            unpacked += _unpacked_size(record) / _MEGABYTE
+    for opcode, begin, end in records:
+        if opcode == Opcode.CHUNK:
+            chunk = Chunk.read(_stream(inside, begin, end))
+            unpacked += _unpacked_size(chunk) / _MEGABYTE
             _MOST_UNPACKED.require(unpacked, "what its chunks hold when they are unpacked")
-            yield from _unpacked(record)
+            stream, size = get_chunk_data_stream(chunk, validate_crc=True)
+            yield stream.read(size)
         else:
-            yield record
+            yield bytes(inside[begin - _RECORD.size : end])
+
+
+def _framed(data: bytes | memoryview) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, begin and end of each record; messages are not read number by number."""
+    at, size = 0, len(data)
+    while at < size:
+        opcode, length = _RECORD.unpack_from(data, at)
+        begin, at = at + _RECORD.size, at + _RECORD.size + length
+        if at > size:
+            raise ValueError("a record is longer than what holds it")
+        yield opcode, begin, at
+
+
+def _stream(data: bytes | memoryview, begin: int, end: int) -> ReadDataStream:
+    """Return the contents of a record as the package reads them."""
+    return ReadDataStream(BytesIO(data[begin:end]))
 
 
 def _unpacked_size(chunk: Chunk) -> int:
@@ -186,42 +231,6 @@ def _unpacked_size(chunk: Chunk) -> int:
     frame = zstandard.get_frame_parameters(packed).content_size if packed else 0
     unknown = frame in (zstandard.CONTENTSIZE_UNKNOWN, zstandard.CONTENTSIZE_ERROR)
     return max(chunk.uncompressed_size, 0 if unknown else frame)
-
-
-def _unpacked(chunk: Chunk) -> Iterator[McapRecord]:
-    """Yield the records of a chunk; a message is read at once, not number by number."""
-    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-    data, at = stream.read(size), 0
-    while at < size:
-        opcode, length = _RECORD.unpack_from(data, at)
-        begin, at = at + _RECORD.size, at + _RECORD.size + length
-        if at > size:
-            raise ValueError("a record of a chunk is longer than the chunk")
-        if opcode == Opcode.MESSAGE:
-            channel, row, time, published = _MESSAGE.unpack_from(data, begin)
-            yield Message(channel, time, data[begin + _MESSAGE.size : at], published, row)
-        elif opcode in _DESCRIPTIONS:
-            yield _DESCRIPTIONS[opcode].read(ReadDataStream(BytesIO(data[begin:at])))
-
-
-def _contents(records: Iterator[McapRecord]) -> Contents:
-    metadata: dict[str, Mapping[str, str]] = {}
-    topics: dict[str, Messages] = {}
-    channels: dict[int, Messages] = {}
-    for record in records:
-        if isinstance(record, Message):
-            number = record.channel_id
-            if number not in channels:
-                raise ValueError(
-                    f"a message is of channel {number}, which is not described before it"
-                )
-            channels[number].time.append(record.log_time)
-            channels[number].data.append(record.data)
-        elif isinstance(record, Channel):
-            channels[record.id] = topics.setdefault(record.topic, Messages())
-        elif isinstance(record, Metadata):
-            metadata[record.name] = record.metadata
-    return Contents(metadata, {name: _in_order(each) for name, each in topics.items()})
 
 
 def _in_order(messages: Messages) -> Messages:

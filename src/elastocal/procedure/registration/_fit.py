@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.results import brief_repr
+from elastocal.robot import nearest_rotation
 
 
 @brief_repr
@@ -126,8 +127,7 @@ def align(here: FloatArray, there: FloatArray) -> tuple[FloatArray, FloatArray]:
     here, there : ndarray, shape (point, 3)
         In m.
     """
-    u, _, vt = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
-    R: FloatArray = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    R = nearest_rotation((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
     return R, there.mean(axis=0) - R @ here.mean(axis=0)
 
 
