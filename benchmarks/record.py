@@ -25,6 +25,7 @@ from elastocal.cell import (
     SensorStatus,
     WrenchBlock,
 )
+from elastocal.files import replacing
 from elastocal.procedure import PoseRecorder, read_streams
 from elastocal.procedure.record import _mcap, streams
 
@@ -71,7 +72,7 @@ def pack(path: Path, topics: Sequence[_mcap.Topic], *_: object) -> None:
         plain = b"".join(pieces)
         packed = zstandard.compress(plain, 1)
         file += struct.pack("<QQI", len(packed), len(plain), zlib.crc32(plain)) + packed
-    with _mcap.replacing(path) as temporary:
+    with replacing(path) as temporary:
         temporary.write_bytes(file)
 
 
