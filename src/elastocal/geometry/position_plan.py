@@ -56,6 +56,7 @@ _FINEST = 3e-5
 """Standard deviation of a coordinate that the prior is weighed against, in m."""
 
 
+@brief_repr
 @record()
 class PositionPose:
     """A pose in free space, where the marker is to be measured."""

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.results import brief_repr
 from elastocal.robot.robot import Robot
 
 _ROLL = (0, 3, 5)
 """First, fourth and sixth joint of an arm."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class JointReading:
     """A way of reading joints that differs from the URDF's."""

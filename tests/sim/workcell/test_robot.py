@@ -166,21 +166,29 @@ def test_upright_is_where_the_upper_arm_points_up():
     )
 
 
+_STANDING = {"IRB": (0, 0, 0, 0, 45, 0), "R-2": (0, 0, 0, 0, 45, 0), "RX1": (0, 0, 90, 0, 45, 0),
+             "UR1": (0, -90, 90, -90, -90, 0), "UR2": (0, -90, 90, -90, -90, 0)}  # fmt: skip
+"""Posture in deg of the arms that are no KUKA, by the beginning of their names."""
+
+
 @pytest.mark.parametrize("model", catalogue.names())
 def test_every_robot_of_the_catalogue_bends_by_a_plausible_amount(model):
-    speeds = {f"joint_a{i}": "100 deg/s" for i in range(1, 7)}
+    names = catalogue.load(model).joint_names
+    angles = _STANDING.get(model[:3], (0, -90, 90, 0, 45, 0))
     other = example_cell(
         "machining",
         robot={"model": model},
         motion={
-            "home": {f"joint_a{i}": f"{a} deg" for i, a in enumerate((0, -90, 90, 0, 45, 0), 1)},
-            "speed": speeds,
+            "home": {name: f"{a} deg" for name, a in zip(names, angles, strict=True)},
+            "speed": dict.fromkeys(names, "100 deg/s"),
             "provenance": "a test",
         },
         limits={},
     )
     arm = TrueRobot.of(other)
-    size = np.linalg.norm(deflection(arm, other.home, (0, 0, -1000)))
+    # A UR carries a tenth of what the others do.
+    force = 100.0 if model.startswith("UR") else 1000.0
+    size = np.linalg.norm(deflection(arm, other.home, (0, 0, -force)))
     assert 0.1e-3 < size < 5e-3
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import PlanningError
 from elastocal.files import replacing
+from elastocal.results import brief_repr
 from elastocal.robot import Robot, T_from_xyzabc, parse_urdf
 from elastocal.robot.inverse import arm_base
 
@@ -32,6 +33,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LONGEST_TEXT = 80
 
 
+@brief_repr
 @dataclass(frozen=True)
 class AxisMove:
     """A move of all axes to joint positions, at the program's part of their speeds."""
@@ -41,6 +43,7 @@ class AxisMove:
     """External axes first, shape (joint,), in rad or m."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class StraightMove:
     """A move of the tool along a straight line, in the posture in which it begins."""
@@ -72,6 +75,7 @@ class Stop:
 Step = AxisMove | StraightMove | Remark | Stop
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Block:
     """Steps that belong together."""
@@ -81,6 +85,7 @@ class Block:
     steps: tuple[Step, ...]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class RobotProgram:
     """A program in no language: what moves where, in order."""

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from elastocal.cell import SensorStatus
 from elastocal.errors import DeviceError
+from elastocal.results import brief_repr
 
 PAGE = "/netftapi2.xml"
 """Path of the configuration page."""
@@ -198,6 +199,7 @@ def _plain(unit: str) -> str:
     return re.sub(r"[^a-z]", "", unit.lower())
 
 
+@brief_repr
 @dataclass(frozen=True)
 class BoxConfiguration:
     """What the configuration page says."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from elastocal.cell import LOOPBACK, Cell, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError
+from elastocal.results import brief_repr
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.wire.servers import Told, bound, serves
 
@@ -43,6 +44,7 @@ _TICKS = 70
 """Steps of the box's own counter between two samples: it measures faster than it sends."""
 
 
+@brief_repr
 @dataclass
 class NetFtBox:
     """How a box is set up, and what is wrong with it; may be changed while it serves."""

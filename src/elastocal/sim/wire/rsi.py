@@ -22,6 +22,7 @@ from typing import Literal
 
 from elastocal.cell import LOOPBACK, WallClock
 from elastocal.errors import DeviceError, ElastocalError
+from elastocal.results import brief_repr
 from elastocal.sim.wire._rsi_messages import LARGEST, Answer, EthernetConfig, RobWriter, SenReader
 from elastocal.sim.wire._rsi_robot import (
     RsiContext,
@@ -95,6 +96,7 @@ def ethernet_config(address: str, port: int, mode: str = "contact", sentype: str
     )
 
 
+@brief_repr
 @dataclass
 class RsiStatistics:
     """Counts since `RsiServer.start`."""
