@@ -12,7 +12,7 @@ from elastocal.errors import DeviceError, nearest
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
 from elastocal.results import Result, brief_repr
-from elastocal.sim.wire import LiveCell, Told, WireServer, wire_servers
+from elastocal.sim.wire import LiveCell, Told, WireServer, suited_servers, wire_servers
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._workflow import workflow
 
@@ -27,8 +27,8 @@ class SimulateSettings:
     out: Path | None = None
     """JSON file for the ports; none: they are only returned."""
     devices: tuple[str, ...] = ()
-    """Drivers whose devices are served; by default those that the cell file names, and all where it
-    names none but simulated ones."""
+    """Drivers whose devices are served; by default those that the cell file names, and where it
+    names none but simulated ones all that can carry its robot."""
     rate: float | None = None
     """Seconds of the cell a second of the wall; by default `clock_rate` of the cell file."""
     seed: int | None = None
@@ -129,7 +129,7 @@ def _told(cell: Cell, devices: Iterable[str]) -> Mapping[str, Told]:
     known = wire_servers()
     rig = rig_of(cell)
     named = [name for name in rig.wanted if name != SIMULATED]
-    chosen = list(devices) or named or list(known)
+    chosen = list(devices) or named or list(suited_servers(cell.robot))
     for name in chosen:
         if name not in known:
             raise DeviceError(

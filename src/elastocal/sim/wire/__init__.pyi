@@ -24,5 +24,6 @@ from .servers import (
     WireServer as WireServer,
     bound as bound,
     serves as serves,
+    suited_servers as suited_servers,
     wire_servers as wire_servers,
 )

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping
 
 from elastocal.cell import LOOPBACK
 from elastocal.errors import DeviceError
+from elastocal.robot import Robot
 from elastocal.sim.wire._rtde_protocol import (
     INPUT_TYPES,
     OUTPUT_TYPES,
@@ -43,6 +44,10 @@ _QUIET = 0.05
 """A script that says no more for so long is complete, in s of the wall."""
 
 
+def _takes(robot: Robot) -> bool:
+    return not robot.external_axes and len(robot.joint_names) == 6
+
+
 class RtdeServer:
     """A controller on three ports of one address."""
 
@@ -57,7 +62,7 @@ class RtdeServer:
             If the arm has external axes or not six joints, or a port cannot be had.
         """
         robot = live.cell.robot
-        if robot.external_axes or len(robot.joint_names) != 6:
+        if not _takes(robot):
             raise DeviceError(f"RTDE knows six joints, {robot.name} has {len(robot.joint_names)}")
         self.robot = UrRobot(live)
         self._lock = threading.RLock()
@@ -263,7 +268,7 @@ class _Session:
         return b""
 
 
-@serves("rtde")
+@serves("rtde", _takes)
 def rtde_server(live: LiveCell, told: Told) -> RtdeServer:
     """Return the controller that a cell file describes, on the ports of a controller."""
     address = str(told.settings.get("address") or told.address)

@@ -13,6 +13,7 @@ from typing import Protocol, TypeVar
 from elastocal.cell import LOOPBACK
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 from elastocal.sim.wire.live_cell import LiveCell
 
 
@@ -51,20 +52,26 @@ class WireServer(Protocol):
 MakeServer = Callable[[LiveCell, Told], WireServer]
 SERVERS: dict[str, MakeServer] = {}
 """What makes a server, by the name of the driver that it answers; see `wire_servers`."""
+_TAKES: dict[str, Callable[[Robot], bool]] = {}
 _Make = TypeVar("_Make", bound=MakeServer)
 
 
-def serves(driver: str) -> Callable[[_Make], _Make]:
+def serves(
+    driver: str, takes: Callable[[Robot], bool] = lambda _: True
+) -> Callable[[_Make], _Make]:
     """Register what makes the server of a driver.
 
     Parameters
     ----------
     driver : str
         Name of the driver, as cell files have it.
+    takes : callable
+        Whether its line can carry a robot; every one by default.
     """
 
     def register(make: _Make) -> _Make:
         SERVERS[driver] = make
+        _TAKES[driver] = takes
         return make
 
     return register
@@ -76,6 +83,11 @@ def wire_servers() -> Mapping[str, MakeServer]:
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{package.__name__}.{module.name}")
     return SERVERS
+
+
+def suited_servers(robot: Robot) -> tuple[str, ...]:
+    """Return the names of all servers whose line can carry a robot."""
+    return tuple(name for name in wire_servers() if _TAKES[name](robot))
 
 
 def bound(kind: socket.SocketKind, port: int, address: str = LOOPBACK) -> socket.socket:
