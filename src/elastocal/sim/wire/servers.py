@@ -53,12 +53,11 @@ MakeServer = Callable[[LiveCell, Told], WireServer]
 SERVERS: dict[str, MakeServer] = {}
 """What makes a server, by the name of the driver that it answers; see `wire_servers`."""
 _TAKES: dict[str, Callable[[Robot], bool]] = {}
+"""Whether the line of a server can carry a robot, where not every one."""
 _Make = TypeVar("_Make", bound=MakeServer)
 
 
-def serves(
-    driver: str, takes: Callable[[Robot], bool] = lambda _: True
-) -> Callable[[_Make], _Make]:
+def serves(driver: str, takes: Callable[[Robot], bool] | None = None) -> Callable[[_Make], _Make]:
     """Register what makes the server of a driver.
 
     Parameters
@@ -71,7 +70,8 @@ def serves(
 
     def register(make: _Make) -> _Make:
         SERVERS[driver] = make
-        _TAKES[driver] = takes
+        if takes is not None:
+            _TAKES[driver] = takes
         return make
 
     return register
@@ -87,7 +87,7 @@ def wire_servers() -> Mapping[str, MakeServer]:
 
 def suited_servers(robot: Robot) -> tuple[str, ...]:
     """Return the names of all servers whose line can carry a robot."""
-    return tuple(name for name in wire_servers() if _TAKES[name](robot))
+    return tuple(name for name in wire_servers() if name not in _TAKES or _TAKES[name](robot))
 
 
 def bound(kind: socket.SocketKind, port: int, address: str = LOOPBACK) -> socket.socket:
