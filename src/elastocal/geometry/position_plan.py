@@ -31,6 +31,8 @@ from elastocal.planning import (
     Vector,
     cell_surface,
     collision_scene,
+    move_records,
+    robot_record,
 )
 from elastocal.planning.checks import SightCheck
 from elastocal.planning.motion import Mover, Route, mover_for, plan_route, require_free_home
@@ -179,10 +181,10 @@ def plan_positions(
     return PositionPlan(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
-        robot=_robot(cell),
+        robot=robot_record(cell),
         technique=wanted.name,
         poses=_poses(cell, pool, order[route.order]),
-        moves=_moves(route),
+        moves=move_records(route),
         drawn=pool.drawn,
         pool=len(pool.q),
         refused=pool.refused,
@@ -299,19 +301,6 @@ def _marker(cell: Cell) -> FloatArray:
     return marker.position_tcp
 
 
-def _robot(cell: Cell) -> RobotRecord:
-    robot = cell.robot
-    home = tuple(cell.home.tolist())
-    return RobotRecord(
-        name=robot.name,
-        urdf=robot.urdf,
-        base=robot.base,
-        tcp=robot.tip,
-        joints=robot.joint_names,
-        home=home,
-    )
-
-
 def _poses(cell: Cell, pool: _FreePool, visited: IndexArray) -> tuple[PositionPose, ...]:
     poses = []
     for number, posture in enumerate(visited.tolist()):
@@ -319,19 +308,6 @@ def _poses(cell: Cell, pool: _FreePool, visited: IndexArray) -> tuple[PositionPo
         x, y, z = cell.robot.forward(q)[:3, 3].tolist()
         poses.append(PositionPose(number, tuple(q.tolist()), (x, y, z), pool.station[posture]))
     return tuple(poses)
-
-
-def _moves(route: Route) -> tuple[MoveRecord, ...]:
-    place = {int(chosen): number for number, chosen in enumerate(route.order)}
-    return tuple(
-        MoveRecord(
-            start=None if move.start is None else place[move.start],
-            end=None if move.end is None else place[move.end],
-            via=tuple(tuple(joints.tolist()) for joints in move.via),
-            duration=move.duration,
-        )
-        for move in route.moves
-    )
 
 
 def _findings(count: int, errors: int) -> tuple[str, ...]:

@@ -5,6 +5,8 @@ from .near_production import (
 from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
+    move_records as move_records,
+    robot_record as robot_record,
 )
 from .plan_result import (
     PLAN as PLAN,

@@ -152,10 +152,10 @@ def make_plan(
     plan = PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
-        robot=_robot(cell),
+        robot=robot_record(cell),
         contact=_contact(cell),
         poses=poses,
-        moves=_moves(route),
+        moves=move_records(route),
         search=search,
         comparison=compared,
         pool=_pool(sampled.pool),
@@ -268,15 +268,11 @@ def _assumptions(cell: Cell) -> list[str]:
     return [f"{a.field}: {a.reason}" for a in cell.robot.assumptions if a.field not in given]
 
 
-def _robot(cell: Cell) -> RobotRecord:
-    robot = cell.robot
+def robot_record(cell: Cell) -> RobotRecord:
+    """Return the robot of a cell, as a plan states it."""
+    robot, home = cell.robot, tuple(cell.home.tolist())
     return RobotRecord(
-        name=robot.name,
-        urdf=robot.urdf,
-        base=robot.base,
-        tcp=robot.tip,
-        joints=robot.joint_names,
-        home=tuple(cell.home.tolist()),
+        robot.name, robot.urdf, robot.base, tcp=robot.tip, joints=robot.joint_names, home=home
     )
 
 
@@ -322,7 +318,8 @@ def _poses(choice: _Choice) -> tuple[PoseRecord, ...]:
     return tuple(poses)
 
 
-def _moves(route: Route) -> tuple[MoveRecord, ...]:
+def move_records(route: Route) -> tuple[MoveRecord, ...]:
+    """Return the moves of a round, by the poses in visiting order."""
     place = {int(chosen): number for number, chosen in enumerate(route.order)}
     return tuple(
         MoveRecord(
