@@ -30,7 +30,7 @@ from elastocal.identification import CalibrateResult
 from elastocal.progress import silent
 from elastocal.records import from_data, record, to_data
 from elastocal.robot import Robot
-from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_trials, tool
+from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_loads, tool
 
 QUOTED = Path(__file__).with_name("process_figures.json")
 KINDS = ("afp", "machining")
@@ -163,13 +163,14 @@ class Measurement:
         first = models[0].trial
         courses = process.process_courses(case.kind, first.cell, case.seed, None)
         name = process.PROCESSES[case.kind].direction
-        for load in loads:
-            loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
-            some = [each for each in models if load == 1.0 or each.campaign == campaigns[0]]
-            found = run_trials([each.trial for each in some], loaded, silent)
-            for model, runs in zip(some, found, strict=True):
-                model.deviations.append(_deviation(runs.line(name), load))
-                model.deviations.append(_deviation(runs.spatial("3-D"), load))
+        for campaign in campaigns:
+            some = [each for each in models if each.campaign == campaign]
+            asked = loads if campaign == campaigns[0] else loads[:1]
+            found = run_loads([each.trial for each in some], courses, asked, silent)
+            for load, runs in found.items():
+                for model, own in zip(some, runs, strict=True):
+                    model.deviations.append(_deviation(own.line(name), load))
+                    model.deviations.append(_deviation(own.spatial("3-D"), load))
         return [model.figures(case) for model in models]
 
     def _models(self, case: Case, campaign: Campaign) -> Iterator[_Model]:
