@@ -109,6 +109,8 @@ def show_compensation(console: Console, result: "CompensateResult", out: Path) -
             f"  {name + ':':30} {readable(length.mean, 'm')} mean,"
             f" {readable(length.max, 'm')} max ({length.at})"
         )
+    if result.program:
+        console.print(f"  {'program:':30} {', '.join(result.program)}", soft_wrap=True)
     for note in result.notes:
         console.print(f"Note: {note}")
 
