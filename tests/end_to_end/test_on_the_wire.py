@@ -99,6 +99,10 @@ def test_a_run_over_sockets_is_the_run_in_process(tmp_path):
     drivers = {"kuka_rsi", "net_ft", "line_stream"}
     over = run_over_sockets(wired.cell, wired.plan, tmp_path / "over", drivers)
     assert (over.figures.readings, over.figures.failed_attempts) == ({"ok": 6}, 0)
+    assert over.figures.lines == over.summary.lines
+    devices_seen = [each.device.split(" ")[0] for each in over.figures.lines]
+    assert devices_seen == ["Net", *["line_stream"] * (len(devices_seen) - 2), "kuka_rsi"]
+    assert min(each.received for each in over.figures.lines if each.received) > 100
     ec.run(planned.cell, plan=planned.plan, out=tmp_path / "within", confirmed=True)
     require_same(tmp_path / "over", tmp_path / "within")
 
