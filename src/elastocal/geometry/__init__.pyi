@@ -17,7 +17,6 @@ from .ladder import (
 from .mistakes import findings as findings, require_own_joints as require_own_joints
 from .model import (
     SCHEMA as SCHEMA,
-    URDF_MARK as URDF_MARK,
     DistanceFigures as DistanceFigures,
     FixedParameter as FixedParameter,
     GeometryModel as GeometryModel,
