@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from elastocal import verdict, workflows
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
 from elastocal.compensation.process import TABLE
@@ -18,15 +19,12 @@ from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.records import read_arrays, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
-from elastocal.verdict import Signature
 from elastocal.wording import plainly
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
 from elastocal.workflows._inputs import ROBOT_SUFFIXES
 from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
-from elastocal.workflows.simulate import Ports
-from elastocal.workflows.stiffness import StiffnessSummary
 
 _Describe = Callable[[Path], FileDescription]
 
@@ -42,10 +40,16 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.comparison": kinds.comparison_file,
     "elastocal.commissioning": kinds.commissioning_file,
     "elastocal.model": kinds.model_file,
-    "elastocal.signature": kinds.record_file("signature", Signature, "of", "sha256", "made", "key"),
-    "elastocal.ports": kinds.record_file("ports of simulated devices", Ports, "address", "ports"),
+    "elastocal.signature": kinds.record_file(
+        "signature", lambda: verdict.Signature, "of", "sha256", "made", "key"
+    ),
+    "elastocal.ports": kinds.record_file(
+        "ports of simulated devices", lambda: workflows.Ports, "address", "ports"
+    ),
     "elastocal.stiffness": kinds.record_file(
-        "stiffness along a path", StiffnessSummary, "direction", "stations", "files"
+        "stiffness along a path",
+        lambda: workflows.StiffnessSummary,
+        *("direction", "stations", "files"),
     ),
     "elastocal.geometry": kinds.geometry_file,
     "elastocal.position-plan": kinds.position_plan_file,
