@@ -79,7 +79,8 @@ app = typer.Typer(
 _ORDER = (
     "robots", "init", "check", "plan", "run", "simulate", "krc_config", "measure_delay",
     "derive", "import_", "geometry", "calibrate", "codec", "study", "predict", "tool",
-    "compensate", "stiffness", "export", "simulate_process", "compare", "report", "verify", "demo",
+    "compensate", "live", "stiffness", "export", "simulate_process", "compare", "report", "verify",
+    "demo",
 )  # fmt: skip
 """The order in which help lists commands: that of the work; others follow by name."""
 

@@ -16,15 +16,26 @@ from elastocal.errors import DatasetError, RobotError, SchemaError, nearest
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
-from elastocal.records import read_arrays, read_json_data, read_yaml_data
+from elastocal.records import read_arrays, read_json, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
 from elastocal.workflows._inputs import ROBOT_SUFFIXES
 from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.live import LiveResult
 
 _Describe = Callable[[Path], FileDescription]
+
+
+def _live_record(path: Path) -> FileDescription:
+    """Describe the record of a live compensation."""
+    found = read_json(path, LiveResult)
+    names = ("cell", "robot", "started", "seconds", "ended", "problem")
+    facts = {name: getattr(found, name) for name in names}
+    schema = {"schema": "elastocal.live/1"}
+    return "record of a live compensation", schema | facts | {"line": found.line.sentence()}
+
 
 _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.plan": kinds.plan_file,
@@ -37,6 +48,7 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
     "elastocal.commissioning": kinds.commissioning_file,
+    "elastocal.live": _live_record,
     "elastocal.model": kinds.model_file,
     "elastocal.signature": kinds.signature_file,
     "elastocal.geometry": kinds.geometry_file,
