@@ -7,6 +7,7 @@ from .options import (
     Force as Force,
     Geometry as Geometry,
     KeyFigures as KeyFigures,
+    Language as Language,
     Marker as Marker,
     NewTool as NewTool,
     NewToolOrFile as NewToolOrFile,

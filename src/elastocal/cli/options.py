@@ -42,6 +42,13 @@ ToolMass = Annotated[
 ToolCentre = Annotated[
     str | None, typer.Option(help="Its centre in the new tcp's frame: 'x, y, z' with units.")
 ]
+Language = Annotated[
+    str | None,
+    typer.Option(
+        help="Language of the robot program: krl, rapid, fanuc, urscript or none."
+        " Default: that of the robot's maker."
+    ),
+]
 Geometry = Annotated[
     Path | None,
     typer.Option(help="Model file from geometry: the arm as built, its errors and its sag."),

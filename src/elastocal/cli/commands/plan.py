@@ -52,13 +52,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         str | None,
         typer.Option(help="Name of the robot program; default: calib, or positions."),
     ] = None,
-    language: Annotated[
-        str | None,
-        typer.Option(
-            help="Language of the robot program: krl, rapid, fanuc, urscript or none."
-            " Default: that of the robot's maker."
-        ),
-    ] = None,
+    language: options.Language = None,
     jobs: Annotated[
         int | None,
         typer.Option(min=1, max=1024, help="Processes for large pools; default: all cores."),

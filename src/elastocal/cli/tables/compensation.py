@@ -108,6 +108,8 @@ def show_compensation(console: Console, result: "CompensateResult", out: Path) -
             f"  {name + ':':30} {1e3 * length.mean:.3g} mm mean, {1e3 * length.max:.3g} mm max"
             f" ({length.at})"
         )
+    if result.program:
+        console.print(f"  {'program:':30} {', '.join(result.program)}", soft_wrap=True)
     for note in result.notes:
         console.print(f"Note: {note}")
 
