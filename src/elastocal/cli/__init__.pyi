@@ -19,6 +19,7 @@ from .options import (
     ToolFrame as ToolFrame,
     ToolMass as ToolMass,
     Written as Written,
+    only_tool as only_tool,
     parse_direction as parse_direction,
     parse_limit as parse_limit,
     parse_loads as parse_loads,

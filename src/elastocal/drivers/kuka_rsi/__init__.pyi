@@ -20,6 +20,7 @@ from .controller_files import (
 from .corrections import (
     CorrectedKuka as CorrectedKuka,
     CorrectionGuard as CorrectionGuard,
+    CorrectionSource as CorrectionSource,
     PathCorrections as PathCorrections,
     as_millimetres as as_millimetres,
 )
