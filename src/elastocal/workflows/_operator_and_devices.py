@@ -26,6 +26,7 @@ from elastocal.cell import (
     DeviceSet,
     DeviceSettings,
     Driver,
+    LineCounts,
     PathDriver,
     RigContext,
     WallClock,
@@ -166,7 +167,11 @@ class Rig:
             _refusals_to_close(made)
             raise
         running = clocks[0] if clocks else clock
-        return Devices(arm, sensor, metrology, running, lambda: _close(made))
+
+        def lines() -> tuple[LineCounts, ...]:
+            return tuple(counts for each in made for counts in each.lines())
+
+        return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
 
     def path_arm(self) -> tuple[PathDriver, DeviceSettings]:
         """Return the driver of the arm, which takes corrections of a path, and its settings.

@@ -186,3 +186,13 @@ def test_a_stream_that_was_silent_has_a_hole_for_a_run_and_goes_on_for_a_correct
     assert stream.sensor.newest().time == pytest.approx(6.002, abs=0.06)
     with pytest.raises(DeviceError, match=r"no record for 0\.25 s"):
         stream.sensor.read()
+
+
+def test_what_is_wrong_with_the_stream_is_counted(stream):
+    stream.send()
+    stream.send(rdt=4)
+    stream.send(status=0x80020000)
+    stream.sensor.received(b"nonsense")
+    (counts,) = stream.sensor.lines()
+    assert (counts.received, counts.lost, counts.saturated, counts.malformed) == (3, 3, 1, 1)
+    assert counts.status == ("0x80020000: error, gauge saturated",)

@@ -24,9 +24,9 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     *,
     compare: Annotated[
         str | None,
-        typer.Option(
-            help="Search technique to lay beside the cell's, or none."
-            " Default: ioops beside cover, else cover."
+        options.choice(
+            "technique or none",
+            "Search technique to lay beside the cell's. Default: ioops beside cover, else cover.",
         ),
     ] = None,
     purpose: Annotated[
@@ -39,7 +39,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     ] = _Purpose.ELASTICITY,
     search: Annotated[
         str | None,
-        typer.Option(help="With --for geometry: search technique; default: i_optimal."),
+        options.choice("technique", "With --for geometry: search technique; default: i_optimal."),
     ] = None,
     poses: Annotated[
         int | None,

@@ -9,6 +9,7 @@ from elastocal.cell import (
     Clock,
     DeviceSet,
     DeviceSettings,
+    LineCounts,
     PathLimits,
     PathSource,
     RigContext,
@@ -84,8 +85,13 @@ class KukaRsiDriver:
         settings = wanted["arm"]
         assert isinstance(settings, RsiSettings)
         arm = connect_arm(cell, settings, context.clock, context.feed)
-        assert arm.link is not None
-        return DeviceSet(arm=arm, close=arm.link.close)
+        link = arm.link
+        assert link is not None
+
+        def lines() -> tuple[LineCounts, ...]:
+            return (link.statistics().counts(arm.guard.saturated, link.source),)
+
+        return DeviceSet(arm=arm, close=link.close, lines=lines)
 
     def path_limits(self, cell: Cell, settings: DeviceSettings) -> PathLimits:
         """Return the limits of corrections; see `elastocal.cell.PathDriver`."""
