@@ -17,7 +17,7 @@ from elastocal.errors import DatasetError, RobotError, SchemaError, nearest
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
-from elastocal.records import read_arrays, read_json_data, read_yaml_data
+from elastocal.records import read_arrays, read_json, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
 from elastocal.wording import plainly
 from elastocal.workflows import _file_kinds as kinds
@@ -27,6 +27,16 @@ from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
 
 _Describe = Callable[[Path], FileDescription]
+
+
+def _live_record(path: Path) -> FileDescription:
+    """Describe the record of a live compensation."""
+    found = read_json(path, workflows.LiveResult)
+    names = ("cell", "robot", "started", "seconds", "ended", "problem")
+    facts = {name: getattr(found, name) for name in names}
+    schema = {"schema": "elastocal.live/1"}
+    return "record of a live compensation", schema | facts | {"line": found.line.sentence()}
+
 
 _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.plan": kinds.plan_file,
@@ -39,6 +49,7 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
     "elastocal.commissioning": kinds.commissioning_file,
+    "elastocal.live": _live_record,
     "elastocal.model": kinds.model_file,
     "elastocal.signature": kinds.record_file(
         "signature", lambda: verdict.Signature, "of", "sha256", "made", "key"
