@@ -278,7 +278,7 @@ def record_file(
     """Return what describes files of a record, imported only then, by some of its figures."""
 
     def describe(path: Path) -> FileDescription:
-        found = read_json(path, record())
+        found: object = read_json(path, record())
         return kind, {"schema": schema_of(type(found)), **_picked(found, *names)}
 
     return describe
