@@ -77,7 +77,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _ORDER = (
-    "robots", "init", "check", "plan", "run", "simulate", "krc_config", "measure_delay",
+    "robots", "init", "check", "studio", "plan", "run", "simulate", "krc_config", "measure_delay",
     "derive", "import_", "geometry", "calibrate", "codec", "study", "predict", "tool",
     "compensate", "stiffness", "export", "simulate_process", "compare", "report", "verify", "demo",
 )  # fmt: skip

@@ -20,6 +20,7 @@ __all__ = [
     "simulate",
     "simulate_process",
     "stiffness",
+    "studio",
     "study",
     "tool",
     "verify",
@@ -164,6 +165,11 @@ from .stiffness import (
     StiffnessSettings as StiffnessSettings,
     StiffnessSummary as StiffnessSummary,
     stiffness as stiffness,
+)
+from .studio import (
+    StudioResult as StudioResult,
+    StudioSettings as StudioSettings,
+    studio as studio,
 )
 from .study import (
     DEFAULT_VARIATION as DEFAULT_VARIATION,

@@ -124,6 +124,10 @@ class Progress:
     """Lateral movement of the marker since the unloaded reference, in m."""
     left: float
     """Estimated time to the end of the run, in s."""
+    q: tuple[float, ...] = ()
+    """Joint positions of the controller, in rad or m."""
+    marker: tuple[float, float, float] | None = None
+    """In the frame of the station that measures, in m; None while the beam is broken."""
 
 
 class FaultScope(Enum):
