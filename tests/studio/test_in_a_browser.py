@@ -98,12 +98,12 @@ def told(cell):
 
     def meanwhile(found):
         with open_tab(browser) as tab:
-            page = Page(tab, found.address)
+            page = Page(tab, found.figures.address)
             for part in (look_at_it, drag_it, edit_it, plan_it, run_it):
                 part(page, cell, told)
             told["complaints"] = complaints_of(tab.events)
             told["foreign"] = [
-                url for url in requests_of(tab.events) if not url.startswith(found.address)
+                url for url in requests_of(tab.events) if not url.startswith(page.address)
             ]
 
     workflows.studio(cell, browser=False, meanwhile=meanwhile)

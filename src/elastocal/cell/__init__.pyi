@@ -28,6 +28,7 @@ from .devices import (
     AskedMetrology as AskedMetrology,
     BeamState as BeamState,
     Clock as Clock,
+    CommandChecks as CommandChecks,
     Devices as Devices,
     ForceSensor as ForceSensor,
     Metrology as Metrology,

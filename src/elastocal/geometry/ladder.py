@@ -177,10 +177,13 @@ class _Sums:
         """Return how far draws of blocks take the unknowns from the fit, (draw, unknown)."""
         free = self.about.free
         there = np.unique(self.block)
+        # At the fit the positions pull as much away from zero as the prior pulls back.
+        prior = self.ridge * self.values
         found = np.zeros((count, len(self.size)))
         for draw in found:
             chosen = rng.choice(there, len(there))
-            x = self._solved(self.G[chosen].sum(axis=0), self.h[chosen].sum(axis=0), free)
+            h = self.h[chosen].sum(axis=0) - prior
+            x = self._solved(self.G[chosen].sum(axis=0), h, free)
             draw[free] = x * self.size[free]
         return found
 

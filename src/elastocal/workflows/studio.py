@@ -16,7 +16,7 @@ from elastocal.planning import read_plan
 from elastocal.procedure import Progress as RunProgress, RunEnd
 from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
-from elastocal.records import to_data
+from elastocal.records import record, to_data
 from elastocal.results import Result, brief_repr
 from elastocal.studio import (
     Data,
@@ -63,20 +63,28 @@ class StudioSettings:
     Ctrl-C."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class StudioResult(Result):
-    """Where the page is."""
+@record()
+class StudioFigures:
+    """What ``studio --json`` prints."""
 
     address: str
     """With its token: whoever knows it may do what the page can."""
     cell: str
     notes: tuple[str, ...]
     """What a person must know of who may come in."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StudioResult(Result):
+    """Where the page is, and what it can ask for."""
+
+    figures: StudioFigures
     session: Session
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
-        return (("cell", self.cell), ("page", self.address), *(("note", n) for n in self.notes))
+        found = self.figures
+        return (("cell", found.cell), ("page", found.address), *(("note", n) for n in found.notes))
 
     def wait(self) -> None:
         """Wait for Ctrl-C."""
@@ -108,8 +116,8 @@ def studio(
     path = Path(settings.cell)
     session = Session(path, _Commands(settings.model), settings.arm)
     server = StudioServer(session.actions, session.news, settings.host, settings.port)
-    notes = tuple(_notes(settings))
-    result = StudioResult(server.address, session.name, notes, session)
+    figures = StudioFigures(server.address, session.name, tuple(_notes(settings)))
+    result = StudioResult(figures, session)
     server.start()
     try:
         if settings.browser:

@@ -30,12 +30,18 @@ def _studio(
     host: Annotated[
         str, typer.Option(help="Address to answer on; another lets the network in.")
     ] = LOOPBACK,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the address in one JSON object.")
+    ] = False,
 ) -> None:
     """Show and edit a cell in the browser, plan it, and watch a run, until Ctrl-C."""
 
     def show(found: workflows.StudioResult) -> None:
-        output.print_lines([found.address])
-        output.print_remarks(output.console(), "warning", found.notes)
+        if as_json:
+            output.print_json(found.figures)
+        else:
+            output.print_lines([found.figures.address])
+        output.print_remarks(output.console(), "warning", found.figures.notes)
         output.console().print("Ctrl-C ends it; whoever has the address can use it")
         found.wait()
 

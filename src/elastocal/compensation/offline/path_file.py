@@ -1,5 +1,6 @@
 """``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -36,6 +37,9 @@ _BYTES_AT_A_TIME = 1 << 20
 """Bytes that are read at a time when lines are counted."""
 _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
 
+HearRows = Callable[[FloatArray, FloatArray, RowName], None]
+"""Hears joints, shape (row, joint), and poses, shape (row, 4, 4), of rows with their names."""
+
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
@@ -56,6 +60,7 @@ def compensate_path(
     out: Path,
     settings: CorrectionSettings | None = None,
     progress: Progress = silent,
+    hear: HearRows | None = None,
 ) -> CorrectionSummary:
     """Correct a path file; write the same columns corrected, and the predicted deflection.
 
@@ -69,6 +74,9 @@ def compensate_path(
         Posture at the start, and the largest deflection.
     progress : Progress
         Hears how many rows are done.
+    hear : callable, optional
+        Hears joints and poses of the corrected rows, block by block, and their names; what it
+        raises leaves no file.
 
     Raises
     ------
@@ -111,6 +119,8 @@ def compensate_path(
                 previous, memory = q[-1], found.memory
                 ends = np.hstack([found.deflection, found.low, found.high])
                 write(rows, ends, _corrected_columns(rows, found, robot.external_axes))
+                if hear is not None:
+                    hear(found.q, found.T_base_tcp, rows.label)
                 progress("rows", summary.rows, total)
     return summary
 

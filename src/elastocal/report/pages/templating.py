@@ -9,12 +9,12 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable
-from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from elastocal.templating import templates
+
 if TYPE_CHECKING:
-    from jinja2 import Environment
     from markupsafe import Markup
 
 _POLICY = "default-src 'none'; script-src {scripts}; style-src {styles}; img-src data: blob:"
@@ -46,7 +46,10 @@ def render(template: str, **values: Any) -> str:
     **values
         For the names in it; one that is missing is an error.
     """
-    return _environment().get_template(template).render(values)
+    pages = templates("elastocal.report.pages", markup=True)
+    pages.globals |= {"policy": _policy, "asset": _asset, "plotly": _plotly}
+    pages.filters |= {"embedded": embedded, "pieces": _pieces}
+    return pages.get_template(template).render(values)
 
 
 def embedded(data: Any) -> "Markup":
@@ -64,22 +67,6 @@ def embedded(data: Any) -> "Markup":
 
     text = json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
-
-
-@cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("elastocal.report.pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals |= {"policy": _policy, "asset": _asset, "plotly": _plotly}
-    environment.filters |= {"embedded": embedded, "pieces": _pieces}
-    return environment
 
 
 def _policy(style: str, drawing: str, script: str) -> str:
