@@ -96,7 +96,7 @@ def told(cell):
         pytest.skip(str(error))
     told = {}
 
-    def meanwhile(found):
+    def while_open(found):
         with open_tab(browser) as tab:
             page = Page(tab, found.figures.address)
             for part in (look_at_it, drag_it, edit_it, plan_it, run_it):
@@ -106,7 +106,7 @@ def told(cell):
                 url for url in requests_of(tab.events) if not url.startswith(page.address)
             ]
 
-    workflows.studio(cell, browser=False, meanwhile=meanwhile)
+    workflows.studio(cell, browser=False, while_open=while_open)
     return told
 
 

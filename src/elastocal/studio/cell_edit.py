@@ -12,6 +12,7 @@ from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import replacing, require_file, require_size, sha256
 from elastocal.outputs import OutputRule, ruled
 from elastocal.records import record
+from elastocal.results import brief_repr
 from elastocal.studio.cell_text import Value, appended, count_items, with_value, without
 
 _BOM = "\ufeff"
@@ -35,6 +36,7 @@ class RegionForm:
     max: tuple[str, str, str]
 
 
+@brief_repr
 @record()
 class LoadForm:
     """Load cases, quantities as they stand in the file."""
@@ -47,6 +49,7 @@ class LoadForm:
     cases: tuple[str, ...]
 
 
+@brief_repr
 @record()
 class CellForm:
     """What of a cell file a page has fields for."""
@@ -59,6 +62,7 @@ class CellForm:
     loads: LoadForm
 
 
+@brief_repr
 @record()
 class CellEdit:
     """What is to be changed; what is None stays."""

@@ -24,6 +24,7 @@ from elastocal.procedure import (
 )
 from elastocal.procedure.record import Action
 from elastocal.records import record
+from elastocal.results import brief_repr
 
 _SAMPLES, _FRAMES = 800, 160
 """Points of a curve, and postures of the arm, that a page gets of a pose."""
@@ -42,6 +43,7 @@ class RunEntry:
     """Whether its last session has not come to an end: it goes on, or its process has died."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class RunView:
     """A run and its journal."""

@@ -41,6 +41,7 @@ class DrawnBody:
     """Numbers of vertices, 32 bits, likewise."""
 
 
+@brief_repr
 @record()
 class DrawnLine:
     """Points in base, in m, that are joined one by one; or in pairs."""
@@ -57,6 +58,7 @@ class DrawnPlace:
     position: tuple[float, float, float]
 
 
+@brief_repr
 @record()
 class Scene:
     """All that stands, and the shapes of what moves."""

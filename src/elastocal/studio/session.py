@@ -18,6 +18,7 @@ from elastocal.cell import Cell, load_cell
 from elastocal.errors import ElastocalError, ProcedureError, SchemaError
 from elastocal.planning import PLAN, read_plan
 from elastocal.records import from_data, record, to_data
+from elastocal.results import brief_repr
 from elastocal.robot import T_from_xyzabc
 from elastocal.studio.cell_edit import CellEdit, CellText, form_of, region_around
 from elastocal.studio.posture import CellView
@@ -32,6 +33,7 @@ _FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 Posture = tuple[float, ...]
 
 
+@brief_repr
 @record()
 class PostureMessage:
     """Joint positions."""
@@ -39,6 +41,7 @@ class PostureMessage:
     q: Posture
 
 
+@brief_repr
 @record()
 class PlaceMessage:
     """Where the tool is wanted, from a posture."""
@@ -50,6 +53,7 @@ class PlaceMessage:
     """a, b, c in rad (Z-Y'-X''); None: as it is."""
 
 
+@brief_repr
 @record()
 class LineMessage:
     """A line of sight of whoever looks at the page, from a posture."""

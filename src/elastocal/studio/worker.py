@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from types import FrameType
 
 from elastocal.errors import ElastocalError, ProcedureError
+from elastocal.results import brief_repr
 
 _GRACE = 5.0
 """How long a worker that was ended may clean up, in s."""
@@ -35,6 +36,7 @@ class WorkState(Enum):
     """By a person."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class WorkNews:
     """What is known of the work that was begun last."""

@@ -58,11 +58,12 @@ class StudioSettings:
     """Let a run move devices that are not simulated."""
     browser: bool = True
     """Open the page."""
-    meanwhile: Callable[["StudioResult"], None] = lambda found: found.wait()
+    while_open: Callable[["StudioResult"], None] = lambda found: found.wait()
     """What is done while the page is answered, which ends when it returns. By default: wait for
     Ctrl-C."""
 
 
+@brief_repr
 @record()
 class StudioFigures:
     """What ``studio --json`` prints."""
@@ -122,7 +123,7 @@ def studio(
     try:
         if settings.browser:
             webbrowser.open(server.address)
-        settings.meanwhile(result)
+        settings.while_open(result)
     finally:
         session.close()
         server.close()

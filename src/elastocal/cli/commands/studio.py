@@ -46,5 +46,5 @@ def _studio(
         found.wait()
 
     workflows.studio(
-        cell, model=model, host=host, port=port, arm=arm, browser=not no_browser, meanwhile=show
+        cell, model=model, host=host, port=port, arm=arm, browser=not no_browser, while_open=show
     )

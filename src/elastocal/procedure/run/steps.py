@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from elastocal.errors import DeviceError, FileAccessError, ProcedureError
+from elastocal.results import brief_repr
 
 
 class Step(Enum):
@@ -103,6 +104,7 @@ class BackOffResult:
     """Why it could not be brought off the surface; empty when it could or need not."""
 
 
+@brief_repr
 @dataclass(frozen=True, slots=True)
 class Progress:
     """Stage of a run, reported several times a second."""

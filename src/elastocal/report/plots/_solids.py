@@ -23,6 +23,7 @@ from elastocal.planning import CollisionScene, PlanResult, collision_scene
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.report.plots.style import tint
+from elastocal.results import brief_repr
 
 MOVING_COLOURS = (style.ARM, style.TOOL)
 _SECTIONS = 24
@@ -40,6 +41,7 @@ _DARK = 0.5
 _UNLIT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0, "fresnel": 0.0}
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Solid:
     """Triangles; vertices in m."""
@@ -98,6 +100,7 @@ class RobotSolids:
         ]
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CoarseSolid:
     """A mesh as it is drawn."""

@@ -32,7 +32,6 @@ export function say(text, good = false) {
 // Runs something that may be refused, and says why.
 export async function attempt(work) {
   try {
-    say("");
     return await work();
   } catch (error) {
     if (!(error instanceof Refusal)) throw error;
@@ -223,6 +222,8 @@ function listen() {
   });
 }
 
+// What was said of the last thing that was done goes with the next one.
+document.addEventListener("click", () => say(""), true);
 openTabs();
 openPosture();
 openForms();
