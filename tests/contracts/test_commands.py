@@ -71,6 +71,7 @@ def lines(tmp_path_factory) -> dict[str, tuple[object, ...]]:
     return {
         "robots": (),
         "init": (out / "new",),
+        "new": ("--robot", "UR20", "--mesh", done / "cell/dome.stl", "-o", out / "begun.yaml"),
         "check": (run,),
         "simulate": (cell,),
         "krc-config": (kuka_bench.write_cell(out), "-o", out / "krc"),

@@ -13,6 +13,7 @@ __all__ = [
     "init",
     "krc_config",
     "measure_delay",
+    "new",
     "plan",
     "predict",
     "report",
@@ -100,6 +101,15 @@ from .measure_delay import (
     MeasureDelayResult as MeasureDelayResult,
     MeasureDelaySettings as MeasureDelaySettings,
     measure_delay as measure_delay,
+)
+from .new import (
+    NONE as NONE,
+    NewResult as NewResult,
+    NewSettings as NewSettings,
+    filled as filled,
+    new as new,
+    offered as offered,
+    parse_answer as parse_answer,
 )
 from .plan import (
     POSITION_PLAN as POSITION_PLAN,
