@@ -45,6 +45,10 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         str,
         options.choice("free frame", "Estimate a frame of tracker and marker for each."),
     ] = "none",
+    geometry: Annotated[
+        Path | None,
+        typer.Option(help="Model file of geometry: springs are fitted on the arm as built."),
+    ] = None,
     budget: Annotated[
         bool,
         typer.Option("--budget", help="State also what the error at left-out poses is made of."),
@@ -76,6 +80,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         keep_blunders=keep_blunders,
         trust_conventions=trust_conventions,
         free_frame=free_frame,
+        geometry=geometry,
         budget=budget,
         process=process,
         draws=draws,

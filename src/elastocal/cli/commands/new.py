@@ -123,7 +123,10 @@ def _needless(settings: "NewSettings", name: str) -> bool:
     """Return whether a question has been answered by another: a catalogue says the flange."""
     if name == "flange":
         return not Path(str(settings.robot)).is_file()
-    return (name, "none") in (("moment_range", settings.force_range), ("marker_place", settings.tracker))
+    return (name, "none") in (
+        ("moment_range", settings.force_range),
+        ("marker_place", settings.tracker),
+    )
 
 
 def _answer(settings: "NewSettings", name: str, question: str) -> str:

@@ -15,8 +15,9 @@ from typing import Any
 
 from pydantic import SerializerFunctionWrapHandler, ValidationError, model_serializer
 
-from elastocal.cell import Clock
+from elastocal.cell import Clock, LineCounts
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import read_bytes
 from elastocal.records import StrictModel
 
 
@@ -79,7 +80,7 @@ class Event(Enum):
     GIVEN_UP = "given up"
     """All attempts at a pose failed; the run goes on without it."""
     FINISH = "finish"
-    """Last entry of a session."""
+    """Last entry of a session; holds what was counted on the lines of its devices."""
 
 
 class Action(Enum):
@@ -155,6 +156,8 @@ class Entry(StrictModel):
     log: PoseLog | None = None
     streams_sha256: str | None = None
     """SHA-256 of the file with the raw streams of a finished pose."""
+    lines: tuple[LineCounts, ...] = ()
+    """What was counted on the lines of the devices, at the end of a session."""
 
 
 Sync = Callable[[int], None]
@@ -273,10 +276,7 @@ def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
 
 def _read(path: Path) -> tuple[tuple[Entry, ...], int]:
     """Return the complete entries and the number of bytes that they take."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise _cannot("read", path, error) from error
+    data = read_bytes(path)
     whole = data.rfind(b"\n") + 1
     lines = data[:whole].splitlines()
     entries = tuple(_entry(path, number, line) for number, line in enumerate(lines))
