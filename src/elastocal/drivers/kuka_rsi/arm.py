@@ -95,7 +95,8 @@ class KukaArm:
         self.law = ForceLaw.design(stiffness, delay, settings.cycle, speed)
         self._rules = StraightMoveRules(self.bounds, self.law, delay + 2.0 * settings.cycle)
         self._postures = PostureReader(cell.robot, settings.signs)
-        self._guard = CorrectionGuard(self.bounds, settings.cycle, delay)
+        self.guard = CorrectionGuard(self.bounds, settings.cycle, delay)
+        """Bounds what is sent, and counts what the controller clamps."""
         self._reader, self._watch = self._feeling(feed)
         self._lock = threading.RLock()
         self._cycle: Cycle | None = None
@@ -154,7 +155,7 @@ class KukaArm:
             self._fault = None
             if self._state in _RESTING:
                 self._state = MotionState.IDLE
-                self._guard.restart(cycle.offset)
+                self.guard.restart(cycle.offset)
 
     def disable(self) -> None:
         """Take the release back; the arm stands."""
@@ -280,13 +281,13 @@ class KukaArm:
             return Step(order=Order.HOLD if self._state in _RESTING else Order.GUIDE)
         try:
             if self._running is None:
-                self._guard.restart(cycle.offset)
+                self.guard.restart(cycle.offset)
                 self._running = task.begin(cycle)
                 step = next(self._running)
             else:
                 step = self._running.send(cycle)
             if cycle.state == ProgramState.GUIDED:
-                self._guard.bounded(step.shift, cycle.offset)
+                self.guard.bounded(step.shift, cycle.offset)
             return step
         except StopIteration:
             self._task = self._running = None
