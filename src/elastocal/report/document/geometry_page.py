@@ -111,7 +111,7 @@ def _result(found: GeometryFindings) -> Iterator[blocks.Block]:
         )
     )
     yield blocks.Bullets(model.findings, "reasons")
-    rows = []
+    rows: list[blocks.Row] = []
     for each in accuracy.axes:
         for when, figures in (("before", each.registration), ("after", each.chosen)):
             bias = "" if each.axis == "norm" else f"{1e3 * figures.bias:+.3f}"
@@ -181,7 +181,7 @@ def _iso(found: GeometryFindings) -> Iterator[blocks.Block]:
         " Where joints are those measured at the time, and not commanded, the scatter of the drives"
         " is not in RP.", "sub",
     )  # fmt: skip
-    rows = tuple(
+    rows: tuple[blocks.Row, ...] = tuple(
         (
             f"row {each.row}",
             each.station,
@@ -227,7 +227,7 @@ def _errors(found: GeometryFindings) -> Iterator[blocks.Block]:
 
 def _links(found: GeometryFindings) -> Iterator[blocks.Block]:
     yield blocks.Paragraph(_LINKS, "sub")
-    rows = []
+    rows: list[blocks.Row] = []
     for each in found.links:
         scale, unit, digits = _drawn_unit(each)
         nominal, calibrated = scale * each.nominal, scale * each.calibrated
@@ -237,11 +237,9 @@ def _links(found: GeometryFindings) -> Iterator[blocks.Block]:
             else f"{scale * each.low - nominal:+.{digits}f} to"
             f" {scale * each.high - nominal:+.{digits}f}"
         )
-        numbers = tuple(
-            f"{round(value, digits) + 0.0:.{digits}f}" for value in (nominal, calibrated)
-        )
+        shown = [f"{round(v, digits) + 0.0:.{digits}f}" for v in (nominal, calibrated)]
         change = f"{calibrated - nominal:+.{digits}f}" if ends else ""
-        rows.append((each.joint, each.number, unit, *numbers, change, ends))
+        rows.append((each.joint, each.number, unit, *shown, change, ends))
     heads = ("Link of", "Number", "Unit", "Nominal", "Calibrated", "Change", "95 % of the change")
     yield blocks.Table("Links as drawn and as built", heads, tuple(rows), texts=3)
 

@@ -77,9 +77,8 @@ def _draw_map(
 ) -> None:
     """Draw positions, the worst on top, so that none of them hides."""
     order = np.argsort(error)
-    axes.scatter(
-        *place[order].T, c=scale.to_rgba(error[order]), s=size, lw=0.2, edgecolors=style.MUTED
-    )
+    x, y = place[order].T
+    axes.scatter(x, y, c=scale.to_rgba(error[order]), s=size, lw=0.2, edgecolors=style.MUTED)
     axes.set_aspect("equal", adjustable="datalim")
     style.open_frame(axes, "both")
 
