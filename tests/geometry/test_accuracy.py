@@ -158,7 +158,7 @@ def test_report_and_table_say_what_was_found(tmp_path):
 def test_a_report_of_a_sound_arm_says_that_it_is_kept(tmp_path):
     path = write_positions(tmp_path / "positions.csv", measure(kuka(), 40, error=0.0))
     found = ec.geometry(
-        path, robot="KR 210 R2700-2", tcp="flange", draws=40, report=tmp_path / "report.html"
+        path, robot="KR 210 R2700-2", tcp="flange", draws=40, report_file=tmp_path / "report.html"
     )
     assert not found.model.parameters
     assert "The nominal arm was kept" in (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -49,7 +49,7 @@ class GeometrySettings:
     """Model file to write; none: the model is only returned."""
     urdf: Path | None = None
     """Calibrated URDF to write."""
-    report: Path | None = None
+    report_file: Path | None = None
     """Report to write, ``.html``."""
     table: Path | None = None
     """Table of links as drawn and as built to write, ``.csv``."""
@@ -89,7 +89,7 @@ class GeometryResult(Result):
 
 @workflow(
     GeometrySettings,
-    outputs=("out", "urdf", "report", "table"),
+    outputs=("out", "urdf", "report_file", "table"),
     marks=("elastocal.geometry/", BUILT_MARK, f"<title>{REPORT_TITLE}", ",".join(_TABLE)),
 )
 def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
@@ -125,19 +125,19 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     if settings.urdf is not None:
         write_text(settings.urdf, model.calibrated_urdf())
     accuracy = accuracy_figures(problem, found)
-    if settings.report is not None or settings.table is not None:
+    if settings.report_file is not None or settings.table is not None:
         links = link_table(problem, found)
         if settings.table is not None:
             write_table(settings.table, _TABLE, map(_cells, links))
-        if settings.report is not None:
-            write_geometry_page(settings.report, GeometryFindings(model, accuracy, links))
+        if settings.report_file is not None:
+            write_geometry_page(settings.report_file, GeometryFindings(model, accuracy, links))
     return GeometryResult(model, accuracy)
 
 
 def _check_suffixes(settings: GeometrySettings) -> None:
     """Refuse names of files that say another kind, before the work."""
     for name, path, suffix in (
-        ("report", settings.report, ".html"),
+        ("report", settings.report_file, ".html"),
         ("table", settings.table, ".csv"),
     ):
         if path is not None and path.suffix.lower() != suffix:

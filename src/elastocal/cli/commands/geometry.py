@@ -47,7 +47,7 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
         tcp=tcp,
         out=out,
         urdf=urdf,
-        report=report,
+        report_file=report,
         table=table,
         markers=tuple(marker or ()),
         draws=draws,
