@@ -26,6 +26,10 @@ from .codec_chart import (
     study_figure as study_figure,
     write_study_figures as write_study_figures,
 )
+from .geometry_figures import (
+    error_maps as error_maps,
+    parameter_figure as parameter_figure,
+)
 from .interactive_codec import compliance_views as compliance_views, error_views as error_views
 from .path_figures import (
     Curve as Curve,
