@@ -222,6 +222,8 @@ def test_every_default_of_the_procedure_is_the_one_that_the_reference_tells():
     told, defaults = dict(rows), ProcedureSettings()
     assert set(told) == set(ProcedureSettings.model_fields)
     assert told.pop("force_limit").startswith("1.3 times the largest load case")
+    assert told.pop("force_tolerance").startswith("1 % of the largest load case")
+    assert told.pop("collision_force") == "50 N and a fifth of the tool's weight"
     assert told.pop("reference") == f"`{defaults.reference}`"
     assert told.pop("conditioning") == f"`{str(defaults.conditioning).lower()}`"
     for key, text in told.items():
