@@ -386,7 +386,8 @@ def test_a_fault_ends_the_run_with_one_line_that_says_where_the_arm_is(planned, 
 
 
 def test_a_soft_collision_on_the_way_to_the_next_pose_ends_the_run(planned, tmp_path):
-    fault = 'kind: soft_collision, pose: 0, step: retract, after: "9 s", amplitude: "250 N"'
+    # The arm leaves for the next pose 4.9 s after it begins to retract, and is there 2 s later.
+    fault = 'kind: soft_collision, pose: 0, step: retract, after: "5.8 s", amplitude: "250 N"'
     cell = planned.with_text("collision.yaml", f"faults: [{{{fault}}}]")
     result = run(cell, tmp_path / "run")
     last = result.err.strip().splitlines()[-1]

@@ -223,3 +223,17 @@ class TestWhatIsReadAndWritten:
         write_text(tmp_path / "a.json", "old")
         read_text(tmp_path / "a.json")
         write_text(tmp_path / "a.json", "new")
+
+
+@pytest.mark.parametrize("name", ["calibrate", "compare", "geometry", "predict", "simulate"])
+@pytest.mark.parametrize("place", ["no/such/out.json", "plain/out.json", "folder"])
+def test_a_place_where_no_file_can_be_is_refused_before_the_work(tmp_path, name, place):
+    """Inputs are not there either: were they read first, they would be what is refused."""
+    (tmp_path / "plain").write_text("x")
+    (tmp_path / "folder").mkdir()
+    out = {each.name: each for each in PLACES[name]}.get("out", Place("ports", "--ports", False))
+    words = [str(word) for word in _words(name)]
+    words = [word for word in words if word != out.option and word != "no_out.json"]
+    shown = elastocal(*words, out.option, tmp_path / place)
+    assert shown.code == 1
+    assert f"cannot write {tmp_path / place}: " in shown.reason

@@ -12,6 +12,7 @@ __all__ = [
     "import_logs",
     "init",
     "krc_config",
+    "live",
     "measure_delay",
     "plan",
     "predict",
@@ -27,6 +28,7 @@ __all__ = [
 
 from ._file_kinds import FileDescription as FileDescription
 from ._inputs import NewTool as NewTool, find_robot as find_robot
+from ._live_session import LiveReport as LiveReport
 from ._operator_and_devices import (
     GROUP as GROUP,
     Operator as Operator,
@@ -95,6 +97,13 @@ from .krc_config import (
     KrcConfigSettings as KrcConfigSettings,
     krc_config as krc_config,
     kuka_settings as kuka_settings,
+)
+from .live import (
+    LIVE_LOG as LIVE_LOG,
+    LIVE_RECORD as LIVE_RECORD,
+    LiveResult as LiveResult,
+    LiveSettings as LiveSettings,
+    live as live,
 )
 from .measure_delay import (
     MeasureDelayResult as MeasureDelayResult,

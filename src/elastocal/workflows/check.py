@@ -16,16 +16,30 @@ from elastocal.errors import DatasetError, RobotError, SchemaError, nearest
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
-from elastocal.records import read_arrays, read_json_data, read_yaml_data
+from elastocal.records import read_arrays, read_json, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
+from elastocal.verdict import Signature
 from elastocal.wording import plainly
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
 from elastocal.workflows._inputs import ROBOT_SUFFIXES
 from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.live import LiveResult
+from elastocal.workflows.simulate import Ports
+from elastocal.workflows.stiffness import StiffnessSummary
 
 _Describe = Callable[[Path], FileDescription]
+
+
+def _live_record(path: Path) -> FileDescription:
+    """Describe the record of a live compensation."""
+    found = read_json(path, LiveResult)
+    names = ("cell", "robot", "started", "seconds", "ended", "problem")
+    facts = {name: getattr(found, name) for name in names}
+    schema = {"schema": "elastocal.live/1"}
+    return "record of a live compensation", schema | facts | {"line": found.line.sentence()}
+
 
 _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.plan": kinds.plan_file,
@@ -38,8 +52,13 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.process": kinds.process_table,
     "elastocal.comparison": kinds.comparison_file,
     "elastocal.commissioning": kinds.commissioning_file,
+    "elastocal.live": _live_record,
     "elastocal.model": kinds.model_file,
-    "elastocal.signature": kinds.signature_file,
+    "elastocal.signature": kinds.record_file("signature", Signature, "of", "sha256", "made", "key"),
+    "elastocal.ports": kinds.record_file("ports of simulated devices", Ports, "address", "ports"),
+    "elastocal.stiffness": kinds.record_file(
+        "stiffness along a path", StiffnessSummary, "direction", "stations", "files"
+    ),
     "elastocal.geometry": kinds.geometry_file,
     "elastocal.position-plan": kinds.position_plan_file,
 }
@@ -208,10 +227,11 @@ def _kind(path: Path, stated: object, known: Mapping[str, _Describe]) -> _Descri
 
     Its version is left to whoever reads the file.
     """
-    name = str(stated or "").partition("/")[0]
+    text = stated if isinstance(stated, str) else ""
+    name = text.partition("/")[0]
     if name in known:
         return known[name]
-    found = "states no schema" if stated is None else f"has schema {stated!r}"
+    found = f"has schema {text!r}" if text else "states no schema"
     raise SchemaError(f"{path} {found}{nearest(name, known)} (known: {', '.join(sorted(known))})")
 
 

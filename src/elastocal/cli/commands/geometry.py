@@ -26,7 +26,7 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
             " for each: then the error of the tcp is found too."
         ),
     ] = None,
-    draws: Annotated[int, typer.Option(min=40, help="Draws of the bootstrap.")] = 200,
+    draws: Annotated[int, typer.Option(min=40, max=100_000, help="Draws of the bootstrap.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Of these draws.")] = 0,
     force: options.Force = False,
     as_json: options.Figures = False,
