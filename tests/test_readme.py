@@ -177,6 +177,20 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     assert not [text for text in quoted if not any(text in message for message in known)]
 
 
+def test_the_faults_that_drivers_are_held_against_have_their_messages_and_their_tests():
+    page = (ROOT / "docs/how-to/write-a-driver.md").read_text(encoding="utf-8")
+    table = page.split("{ #faults }")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", table, flags=re.MULTILINE)
+    assert len(rows) > 10
+    known = messages()
+    for _, told, tests in rows:
+        for text in re.findall(r"`([^`]+)`", told):
+            assert any(text in message for message in known), text
+        for path, name in re.findall(r"`([^`:]+)::(\w+)`", tests):
+            assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8"), name
+        assert "::" in tests
+
+
 def test_every_face_has_its_page_in_the_reference():
     pages = (ROOT / "docs/reference/api").glob("*.md")
     marked = [m for page in pages for m in FACE.findall(page.read_text(encoding="utf-8"))]

@@ -8,33 +8,39 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import DeviceError
 
-_WINDOW = 0.05
-"""Time over which the change of a force is looked at, in s."""
-
 
 class CollisionWatch:
     """Holds the force that is measured on a free move against the tool's weight.
 
     In free air the sensor feels the tool's weight, which turns with the tool, and a bias, which
     stays. What is left when the weight is taken off hardly changes while the arm moves slowly: a
-    change of it within 50 ms by more than the limit is a collision, and so is a slow one that grows
-    beyond the largest. Accelerating the tool counts too, so that the limit must be above mass times
-    acceleration of the fastest free move.
+    change of it within a short time by more than the limit is a collision, and so is a slow one
+    that grows beyond the largest. Accelerating the tool counts too, so that the limit must be above
+    mass times acceleration of the fastest free move.
 
     Parameters
     ----------
     weight_base : ndarray, shape (3,)
         Of the tool, in base, in N.
     limit : float
-        Change within 50 ms, in N.
+        Change within the window, in N.
     largest : float
         Change since `restart`, in N; by default none counts.
+    window : float
+        In s.
     """
 
-    def __init__(self, weight_base: FloatArray, limit: float, largest: float = math.inf) -> None:
+    def __init__(
+        self,
+        weight_base: FloatArray,
+        limit: float,
+        largest: float = math.inf,
+        window: float = 0.05,
+    ) -> None:
         if not limit > 0.0:
             raise DeviceError(f"collision force is {limit:g} N: must be above 0 N")
-        self._weight_base, self._limit, self._largest = weight_base, limit, largest
+        self._weight_base, self._window = weight_base, window
+        self._limit, self._largest = limit, largest
         self._rest: deque[tuple[float, FloatArray]] = deque()
         self._first: FloatArray | None = None
 
@@ -59,13 +65,13 @@ class CollisionWatch:
         rest = force_sensor - R_base_sensor.T @ self._weight_base
         if self._first is None:
             self._first = rest
-        while self._rest and time - self._rest[0][0] > _WINDOW:
+        while self._rest and time - self._rest[0][0] > self._window:
             self._rest.popleft()
         self._rest.append((time, rest))
         change = float(np.linalg.norm(rest - self._rest[0][1]))
         if change > self._limit:
             return (
-                f"collision: the force changed by {change:.0f} N within {1e3 * _WINDOW:.0f} ms"
+                f"collision: the force changed by {change:.0f} N within {1e3 * self._window:.0f} ms"
                 f" while moving freely, limit {self._limit:.0f} N"
             )
         grown = float(np.linalg.norm(rest - self._first))

@@ -24,6 +24,10 @@ _TOLERANCE_PER_LOAD, _LEAST_TOLERANCE = 0.01, 5.0
 """Default force tolerance, as a part of the largest load case, and its least, in N."""
 _COLLISION, _COLLISION_PER_WEIGHT = 50.0, 0.2
 """Default force of a collision, in N and as a part of the tool's weight: its inertia at 2 m/s²."""
+_COLLISION_WINDOW = 0.1
+"""Time over which its change is looked at, in s: two cycles and a half."""
+_WRONG_WEIGHT = 0.35
+"""Part of the weight that may be missing on a way: a mass a quarter off, turned by 90 deg."""
 _SAME_PLACE = 1e-5
 """Largest distance between a frame and where its joints lead, in m."""
 _SAME_TURN = 1e-5
@@ -66,9 +70,9 @@ class RunSettings:
         """Return what finds collisions of free moves."""
         weight, asked = self.tool_weight, self.procedure.collision_force
         limit = _COLLISION + _COLLISION_PER_WEIGHT * weight if asked is None else asked
-        # Of a mass that is only roughly known the rest turns with the tool; without one all does.
-        largest = limit + weight if weight > 0.0 else np.inf
-        return CollisionWatch(self.weight_base, limit, largest)
+        # What is wrong with the mass turns with the tool; without one all of its weight does.
+        largest = limit + _WRONG_WEIGHT * weight if weight > 0.0 else np.inf
+        return CollisionWatch(self.weight_base, limit, largest, _COLLISION_WINDOW)
 
 
 def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
