@@ -20,13 +20,13 @@ from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
 from elastocal.planning.search import TECHNIQUES
 from elastocal.robot import catalogue
-from elastocal.workflows import SimulateResult
+from elastocal.workflows import EXPORT_TARGETS, SimulateResult
 from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
 from support import foreign_logs, kuka_bench, measured_arms, reported
 from support.cli import elastocal
 
 GROUP = typer.main.get_command(app)
-ELSEWHERE = {"codec", "demo", "measure-delay", "plan", "run", "simulate-process", "study"}
+ELSEWHERE = {"codec", "demo", "live", "measure-delay", "plan", "run", "simulate-process", "study"}
 """They take long, or need a device: what they print is tested beside what they do."""
 
 
@@ -125,6 +125,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "weights": _WEIGHTS,
         "free frame": _FREE_FRAMES,
         "posture": (PROGRAMMED, STIFFEST),
+        "target": EXPORT_TARGETS,
     } == options.CHOICES
 
 
