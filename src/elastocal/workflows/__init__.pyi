@@ -14,6 +14,7 @@ __all__ = [
     "krc_config",
     "live",
     "measure_delay",
+    "new",
     "plan",
     "predict",
     "report",
@@ -21,6 +22,7 @@ __all__ = [
     "simulate",
     "simulate_process",
     "stiffness",
+    "studio",
     "study",
     "tool",
     "verify",
@@ -115,6 +117,15 @@ from .measure_delay import (
     MeasureDelaySettings as MeasureDelaySettings,
     measure_delay as measure_delay,
 )
+from .new import (
+    NONE as NONE,
+    NewResult as NewResult,
+    NewSettings as NewSettings,
+    filled as filled,
+    new as new,
+    offered as offered,
+    parse_answer as parse_answer,
+)
 from .plan import (
     POSITION_PLAN as POSITION_PLAN,
     POSITION_TABLE as POSITION_TABLE,
@@ -177,6 +188,12 @@ from .stiffness import (
     StiffnessSettings as StiffnessSettings,
     StiffnessSummary as StiffnessSummary,
     stiffness as stiffness,
+)
+from .studio import (
+    StudioFigures as StudioFigures,
+    StudioResult as StudioResult,
+    StudioSettings as StudioSettings,
+    studio as studio,
 )
 from .study import (
     DEFAULT_VARIATION as DEFAULT_VARIATION,

@@ -5,10 +5,12 @@ of `elastocal.workflows._file_kinds`, and its entry in a table here.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
+from elastocal import planning
+from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
 from elastocal.compensation.process import TABLE
@@ -94,6 +96,8 @@ _UNITS = {
 }
 """SI units of the numbers that files hold, by the key of `CheckResult.holds`."""
 
+_FEW_POSES, _FEW_CANDIDATES = 6, 150
+"""Of a preview: seconds, not minutes."""
 _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
     ((PLAN,), lambda folder: kinds.plan_file(folder / PLAN)),
     ((JOURNAL,), kinds.run_folder),
@@ -112,6 +116,10 @@ class CheckSettings:
     """Any file of ours, a dataset, a robot, or a folder that a command made."""
     tcp: str | None = None
     """Link of a robot at the tool centre point; by default that behind the most joints."""
+    preview: str | PathLike[str] | None = None
+    """Page (.html) to write of a cell: a view in three dimensions of a first few poses."""
+    force: bool = False
+    """Replace a file that is there by the page."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,7 +149,7 @@ def _label(name: str) -> str:
     return name.removesuffix("_m").replace("_", " ")
 
 
-@workflow(CheckSettings)
+@workflow(CheckSettings, marks=("<title>Calibration plan:",), outputs=("preview",))
 def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: ARG001 - an instant
     """Validate a file and say what it holds.
 
@@ -157,7 +165,8 @@ def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: 
     SchemaError
         If the suffix is not one of ours, or a folder holds nothing of ours.
     ElastocalError
-        If the contents are not valid, or a tcp is asked for and is no link of a robot.
+        If the contents are not valid, a tcp is asked for and is no link of a robot, or a preview
+        of what is no cell, or of a cell that no pose can be found for.
     """
     path = Path(settings.file)
     if settings.tcp is None:
@@ -166,7 +175,27 @@ def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: 
         kind, holds = kinds.robot_file(path, settings.tcp)
     else:
         raise RobotError(f"{path} is no robot description: a tcp is a link of one")
+    if settings.preview is not None:
+        if kind != "cell file":
+            raise SchemaError(f"{path} is a {kind}: a preview is of a cell file")
+        _write_preview(Path(settings.preview), load_cell(path))
     return CheckResult(str(settings.file), kind, holds)
+
+
+def _write_preview(page: Path, cell: Cell) -> None:
+    """Write the page of a plan of few poses from few candidates.
+
+    It shows where the arm comes to, and what refuses the other points.
+    """
+    from elastocal.report import write_plan_page  # takes longer to import than most files to check
+
+    few = {"technique": "cover", "poses": _FEW_POSES, "d_max": None, "accuracy": None}
+    search = cell.file.search.model_copy(update={**few, "pool": _FEW_CANDIDATES})
+    file = cell.file.model_copy(update={"search": search, "process": None})
+    planned = planning.make_plan(replace(cell, file=file, process=None))
+    named = replace(planned.plan.cell, name=f"{cell.name}, a first look with few poses")
+    plan = replace(planned.plan, cell=named)
+    write_plan_page(page, cell, planned.surface, plan, planned.pool)
 
 
 def describe_file(path: Path) -> FileDescription:
