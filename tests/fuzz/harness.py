@@ -28,6 +28,7 @@ import sys
 import tempfile
 import time
 import warnings
+import webbrowser
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -210,6 +211,9 @@ _PLAIN = {
     "krc-config": "krc-config {s}/kuka.yaml --out {o}",
     "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
+    "studio": "studio {s}/cell.yaml --no-browser",
+    "live": "live {s}/kuka.yaml --model {s}/model.json --duration 0.1 --out {o}",
+    "new": "new --out {o}.yaml --mesh {s}/dome.stl --no-browser --no-ask",
     "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
 }
 """Commands that work, to which absurd options are added; an option that stands twice: the last."""
@@ -352,6 +356,8 @@ def _exit_code(words: list[str]) -> int:
         mock.patch.object(sys, "argv", ["elastocal", *words]),
         mock.patch.object(main, "app", _commands()),
         mock.patch.object(elastocal.workflows.SimulateResult, "wait", return_value=None),
+        mock.patch.object(elastocal.workflows.StudioResult, "wait", return_value=None),
+        mock.patch.object(webbrowser, "open", return_value=True),
     ):
         try:
             main.run()
