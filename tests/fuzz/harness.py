@@ -57,6 +57,9 @@ _NOISE = re.compile(
 
 
 _LINKS = re.compile(r"^(whole|broken|not signed|not verifiable) +[^:\n]+: .*\n", re.M)
+"""What verify prints before its reason: a line a link."""
+_QUESTION = re.compile(r"^.*\n(?=elastocal: nobody answers)")
+"""What new prints before its reason, where it asks."""
 
 
 @dataclass(frozen=True)
@@ -335,8 +338,7 @@ def _ended(case: Case, seeds: Path, folder: Path, err: Path) -> dict[str, object
     seconds = time.process_time() - started
     text = err.read_bytes().decode("utf-8", "replace")
     memory = _status("VmHWM") - base
-    # What verify prints before its reason is a line a link.
-    judged = _LINKS.sub("", text) if words[0] == "verify" else text
+    judged = _QUESTION.sub("", _LINKS.sub("", text) if words[0] == "verify" else text)
     word = _judged(code, judged, seconds, memory)
     if word == "ok" and code and _listed(folder) != before:
         word, text = "half-written", f"{sorted(set(_listed(folder)) ^ set(before))} {text}"
