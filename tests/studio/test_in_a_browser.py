@@ -106,7 +106,7 @@ def told(cell):
                 url for url in requests_of(tab.events) if not url.startswith(page.address)
             ]
 
-    workflows.studio(cell, browser=False, while_open=while_open)
+    workflows.studio(cell, while_open=while_open)
     return told
 
 
