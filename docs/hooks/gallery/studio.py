@@ -15,8 +15,8 @@ from elastocal.workflows import StudioResult, studio
 
 WIDTH, HEIGHT = 1440, 860
 WAIT = """new Promise((done) => {
-  const shown = document.documentElement;
-  const look = () => shown?.dataset.%s ? setTimeout(done, 1500) : setTimeout(look, 30);
+  const shown = () => document.documentElement?.dataset.%s;
+  const look = () => shown() ? setTimeout(done, 1500) : setTimeout(look, 30);
   look();
 })"""
 PRESS = """import(new URL("studio.js", location)).then(({ view }) => {
