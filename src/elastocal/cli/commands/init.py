@@ -18,7 +18,7 @@ def _init(
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     wire: Annotated[
         bool,
-        typer.Option("--wire", help="Devices on the wire, as `elastocal simulate` serves them."),
+        typer.Option("--wire", help="Devices on the wire, as `simulate` serves them."),
     ] = False,
     as_json: options.Written = False,
 ) -> None:
