@@ -7,12 +7,12 @@ BIN := $(VENV)/bin
 # Neighbours stay together, so that what a file prepares is seldom prepared twice.
 SHARED_OUT := -n auto --dist worksteal
 
-.PHONY: demo test lint units end-to-end browser docs-strict nightly slow process-figures coverage lowest lock mutation docs bench house fuzz clean
+.PHONY: demo test lint units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest lock mutation docs bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
 
-test: lint units end-to-end browser docs-strict
+test: lint units end-to-end browser docs-strict fuzz-lines
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
@@ -31,6 +31,11 @@ browser: $(VENV)/installed-dev
 
 docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+# Every parser of what devices send, under Atheris; `make fuzz-lines UNTIL=-runs=1000000` is longer.
+UNTIL ?= -max_total_time=20
+fuzz-lines: $(VENV)/installed-fuzz
+	cd tests && ../$(BIN)/python -m fuzz.lines $(UNTIL) -max_len=4096 -verbosity=0 -print_final_stats=1
 
 nightly: slow process-figures coverage lowest mutation
 
@@ -106,6 +111,11 @@ $(VENV)/installed: pyproject.toml | $(VENV)/bin/python
 $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,docs]'
 	touch $@ $(VENV)/installed
+
+# Where it cannot be had nothing is fuzzed, and that is said.
+$(VENV)/installed-fuzz: $(VENV)/installed-dev
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[fuzz]' || true
+	touch $@
 
 $(VENV)/installed-nightly: $(VENV)/installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[nightly]'

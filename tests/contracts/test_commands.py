@@ -20,7 +20,7 @@ from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
 from elastocal.planning.search import TECHNIQUES
 from elastocal.robot import catalogue
-from elastocal.workflows import SimulateResult
+from elastocal.workflows import EXPORT_TARGETS, SimulateResult, StudioResult
 from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
 from support import foreign_logs, kuka_bench, measured_arms, reported
 from support.cli import elastocal
@@ -76,6 +76,7 @@ def lines(tmp_path_factory) -> dict[str, tuple[object, ...]]:
         "new": ("--robot", "UR20", "--mesh", done / "cell/dome.stl", "-o", out / "begun.yaml"),
         "check": (run,),
         "simulate": (cell,),
+        "studio": (cell, "--no-browser"),
         "krc-config": (kuka_bench.write_cell(out), "-o", out / "krc"),
         "derive": (run,),
         "import": (*logs, "--map", log_map, "-o", out / "imported.nc"),
@@ -98,7 +99,8 @@ def test_every_command_is_quick_or_tried_elsewhere(lines):
 
 @pytest.mark.parametrize("command", sorted(set(COMMANDS) - ELSEWHERE))
 def test_json_is_one_object_and_nothing_else(lines, command):
-    with mock.patch.object(SimulateResult, "wait"):
+    waits = mock.patch.object(SimulateResult, "wait"), mock.patch.object(StudioResult, "wait")
+    with waits[0], waits[1]:
         result = elastocal(command, *lines[command], "--json")
     assert result.code == 0, result.err
     assert isinstance(json.loads(result.out), dict)
@@ -128,6 +130,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "weights": _WEIGHTS,
         "free frame": _FREE_FRAMES,
         "posture": (PROGRAMMED, STIFFEST),
+        "target": EXPORT_TARGETS,
     } == options.CHOICES
 
 

@@ -23,6 +23,7 @@ from .cell import (
     load_cell as load_cell,
     mounted_robot as mounted_robot,
 )
+from .collision import CollisionWatch as CollisionWatch
 from .devices import (
     ArmState as ArmState,
     AskedMetrology as AskedMetrology,

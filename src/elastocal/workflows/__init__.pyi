@@ -22,6 +22,7 @@ __all__ = [
     "simulate",
     "simulate_process",
     "stiffness",
+    "studio",
     "study",
     "tool",
     "verify",
@@ -77,7 +78,12 @@ from .demo import (
     finish as finish,
 )
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
-from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
+from .export import (
+    EXPORT_TARGETS as EXPORT_TARGETS,
+    ExportResult as ExportResult,
+    ExportSettings as ExportSettings,
+    export as export,
+)
 from .geometry import (
     GeometryResult as GeometryResult,
     GeometrySettings as GeometrySettings,
@@ -182,6 +188,12 @@ from .stiffness import (
     StiffnessSettings as StiffnessSettings,
     StiffnessSummary as StiffnessSummary,
     stiffness as stiffness,
+)
+from .studio import (
+    StudioFigures as StudioFigures,
+    StudioResult as StudioResult,
+    StudioSettings as StudioSettings,
+    studio as studio,
 )
 from .study import (
     DEFAULT_VARIATION as DEFAULT_VARIATION,

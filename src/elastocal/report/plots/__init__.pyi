@@ -1,4 +1,10 @@
 from . import style as style
+from ._solids import (
+    CoarseSolid as CoarseSolid,
+    Solid as Solid,
+    coarsened as coarsened,
+    triangles_of as triangles_of,
+)
 from .analysis_charts import (
     INDEX_NAMES as INDEX_NAMES,
     KIND_TITLES as KIND_TITLES,
