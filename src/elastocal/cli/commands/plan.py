@@ -76,9 +76,6 @@ def _plan(  # noqa: PLR0913 - one parameter an option
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
     from elastocal.errors import PlanningError
-    from elastocal.geometry import PositionPlan
-    from elastocal.planning.export import pose_lines
-    from elastocal.records import read_json
 
     if free_poses is not None and purpose is not _Purpose.BOTH:
         raise PlanningError("--positions is for --for both")
@@ -113,20 +110,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     )
     with output.progress_bars() as progress:
         found = workflows.plan(settings, progress)
-    after = None
-    if purpose is _Purpose.BOTH:
-        after = read_json(out / workflows.POSITION_PLAN, PositionPlan)
-    figures = workflows.plan_figures(found, out, program, language, after)
-    if dry_run:
-        figures = replace(figures, files=())
-    if as_json:
-        output.print_json(figures)
-    else:
-        tables.show_plan(output.console(), found, figures)
-        if after is not None:
-            tables.show_position_plan(output.console(), after, out)
-        if dry_run:
-            output.print_lines(pose_lines(found))
+    _show_plan(settings, found, as_json)
 
 
 def _plan_positions(settings: workflows.PlanPositionsSettings, out: Path, as_json: bool) -> None:
@@ -136,3 +120,27 @@ def _plan_positions(settings: workflows.PlanPositionsSettings, out: Path, as_jso
         output.print_json(found)
     else:
         tables.show_position_plan(output.console(), found, out)
+
+
+def _show_plan(
+    settings: workflows.PlanSettings, found: workflows.PlanResult, as_json: bool
+) -> None:
+    from elastocal.geometry import PositionPlan
+    from elastocal.planning.export import pose_lines
+    from elastocal.records import read_json
+
+    out = Path(settings.out)
+    free = None
+    if settings.free_poses is not None:
+        free = read_json(out / workflows.POSITION_PLAN, PositionPlan)
+    figures = workflows.plan_figures(found, out, settings.program, settings.language, free)
+    if settings.dry_run:
+        figures = replace(figures, files=())
+    if as_json:
+        output.print_json(figures)
+        return
+    tables.show_plan(output.console(), found, figures)
+    if free is not None:
+        tables.show_position_plan(output.console(), free, out)
+    if settings.dry_run:
+        output.print_lines(pose_lines(found))
