@@ -52,7 +52,9 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     ] = None,
     free_poses: Annotated[
         int | None,
-        typer.Option("--positions", min=1, help="With --for both: number of these; default: 60."),
+        typer.Option(
+            "--positions", min=1, max=100_000, help="With --for both: number of these; default: 60."
+        ),
     ] = None,
     program: Annotated[
         str | None,
@@ -113,7 +115,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     _show_plan(settings, found, as_json)
 
 
-def _plan_positions(settings: workflows.PlanPositionsSettings, out: Path, as_json: bool) -> None:
+def _plan_positions(settings: "workflows.PlanPositionsSettings", out: Path, as_json: bool) -> None:
     with output.progress_bars() as progress:
         found = workflows.plan_positions(settings, progress)
     if as_json:
@@ -123,7 +125,7 @@ def _plan_positions(settings: workflows.PlanPositionsSettings, out: Path, as_jso
 
 
 def _show_plan(
-    settings: workflows.PlanSettings, found: workflows.PlanResult, as_json: bool
+    settings: "workflows.PlanSettings", found: "workflows.PlanResult", as_json: bool
 ) -> None:
     from elastocal.geometry import PositionPlan
     from elastocal.planning.export import pose_lines
