@@ -86,7 +86,8 @@ def test_questions_that_nobody_answers_end_in_a_refusal(tmp_path):
 
 
 def test_ctrl_c_at_a_question_is_an_interruption(tmp_path):
-    keyboard = mock.Mock(readline=mock.Mock(side_effect=KeyboardInterrupt))
+    keyboard = io.StringIO()
+    keyboard.readline = mock.Mock(side_effect=KeyboardInterrupt)
     with mock.patch.object(sys, "stdin", keyboard):
         assert elastocal("new", "-o", tmp_path / "cell.yaml", "--ask").code == 130
 

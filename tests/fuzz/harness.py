@@ -216,7 +216,6 @@ _PLAIN = {
     "live": "live {s}/kuka.yaml --model {s}/model.json --duration 1",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
     "studio": "studio {s}/cell.yaml --no-browser",
-    "live": "live {s}/kuka.yaml --model {s}/model.json --duration 0.1 --out {o}",
     "new": "new --out {o}.yaml --mesh {s}/dome.stl --no-browser --no-ask",
     "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
 }
