@@ -12,7 +12,6 @@ memory, or time, than there is.
 """
 
 import contextlib
-import fcntl
 import glob
 import hashlib
 import json
@@ -26,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.locks import show_life, taken_over
 from elastocal.outputs import current_rule
 
 _STANDARD_INPUT = Path("/dev/stdin")
@@ -33,6 +33,7 @@ _DESCRIPTORS = (Path("/dev/fd"), Path("/proc/self/fd"))
 """Where a shell puts what it pipes into a command by name (``<(...)``)."""
 _UNDER_WAY = ".elastocal-"
 """In the names of what is being written, behind a dot and the name that it will have."""
+_NO_FILE = "it is a folder or a device, not a file"
 _LONGEST_NAME = 200
 """Letters of a name that are kept there: file systems take 255 bytes."""
 
@@ -81,7 +82,7 @@ class Limit:
         return f"is more than {self.most} {self.unit} (the variable {self.variable} raises this)"
 
 
-_MOST_READ = Limit("ELASTOCAL_MAX_FILE_MB", 256, "MB")
+_MOST_READ = Limit("ELASTOCAL_MAX_FILE_MB", 100, "MB")
 """Size of a file that is read whole: texts, meshes, streams."""
 _MEGABYTE = 1_000_000
 
@@ -105,10 +106,10 @@ def replacing(path: Path) -> Iterator[Path]:
 
     try:
         if path.exists() and not path.is_file():
-            raise IsADirectoryError("it is a folder or a device, not a file")
+            raise IsADirectoryError(_NO_FILE)
         if rule is not None:
             rule.require(path)
-        temporary, lock = _locked(make)
+        temporary, release = _locked(make)
     except OSError as error:
         if isinstance(error, FileAccessError):
             raise
@@ -122,11 +123,35 @@ def replacing(path: Path) -> Iterator[Path]:
             rule.note_output(path)
     except FileAccessError:
         raise  # of another file: it says so itself
+    except UnicodeEncodeError as error:
+        raise FileAccessError(
+            f"cannot write {path}: a name in it is no text in UTF-8: rename that file"
+        ) from error
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
-        os.close(lock)
+        release()
+
+
+def require_place(path: Path) -> None:
+    """Refuse a place at which no file can be written, before there is anything to write.
+
+    Raises
+    ------
+    FileAccessError
+        If its folder is not there or cannot be written into, or it is itself no file.
+    """
+    path = Path(path)
+    try:
+        if not stat.S_ISDIR(path.parent.stat().st_mode):
+            raise NotADirectoryError(f"{path.parent} is a file, not a folder")
+        if path.exists() and not path.is_file():
+            raise IsADirectoryError(_NO_FILE)
+        if not os.access(path.parent, os.W_OK | os.X_OK):
+            raise PermissionError(f"nobody may write into {path.parent}")
+    except OSError as error:
+        raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 @contextlib.contextmanager
@@ -165,7 +190,7 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
         if rule is not None:
             rule.require(folder / last)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary, lock = _locked(
+        temporary, release = _locked(
             lambda: tempfile.mkdtemp(prefix=_prefix(folder), dir=folder.parent)
         )
     except OSError as error:
@@ -184,7 +209,7 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
         raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-        os.close(lock)
+        release()
 
 
 def _move_all(source: Path, folder: Path, last: str) -> None:
@@ -209,32 +234,22 @@ def remove_leftovers(output: Path) -> None:
     pattern = f".*{_UNDER_WAY}*"
     inside = [*output.glob(pattern), *output.glob(f"*/{pattern}")]
     for place in (*output.parent.glob(f"{glob.escape(_prefix(output))}*"), *inside):
-        with contextlib.suppress(OSError):
-            handle = os.open(place, os.O_RDONLY | os.O_NOFOLLOW)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if place.is_dir():
-                    shutil.rmtree(place)
-                else:
-                    place.unlink()
-            finally:
-                os.close(handle)
+        with contextlib.suppress(OSError), taken_over(place) as abandoned:
+            if abandoned and place.is_dir():
+                shutil.rmtree(place)
+            elif abandoned:
+                place.unlink()
 
 
-def _locked(make: Callable[[], str]) -> tuple[Path, int]:
-    """Return a new temporary file or folder, and the descriptor whose lock says that we live.
-
-    Where a file system knows no locks, nobody can tell it from one at work, and it is left alone.
-    """
+def _locked(make: Callable[[], str]) -> tuple[Path, Callable[[], None]]:
+    """Return a new temporary file or folder, and what ends its sign that we live."""
     while True:
         place = Path(make())
-        handle = os.open(place, os.O_RDONLY)
-        with contextlib.suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        release = show_life(place)
         # Between the two, another process may have taken it for a leftover.
         if place.exists():
-            return place, handle
-        os.close(handle)
+            return place, release
+        release()
 
 
 def _prefix(path: Path) -> str:
@@ -289,6 +304,31 @@ def read_text(path: Path) -> str:
     return text
 
 
+def read_bytes(path: Path, most: Limit | None = None) -> bytes:
+    """Return the content of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    most : Limit, optional
+        Its largest size in MB; by default that of every file that is read whole.
+
+    Raises
+    ------
+    FileAccessError
+        If the file is missing or unreadable, or is a pipe or a device.
+    SchemaError
+        If it is too large to be read whole.
+    """
+    require_file(path)
+    try:
+        require_size(path, most or _MOST_READ)
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
 def require_file(path: Path) -> None:
     """Refuse a pipe, a socket or a device: reading it may wait for ever, or never end.
 
@@ -314,7 +354,7 @@ def require_file(path: Path) -> None:
         rule.note_input(path)
 
 
-def require_size(path: Path) -> None:
+def require_size(path: Path, most: Limit = _MOST_READ) -> None:
     """Refuse a file that is too large to be read whole.
 
     Raises
@@ -325,7 +365,7 @@ def require_size(path: Path) -> None:
         If it is not there.
     """
     size = Path(path).stat().st_size / _MEGABYTE
-    _MOST_READ.require(size, f"{path} has {size:.0f} MB, which")
+    most.require(size, f"{path} has {size:.0f} MB, which")
 
 
 def sha256(text: str) -> str:

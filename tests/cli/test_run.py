@@ -335,7 +335,7 @@ def test_a_device_that_is_not_configured_is_refused_by_name(planned, tmp_path):
 @pytest.mark.parametrize(
     ("section", "message"),
     [
-        ('procedure: {force_limit: "1 kN"}', "procedure.force_limit must be above 1140"),
+        ('procedure: {force_limit: "1 kN"}', "procedure.force_limit must be above 1146"),
         ('procedure: {force_limit: "9 kN"}', "at most 6250 N (range of the sensor), got 9000 N"),
         ('procedure: {stale: "60 ms"}', "must be above two cycles (0.08 s)"),
         ('procedure: {dwell: "100 ms"}', "must be at least four cycles (0.16 s)"),
@@ -383,6 +383,16 @@ def test_a_fault_ends_the_run_with_one_line_that_says_where_the_arm_is(planned, 
     assert "Traceback" not in result.err
     # The fault is gone, the cell is the same.
     assert run(planned, tmp_path / "run", "--resume", "--yes").code == 0
+
+
+def test_a_soft_collision_on_the_way_to_the_next_pose_ends_the_run(planned, tmp_path):
+    # The arm leaves for the next pose 4.9 s after it begins to retract, and is there 2 s later.
+    fault = 'kind: soft_collision, pose: 0, step: retract, after: "5.8 s", amplitude: "250 N"'
+    cell = planned.with_text("collision.yaml", f"faults: [{{{fault}}}]")
+    result = run(cell, tmp_path / "run")
+    last = result.err.strip().splitlines()[-1]
+    assert last.startswith("elastocal: pose 1, attempt 1, move: hit something on the way: ")
+    assert last.endswith("limit 168 N. The arm is on its way between poses, off every surface")
 
 
 def test_files_above_the_cell_file_keep_their_places(planned, tmp_path):

@@ -23,6 +23,7 @@ from .cell import (
     load_cell as load_cell,
     mounted_robot as mounted_robot,
 )
+from .collision import CollisionWatch as CollisionWatch
 from .devices import (
     ArmState as ArmState,
     AskedMetrology as AskedMetrology,
@@ -73,6 +74,7 @@ from .identity import (
     fingerprint as fingerprint,
     named_files as named_files,
 )
+from .line_counts import COUNTED as COUNTED, LineCounts as LineCounts, no_lines as no_lines
 from .motion import (
     MotionEntry as MotionEntry,
     axis_speeds as axis_speeds,
@@ -81,6 +83,16 @@ from .motion import (
     joint_margins as joint_margins,
     joint_positions as joint_positions,
     torque_limits as torque_limits,
+)
+from .path_arm import (
+    AnswerTimes as AnswerTimes,
+    CorrectedArm as CorrectedArm,
+    CycleStatistics as CycleStatistics,
+    PathCycle as PathCycle,
+    PathDriver as PathDriver,
+    PathLimits as PathLimits,
+    PathSource as PathSource,
+    Shift as Shift,
 )
 from .presets import (
     PRESET_FIGURES as PRESET_FIGURES,

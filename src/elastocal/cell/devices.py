@@ -23,6 +23,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell.line_counts import LineCounts, no_lines
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
@@ -352,6 +353,7 @@ def close_nothing() -> None:
     """Give nothing back: of devices that hold no line and no thread."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Devices:
     """The devices of a run, with the clock that they share."""
@@ -362,3 +364,5 @@ class Devices:
     clock: Clock
     close: Callable[[], None] = close_nothing
     """Gives lines and threads back, at the end of a run, whatever happened."""
+    lines: Callable[[], tuple[LineCounts, ...]] = no_lines
+    """What was counted on the lines so far; never raises."""

@@ -303,13 +303,19 @@ class ProcedureSettings(StrictModel):
     force_limit: PositiveForce | None = None
     """Largest force that is let happen, in N; by default 1.3 times the largest load case, and
     never more than the sensor's range allows."""
+    collision_force: Annotated[PositiveForce, Field(le=5e3)] | None = None
+    """Change of the force beyond that of the tool's weight, within 0.1 s of a free move, that is a
+    collision, in N; by default 50 N and a fifth of the tool's weight. A slow one is found when it
+    is as much and a third of the weight more."""
     travel_limit: Annotated[PositiveLength, Field(le=50e-3)] = 15e-3
     """How far the tool may go beyond the expected contact, or aside, in m."""
     contact_compliance: Annotated[TranslationalCompliance, Field(le=10e-6)] = 0.5e-6
     """Lateral movement of the marker under load that is expected without slip (disk, tooling,
     tilt of the tool), in m/N of the load case."""
-    force_tolerance: Annotated[PositiveForce, Field(le=50.0)] = 5.0
-    """Largest distance of the mean force from the load case, in N."""
+    force_tolerance: Annotated[PositiveForce, Field(le=50.0)] | None = None
+    """Largest distance of the mean force from the load case, in N; by default 1 % of the largest
+    load case, at least 5 N. The fit takes the force that was measured, so that this is no error
+    of the reading: it tells an arm that does not do what it is told."""
     force_drift: Annotated[PositiveForceRate, Field(le=50.0)] = 5.0
     """Largest drift of the force over the dwell, in N/s."""
     force_spread: Annotated[PositiveForce, Field(le=50.0)] = 8.0

@@ -3,6 +3,7 @@
 A new kind is a function here and its entry in a table of `elastocal.workflows.check`.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,6 @@ from elastocal.robot import (
     refusals_naming,
     tip_links,
 )
-from elastocal.verdict import read_signature
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._table_kinds import dataset_file
 
@@ -147,9 +147,8 @@ def streams_file(path: Path) -> FileDescription:
 def summary_file(path: Path) -> FileDescription:
     """Describe a summary of a run."""
     summary = procedure.read_summary(path)
-    counts, warnings = summary.readings.counts, len(summary.warnings)
-    schema = schema_of(procedure.RunSummary)
-    return "summary of a run", {"schema": schema, "readings": counts, "warnings": warnings}
+    found = {"readings": summary.readings.counts, "warnings": len(summary.warnings)}
+    return "summary of a run", {"schema": schema_of(procedure.RunSummary)} | found
 
 
 def robot_file(path: Path, tcp: str | None = None) -> FileDescription:
@@ -176,8 +175,8 @@ def robot_file(path: Path, tcp: str | None = None) -> FileDescription:
 def springs_file(path: Path) -> FileDescription:
     """Describe a file of springs."""
     file = read_springs(path)
-    facts = {"include": file.include, "springs": len(file.springs)}
-    return "spring file", {"schema": "elastocal.springs/1", **facts}
+    schema = {"schema": "elastocal.springs/1"}
+    return "spring file", schema | {"include": file.include, "springs": len(file.springs)}
 
 
 def catalogue_file(path: Path) -> FileDescription:
@@ -236,8 +235,8 @@ def model_file(path: Path) -> FileDescription:
 
 def tool_file(path: Path) -> FileDescription:
     """Describe a tool file."""
-    facts = _picked(read_tool(path), "flange", "mass", "postures", "undetermined")
-    return "tool file", {"schema": "elastocal.tool/1", **facts}
+    found = _picked(read_tool(path), "flange", "mass", "postures", "undetermined")
+    return "tool file", {"schema": "elastocal.tool/1"} | found
 
 
 def compensator_file(path: Path) -> FileDescription:
@@ -273,13 +272,16 @@ def process_folder(path: Path) -> FileDescription:
     return kind, {**facts, "courses": courses}
 
 
-def signature_file(path: Path) -> FileDescription:
-    """Describe the signature of a run."""
-    found = read_signature(path)
-    return "signature", {
-        "schema": "elastocal.signature/1",
-        **_picked(found, "of", "sha256", "made", "key"),
-    }
+def record_file(
+    kind: str, record: Callable[[], type], *names: str
+) -> Callable[[Path], FileDescription]:
+    """Return what describes files of a record, imported only then, by some of its figures."""
+
+    def describe(path: Path) -> FileDescription:
+        found: object = read_json(path, record())
+        return kind, {"schema": schema_of(type(found)), **_picked(found, *names)}
+
+    return describe
 
 
 def commissioning_file(path: Path) -> FileDescription:

@@ -18,7 +18,6 @@ from typing import Any, Protocol, cast
 from elastocal import drivers
 from elastocal.cell import (
     KINDS,
-    LOOPBACK,
     SIMULATED,
     Cell,
     Clock,
@@ -26,12 +25,14 @@ from elastocal.cell import (
     DeviceSet,
     DeviceSettings,
     Driver,
+    LineCounts,
+    PathDriver,
     RigContext,
     WallClock,
 )
 from elastocal.errors import DeviceError, ElastocalError, ProcedureError, nearest
 from elastocal.procedure import Progress as RunProgress
-from elastocal.records import validate
+from elastocal.records import StrictModel, validate
 from elastocal.results import brief_repr
 
 
@@ -80,6 +81,8 @@ class Unattended:
         yield Supervision(lambda _step: None, lambda: False)
 
 
+_ADDRESSES = ("address", "robot", "peer")
+"""Keys under which drivers take addresses."""
 GROUP = "elastocal.drivers"
 """Group of entry points that name drivers."""
 
@@ -165,7 +168,47 @@ class Rig:
             _refusals_to_close(made)
             raise
         running = clocks[0] if clocks else clock
-        return Devices(arm, sensor, metrology, running, lambda: _close(made))
+
+        def lines() -> tuple[LineCounts, ...]:
+            return tuple(counts for each in made for counts in each.lines())
+
+        return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
+
+    def path_arm(self) -> tuple[PathDriver, DeviceSettings]:
+        """Return the driver of the arm, which takes corrections of a path, and its settings.
+
+        Raises
+        ------
+        DeviceError
+            If it takes none.
+        """
+        name = self.cell.file.devices.arm.driver
+        driver = self.drivers[name]
+        if not isinstance(driver, PathDriver):
+            raise DeviceError(
+                f"{self.cell.path}: devices.arm: driver {name!r} takes no corrections of a path"
+            )
+        return driver, self.wanted[name]["arm"]
+
+    def connect_sensor(self, context: RigContext) -> DeviceSet:
+        """Return the force sensor alone, with its feed; to be closed by whoever asked.
+
+        Raises
+        ------
+        DeviceError
+            If it cannot be used, or its driver gives no newest wrench.
+        """
+        name = self.cell.file.devices.sensor.driver
+        found = self.drivers[name].connect(
+            self.cell, {"sensor": self.wanted[name]["sensor"]}, context
+        )
+        if found.sensor is None or found.feed is None:
+            found.close()
+            raise DeviceError(
+                f"{self.cell.path}: devices.sensor: driver {name!r} gives no newest wrench in"
+                " between, which a correction needs each cycle"
+            )
+        return found
 
     def _only(self, kind: str, made: Sequence[DeviceSet]) -> Any:
         (device,) = (
@@ -238,9 +281,20 @@ def _require_real_time(rig: Rig) -> None:
     rate = rig.cell.file.devices.clock_rate
     for kinds in rig.wanted.values():
         for kind, settings in kinds.items():
-            address = getattr(settings, "address", LOOPBACK)
-            if rate != 1.0 and not _is_loopback(address):
+            far = next((each for each in _addresses(settings) if not _is_loopback(each)), None)
+            if rate != 1.0 and far is not None:
                 raise DeviceError(
                     f"{rig.cell.path}: devices.clock_rate is {rate:g}, for simulators on this"
-                    f" machine alone; devices.{kind} is at {address}"
+                    f" machine alone; devices.{kind} is at {far}"
                 )
+
+
+def _addresses(settings: StrictModel) -> Iterator[str]:
+    """Yield all addresses that settings name, those of single stations too."""
+    for key, value in settings:
+        if key in _ADDRESSES:
+            yield str(value)
+        elif isinstance(value, Mapping):
+            for each in value.values():
+                if isinstance(each, StrictModel):
+                    yield from _addresses(each)

@@ -141,7 +141,8 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     calibrated = settings.read_model(Path(settings.model))
     robot = calibrated.model.robot
     start = parse_posture(robot, settings.start)
-    how = CorrectionSettings(start, settings.largest, settings.unloaded(robot))
+    controller, unloaded = settings.unloaded(robot)
+    how = CorrectionSettings(start, settings.largest, unloaded, controller)
     if is_program:
         if forces is None:
             raise FileAccessError(f"{path} has no forces: name a table of them with --forces")

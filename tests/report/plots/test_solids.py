@@ -4,7 +4,7 @@ import coal
 import numpy as np
 import pytest
 
-from elastocal.report.plots._solids import Solid, drawn, fixture_solids, joined, robot_solids
+from elastocal.report.plots._solids import Solid, fixture_solids, joined, robot_solids, triangles_of
 from elastocal.shapes import Mesh, solid_of
 
 TETRAHEDRON = (
@@ -23,7 +23,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_solid_fills_the_bounding_box_of_its_shape(name):
-    shape, solid = SHAPES[name], drawn(solid_of(SHAPES[name]))
+    shape, solid = SHAPES[name], triangles_of(solid_of(SHAPES[name]))
     shape.computeLocalAABB()
     np.testing.assert_allclose(solid.vertices.min(axis=0), shape.aabb_local.min_, atol=5e-3)
     np.testing.assert_allclose(solid.vertices.max(axis=0), shape.aabb_local.max_, atol=5e-3)
@@ -31,13 +31,13 @@ def test_solid_fills_the_bounding_box_of_its_shape(name):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_faces_are_wound_outward(name):
-    solid = drawn(solid_of(SHAPES[name]))
+    solid = triangles_of(solid_of(SHAPES[name]))
     a, b, c = np.moveaxis(solid.vertices[solid.faces], 1, 0)
     assert np.einsum("fi,fi->", a, np.cross(b, c)) > 0.0
 
 
 def test_faces_towards_the_light_are_bright():
-    solid = drawn(solid_of(coal.Box(1.0, 1.0, 1.0)))
+    solid = triangles_of(solid_of(coal.Box(1.0, 1.0, 1.0)))
     bright = solid.brightness(np.array([0.0, 0.0, 1.0]))
     assert sorted(set(bright.round(9))) == [0.0, 0.5, 1.0]
     top = solid.vertices[solid.faces].mean(axis=1)[:, 2] > 0.49
@@ -50,7 +50,7 @@ def test_a_face_without_area_is_neither_lit_nor_dark():
 
 
 def test_joined_solids_keep_their_faces():
-    parts = [drawn(solid_of(SHAPES[kind])) for kind in ("box", "mesh")]
+    parts = [triangles_of(solid_of(SHAPES[kind])) for kind in ("box", "mesh")]
     both = joined(parts)
     expected = np.concatenate([part.vertices[part.faces] for part in parts])
     np.testing.assert_array_equal(both.vertices[both.faces], expected)

@@ -24,9 +24,9 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     *,
     compare: Annotated[
         str | None,
-        typer.Option(
-            help="Search technique to lay beside the cell's, or none."
-            " Default: ioops beside cover, else cover."
+        options.choice(
+            "technique or none",
+            "Search technique to lay beside the cell's. Default: ioops beside cover, else cover.",
         ),
     ] = None,
     purpose: Annotated[
@@ -39,12 +39,13 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     ] = _Purpose.ELASTICITY,
     search: Annotated[
         str | None,
-        typer.Option(help="With --for geometry: search technique; default: i_optimal."),
+        options.choice("technique", "With --for geometry: search technique; default: i_optimal."),
     ] = None,
     poses: Annotated[
         int | None,
         typer.Option(
             min=1,
+            max=100_000,
             help="Number of poses; default: search.poses of the cell file; 60 for geometry.",
         ),
     ] = None,

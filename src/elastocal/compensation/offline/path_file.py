@@ -20,6 +20,7 @@ from elastocal.files import require_file
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 from elastocal.robot.inverse import (
     InverseKinematics,
     RowName,
@@ -52,6 +53,8 @@ class CorrectionSettings:
     """Largest deflection that is taken for one, in m."""
     unloaded: Unloaded | None = None
     """Where the arm as built stands; by default where its controller believes."""
+    controller: Robot | None = None
+    """The arm as its controller knows it, which paths are written for; by default the model's."""
 
 
 def compensate_path(
@@ -86,7 +89,8 @@ def compensate_path(
         If a file cannot be read or written.
     """
     settings = CorrectionSettings() if settings is None else settings
-    robot, solver = calibrated.model.robot, inverse_for(calibrated.model.robot)
+    robot = settings.controller or calibrated.model.robot
+    solver = inverse_for(robot)
     with in_file(path):
         table = PathTable.open(path, lambda header: find_columns(header, robot))
         total = _count_lines(path) - len(table.layout.preamble) - 1

@@ -16,16 +16,17 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
+from elastocal.cell import ArmState, Cell, Clock, CollisionWatch, Motion as MotionState, WrenchFeed
 from elastocal.drivers.kuka_rsi._commands import (
     CHECKS,
     StraightMoveRules,
 )
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
-from elastocal.drivers.kuka_rsi.force_control import CollisionWatch, ForceLaw, ForceReader
-from elastocal.drivers.kuka_rsi.link import Arrival, RsiLink
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
+from elastocal.drivers.kuka_rsi.link import RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
+    Arrival,
     MoveTarget,
     Order,
     ProgramState,
@@ -95,7 +96,8 @@ class KukaArm:
         self.law = ForceLaw.design(stiffness, delay, settings.cycle, speed)
         self._rules = StraightMoveRules(self.bounds, self.law, delay + 2.0 * settings.cycle)
         self._postures = PostureReader(cell.robot, settings.signs)
-        self._guard = CorrectionGuard(self.bounds, settings.cycle, delay)
+        self.guard = CorrectionGuard(self.bounds, settings.cycle, delay)
+        """Bounds what is sent, and counts what the controller clamps."""
         self._reader, self._watch = self._feeling(feed)
         self._lock = threading.RLock()
         self._cycle: Cycle | None = None
@@ -154,7 +156,7 @@ class KukaArm:
             self._fault = None
             if self._state in _RESTING:
                 self._state = MotionState.IDLE
-                self._guard.restart(cycle.offset)
+                self.guard.restart(cycle.offset)
 
     def disable(self) -> None:
         """Take the release back; the arm stands."""
@@ -280,13 +282,13 @@ class KukaArm:
             return Step(order=Order.HOLD if self._state in _RESTING else Order.GUIDE)
         try:
             if self._running is None:
-                self._guard.restart(cycle.offset)
+                self.guard.restart(cycle.offset)
                 self._running = task.begin(cycle)
                 step = next(self._running)
             else:
                 step = self._running.send(cycle)
             if cycle.state == ProgramState.GUIDED:
-                self._guard.bounded(step.shift, cycle.offset)
+                self.guard.bounded(step.shift, cycle.offset)
             return step
         except StopIteration:
             self._task = self._running = None

@@ -138,7 +138,8 @@ class BoxLine:
             try:
                 self.sensor.received(self._socket.recv(MOST_PAGE))
             except TimeoutError:
-                self._end_or_go_on()
+                if not self.sensor.hole:
+                    self._end_or_go_on()
             except OSError as error:
                 self.sensor.fail(f"{error.strerror or error}")
 
@@ -149,7 +150,7 @@ class BoxLine:
             self.sensor.received(self._socket.recv(MOST_PAGE))
         except TimeoutError:
             if not self._closed.is_set():
-                self.sensor.fail(why)
+                self.sensor.leave_hole(why)
 
     def _why_silent(self) -> str:
         text = f"no record for {_SILENCE:g} s"
@@ -260,7 +261,8 @@ class NetFtDriver:
         settings = wanted["sensor"]
         assert isinstance(settings, NetFtSettings)
         line = BoxLine(settings, context.clock)
-        return DeviceSet(sensor=line.sensor, feed=line.sensor, close=line.close)
+        sensor = line.sensor
+        return DeviceSet(sensor=sensor, feed=sensor, close=line.close, lines=sensor.lines)
 
 
 DRIVER = NetFtDriver()

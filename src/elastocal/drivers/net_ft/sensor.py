@@ -6,7 +6,7 @@ from collections import deque
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Clock, SensorStatus, WrenchBlock, WrenchSample
+from elastocal.cell import Clock, LineCounts, SensorStatus, WrenchBlock, WrenchSample
 from elastocal.drivers.net_ft.protocol import (
     CountScale,
     RdtRecord,
@@ -25,6 +25,8 @@ _WINDOW = 1000
 _MOST_LOST = 0.1
 _STANDING = 100
 """Records without progress of the box's own counter after which it counts as stalled."""
+_MOST_STATES = 16
+"""Words of status that are remembered."""
 _MOST_MALFORMED = 10
 """Datagrams in a row that are no records."""
 _FOLLOWS = 1e-3
@@ -59,12 +61,17 @@ class NetFtSensor:
         self.source = source
         self.lost = self.late = self.malformed = 0
         """Records that never came; that came after later ones; datagrams that were none."""
+        self.taken = self.saturated = 0
+        """Records that were taken; those of them beyond a range."""
+        self._states: set[int] = set()
         self._clock, self._scale = clock, scale
         self._lock = threading.Lock()
         self._rows: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=_NEWEST)
         self._saturated = False
         self._newest: tuple[float, tuple[int, ...], SensorStatus] | None = None
         self._failure: str | None = None
+        self.hole = ""
+        """Why too much is missing in the stream; empty as long as it is not."""
         self._last: RdtRecord | None = None
         self._time = self._arrived = -np.inf
         self._count = 0
@@ -94,6 +101,15 @@ class NetFtSensor:
         with self._lock:
             self._failure = self._failure or why
 
+    def leave_hole(self, why: str) -> None:
+        """Refuse every further `read`: too much is missing in the stream.
+
+        `newest` goes on. Its time says how old it is; where the stream comes again by itself, who
+        corrects a process may go on, whereas readings of a procedure have a hole.
+        """
+        with self._lock:
+            self.hole = self.hole or why
+
     @property
     def failed(self) -> bool:
         """Whether something has gone wrong."""
@@ -104,6 +120,9 @@ class NetFtSensor:
         if last is not None and not self._goes_on(last, record):
             return
         status = status_of(record.status)
+        self.taken += 1
+        if record.status not in (0, *self._states) and len(self._states) < _MOST_STATES:
+            self._states.add(record.status)
         if status is SensorStatus.FAULT:
             self.fail(f"status {status_names(record.status)}")
             return
@@ -111,6 +130,7 @@ class NetFtSensor:
         with self._lock:
             self._rows.append((self._time, record.counts))
             self._saturated |= status is SensorStatus.SATURATED
+            self.saturated += status is SensorStatus.SATURATED
             self._newest = self._time, record.counts, status
 
     def _goes_on(self, last: RdtRecord, record: RdtRecord) -> bool:
@@ -155,7 +175,9 @@ class NetFtSensor:
         self._window, self._window_lost = self._window + lost + 1, self._window_lost + lost
         if self._window >= _WINDOW:
             if self._window_lost > _MOST_LOST * self._window:
-                self.fail(f"{self._window_lost} of {self._window} records were lost on the way")
+                self.leave_hole(
+                    f"{self._window_lost} of {self._window} records were lost on the way"
+                )
             self._window = self._window_lost = 0
 
     def _wrenches(self, counts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -185,6 +207,8 @@ class NetFtSensor:
             If the stream cannot be trusted: why.
         """
         self._require()
+        if self.hole:
+            raise DeviceError(f"{self.source}: {self.hole}")
         with self._lock:
             rows, saturated = list(self._rows), self._saturated
             self._rows.clear()
@@ -200,6 +224,19 @@ class NetFtSensor:
             status=SensorStatus.SATURATED if saturated else SensorStatus.OK,
             source=self.source,
         )
+
+    def lines(self) -> tuple[LineCounts, ...]:
+        """Return what was counted on the stream."""
+        counts = LineCounts(
+            device=self.source,
+            received=self.taken,
+            lost=self.lost,
+            late=self.late,
+            malformed=self.malformed,
+            saturated=self.saturated,
+            status=tuple(status_names(state) for state in sorted(self._states)),
+        )
+        return (counts,)
 
     def _require(self) -> None:
         if self._failure is not None:

@@ -6,7 +6,6 @@ and cut off before the next entry is written.
 
 import contextlib
 import errno
-import fcntl
 import os
 from collections.abc import Callable, Iterator
 from enum import Enum
@@ -15,8 +14,10 @@ from typing import Any
 
 from pydantic import SerializerFunctionWrapHandler, ValidationError, model_serializer
 
-from elastocal.cell import Clock
+from elastocal.cell import Clock, LineCounts
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import read_bytes
+from elastocal.locks import lock_file
 from elastocal.records import StrictModel
 
 
@@ -58,6 +59,8 @@ class PoseLog(StrictModel):
     windows: tuple[Window, ...]
 
 
+_BYTES: int = getattr(os, "O_BINARY", 0)
+"""Keeps Windows from writing another line end than it is given."""
 _JOURNAL_SCHEMA = "elastocal.journal/1"
 
 
@@ -79,7 +82,7 @@ class Event(Enum):
     GIVEN_UP = "given up"
     """All attempts at a pose failed; the run goes on without it."""
     FINISH = "finish"
-    """Last entry of a session."""
+    """Last entry of a session; holds what was counted on the lines of its devices."""
 
 
 class Action(Enum):
@@ -155,6 +158,8 @@ class Entry(StrictModel):
     log: PoseLog | None = None
     streams_sha256: str | None = None
     """SHA-256 of the file with the raw streams of a finished pose."""
+    lines: tuple[LineCounts, ...] = ()
+    """What was counted on the lines of the devices, at the end of a session."""
 
 
 Sync = Callable[[int], None]
@@ -184,7 +189,7 @@ class Journal:
     def __init__(self, path: Path, sync: Sync = os.fsync) -> None:
         self.path, self._sync = Path(path), sync
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | _BYTES, 0o666)
         except OSError as error:
             raise _cannot("write", self.path, error) from error
         try:
@@ -236,7 +241,7 @@ class Journal:
 
     def _lock(self) -> None:
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(self._file)
         except OSError as error:
             raise FileAccessError(f"{self.path} is in use: another process runs here") from error
 
@@ -273,10 +278,7 @@ def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
 
 def _read(path: Path) -> tuple[tuple[Entry, ...], int]:
     """Return the complete entries and the number of bytes that they take."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise _cannot("read", path, error) from error
+    data = read_bytes(path)
     whole = data.rfind(b"\n") + 1
     lines = data[:whole].splitlines()
     entries = tuple(_entry(path, number, line) for number, line in enumerate(lines))

@@ -125,7 +125,7 @@ class Runner:
             height = self._settings.approach_distance
             retract_to(s, ApproachLine.of_pose(home.retract_from, limit), Guard(), height)
         self._location = ArmLocation.BETWEEN_POSES
-        drive(s, home.legs, Guard(self._free_limit))
+        drive(s, home.legs, Guard(self._free_limit, free=True))
 
     def _visit_all(self) -> None:
         in_a_row = 0
@@ -218,7 +218,8 @@ class Runner:
             return
         self._enable()
         self._pose_start = self._supervisor.now
-        drive(self._supervisor, route(self._plan, self._stop, end), Guard(self._free_limit))
+        guard = Guard(self._free_limit, free=True)
+        drive(self._supervisor, route(self._plan, self._stop, end), guard)
         self._location = ArmLocation.HOME
 
     def _enter(self, a: Attempt) -> None:
@@ -274,6 +275,8 @@ class Runner:
             force=float(np.linalg.norm(force)),
             slip=0.0 if a is None else a.slip,
             left=max(float(left), 0.0),
+            q=tuple(seen.arm.q.tolist()),
+            marker=tuple(seen.points.position[-1].tolist()) if len(seen.points) else None,
         )
 
     def _given_up_message(self) -> str:
@@ -295,7 +298,7 @@ class Runner:
         text = f"{result.end.value}, {result.location.value}"
         text = f"{text}: {result.message}" if result.message else text
         with contextlib.suppress(*EXPECTED_ERRORS):
-            self._log.write(Event.FINISH, text=text)
+            self._log.write(Event.FINISH, text=text, lines=self._devices.lines())
 
 
 def _save(recorder: StreamRecorder, path: Path) -> str | None:

@@ -23,6 +23,7 @@ from elastocal.planning import CollisionScene, PlanResult, collision_scene
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.report.plots.style import tint
+from elastocal.results import brief_repr
 
 MOVING_COLOURS = (style.ARM, style.TOOL)
 _SECTIONS = 24
@@ -40,6 +41,7 @@ _DARK = 0.5
 _UNLIT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0, "fresnel": 0.0}
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Solid:
     """Triangles; vertices in m."""
@@ -98,6 +100,7 @@ class RobotSolids:
         ]
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CoarseSolid:
     """A mesh as it is drawn."""
@@ -131,13 +134,13 @@ def robot_solids(cell: Cell, surface: Surface) -> RobotSolids:
     """Return the solids of a cell's robot and tool."""
     scene = collision_scene(cell, surface)
     nowhere = np.zeros((0, len(cell.robot.joint_names)))
-    return RobotSolids(scene, tuple(drawn(body.solid) for body in scene.moving(nowhere)))
+    return RobotSolids(scene, tuple(triangles_of(body.solid) for body in scene.moving(nowhere)))
 
 
 def fixture_solids(cell: Cell, surface: Surface) -> dict[str, Solid]:
     """Return the fixtures of a cell in base, by name; not the tooling."""
     return {
-        body.name: drawn(body.solid).placed(body.T_frame_body)
+        body.name: triangles_of(body.solid).placed(body.T_frame_body)
         for body in collision_scene(cell, surface).obstacles
         if body.name != TOOLING
     }
@@ -152,7 +155,7 @@ def joined(solids: Sequence[Solid]) -> Solid:
     return Solid(np.concatenate([solid.vertices for solid in solids]), np.concatenate(faces))
 
 
-def drawn(solid: shapes.Solid) -> Solid:
+def triangles_of(solid: shapes.Solid) -> Solid:
     """Return the triangles of a solid, its round sides as fine as they are drawn."""
     mesh = solid.triangulated(_SECTIONS)
     return Solid(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.intp))
