@@ -16,7 +16,6 @@ side by side, poses last, so that each elimination step is one whole-array opera
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
@@ -370,14 +369,9 @@ class IOptimal(Criterion):
         """Return the values by Woodbury's identity."""
         if not information.updates_pay:
             return super().after_adding(matrix, information)
-        return self.value(matrix) + inverse_trace_loss(matrix, information.rows, self._root)
-
-    @cached_property
-    def _root(self) -> FloatArray:
-        """A root of the process matrix, shape (r, r)."""
         eigenvalues, vectors = np.linalg.eigh(self.process)
-        root: FloatArray = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-        return root
+        root = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
+        return self.value(matrix) + inverse_trace_loss(matrix, information.rows, root)
 
     def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray:
         """Return the tangent at ``S``, which a concave function stays below."""
