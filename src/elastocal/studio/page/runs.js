@@ -159,7 +159,9 @@ async function openPose(folder, pose, button) {
   play.value = 0;
   play.oninput = () => {
     const k = Number(play.value);
-    play.setAttribute("aria-valuetext", `${streams.time[k].toFixed(1)} s`);
+    const within = streams.windows.find(({ start, end }) => start <= streams.time[k] && streams.time[k] <= end);
+    $("play-text").textContent = `At ${streams.time[k].toFixed(1)} s: ${within ? `${within.name}, ${within.status}` : "between the readings"}`;
+    play.setAttribute("aria-valuetext", $("play-text").textContent);
     shown(streams.time[k]);
     follow(streams.q[k]);
   };
@@ -167,9 +169,17 @@ async function openPose(folder, pose, button) {
   if (streams.q.length) play.oninput();
 }
 
+let charted = null;
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charted && chart(...charted));
+
+// Of a run there is no time to choose.
+const ofTheRun = (points) => points === curves?.force;
+
 function chart(title, first, force, second, slip, windows = [], now = null) {
+  charted = [title, first, force, second, slip, windows, now];
   $("charts").hidden = false;
   $("charts-title").textContent = title;
+  if (ofTheRun(force)) $("play-label").hidden = true;
   plot($("force-chart"), first, force, "region", windows, now);
   plot($("slip-chart"), second, slip, "arrow", windows, now);
 }
@@ -193,9 +203,9 @@ function plot(canvas, label, points, name, windows, now) {
   pen.strokeStyle = colour("line");
   pen.strokeRect(left, top, right - left, bottom - top);
   pen.fillStyle = colour("muted");
-  pen.fillText(most.toPrecision(3), 4, top + 8);
+  pen.fillText(most < 100 ? most.toPrecision(3) : most.toFixed(0), 4, top + 8);
   pen.fillText("0", 4, bottom);
-  pen.fillText(`${start.toFixed(0)} s`, left, height - 5);
+  pen.fillText(`${Math.round(start)} s`, left, height - 5);
   pen.textAlign = "right";
   pen.fillText(`${end.toFixed(0)} s`, right, height - 5);
   pen.textAlign = "left";
@@ -211,7 +221,7 @@ function plot(canvas, label, points, name, windows, now) {
     pen.lineTo(x(now), bottom);
     pen.stroke();
   }
-  canvas.setAttribute("aria-label", `${label}: from ${start.toFixed(0)} s to ${end.toFixed(0)} s, at most ${most.toPrecision(3)}`);
+  canvas.setAttribute("aria-label", `${label}: from ${Math.round(start)} s to ${end.toFixed(0)} s, at most ${most.toPrecision(3)}`);
 }
 
 export function openRuns() {
