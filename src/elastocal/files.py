@@ -123,6 +123,10 @@ def replacing(path: Path) -> Iterator[Path]:
             rule.note_output(path)
     except FileAccessError:
         raise  # of another file: it says so itself
+    except UnicodeEncodeError as error:
+        raise FileAccessError(
+            f"cannot write {path}: a name in it is no text in UTF-8: rename that file"
+        ) from error
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
     finally:

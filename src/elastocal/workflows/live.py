@@ -127,7 +127,7 @@ class LiveResult(Result):
         )
 
 
-@workflow(LiveSettings, marks=("elastocal.live/",))
+@workflow(LiveSettings)
 def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG001 - it reports
     """Correct the path that an arm's own program follows, by the measured wrench, cycle by cycle.
 
