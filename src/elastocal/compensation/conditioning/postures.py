@@ -22,7 +22,7 @@ LEAST_POSTURES = 3
 _QUATERNION = 4
 """Columns of an orientation as a quaternion."""
 
-_MOST_POSTURES = Limit("ELASTOCAL_MAX_POSTURES", 4000, "static postures")
+_MOST_POSTURES = Limit("ELASTOCAL_MAX_POSTURES", 500, "static postures")
 """A tool is weighed at some dozen; fits of left-out ones hold a number for each pair of rows."""
 
 
