@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.cell import SIMULATED, Cell, fingerprint
+from elastocal.cell import SIMULATED, Cell, CertificateEntry, certificate_of, fingerprint
 from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
@@ -147,6 +147,8 @@ class Evidence:
     missing: tuple[MissingPart, ...] = ()
     chain: "tuple[Link, ...]" = ()
     """Every part held against what it was made from."""
+    stated: Mapping[str, str] = field(default_factory=dict)
+    """What was stated for the certificate when the report was made."""
     doubts: tuple[str, ...] = ()
     """Contradictions between parts that are sound by themselves, broken links among them."""
 
@@ -171,6 +173,13 @@ class Evidence:
     def run_record(self) -> RunRecord | None:
         """The begin of the run, by its journal."""
         return self.journal[0].run if self.journal else None
+
+    @property
+    def certificate(self) -> CertificateEntry:
+        """What is stated of the calibration: by the cell file, at the run, for the report."""
+        entry = CertificateEntry() if self.cell is None else self.cell.file.certificate
+        at_run = {} if self.run_record is None else self.run_record.stated
+        return certificate_of(entry, at_run, self.stated)
 
     @property
     def figures(self) -> CalibrationSummary | None:

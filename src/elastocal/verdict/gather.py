@@ -5,8 +5,8 @@ name and cannot be used is left out, and the report says why. Parts that belong 
 or another cell count as unusable.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -81,6 +81,8 @@ class EvidenceOptions:
     """In m; likewise."""
     signer: str | None = None
     """Public key that must have signed the run, 64 hexadecimal digits."""
+    stated: Mapping[str, str] = field(default_factory=dict)
+    """For the certificate, beside what cell file and run state."""
 
 
 def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
@@ -99,7 +101,7 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
         If there is nothing to report on, or a part that is named cannot be used.
     """
     reader = PartReader(find_folders(options.run))
-    evidence = _with_run(Evidence(made=made), reader)
+    evidence = _with_run(Evidence(made=made, stated=options.stated), reader)
     evidence = _with_model(evidence, reader, options)
     evidence = replace(evidence, limits=_limits(evidence.cell, options))
     evidence = _with_rest(evidence, reader, options)

@@ -8,14 +8,19 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Callable, Iterable
+from functools import cache, partial
 from importlib import resources
 from typing import TYPE_CHECKING, Any
+
+from elastocal.report.language import ENGLISH, Language, language_of
+from elastocal.report.plots import sequential_stops, themed_svg
+from elastocal.wording import phrase
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
+    from matplotlib.figure import Figure
 
 _POLICY = "default-src 'none'; script-src {scripts}; style-src {styles}; img-src data: blob:"
 """Lets a page load nothing, and run no script and have no style but its own, by their SHA-256."""
@@ -36,17 +41,20 @@ _STYLE_OF_MAPS = re.compile(r"(e\.textContent=)'\.maplibregl(?:[^'\\]|\\.)*'")
 """Its only style that is written out is of maps, which no page of ours has."""
 
 
-def render(template: str, **values: Any) -> str:
+def render(template: str, language: Language = ENGLISH, **values: Any) -> str:
     """Return a template with its values.
 
     Parameters
     ----------
     template : str
         Name of a file in the folder ``templates``.
+    language : Language
+        In which its phrases are said.
     **values
         For the names in it; one that is missing is an error.
     """
-    return _environment().get_template(template).render(values)
+    made = _environment(language.code).get_template(template)
+    return made.render(values | {"language": language.code})
 
 
 def embedded(data: Any) -> "Markup":
@@ -67,7 +75,7 @@ def embedded(data: Any) -> "Markup":
 
 
 @cache
-def _environment() -> "Environment":
+def _environment(code: str) -> "Environment":
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -78,8 +86,22 @@ def _environment() -> "Environment":
         lstrip_blocks=True,
     )
     environment.globals |= {"policy": _policy, "asset": _asset, "plotly": _plotly}
-    environment.filters |= {"embedded": embedded, "pieces": _pieces}
+    environment.globals["margin_scale"] = sequential_stops
+    say = language_of(code).say
+    environment.filters |= {
+        "embedded": embedded,
+        "pieces": _pieces,
+        "say": say,
+        # Words of the templates themselves.
+        "words": lambda text: say(phrase(text)),
+        "drawn": partial(_data_url, say),
+    }
     return environment
+
+
+def _data_url(say: Callable[[object], str], draw: "Callable[[], Figure]") -> str:
+    svg = themed_svg(draw, say)
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
 
 
 def _policy(style: str, drawing: str, script: str) -> str:
