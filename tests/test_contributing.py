@@ -99,7 +99,7 @@ def test_every_contract_suite_has_a_row():
     suites = {f"tests/contracts/{path.name}" for path in ROOT.glob("tests/contracts/test_*.py")}
     # What every public object, every call and every result keeps is no matter of a kind.
     general = {"test_names.py", "test_outputs.py", "test_public_objects.py"}
-    general |= {"test_workflow_calls.py", "test_workflow_results.py"}
+    general |= {"test_commands.py", "test_workflow_calls.py", "test_workflow_results.py"}
     assert suites - {f"tests/contracts/{name}" for name in general} <= named
 
 

@@ -68,3 +68,8 @@ def test_the_package_imports_nothing_before_it_is_used():
     found = imported("import elastocal")
     assert not found & (UNUSED | NUMERICAL | {"typer", "rich"})
     assert len(found) <= 120
+
+
+def test_the_package_is_the_program_where_no_script_is_on_the_path():
+    ran = subprocess.run([sys.executable, "-m", "elastocal", "--version"], capture_output=True)
+    assert (ran.returncode, ran.stdout.split()[0]) == (0, b"elastocal")

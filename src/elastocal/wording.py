@@ -68,6 +68,42 @@ def readable(value: float, unit: str) -> str:
     return f"{_three_digits(value * scale)}{name}"
 
 
+def plainly(value: object, unit: str = "") -> str:
+    """Return a value of a JSON-ready record as people read it, numbers of an SI unit with it.
+
+    >>> plainly(["normal", "north"]), plainly([0, 1, 2, 5]), plainly([]), plainly(True)
+    ('normal, north', '0 to 2, 5', 'none', 'yes')
+    >>> plainly({"ok": 150, "slipped": 0}), plainly(None), plainly(0.1738763047742587, "m")
+    ('ok 150, slipped 0', 'none', '174 mm')
+    """
+    if value is None or (isinstance(value, Sequence | Mapping) and not value):
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return listed([f"{name} {plainly(each, unit)}" for name, each in value.items()])
+    if isinstance(value, list | tuple):
+        whole = [each for each in value if isinstance(each, int)]
+        return (
+            spans(whole)
+            if len(whole) == len(value)
+            else listed([plainly(each, unit) for each in value])
+        )
+    return readable(value, unit) if isinstance(value, float) else str(value)
+
+
+def plus_minus(value: float, half: float) -> tuple[str, str]:
+    """Return a value and its half width, both to the second digit of the half width.
+
+    >>> plus_minus(60.02031521, 0.0317), plus_minus(1234.5, 210.0), plus_minus(0.5, 0.0)
+    (('60.020', '0.032'), ('1234', '210'), ('0.5', '0'))
+    """
+    if not (half > 0.0 and math.isfinite(half)):
+        return _three_digits(value), _three_digits(half)
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    return f"{value:.{digits}f}", f"{half:.{digits}f}"
+
+
 def millimetres(point: tuple[float, float, float]) -> str:
     """Return a point in mm.
 

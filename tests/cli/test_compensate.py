@@ -124,6 +124,18 @@ def test_a_program_is_corrected_with_a_table_of_forces(folder):
     assert (folder / "out/job.dat").read_bytes() != plain
 
 
+def test_a_path_is_written_as_a_robot_program_too(folder):
+    part = {name: column[:6] for name, column in (euler_columns(COURSE) | FORCE).items()}
+    write_csv(folder / "part.csv", part)
+    asked = ("--start", start_text(), "--program", "course", "--language", "krl")
+    result = run(folder, *asked, path="part.csv", out="part_out.csv")
+    assert result.code == 0, result.err
+    words = "".join(result.err.split())
+    assert f"program:{folder}/course.src,{folder}/course.dat" in words
+    assert "programcourse:KRL,asaskedfor" in words
+    assert (folder / "course.src").read_text().count("LIN XROW") == 6
+
+
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
@@ -132,6 +144,9 @@ def test_a_program_is_corrected_with_a_table_of_forces(folder):
         (("--start", "0 deg"), "has 1 values"),
         (("--start", ", ".join(["200 deg"] * 6)), "joint_1 at 200 deg is outside its limits"),
         (("--forces", "f.csv"), "are for KUKA programs"),
+        (("--program", "course"), "maker of robot"),
+        (("--language", "krl"), "needs --program NAME"),
+        (("--speed", "0 mm/s"), "must be above 0"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(folder, arguments, why):

@@ -1,6 +1,7 @@
 """`elastocal check` of what codec and study leave behind; damaged ones are refused by name."""
 
 import json
+import re
 
 import pytest
 
@@ -13,6 +14,9 @@ from elastocal.codec.study import (
 )
 from elastocal.errors import SchemaError
 from elastocal.workflows import describe_file
+from elastocal.workflows.check import _UNITS
+from support import reported
+from support.cli import elastocal
 from support.studies import settings, simulate
 
 
@@ -53,3 +57,21 @@ def test_a_row_that_lacks_a_cell_is_refused_by_its_line(study):
     table.write_text("\n".join(lines))
     with pytest.raises(SchemaError, match=r"study\.csv, line 3: 10 cells, not 11"):
         describe_file(table)
+
+
+def test_check_shows_numbers_with_their_units_and_no_more_digits_than_mean_something(study):
+    done = reported.finished()
+    for path in (study, study / "study.json", done / "plan", done / "process", done / "tool.json"):
+        shown = elastocal("check", path)
+        assert shown.code == 0
+        assert not re.search(r"\.0*[1-9]\d{4}|[\[\]{}']", shown.err), shown.err
+    assert re.search(r"covering radius: [\d.]+ mm$", elastocal("check", done / "plan").err, re.M)
+    assert re.search(r"mass: [\d.]+ kg$", elastocal("check", done / "tool.json").err, re.M)
+
+
+def test_every_number_that_is_no_count_has_a_unit(study):
+    done = reported.finished()
+    for path in (study / "study.json", done / "plan", done / "process", done / "tool.json"):
+        holds = describe_file(path)[1]
+        lengths = {name for name, value in holds.items() if isinstance(value, float)}
+        assert lengths <= _UNITS.keys()

@@ -335,7 +335,7 @@ def test_a_device_that_is_not_configured_is_refused_by_name(planned, tmp_path):
 @pytest.mark.parametrize(
     ("section", "message"),
     [
-        ('procedure: {force_limit: "1 kN"}', "procedure.force_limit must be above 1140"),
+        ('procedure: {force_limit: "1 kN"}', "procedure.force_limit must be above 1146"),
         ('procedure: {force_limit: "9 kN"}', "at most 6250 N (range of the sensor), got 9000 N"),
         ('procedure: {stale: "60 ms"}', "must be above two cycles (0.08 s)"),
         ('procedure: {dwell: "100 ms"}', "must be at least four cycles (0.16 s)"),

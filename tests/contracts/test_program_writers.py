@@ -1,21 +1,28 @@
 """What every writer of robot programs keeps, read back by readers that share no code with them."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from elastocal import workflows
 from elastocal.compensation.programs import (
+    BEFORE_PATH,
+    MOST_ROWS,
     PROGRAM_WRITERS,
     TOUCH_SPEED,
+    PathProgram,
     choose_writer,
     plan_program,
     write_plan_program,
     writer_named,
 )
-from elastocal.errors import PlanningError
+from elastocal.errors import FileAccessError, PathError, PlanningError
+from elastocal.identification import write_model
 from elastocal.robot import Robot, catalogue
 from support import plans, urdfs
+from support.paths import euler_columns, force_columns, made_up, read_csv, write_csv
 from support.program_readers import READERS
 
 MODELS = {
@@ -231,6 +238,145 @@ class TestChoice:
         )
         with pytest.raises(PlanningError, match="third axis must turn against its second"):
             choose_writer(robot, "fanuc")
+
+
+def write_path(folder, plan, rows=12):
+    """Write a model and a path of 2 mm steps beside the first pose, pressed; return the poses."""
+    robot = Robot.from_urdf(plan.robot.urdf, "tcp")
+    write_model(folder / "model.json", made_up(robot))
+    pose = plan.poses[0]
+    T = np.tile(pose.T_base_tcp, (rows, 1, 1))
+    T[:, :3, 3] += 2e-3 * np.arange(rows)[:, None] * T[:, :3, 0]
+    force = force_columns(np.tile([50.0, -30.0, -400.0], (rows, 1)), "force_tcp_")
+    rail = {f"{name}[m]": np.full(rows, plans.RAIL_AT) for name in robot.joint_names[:-6]}
+    write_csv(folder / "path.csv", rail | euler_columns(T) | force)
+    return T
+
+
+def compensate(folder, plan, **options):
+    start = ", ".join(
+        f"{value} {'m' if name == 'rail' else 'rad'}"
+        for name, value in zip(plan.robot.joints, plan.poses[0].joints, strict=True)
+    )
+    files = {"path": folder / "path.csv", "out": folder / "corrected.csv"}
+    return workflows.compensate(folder / "model.json", **files, start=start, **options)
+
+
+@pytest.fixture(scope="module")
+def folder(plan, tmp_path_factory):
+    """Return a folder with a path for the case's robot, and its model."""
+    folder = tmp_path_factory.mktemp("path")
+    write_path(folder, plan)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def course(case, plan, folder):
+    """Return the program of that path, corrected."""
+    found = compensate(folder, plan, program="course", language=case[0], speed=0.02)
+    assert {Path(each).stem for each in found.program} == {"course"}
+    return READERS[case[0]]([Path(each) for each in found.program])
+
+
+class TestPath:
+    """The program of a path that `compensate` corrected."""
+
+    def test_it_stops_before_the_first_row_and_goes_straight_through_all(self, course):
+        assert [step[:2] for step in course.steps] == [
+            ("axes", "XBEFORE"),
+            ("stop",),
+            *(("straight", f"XROW{index}") for index in range(1, 13)),
+            ("straight", "XAFTER"),
+        ]
+        assert {round(step[2], 9) for step in course.steps if step[0] == "straight"} == {0.02}
+
+    def test_its_rows_are_the_corrected_path(self, course, plan, folder, case):
+        robot = Robot.from_urdf(plan.robot.urdf, "tcp")
+        wanted = 1e-3 * read_csv(folder / "corrected.csv", "x[mm]", "y[mm]", "z[mm]")
+        programmed = 1e-3 * read_csv(folder / "path.csv", "x[mm]", "y[mm]", "z[mm]")
+        assert np.linalg.norm(wanted - programmed, axis=1).min() > 1e-4
+        for index, position in enumerate(wanted, start=1):
+            target = course.targets[f"XROW{index}"]
+            rail = np.array(target.external[:1]) / 1e3 if case[1] else []
+            T = robot.forward([*rail, *target.arm]) if target.T is None else target.T
+            np.testing.assert_allclose(T[:3, 3], position, rtol=0, atol=2 * MM * MM)
+            np.testing.assert_allclose(
+                T[:3, :3], plan.poses[0].T_base_tcp[:3, :3], rtol=0, atol=DEG
+            )
+
+    def test_the_place_before_it_is_back_along_the_tool(self, course, plan, folder, case):
+        robot = Robot.from_urdf(plan.robot.urdf, "tcp")
+        target = course.targets["XBEFORE"]
+        rail = np.array(target.external[:1]) / 1e3 if case[1] else []
+        back = robot.forward([*rail, *target.arm])
+        first = 1e-3 * read_csv(folder / "corrected.csv", "x[mm]", "y[mm]", "z[mm]")[0]
+        wanted = first - BEFORE_PATH * plan.poses[0].T_base_tcp[:3, 2]
+        np.testing.assert_allclose(back[:3, 3], wanted, rtol=0, atol=2 * MM * MM)
+
+    def test_its_head_says_what_it_is(self, course):
+        told = " ".join(" ".join(course.comments).split())
+        assert "NOT TRIED ON A ROBOT" in told
+        assert "Path path.csv, corrected by elastocal compensate." in told
+        assert "all 12 rows at 20 mm/s" in told
+
+    def test_it_replaces_its_own_and_nothing_else(self, case, plan, folder, course, tmp_path):
+        again = compensate(folder, plan, program="course", language=case[0])
+        assert Path(again.program[0]).stem == course.name
+        write_path(tmp_path, plan)
+        main = writer_named(case[0]).paths(tmp_path, "mine")[0]
+        main.write_text("not ours")
+        with pytest.raises(FileAccessError, match="is there already"):
+            compensate(tmp_path, plan, program="mine", language=case[0])
+
+    def test_a_row_to_which_no_straight_move_leads_leaves_no_file(self, case, plan):
+        robot = Robot.from_urdf(plan.robot.urdf, "tcp")
+        program = PathProgram(robot, writer_named(case[0]), "course")
+        q = np.tile(plan.poses[0].joints, (3, 1))
+        q[2, -1] += np.radians(91.0)
+        with pytest.raises(PathError, match=r"row 2: .* turns by 91\.0 deg from the row before"):
+            program.add(q, robot.forward(q), lambda row: f"row {row}")
+
+    def test_too_many_rows_are_refused(self, case, plan):
+        robot = Robot.from_urdf(plan.robot.urdf, "tcp")
+        program = PathProgram(robot, writer_named(case[0]), "course")
+        q = np.tile(plan.poses[0].joints, (MOST_ROWS, 1))
+        T = np.broadcast_to(plan.poses[0].T_base_tcp, (MOST_ROWS, 4, 4))
+        program.add(q, T, str)
+        with pytest.raises(PathError, match=f"at most {MOST_ROWS} rows"):
+            program.add(q[:1], T[:1], str)
+
+    def test_the_name_is_one_that_the_controller_allows(self, case, plan, folder):
+        with pytest.raises(PlanningError, match="cannot name a"):
+            compensate(folder, plan, program="2nd", language=case[0])
+
+
+class TestPathChoice:
+    """One rule for `plan` and `compensate`."""
+
+    def test_the_maker_of_the_robot_chooses(self, tmp_path):
+        plan = plan_of("urscript")
+        robot = Robot.from_urdf(plan.robot.urdf, "tcp")
+        write_path(tmp_path, plan, rows=2)
+        if choose_writer(robot)[0] is None:
+            with pytest.raises(PlanningError, match="give --language"):
+                compensate(tmp_path, plan, program="course")
+        else:
+            found = compensate(tmp_path, plan, program="course")
+            assert [Path(each).name for each in found.program] == ["course.script"]
+            assert any("URScript, for a robot of Universal Robots" in note for note in found.notes)
+
+    def test_a_language_without_a_name_is_refused(self, tmp_path):
+        plan = plan_of("urscript")
+        write_path(tmp_path, plan, rows=2)
+        with pytest.raises(PlanningError, match="--language rapid needs --program NAME"):
+            compensate(tmp_path, plan, language="rapid")
+
+    def test_no_program_is_written_unasked(self, tmp_path):
+        plan = plan_of("urscript")
+        write_path(tmp_path, plan, rows=2)
+        assert compensate(tmp_path, plan).program == ()
+        assert compensate(tmp_path, plan, program="course", language="none").program == ()
+        assert not list(tmp_path.glob("course.*"))
 
 
 def test_the_words_of_the_head_are_those_of_the_language():

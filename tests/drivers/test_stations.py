@@ -119,3 +119,19 @@ def test_only_the_station_that_was_looked_at_is_read(clock):
     assert looked == ["far"]
     with pytest.raises(DeviceError, match="did you mean 'near'"):
         metrology.look("neer")
+
+
+def test_points_and_breaks_are_counted_once_each(clock):
+    station = feed(clock, silence=0.2)
+    for _ in range(2):
+        station.point(PLACE, SIGMA)
+        station.point(PLACE, SIGMA)
+        station.beam_broken("prism error")
+        station.beam_broken("prism error")
+    station.point(PLACE, SIGMA)
+    clock.sleep(0.3)
+    station.take()
+    station.take()
+    (counts,) = StationsMetrology({"one": station}, 100.0, lambda _: None).lines()
+    assert (counts.received, counts.breaks) == (5, 3)
+    assert counts.device.startswith("tracker at 127.0.0.1:1: ")

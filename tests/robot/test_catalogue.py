@@ -63,6 +63,21 @@ class TestNames:
         assert sum(name in str(refusal.value) for name in ALL) <= 4
         assert str(refusal.value).endswith("(`elastocal robots` lists them)")
 
+    @pytest.mark.parametrize(
+        ("name", "meant"),
+        [
+            ("KR 300", ["KR 300 R2500 ultra", "KR 300 R2700-2"]),
+            ("kr500", ["KR 500 R2800-2"]),
+            ("R3330", ["KR 240 R3330"]),
+            ("universal robots", ["UR10e", "UR20"]),
+        ],
+    )
+    def test_part_of_a_name_or_a_maker_suggests_all_that_it_may_mean(self, name, meant):
+        with pytest.raises(RobotError) as refusal:
+            catalogue.load(name)
+        suggested = [robot for robot in ALL if repr(robot) in str(refusal.value)]
+        assert suggested == meant
+
     def test_a_name_like_none_is_refused_without_the_whole_table(self):
         with pytest.raises(RobotError) as refusal:
             catalogue.load("KR 999")

@@ -129,6 +129,7 @@ def settings(of: PlanResult, **changes: Any) -> RunSettings:
         axes=AxisMotion(np.ones(3), 0.1),
         R_tcp_sensor=np.eye(3),
         force_limit=450.0,
+        force_tolerance=5.0,
         tool_weight=600.0,
         near_contact=NEAR,
         approach_distance=APPROACH,

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.geometry import Positions
-from elastocal.robot import Robot, with_joint_origins
+from elastocal.robot import Robot, catalogue, with_joint_origins
 
 MARKERS = np.array([[0.10, 0.20, 0.30], [0.30, -0.10, 0.20], [-0.10, -0.20, 0.40]])
 
@@ -107,3 +107,46 @@ def weight_torque(robot: Robot, q: np.ndarray, payload: np.ndarray) -> np.ndarra
         rise = (robot.forward(q + to)[:, 2, 3] - robot.forward(q - to)[:, 2, 3]) / (2.0 * step)
         torque[:, joint] -= payload * 9.80665 * rise
     return torque
+
+
+_CHAIN = """<robot name="parallel"><link name="l0"/>{}<link name="tcp"/>
+<joint name="tip" type="fixed"><parent link="l6"/><child link="tcp"/>
+<origin xyz="0 0 0.09"/></joint></robot>"""
+_JOINT = """<link name="l{n}"/><joint name="j{n}" type="revolute"><parent link="l{m}"/>
+<child link="l{n}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>
+<limit lower="-3" upper="3" effort="0" velocity="0"/></joint>"""
+
+
+def chain(*joints: tuple[str, str]) -> Robot:
+    """Return an arm of revolute joints: place in the link before, axis."""
+    parts = [
+        _JOINT.format(n=n, m=n - 1, xyz=xyz, axis=axis) for n, (xyz, axis) in enumerate(joints, 1)
+    ]
+    text = _CHAIN.format("".join(parts)).replace('"l6"/><child', f'"l{len(joints)}"/><child')
+    return Robot.from_urdf(text, "tcp")
+
+
+def kuka() -> Robot:
+    """Return six axes with a spherical wrist."""
+    return catalogue.load("KR 210 R2700-2")
+
+
+def universal() -> Robot:
+    """Return six axes of which the second, third and fourth are parallel."""
+    z, y = "0 0 1", "0 1 0"
+    return chain(
+        ("0 0 0.13", z), ("0 0.14 0", y), ("0 -0.12 0.61", y), ("0 0 0.57", y),
+        ("0 0.12 0", z), ("0 0 0.12", y),
+    )  # fmt: skip
+
+
+def seven_axes() -> Robot:
+    """Return seven axes, each square to the next."""
+    z, y = "0 0 1", "0 1 0"
+    return chain(
+        ("0 0 0.16", z), ("0 0 0.2", y), ("0 0 0.2", z), ("0 0 0.22", y), ("0 0 0.2", z),
+        ("0 0 0.2", y), ("0 0 0.1", z),
+    )  # fmt: skip
+
+
+ARMS = {"spherical wrist": kuka, "parallel axes": universal, "seven axes": seven_axes}

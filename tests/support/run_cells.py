@@ -23,15 +23,15 @@ class PlannedCell:
         return PlannedCell(path, self.plan)
 
 
-def planned_cell(folder: Path, poses: int = 4) -> PlannedCell:
-    """Write the fibre placement cell, its pool and load cases few and its truth kind; plan it."""
-    cell = write_example(folder / "cell", "afp")[0]
+def planned_cell(folder: Path, poses: int = 4, example: str = "afp") -> PlannedCell:
+    """Write an example's cell, its pool and load cases few and its truth kind; plan it."""
+    cell = write_example(folder / "cell", example)[0]
     text = cell.read_text(encoding="utf-8")
     for pattern, replacement in (
-        (r"\n  d_max: .*", f"\n  poses: {poses}"),
+        (r"\n  (d_max|poses): .*", f"\n  poses: {poses}"),
         (r"\n  pool: .*", "\n  pool: 40"),
         (r"\n  preset: .*", "\n  preset: kind"),
-        (r"\n  cases: .*\n  level: .*\n  check: .*", "\n  cases: [normal, north]"),
+        (r"\n  cases: .*(\n  level: .*\n  check: .*)?", "\n  cases: [normal, north]"),
     ):
         text, count = re.subn(pattern, replacement, text)
         assert count == 1, pattern

@@ -25,7 +25,7 @@ from elastocal.sim.workcell import (
     ErrorDraws,
     ErrorScales,
 )
-from elastocal.workflows import ProcessTrial, TrialRuns, run_trial
+from elastocal.workflows import ProcessTrial, TrialRuns, run_loads
 
 SEED = 0
 
@@ -78,7 +78,7 @@ def process(done: Campaign, kind: str, settings: CompensatorSettings, count: int
     """Run some courses of a process without and with the calibrated model's correction."""
     courses = process_courses(kind, done.cell, SEED, None)[:count]
     trial = ProcessTrial(done.cell, done.calibration.calibrated, None, settings, SEED)
-    return run_trial(trial, courses, silent)
+    return run_loads((trial,), courses, (1.0,), silent)[1.0][0]
 
 
 def accuracy(done: Campaign) -> str:

@@ -30,11 +30,11 @@ from elastocal.identification import CalibrateResult
 from elastocal.progress import silent
 from elastocal.records import from_data, record, to_data
 from elastocal.robot import Robot
-from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_trials, tool
+from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_loads, tool
 
 QUOTED = Path(__file__).with_name("process_figures.json")
 KINDS = ("afp", "machining")
-TYPICAL, OTHERS = "typical", ("harsh", "kind")
+TYPICAL, OTHERS = "typical", ("kind", "harsh")
 SEEDS = (1, 2, 3, 4, 5)
 _LOADS = (1.0, 0.5, -1.0)
 
@@ -96,10 +96,11 @@ class ProcessFigures:
 def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
     """Yield every case with what is measured of it, in an order that may be cut anywhere.
 
-    One seed of each truth comes first, and of `typical` all campaigns; then a seed after the other.
+    `typical`, the truth that the README quotes, comes first, its first seed with all campaigns;
+    then a seed of each other truth, their other seeds, and the shorter campaigns.
     """
-    order = [(TYPICAL, 1), (OTHERS[0], 1), (TYPICAL, 2), (OTHERS[1], 1), (TYPICAL, 3)]
-    every = [(preset, seed) for seed in SEEDS for preset in (TYPICAL, *OTHERS)]
+    order = [(TYPICAL, seed) for seed in SEEDS] + [(preset, 1) for preset in OTHERS]
+    every = [(preset, seed) for preset in OTHERS for seed in SEEDS]
     for preset, seed in dict.fromkeys((*order, *every)):
         for kind in KINDS:
             case = Case(kind, preset, seed)
@@ -163,13 +164,14 @@ class Measurement:
         first = models[0].trial
         courses = process.process_courses(case.kind, first.cell, case.seed, None)
         name = process.PROCESSES[case.kind].direction
-        for load in loads:
-            loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
-            some = [each for each in models if load == 1.0 or each.campaign == campaigns[0]]
-            found = run_trials([each.trial for each in some], loaded, silent)
-            for model, runs in zip(some, found, strict=True):
-                model.deviations.append(_deviation(runs.line(name), load))
-                model.deviations.append(_deviation(runs.spatial("3-D"), load))
+        for campaign in campaigns:
+            some = [each for each in models if each.campaign == campaign]
+            asked = loads if campaign == campaigns[0] else loads[:1]
+            found = run_loads([each.trial for each in some], courses, asked, silent)
+            for load, runs in found.items():
+                for model, own in zip(some, runs, strict=True):
+                    model.deviations.append(_deviation(own.line(name), load))
+                    model.deviations.append(_deviation(own.spatial("3-D"), load))
         return [model.figures(case) for model in models]
 
     def _models(self, case: Case, campaign: Campaign) -> Iterator[_Model]:

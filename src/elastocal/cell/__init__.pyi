@@ -38,6 +38,7 @@ from .devices import (
     AskedMetrology as AskedMetrology,
     BeamState as BeamState,
     Clock as Clock,
+    CommandChecks as CommandChecks,
     Devices as Devices,
     ForceSensor as ForceSensor,
     Metrology as Metrology,
@@ -82,6 +83,7 @@ from .identity import (
     fingerprint as fingerprint,
     named_files as named_files,
 )
+from .line_counts import COUNTED as COUNTED, LineCounts as LineCounts, no_lines as no_lines
 from .motion import (
     MotionEntry as MotionEntry,
     axis_speeds as axis_speeds,

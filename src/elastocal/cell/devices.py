@@ -14,13 +14,21 @@ A new driver is one package, ``drivers/NAME``; see `elastocal.cell.rig` and
 docs/how-to/write-a-driver.md.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
 from elastocal.arrays import FloatArray
+from elastocal.cell.line_counts import LineCounts, no_lines
+from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
+
+_UNIT = 1e-6
+"""How far the length of a direction may be from 1."""
 
 
 class Motion(Enum):
@@ -131,6 +139,84 @@ class RobotArm(Protocol):
 
     def stop(self) -> None:
         """Stop at once, in position control. Always allowed."""
+
+
+@dataclass(frozen=True)
+class CommandChecks:
+    """Checks of what an arm is told, before anything is begun; refusals name the arm."""
+
+    source: str
+
+    def require(self, holds: bool, what: str, value: object, allowed: str) -> None:
+        """Refuse a value.
+
+        Raises
+        ------
+        DeviceError
+            Naming it and what is allowed.
+        """
+        if not holds:
+            raise DeviceError(f"{self.source}: {what} is {value}: must be {allowed}")
+
+    def vector(self, what: str, values: FloatArray, size: int) -> FloatArray:
+        """Return finite numbers, shape (size,), as an array of their own.
+
+        Parameters
+        ----------
+        what : str
+            How the message names them.
+        values : ndarray, shape (size,)
+            Finite.
+        size : int
+            How many there must be.
+
+        Raises
+        ------
+        DeviceError
+            If they are not as they must be.
+        """
+        array = np.array(values, dtype=float)
+        fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
+        self.require(fits, what, array.tolist(), f"{size} finite numbers")
+        return array
+
+    def joint_move(
+        self,
+        q: FloatArray,
+        speed: float,
+        names: Sequence[str],
+        limits: tuple[FloatArray, FloatArray],
+    ) -> FloatArray:
+        """Return the target of a joint move, shape (joint,), in rad or m, as an array of its own.
+
+        Raises
+        ------
+        DeviceError
+            If it is beyond a lower or upper limit, or the speed is no part of the axis speeds.
+        """
+        target = self.vector("joint target", q, len(names))
+        for name, value, low, high in zip(names, target, *limits, strict=True):
+            self.require(
+                low <= value <= high, f"joint target {name}", value, f"{low:g} to {high:g}"
+            )
+        self.require(0.0 < speed <= 1.0, "speed", speed, "a part of the axis speeds in (0, 1]")
+        return target
+
+    def line(self, what: str, direction: FloatArray, distance: float, speed: float) -> FloatArray:
+        """Return the direction of a straight move, shape (3,), of length 1 exactly.
+
+        Raises
+        ------
+        DeviceError
+            If it is no unit vector, or distance or speed is not above 0 and finite.
+        """
+        array = self.vector(f"{what} direction", direction, 3)
+        length = float(np.linalg.norm(array))
+        self.require(abs(length - 1.0) <= _UNIT, f"length of the {what} direction", length, "1")
+        finite = "above 0 {} and finite"
+        self.require(0.0 < distance < math.inf, f"{what} distance", distance, finite.format("m"))
+        self.require(0.0 < speed < math.inf, f"{what} speed", speed, finite.format("m/s"))
+        return array / length
 
 
 class Clock(Protocol):
@@ -267,6 +353,7 @@ def close_nothing() -> None:
     """Give nothing back: of devices that hold no line and no thread."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Devices:
     """The devices of a run, with the clock that they share."""
@@ -277,3 +364,5 @@ class Devices:
     clock: Clock
     close: Callable[[], None] = close_nothing
     """Gives lines and threads back, at the end of a run, whatever happened."""
+    lines: Callable[[], tuple[LineCounts, ...]] = no_lines
+    """What was counted on the lines so far; never raises."""

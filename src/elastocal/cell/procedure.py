@@ -308,8 +308,10 @@ class ProcedureSettings(StrictModel):
     contact_compliance: Annotated[TranslationalCompliance, Field(le=10e-6)] = 0.5e-6
     """Lateral movement of the marker under load that is expected without slip (disk, tooling,
     tilt of the tool), in m/N of the load case."""
-    force_tolerance: Annotated[PositiveForce, Field(le=50.0)] = 5.0
-    """Largest distance of the mean force from the load case, in N."""
+    force_tolerance: Annotated[PositiveForce, Field(le=50.0)] | None = None
+    """Largest distance of the mean force from the load case, in N; by default 1 % of the largest
+    load case, at least 5 N. The fit takes the force that was measured, so that this is no error
+    of the reading: it tells an arm that does not do what it is told."""
     force_drift: Annotated[PositiveForceRate, Field(le=50.0)] = 5.0
     """Largest drift of the force over the dwell, in N/s."""
     force_spread: Annotated[PositiveForce, Field(le=50.0)] = 8.0

@@ -29,6 +29,7 @@ from elastocal.cell.devices import (
     SensorStatus,
     close_nothing,
 )
+from elastocal.cell.line_counts import LineCounts, no_lines
 from elastocal.errors import DeviceError
 from elastocal.records import StrictModel
 from elastocal.results import brief_repr
@@ -131,6 +132,7 @@ class RigContext:
     """Of another driver of the rig; None where none has one."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class DeviceSet:
     """What one driver made: at least what was wanted of it."""
@@ -144,6 +146,8 @@ class DeviceSet:
     """Takes the place of the rig's; only where one driver makes everything."""
     close: Callable[[], None] = close_nothing
     """Gives lines and threads back; called once."""
+    lines: Callable[[], tuple[LineCounts, ...]] = no_lines
+    """What was counted on its lines so far; called at any time until `close`, never raises."""
 
 
 class Driver(Protocol):

@@ -1,5 +1,6 @@
 from .main import COMMANDS as COMMANDS, app as app, run as run
 from .options import (
+    CHOICES as CHOICES,
     START_HELP as START_HELP,
     CompensatorFile as CompensatorFile,
     Exclude as Exclude,
@@ -7,6 +8,7 @@ from .options import (
     Force as Force,
     Geometry as Geometry,
     KeyFigures as KeyFigures,
+    Language as Language,
     Marker as Marker,
     NewTool as NewTool,
     NewToolOrFile as NewToolOrFile,
@@ -18,9 +20,11 @@ from .options import (
     ToolFrame as ToolFrame,
     ToolMass as ToolMass,
     Written as Written,
+    choice as choice,
     parse_direction as parse_direction,
     parse_limit as parse_limit,
     parse_loads as parse_loads,
+    robot_names as robot_names,
     split_tools as split_tools,
 )
 from .output import (

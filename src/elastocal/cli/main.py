@@ -52,7 +52,16 @@ class _Commands(TyperGroup):
 
 
 class _Command(TyperCommand):
-    """A command whose numbers are written as those of every file: no ``1_000``."""
+    """A command whose numbers are written as those of every file: no ``1_000``.
+
+    What it writes is named by ``-o``, too, whichever command it is.
+    """
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        for param in self.params:
+            if "--out" in param.opts:
+                param.opts.append("-o")
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse what Python would take for a number and `parse_number` does not."""
@@ -73,35 +82,41 @@ app = typer.Typer(
     cls=_Commands,
     help="In-situ elastic calibration of industrial robots.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
 )
-_ORDER = (
-    "robots", "init", "check", "plan", "run", "simulate", "krc_config", "measure_delay",
-    "derive", "import_", "geometry", "calibrate", "codec", "study", "predict", "tool",
-    "compensate", "stiffness", "export", "simulate_process", "compare", "report", "verify", "demo",
-)  # fmt: skip
-"""The order in which help lists commands: that of the work; others follow by name."""
+_GROUPS = {
+    "Prepare": ("robots", "init", "check", "plan", "study"),
+    "Measure": ("run", "simulate", "krc_config", "measure_delay", "derive", "import_"),
+    "Identify": ("tool", "geometry", "calibrate", "codec"),
+    "Use": ("predict", "compensate", "stiffness", "simulate_process", "export"),
+    "Judge and hand over": ("report", "compare", "verify"),
+    "See all of it": ("demo",),
+}
+"""The order in which help lists commands: that of the work."""
+_OTHERS = "Further commands"
+"""Where help lists commands of no group, by name."""
 
 
 def _found_commands() -> dict[str, Callable[..., None]]:
-    """Return the function of each file in ``commands``, by the name that people type."""
+    """Return the function of each file in ``commands``, by the name that people type.
+
+    Each is added to the program, in its group.
+    """
     names = {module.name for module in pkgutil.iter_modules(commands.__path__)}
-    ordered = [*(name for name in _ORDER if name in names), *sorted(names - set(_ORDER))]
-    package = commands.__name__
-    # A module cannot be named as a word of Python: the command import is in import_.py.
-    plain = {name: name.rstrip("_") for name in ordered}
-    return {
-        command.replace("_", "-"): getattr(
-            importlib.import_module(f"{package}.{name}"), f"_{command}"
-        )
-        for name, command in plain.items()
-    }
+    others = names.difference(*_GROUPS.values())
+    found: dict[str, Callable[..., None]] = {}
+    for group, members in {**_GROUPS, _OTHERS: tuple(sorted(others))}.items():
+        for name in members:
+            module = importlib.import_module(f"{commands.__name__}.{name}")
+            # A module cannot be named as a word of Python: the command import is in import_.py.
+            command = name.rstrip("_")
+            function = found[command.replace("_", "-")] = getattr(module, f"_{command}")
+            app.command(command.replace("_", "-"), cls=_Command, rich_help_panel=group)(function)
+    return found
 
 
 COMMANDS = _found_commands()
-for name, command in COMMANDS.items():
-    app.command(name, cls=_Command)(command)
 
 
 def _version(wanted: bool) -> None:

@@ -1,19 +1,80 @@
 """Options that several commands share, with their help, and small values that people type."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from elastocal.errors import CompensationError, UnitError
 from elastocal.units import parse_number, parse_quantity
 
+_NARROW = 20
+"""Characters that help shows of what an option takes, where a terminal has 80 columns."""
+_TECHNIQUES = (
+    "cover", "ioops", "i_optimal", "random", "exchange-d", "exchange-a", "exchange-e",
+    "exchange-o2", "exchange-o3", "exchange-o4", "exchange-o5",
+)  # fmt: skip
+CHOICES: dict[str, tuple[str, ...]] = {
+    "technique": _TECHNIQUES,
+    "technique or none": (*_TECHNIQUES, "none"),
+    "springs": (
+        "auto", "actuated", "bearing", "bearing-joint", "bearing-ends", "links", "tensor", "gears",
+    ),
+    "process": ("afp", "machining"),
+    "example": ("afp", "machining", "ur20"),
+    "language": ("krl", "rapid", "fanuc", "urscript", "none"),
+    "loss": ("linear", "huber", "cauchy"),
+    "weights": ("none", "sigma"),
+    "free frame": ("none", "load_case", "campaign"),
+    "posture": ("programmed", "stiffest"),
+}  # fmt: skip
+"""What help lists without importing what knows them; tests/contracts/test_commands.py holds it."""
+
+
+def choice(kind: str, help: str, file: bool = False) -> Any:
+    """Return an option that shows its choices, and that a shell completes.
+
+    What is none of them is refused by the workflow, which says what is nearest.
+
+    Parameters
+    ----------
+    kind : str
+        Of `CHOICES`.
+    help : str
+        What the option is for.
+    file : bool, optional
+        Whether a file may be given as well.
+    """
+    names = CHOICES[kind]
+    shown = f"[{'|'.join(names)}]"
+    if file or len(shown) > _NARROW:
+        # Help would break it in the middle of a name.
+        help = f"{help} One of {', '.join(names)}{', or a .yaml file' if file else ''}."
+        shown = "NAME|FILE" if file else "NAME"
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return typer.Option(metavar=shown, autocompletion=complete, help=help)
+
+
+def robot_names(incomplete: str) -> list[str]:
+    """Return the robots of the catalogue that begin with a text, for a shell."""
+    from elastocal.robot import catalogue  # not for help
+
+    return [name for name in catalogue.names() if name.casefold().startswith(incomplete.casefold())]
+
+
 START_HELP = (
     "Posture before the first row, a quantity a joint from base to tip:"
     " '0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg'."
 )
 RobotName = Annotated[
-    str | None, typer.Option(help="URDF file or catalogue name; default: the dataset's own.")
+    str | None,
+    typer.Option(
+        help="URDF file or catalogue name; default: the dataset's own.",
+        autocompletion=robot_names,
+    ),
 ]
 TcpLink = Annotated[
     str | None, typer.Option(help="Link at the tool centre point; default: the dataset's.")
@@ -41,6 +102,10 @@ ToolMass = Annotated[
 ]
 ToolCentre = Annotated[
     str | None, typer.Option(help="Its centre in the new tcp's frame: 'x, y, z' with units.")
+]
+Language = Annotated[
+    str | None,
+    choice("language", "Language of the robot program. Default: that of the robot's maker."),
 ]
 Geometry = Annotated[
     Path | None,

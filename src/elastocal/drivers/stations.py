@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import BeamState, Cell, Clock, PointBlock, Tracker
+from elastocal.cell import BeamState, Cell, Clock, LineCounts, PointBlock, Tracker
 from elastocal.drivers.device_clock import DeviceClock
 from elastocal.errors import DeviceError, nearest
 from elastocal.units import factor
@@ -64,6 +64,13 @@ class StationFeed:
         self._beam, self._note, self._fault = BeamState.BROKEN, "no point has come yet", ""
         self._heard = -np.inf
         self._outside = 0
+        self._points = self._breaks = 0
+
+    @property
+    def counts(self) -> LineCounts:
+        """What was counted so far."""
+        device = f"{self.source}: {self.tracker.name}"
+        return LineCounts(device=device, received=self._points, breaks=self._breaks)
 
     @property
     def clock(self) -> DeviceClock:
@@ -90,11 +97,12 @@ class StationFeed:
                 return
             self._rows.append((time, *position.tolist(), *sigma.tolist()))
             self._heard, self._beam, self._note = now, BeamState.LOCKED, ""
+            self._points += 1
 
     def beam_broken(self, why: str) -> None:
         """Take note that the marker is not seen, and why."""
         with self._lock:
-            self._beam, self._note = BeamState.BROKEN, why
+            self._break_beam(why)
             self._rows.clear()
 
     def fail(self, why: str) -> None:
@@ -120,7 +128,7 @@ class StationFeed:
             if self._fault:
                 raise DeviceError(self._fault)
             if self._beam is BeamState.LOCKED and not now - self._heard <= self._silence:
-                self._beam, self._note = BeamState.BROKEN, "it says nothing"
+                self._break_beam("it says nothing")
             beam, note = self._beam, self._note
             rows = np.array(self._rows, dtype=float).reshape(-1, 7)
             self._rows.clear()
@@ -135,6 +143,10 @@ class StationFeed:
             source=self.source,
             note=note,
         )
+
+    def _break_beam(self, why: str) -> None:
+        self._breaks += self._beam is BeamState.LOCKED
+        self._beam, self._note = BeamState.BROKEN, why
 
     def _require_in_range(self, position: FloatArray) -> None:
         """Refuse a marker that is outside the station's range time after time."""
@@ -208,6 +220,10 @@ class StationsMetrology:
             If something is wrong with the station that measures, or its line.
         """
         return self._feeds[self._station].take()
+
+    def lines(self) -> tuple[LineCounts, ...]:
+        """Return what was counted of each station."""
+        return tuple(feed.counts for feed in self._feeds.values())
 
 
 def require_station(station: str, stations: tuple[str, ...]) -> None:

@@ -1,3 +1,11 @@
+from .accuracy import (
+    AxisErrors as AxisErrors,
+    Blunder as Blunder,
+    ErrorFigures as ErrorFigures,
+    GeometryAccuracy as GeometryAccuracy,
+    PoseAccuracy as PoseAccuracy,
+    accuracy_figures as accuracy_figures,
+)
 from .arm import (
     KINDS as KINDS,
     MOTION as MOTION,
@@ -6,6 +14,14 @@ from .arm import (
     frames as frames,
     motion_terms as motion_terms,
     screws as screws,
+)
+from .denavit_hartenberg import (
+    LINK_NUMBERS as LINK_NUMBERS,
+    TOOL_NUMBERS as TOOL_NUMBERS,
+    LinkNumber as LinkNumber,
+    link_numbers as link_numbers,
+    link_table as link_table,
+    link_transform as link_transform,
 )
 from .ladder import (
     FOLDS as FOLDS,
@@ -17,7 +33,6 @@ from .ladder import (
 from .mistakes import findings as findings, require_own_joints as require_own_joints
 from .model import (
     SCHEMA as SCHEMA,
-    URDF_MARK as URDF_MARK,
     DistanceFigures as DistanceFigures,
     FixedParameter as FixedParameter,
     GeometryModel as GeometryModel,

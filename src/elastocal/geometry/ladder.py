@@ -30,10 +30,15 @@ class RungErrors:
     """Errors of a rung at poses that it was not fitted to."""
 
     rung: str
-    distance: FloatArray
-    """Of each position that is no blunder, shape (point,), in m."""
+    residual: FloatArray
+    """Measured minus expected of each position that is no blunder, in base, shape (point, 3), m."""
     free: int
     """Unknowns that the positions tell apart."""
+
+    @property
+    def distance(self) -> FloatArray:
+        """Its length, shape (point,), in m."""
+        return np.asarray(np.linalg.norm(self.residual, axis=1))
 
 
 @brief_repr
@@ -161,7 +166,7 @@ class _Sums:
         back = np.where(frames, 0.0, -self.values)
         back[free] = np.where(frames[free], 0.0, -self.values[free])
         b = self.b - self.A @ back
-        distance = np.empty(len(self.block))
+        residual = np.empty((len(self.block), 3))
         for k in range(FOLDS):
             train = np.arange(self.count) % FOLDS != k
             G = self.G[train].sum(axis=0)
@@ -170,17 +175,20 @@ class _Sums:
             out = self.block % FOLDS == k
             rows = np.repeat(out, 3)
             left = b[rows] - self.A[np.ix_(rows, free)] @ x
-            distance[out] = np.linalg.norm(left.reshape(-1, 3), axis=1)
-        return RungErrors(rung, distance, len(free))
+            residual[out] = left.reshape(-1, 3)
+        return RungErrors(rung, residual, len(free))
 
     def draws(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Return how far draws of blocks take the unknowns from the fit, (draw, unknown)."""
         free = self.about.free
         there = np.unique(self.block)
+        # At the fit the positions pull as much away from zero as the prior pulls back.
+        prior = self.ridge * self.values
         found = np.zeros((count, len(self.size)))
         for draw in found:
             chosen = rng.choice(there, len(there))
-            x = self._solved(self.G[chosen].sum(axis=0), self.h[chosen].sum(axis=0), free)
+            h = self.h[chosen].sum(axis=0) - prior
+            x = self._solved(self.G[chosen].sum(axis=0), h, free)
             draw[free] = x * self.size[free]
         return found
 

@@ -1,6 +1,7 @@
 """The geometric model of an arm: what a fit found, as a file, and as a URDF."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +18,22 @@ from elastocal.identification import interval
 from elastocal.records import read_json, record
 from elastocal.results import brief_repr
 from elastocal.robot import (
+    BUILT_MARK,
+    ChainJoint,
     Robot,
+    fixed_joint_of,
+    inverse_transform,
     probe_configurations,
     refusals_naming,
     same_joints,
     with_joint_origins,
+    with_tool,
 )
 from elastocal.wording import counted
 
 SCHEMA = "elastocal.geometry/1"
-URDF_MARK = "made by elastocal geometry"
-"""Comment by which a calibrated URDF is known."""
 _OFFSET = MOTION.index("offset")
+_DRAWN_TOOL = "tool_as_drawn"
 _LINE = 1e-2
 """Spread of markers across their line, in m, from which they show a turn."""
 _SAME = 1e-6
@@ -163,21 +168,10 @@ class GeometryModel:
             If it is another arm.
         """
         own, errors = self.robot, self.errors
-        if not same_joints(own, robot):
-            raise GeometryError(
-                f"the geometry is of an arm with the joints {', '.join(own.joint_names)}, not"
-                f" {', '.join(robot.joint_names)}"
-            )
-        some = probe_configurations(own)
-        T_own_tool = np.linalg.inv(own.forward(some)) @ robot.forward(some)
-        if not np.abs(T_own_tool - T_own_tool[0]).max() < _SAME:
-            raise GeometryError(
-                f"the geometry is of another arm than {robot.name}: from {self.tcp} to"
-                f" {robot.tip} it is not the same way at all postures"
-            )
+        T_tcp_tool = self._way_to(robot)
         weight = Payload() if payload is None else payload
-
-        T_tcp_tool = T_own_tool[0] if self.T_tcp_built is None else self.T_tcp_built @ T_own_tool[0]
+        if self.T_tcp_built is not None:
+            T_tcp_tool = self.T_tcp_built @ T_tcp_tool
 
         def stands(q: FloatArray) -> FloatArray:
             torque = joint_torques(own, Positions.unloaded(q, weight))
@@ -186,25 +180,103 @@ class GeometryModel:
 
         return stands
 
-    def calibrated_urdf(self) -> str:
-        """Return the URDF with corrected origins of the joints.
+    def as_drawn(self, robot: Robot) -> Robot:
+        """Return the arm with a robot's tool as its controller knows it.
 
-        Errors of gears and compliances have no place in a URDF: they are left out.
+        Parameters
+        ----------
+        robot : Robot
+            The same arm as drawn, which comes back as it is, or as built by `as_built`.
+
+        Raises
+        ------
+        GeometryError
+            If it is another arm.
         """
-        robot, place = self.robot, self.errors.place
-        corrections = {}
-        for index, joint in enumerate(robot.chain.joints):
-            T = np.eye(4)
-            T[:3, 3] = place[index, :3]
-            T[:3, :3] = Rotation.from_rotvec(place[index, 3:]).as_matrix()
-            offset = self.motion[index, _OFFSET] * joint.axis
-            if joint.revolute:
-                T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(offset).as_matrix()
-            else:
-                T[:3, 3] += T[:3, :3] @ offset
-            corrections[joint.name] = T
-        urdf = with_joint_origins(self.robot_urdf, corrections)
-        return urdf.replace("</robot>", f"  <!-- {URDF_MARK}: {self.provenance} -->\n</robot>")
+        if BUILT_MARK not in robot.urdf:
+            return robot
+        own, T_own_tool = self.robot, self._way_to(robot)
+        if np.abs(T_own_tool - np.eye(4)).max() < _SAME:
+            return own
+        return Robot.from_urdf(with_tool(own.urdf, own.tip, _DRAWN_TOOL, T_own_tool), _DRAWN_TOOL)
+
+    def as_built(self, robot: Robot) -> Robot:
+        """Return an arm with joints where they stand, and with the tcp as built where it is known.
+
+        Errors of gears and compliances have no place in a URDF: they are left out. So is an error
+        of the tcp where that is the link of a moving joint.
+
+        Parameters
+        ----------
+        robot : Robot
+            The same arm as drawn, perhaps with another tool behind this model's tcp.
+
+        Raises
+        ------
+        GeometryError
+            If it is another arm, or its joints' frames lie elsewhere on their axes.
+        """
+        own, T_own_tool, corrections = self.robot, self._way_to(robot), {}
+        joints = robot.chain.joints
+        for index, (joint, described) in enumerate(zip(own.chain.joints, joints, strict=True)):
+            gap = np.abs(joint.placement - described.placement).max()
+            if not (gap < _SAME and np.abs(joint.axis - described.axis).max() < _SAME):
+                raise GeometryError(
+                    f"the geometry is of another description of the arm: the frame of {joint.name}"
+                    " lies elsewhere"
+                )
+            corrections[joint.name] = self._correction(index, joint)
+        tool = fixed_joint_of(robot.urdf, robot.tip)
+        if self.T_tcp_built is not None and tool is not None:
+            corrections[tool] = inverse_transform(T_own_tool) @ self.T_tcp_built @ T_own_tool
+        # Two dashes would end a comment of XML.
+        made = f"{BUILT_MARK}: {self.provenance.replace('--', '- -')}"
+        urdf = with_joint_origins(robot.urdf, corrections)
+        urdf = urdf.replace("</robot>", f"  <!-- {made} -->\n</robot>")
+        return replace(Robot.from_urdf(urdf, robot.tip, robot.base), gravity=robot.gravity)
+
+    def calibrated_urdf(self) -> str:
+        """Return the URDF of the arm as it was built; see `as_built`."""
+        return self.as_built(self.robot).urdf
+
+    def markers_on(self, built: Robot) -> FloatArray:
+        """Return the markers in the tcp of an arm by `as_built`, shape (marker, 3), in m."""
+        q = np.zeros((1, len(built.joint_names)))
+        place = replace(self.errors, motion=self.motion * (np.arange(len(MOTION)) == _OFFSET))
+        T_base_own = frames(self.robot, q, np.zeros_like(q), place).T_base_tcp[0]
+        T = inverse_transform(built.forward(q[0])) @ T_base_own
+        return np.asarray(self.markers @ T[:3, :3].T + T[:3, 3])
+
+    def _correction(self, index: int, joint: ChainJoint) -> FloatArray:
+        """Return where a joint stands in its frame as drawn, its zero included, shape (4, 4)."""
+        T, place = np.eye(4), self.errors.place[index]
+        T[:3, 3] = place[:3]
+        T[:3, :3] = Rotation.from_rotvec(place[3:]).as_matrix()
+        offset = self.motion[index, _OFFSET] * joint.axis
+        if joint.revolute:
+            T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(offset).as_matrix()
+        else:
+            T[:3, 3] += T[:3, :3] @ offset
+        return T
+
+    def _way_to(self, robot: Robot) -> FloatArray:
+        """Return a tool of the same arm, as drawn or as built, in the tcp, shape (4, 4)."""
+        own = self.robot
+        if not same_joints(own, robot):
+            raise GeometryError(
+                f"the geometry is of an arm with the joints {', '.join(own.joint_names)}, not"
+                f" {', '.join(robot.joint_names)}"
+            )
+        if BUILT_MARK in robot.urdf:
+            own = self.as_built(own)
+        some = probe_configurations(own)
+        T_own_tool = np.linalg.inv(own.forward(some)) @ robot.forward(some)
+        if not np.abs(T_own_tool - T_own_tool[0]).max() < _SAME:
+            raise GeometryError(
+                f"the geometry is of another arm than {robot.name}: from {self.tcp} to"
+                f" {robot.tip} it is not the same way at all postures"
+            )
+        return np.asarray(T_own_tool[0])
 
 
 def read_geometry(path: Path) -> GeometryModel:

@@ -22,6 +22,7 @@ _SAME_POSE = 1e-2
 """Joints that differ by less, in rad or m, are of one pose, whatever the payload."""
 _FAR = 100.0
 """In m: no tracker sees as far in a hall."""
+_EXAMPLES = {"angle": "deg", "length": "mm", "mass": "kg", "force": "N"}
 _BEYOND = 0.1
 """Distance beyond a joint's limit, in rad or m, that the limits of a drawing may be wrong by."""
 
@@ -87,6 +88,8 @@ class _Columns:
         self.rows = rows
         self.found: dict[str, tuple[int, str | None]] = {}
         for index, cell in enumerate(header):
+            if not cell.strip():  # numbers of rows, as some programs write them
+                continue
             name, unit = split_column(cell)
             if name in self.found:
                 raise GeometryError(f"column {name!r} stands twice in the header")
@@ -94,14 +97,18 @@ class _Columns:
 
     def numbers(self, name: str, dimension: str, *, blank: bool = False) -> FloatArray:
         """Return the numbers of a column in SI units, shape (row,)."""
+        example = f"{name}[{_EXAMPLES[dimension]}]"
         if name not in self.found:
             raise GeometryError(
-                f"column '{name}[…]' is missing{nearest(name, self.found)}"
-                f" (columns: {', '.join(self.found)})"
+                f"column '{name}[…]' is missing{nearest(name, self.found)}: it is written like"
+                f" '{example}' (columns: {', '.join(self.found)})"
             )
         index, unit = self.found[name]
         if unit is None:
-            raise GeometryError(f"column {name!r} has no unit: it is a {dimension}")
+            raise GeometryError(
+                f"column {name!r} has no unit: it is written like '{example}', whatever the"
+                f" {dimension} is in"
+            )
         column = Column(index, name, unit, factor(unit, dimension))
         values = self.rows.numbers(column, _or_hidden if blank else None)
         # Joints and markers have limits of their own, and hints at their unit.
@@ -131,7 +138,8 @@ def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Position
     kinds = ["angle" if turns else "length" for turns in robot.revolute]
     names = zip(robot.joint_names, kinds, strict=True)
     q = np.column_stack([columns.numbers(name, kind) for name, kind in names])
-    _require_within_limits(q, robot, rows.lines)
+    in_rad = [columns.found[name][1] == "rad" for name in robot.joint_names]
+    _require_within_limits(q, robot, rows.lines, in_rad)
     found = sorted(m[1] for name in columns.found if (m := _MARKER.fullmatch(name)))
     if not found:
         raise GeometryError(
@@ -167,12 +175,14 @@ def _or_hidden(cell: str) -> float:
     return value
 
 
-def _require_within_limits(q: FloatArray, robot: Robot, lines: Sequence[int]) -> None:
+def _require_within_limits(
+    q: FloatArray, robot: Robot, lines: Sequence[int], in_rad: Sequence[bool]
+) -> None:
     low, high = robot.limits.lower - _BEYOND, robot.limits.upper + _BEYOND
     outside = ~((q >= low) & (q <= high) & (np.abs(q) < _FAR))
     for row, joint in np.argwhere(outside)[:1].tolist():
         value, unit = q[row, joint], "rad" if robot.revolute[joint] else "m"
-        degrees = robot.revolute[joint] and low[joint] <= np.radians(value) <= high[joint]
+        degrees = in_rad[joint] and low[joint] <= np.radians(value) <= high[joint]
         raise GeometryError(
             f"row {lines[row]}: {robot.joint_names[joint]} of {value:.4g} {unit} is outside its"
             f" limits{': is it in degrees?' if degrees else ''}"

@@ -18,7 +18,7 @@ from elastocal.wording import Phrase
 LANGUAGES = {"en": "English", "de": "Deutsch", "fr": "Français"}
 """Languages that a report can be written in, by their code."""
 _BETWEEN_NUMBERS = re.compile(r"(?<=\d), (?=[-+−]?\d)")
-_DECIMAL = re.compile(r"(?<![\d.])([-+−]?\d+)\.(\d+)(?![\d.])")
+_DECIMAL = re.compile(r"(?<![\w.])([-+−]?\d*)\.(\d+)(?![\w.])")
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,10 @@ from .collision import (
     is_relative as is_relative,
 )
 from .identity import (
+    BUILT_MARK as BUILT_MARK,
     Gap as Gap,
     link_gap as link_gap,
+    of_one_arm as of_one_arm,
     probe_configurations as probe_configurations,
     same_joints as same_joints,
     tcp_gap as tcp_gap,
@@ -55,6 +57,7 @@ from .transforms import (
 from .urdf import (
     Assumption as Assumption,
     assumptions as assumptions,
+    fixed_joint_of as fixed_joint_of,
     leaf_links as leaf_links,
     parse_urdf as parse_urdf,
     read_chain as read_chain,

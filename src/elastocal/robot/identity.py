@@ -12,6 +12,10 @@ _PROBES, _SEED = 8, 0
 _LENGTH, _ANGLE = 1e-4, 1e-4
 """Largest gap between two descriptions of one robot, in m and rad: on a lever of 2 m it changes a
 deflection by less than a part in ten thousand."""
+BUILT_MARK = "made by elastocal geometry"
+"""Comment by which the URDF of an arm as it was built is known (`elastocal.geometry`)."""
+_BUILT_LENGTH, _BUILT_ANGLE = 2e-2, 2e-2
+"""Largest gap between an arm as drawn and as built, in m and rad."""
 
 
 @dataclass(frozen=True)
@@ -71,3 +75,9 @@ def tcp_gap(a: Robot, b: Robot) -> Gap:
     """Return how far apart two tool centre points are in base, at the same joints."""
     q = probe_configurations(a)
     return Gap.between(a.forward(q), b.forward(q))
+
+
+def of_one_arm(gap: Gap, *robots: Robot) -> bool:
+    """Return whether a gap is that of one arm: none, or where one is as built, its errors."""
+    near = gap.distance <= _BUILT_LENGTH and gap.angle <= _BUILT_ANGLE
+    return gap.closed or (near and any(BUILT_MARK in robot.urdf for robot in robots))

@@ -346,3 +346,15 @@ def _joint_of(
         centre_of_mass=inertia.lever,
         **limits,
     )
+
+
+def fixed_joint_of(urdf: str, link: str) -> str | None:
+    """Return the name of the fixed joint that carries a link; none where a moving one does.
+
+    Raises
+    ------
+    RobotError
+        If the URDF cannot be read.
+    """
+    joint = joints_by_child(parse_urdf(urdf)).get(link)
+    return joint.get("name") if joint is not None and joint.get("type") == "fixed" else None

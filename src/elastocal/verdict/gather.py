@@ -62,6 +62,7 @@ from elastocal.verdict.evidence import (
     check_tool,
     find_doubts,
 )
+from elastocal.wording import phrase
 
 
 @dataclass(frozen=True)
@@ -281,7 +282,7 @@ def _limits(cell: Cell | None, options: EvidenceOptions) -> AcceptanceLimits:
     stated = cell.file.acceptance if cell is not None else None
     drift = options.drift or (stated.drift if stated else None)
     if options.tolerance is not None:
-        return AcceptanceLimits(options.tolerance, drift, "given with --tolerance")
+        return AcceptanceLimits(options.tolerance, drift, phrase("given with --tolerance"))
     if stated is not None and stated.tolerance is not None:
-        return AcceptanceLimits(stated.tolerance, drift, "of the cell file")
+        return AcceptanceLimits(stated.tolerance, drift, phrase("of the cell file"))
     return AcceptanceLimits(None, drift)

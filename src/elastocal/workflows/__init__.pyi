@@ -124,8 +124,7 @@ from .process_trial import (
     ProcessTrial as ProcessTrial,
     TrialRuns as TrialRuns,
     run_budget as run_budget,
-    run_trial as run_trial,
-    run_trials as run_trials,
+    run_loads as run_loads,
 )
 from .report import (
     ReportFigures as ReportFigures,

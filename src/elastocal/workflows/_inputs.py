@@ -25,6 +25,7 @@ from elastocal.robot import (
     Robot,
     T_from_xyzabc,
     catalogue,
+    of_one_arm,
     parse_urdf,
     read_urdf,
     refusals_naming,
@@ -111,7 +112,7 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
             f" cell {name} {', '.join(cell.joint_names)}: they must be the same"
         )
     gap = tcp_gap(model, cell)
-    if not gap.closed:
+    if not of_one_arm(gap, model, cell):
         raise RobotError(
             f"{file}: the same joints lead {np.degrees(gap.angle):.3g}° and"
             f" {1e3 * gap.distance:.3g} mm apart in the model and in cell {name}: another tool"
@@ -167,8 +168,10 @@ class ArmAsBuilt:
     payload_centre: str | None = None
     """Its centre in that model's tcp, ``"x, y, z"`` with units."""
 
-    def unloaded(self, robot: Robot) -> Callable[[FloatArray], FloatArray] | None:
-        """Return where the robot as built stands; none where its geometry is not known.
+    def unloaded(self, robot: Robot) -> tuple[Robot, Callable[[FloatArray], FloatArray] | None]:
+        """Return the arm as its controller knows it, and where it stands as it was built.
+
+        That is none where its geometry is not known; then the controller's is the model's own.
 
         Raises
         ------
@@ -180,12 +183,13 @@ class ArmAsBuilt:
         if self.geometry is None:
             if self.payload is not None or self.payload_centre is not None:
                 raise GeometryError("a payload needs the arm that it bends: give --geometry")
-            return None
+            return robot, None
         from elastocal.geometry import Payload, read_geometry
 
         mass = 0.0 if self.payload is None else parse_quantity(self.payload, "mass")
         x, y, z = (0.0,) * 3 if self.payload_centre is None else parse_point(self.payload_centre)
-        return read_geometry(self.geometry).tool_of(robot, Payload(mass, (x, y, z)))
+        found = read_geometry(self.geometry)
+        return found.as_drawn(robot), found.tool_of(robot, Payload(mass, (x, y, z)))
 
 
 def _require_near(what: str, point: ArrayLike, origin: str) -> None:

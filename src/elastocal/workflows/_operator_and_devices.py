@@ -26,6 +26,7 @@ from elastocal.cell import (
     DeviceSet,
     DeviceSettings,
     Driver,
+    LineCounts,
     RigContext,
     WallClock,
 )
@@ -172,7 +173,11 @@ class Rig:
             _refusals_to_close(made)
             raise
         running = clocks[0] if clocks else clock
-        return Devices(arm, sensor, metrology, running, lambda: _close(made))
+
+        def lines() -> tuple[LineCounts, ...]:
+            return tuple(counts for each in made for counts in each.lines())
+
+        return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
 
     def _only(self, kind: str, made: Sequence[DeviceSet]) -> Any:
         (device,) = (

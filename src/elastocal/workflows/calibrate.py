@@ -33,6 +33,9 @@ from elastocal.robot.inverse import nearest_zero_posture
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
+_SAME_MARKER = 0.03
+"""Distance of a marker from where readings say, in m, within which it is that one."""
+
 __all__ = ["CalibrateResult", "CalibrateSettings", "calibrate"]
 
 
@@ -51,6 +54,9 @@ class CalibrateSettings(FitSettings):
     """Link at the tool centre point; by default the dataset's."""
     tool_frame: str | None = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
+    geometry: Path | None = None
+    """Model file of `geometry` of the same arm: springs are fitted on the arm as built, with the
+    marker where it was found."""
     budget: bool = False
     """State also what the error at left-out poses is made of."""
     process: Path | None = None
@@ -95,6 +101,9 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     made_from = {str(path): content_sha256(each) for path, each in found}
     measured, source = _measured(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
+    if settings.geometry is not None:
+        arm, settings = _as_built(settings, arm, measured)
+        source = f"{source}, on the arm as built of {settings.geometry}"
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
     path = None if settings.process is None else _production(settings.process, arm)
@@ -126,6 +135,28 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+def _as_built(
+    settings: CalibrateSettings, arm: Robot, measured: Dataset
+) -> tuple[Robot, CalibrateSettings]:
+    """Return the arm as built, and settings with the marker where the geometry found it.
+
+    Of several markers on the tool that of the readings is the one within a few centimetres of where
+    they say; an explicit place counts as it is.
+    """
+    from elastocal.geometry import read_geometry
+
+    assert settings.geometry is not None
+    found = read_geometry(settings.geometry)
+    built = found.as_built(arm)
+    markers = found.markers_on(built)
+    if settings.marker is None and measured.marker is not None:
+        apart = np.linalg.norm(markers - np.array(measured.marker), axis=1)
+        if apart.min() < _SAME_MARKER:
+            x, y, z = markers[apart.argmin()].tolist()
+            settings = replace(settings, marker=(x, y, z))
+    return built, settings
 
 
 def _production(path: Path, robot: Robot) -> ProductionPath:

@@ -18,6 +18,7 @@ from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.records import read_arrays, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
+from elastocal.wording import plainly
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
 from elastocal.workflows._inputs import ROBOT_SUFFIXES
@@ -58,6 +59,22 @@ _YAML_KINDS: dict[str, _Describe] = {
 }
 """YAML files likewise."""
 
+_UNITS = {
+    "correction": "m",
+    "covering_radius": "m",
+    "cycle": "s",
+    "delay": "s",
+    "filter_delay": "s",
+    "held_out_mean_m": "m",
+    "limit": "m",
+    "mass": "kg",
+    "max_after": "m",
+    "mean_after": "m",
+    "median_error_m": "m",
+    "rate": "m/s",
+}
+"""SI units of the numbers that files hold, by the key of `CheckResult.holds`."""
+
 _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
     ((PLAN,), lambda folder: kinds.plan_file(folder / PLAN)),
     ((JOURNAL,), kinds.run_folder),
@@ -89,8 +106,20 @@ class CheckResult(Result):
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
-        held = ((name.replace("_", " "), brief(value)) for name, value in self.holds.items())
+        held = ((name, brief(text)) for name, text in self.lines())
         return (("file", self.file), ("kind", self.kind), *held)
+
+    def lines(self) -> tuple[tuple[str, str], ...]:
+        """Return all that the file holds for a person: pairs of a label and its text."""
+        return tuple(
+            (_label(name), plainly(value, _UNITS.get(name, "")))
+            for name, value in self.holds.items()
+        )
+
+
+def _label(name: str) -> str:
+    """Return a key as people read it; its unit stands behind the number."""
+    return name.removesuffix("_m").replace("_", " ")
 
 
 @workflow(CheckSettings)

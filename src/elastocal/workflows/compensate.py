@@ -11,13 +11,21 @@ from elastocal.compensation.offline import (
     CorrectionSummary,
     compensate_path,
 )
-from elastocal.compensation.programs import PROGRAM_READERS, compensate_program
-from elastocal.errors import FileAccessError
+from elastocal.compensation.programs import (
+    LIN_SPEED,
+    NO_PROGRAM,
+    PROGRAM_READERS,
+    PathProgram,
+    choose_writer,
+    compensate_program,
+)
+from elastocal.errors import FileAccessError, PlanningError
 from elastocal.identification import PredictionDoubt, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
 from elastocal.robot import Robot
+from elastocal.templating import plain
 from elastocal.workflows._inputs import (
     ArmAsBuilt,
     NewTool,
@@ -27,6 +35,9 @@ from elastocal.workflows._inputs import (
     write_posture,
 )
 from elastocal.workflows._workflow import workflow
+
+_PROGRAM_MARKS = ("NOT TRIED ON A ROBOT", "DECL E6AXIS XBEFORE=")
+"""How robot programs of ours are known: by their head, KRL's positions by the first."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +58,12 @@ class CompensateSettings(NewTool, ArmAsBuilt):
     """Posture before the first row, a quantity a joint from base to tip."""
     largest: float = LARGEST_DEFLECTION
     """Largest deflection that is taken for one, in m."""
+    program: str | None = None
+    """Name of a robot program of a path, to be written beside ``out``; none: no program."""
+    language: str | None = None
+    """Its language; by default that of the robot's maker."""
+    speed: float = LIN_SPEED
+    """Speed of the tool along the path in that program, in m/s."""
     force: bool = False
     """Replace a file that is no former output of this command."""
 
@@ -64,6 +81,8 @@ class CompensateResult(Result, CorrectionFigures):
     model does not know where that was."""
     doubt: PredictionDoubt | None = None
     """How sure the predictions along the path are; none where no row has a load."""
+    program: tuple[str, ...] = ()
+    """Files of the robot program that was written, the main one first."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -87,7 +106,7 @@ class CompensateResult(Result, CorrectionFigures):
         )
 
 
-@workflow(CompensateSettings, marks=("deflection_x_low[m]",))
+@workflow(CompensateSettings, marks=("deflection_x_low[m]", *_PROGRAM_MARKS))
 def compensate(settings: CompensateSettings, progress: Progress) -> CompensateResult:
     """Correct a programmed path so that the loaded tool is where it was programmed.
 
@@ -104,6 +123,8 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         If the path or program is not understood, or a row cannot be corrected; by its line.
     RobotError, UnitError
         If ``start`` or ``base`` does not fit.
+    PlanningError
+        If no program can be written of this robot, name, language or speed.
     FileAccessError
         If a file cannot be read or written, is an input, or does not belong to this kind of path.
     """
@@ -111,21 +132,29 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     is_program = path.suffix.lower() in PROGRAM_READERS
     if is_program != (settings.out.suffix.lower() in PROGRAM_READERS):
         raise FileAccessError(f"--out {settings.out} must end in {path.suffix} like {path}")
+    if settings.program is None and settings.language is not None:
+        raise PlanningError(f"--language {settings.language} needs --program NAME")
+    if is_program and settings.program is not None:
+        raise FileAccessError(f"--program is for paths (.csv), {path} is a program already")
     if not is_program and (forces or settings.base):
         raise FileAccessError(f"--forces and --base are for KUKA programs (.src), not for {path}")
     calibrated = settings.read_model(Path(settings.model))
     robot = calibrated.model.robot
     start = parse_posture(robot, settings.start)
-    how = CorrectionSettings(start, settings.largest, settings.unloaded(robot))
+    controller, unloaded = settings.unloaded(robot)
+    how = CorrectionSettings(start, settings.largest, unloaded, controller)
     if is_program:
         if forces is None:
             raise FileAccessError(f"{path} has no forces: name a table of them with --forces")
         T_base_frame = None if settings.base is None else parse_frame(settings.base)
         found = compensate_program(calibrated, path, forces, settings.out, how, T_base_frame)
         summary, notes = found.summary, found.notes
+        program: PathProgram | None = None
     else:
-        summary = compensate_path(calibrated, path, settings.out, how, progress)
-        notes = _path_notes(summary, robot, settings.start)
+        program, reason = _program_of(settings, robot)
+        hear = None if program is None else program.add
+        summary = compensate_path(calibrated, path, settings.out, how, progress, hear)
+        notes = (*_path_notes(summary, robot, settings.start), *reason)
     figures = summary.figures()
     further = (*_force_notes(summary), *_covered(summary))
     return CompensateResult(
@@ -134,7 +163,27 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         notes=(*_built(settings), *coverage_notes(calibrated), *notes, *further),
         coverage=summary.coverage,
         doubt=summary.doubt,
+        program=() if program is None else _written(program, settings),
     )
+
+
+def _program_of(
+    settings: CompensateSettings, robot: Robot
+) -> tuple[PathProgram | None, tuple[str, ...]]:
+    """Return the program to be filled, and in which language it is, if one is asked for."""
+    if settings.program is None or (settings.language or "").casefold() == NO_PROGRAM:
+        return None, ()
+    writer, reason = choose_writer(robot, settings.language)
+    if writer is None:
+        raise PlanningError(reason)
+    program = PathProgram(robot, writer, settings.program, settings.speed)
+    return program, (f"program {settings.program}: {reason}",)
+
+
+def _written(program: PathProgram, settings: CompensateSettings) -> tuple[str, ...]:
+    fact = f"Path {plain(settings.path.name)}, corrected by elastocal compensate."
+    robot = f"Robot: {plain(program.robot.name)}."
+    return tuple(str(each) for each in program.write(settings.out.parent, fact, robot))
 
 
 def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from elastocal.files import write_text
 from elastocal.geometry import (
-    URDF_MARK,
     GeometryModel,
     GeometryProblem,
     climb,
@@ -18,6 +17,7 @@ from elastocal.geometry import (
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result, brief_repr
+from elastocal.robot import BUILT_MARK
 from elastocal.units import parse_point
 from elastocal.wording import counted
 from elastocal.workflows._inputs import find_robot
@@ -73,7 +73,7 @@ class GeometryResult(Result):
         )
 
 
-@workflow(GeometrySettings, outputs=("out", "urdf"), marks=("elastocal.geometry/", URDF_MARK))
+@workflow(GeometrySettings, outputs=("out", "urdf"), marks=("elastocal.geometry/", BUILT_MARK))
 def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     """Find the geometric errors of an arm, and what it yields under its weight and payloads.
 

@@ -100,11 +100,11 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     model, rows = Path(settings.model), Path(settings.rows)
     calibrated = settings.read_model(model)
     robot = calibrated.model.robot
-    unloaded = settings.unloaded(robot)
+    controller, unloaded = settings.unloaded(robot)
     with in_file(rows):
         table = PathTable.open(rows, lambda header: find_columns(header, robot, poses=False))
         loads = table.rows()
-        T_base_tcp = robot.forward(loads.joints)
+        T_base_tcp = controller.forward(loads.joints)
         wrench = loads.wrench_in_base(T_base_tcp)
         prediction = calibrated.predict(loads.joints, *wrench, loads.names("visit"))
         misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None

@@ -21,9 +21,13 @@ from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.sim.workcell import ProcessCell
 
-__all__ = ["ProcessTrial", "TrialRuns", "run_budget", "run_trial", "run_trials"]
+__all__ = ["ProcessTrial", "TrialRuns", "run_budget", "run_loads"]
 _ZEROING = 250
 """Readings in the air that a sensor is zeroed by when no tool file says its bias."""
+_ALIKE = 0.5
+"""Rows of a course over those of the longest beside it, at least."""
+_TOGETHER = 32
+"""Most courses that a process runs at once: more take more memory, and no less time each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,21 +135,13 @@ class TrialRuns:
         return [process.CourseDeviation.of(seed, before, after) for before, after in pairs]
 
 
-def run_trial(trial: ProcessTrial, courses: tuple[Course, ...], progress: Progress) -> TrialRuns:
-    """Run courses without and with correction.
-
-    Raises
-    ------
-    DeviceError, EquilibriumError
-        If the cell cannot be simulated, or not under these forces.
-    """
-    return _run_courses((trial,), courses, False, progress)[0]
-
-
-def run_trials(
-    trials: Sequence[ProcessTrial], courses: tuple[Course, ...], progress: Progress
-) -> list[TrialRuns]:
-    """Run courses once without correction, and with that of each trial.
+def run_loads(
+    trials: Sequence[ProcessTrial],
+    courses: tuple[Course, ...],
+    loads: Sequence[float],
+    progress: Progress,
+) -> dict[float, list[TrialRuns]]:
+    """Run courses under shares of their force, once without correction and with that of each trial.
 
     Parameters
     ----------
@@ -153,15 +149,34 @@ def run_trials(
         Of one cell, seed and controller, with settings that sample alike; their models differ.
     courses : tuple of Course
         The process.
+    loads : sequence of float
+        Shares of the force; see `process.at_load`.
     progress : callable
         Told how many courses are done.
+
+    Returns
+    -------
+    dict
+        Runs of each trial, by load.
 
     Raises
     ------
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     """
-    return _run_courses(trials, courses, False, progress)
+    loaded = [
+        course if load == 1.0 else process.at_load(course, load)
+        for load in loads
+        for course in courses
+    ]
+    found, count = _run_courses(trials, loaded, False, progress), len(courses)
+    return {
+        load: [
+            TrialRuns(runs.before[n * count :][:count], runs.after[n * count :][:count])
+            for runs in found
+        ]
+        for n, load in enumerate(loads)
+    }
 
 
 def run_budget(
@@ -190,7 +205,7 @@ def _run_effect(
 
 def _run_courses(
     trials: Sequence[ProcessTrial],
-    courses: tuple[Course, ...],
+    courses: Sequence[Course],
     exact: bool,
     progress: Progress,
     stage: str = "courses",
@@ -201,34 +216,63 @@ def _run_courses(
     place of the model's.
     """
     runs: dict[int, list[CourseRun]] = {}
-    # The longest first, or the last one would be run while the other processes wait.
-    order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
     progress(stage, 0, len(courses))
-    run = partial(_run_course, trials, zeroed_at=courses[0].q[0], exact=exact)
-    processes = process_count(trials[0].jobs, len(courses))
-    found = map_in_processes(run, [courses[number] for number in order], processes)
-    for number, each in zip(order, found, strict=True):
-        runs[number] = each
+    together = _side_by_side(courses, trials[0].jobs)
+    run = partial(_run_side_by_side, trials, zeroed_at=courses[0].q[0], exact=exact)
+    tasks = [[courses[number] for number in numbers] for numbers in together]
+    found = map_in_processes(run, tasks, process_count(trials[0].jobs, len(tasks)))
+    for numbers, each in zip(together, found, strict=True):
+        runs |= zip(numbers, each, strict=True)
         progress(stage, len(runs), len(courses))
     before, *corrected = zip(*(runs[number] for number in range(len(courses))), strict=True)
     return [TrialRuns(before, after) for after in corrected]
 
 
-def _run_course(
-    trials: Sequence[ProcessTrial], course: Course, *, zeroed_at: FloatArray, exact: bool
-) -> list[CourseRun]:
-    """Return a course without and with each correction; courses know nothing of one another."""
+def _side_by_side(courses: Sequence[Course], jobs: int | None) -> list[list[int]]:
+    """Return which courses are run at once: a share for each process, longest first.
+
+    A short course waits for the longest beside it, so none has less than half of its rows.
+    """
+    order = sorted(range(len(courses)), key=lambda number: -len(courses[number].q))
+    batches: list[list[int]] = []
+    shares = process_count(jobs, len(courses))
+    for number in order:
+        course, first = courses[number], courses[batches[-1][0]] if batches else None
+        alike = first is not None and (
+            course.step == first.step and len(course.q) >= _ALIKE * len(first.q)
+        )
+        if alike and len(batches[-1]) < shares * _TOGETHER:
+            batches[-1].append(number)
+        else:
+            batches.append([number])
+    return [batch[n::shares] for batch in batches for n in range(min(shares, len(batch)))]
+
+
+def _run_side_by_side(
+    trials: Sequence[ProcessTrial],
+    courses: Sequence[Course],
+    *,
+    zeroed_at: FloatArray,
+    exact: bool,
+) -> list[list[CourseRun]]:
+    """Return each course without and with each correction; runs know nothing of one another."""
     first = trials[0]
     truth, robot = ProcessCell(first.cell, first.seed), first.cell.robot
-    correctors = [
-        _perfect(trial.settings) if exact else _corrector(trial, truth, zeroed_at)
-        for trial in trials
-    ]
-    air = process.air_shifts(truth, course)
-    return [
-        process.run_course(truth, robot, course, air, first.clocked, corrector)
-        for corrector in (None, *correctors)
-    ]
+    designs = [] if exact else [_compensator(trial, truth, zeroed_at) for trial in trials]
+    airs: dict[str, FloatArray] = {}
+    passages = []
+    for course in courses:
+        if course.name not in airs:
+            airs[course.name] = process.air_shifts(truth, course)
+        correctors: list[process.Corrector] = (
+            [_perfect(trial.settings) for trial in trials]
+            if exact
+            else [process.ModelCorrector(each) for each in designs]
+        )
+        air = airs[course.name]
+        passages += [process.Passage(course, air, each) for each in (None, *correctors)]
+    runs, count = process.run_courses(truth, robot, passages, first.clocked), 1 + len(trials)
+    return [runs[n * count :][:count] for n in range(len(courses))]
 
 
 def _perfect(settings: CompensatorSettings) -> process.Corrector:
@@ -238,9 +282,9 @@ def _perfect(settings: CompensatorSettings) -> process.Corrector:
     return process.PerfectCorrector(round(late / cycle), (filters.lead or 0.0) / cycle)
 
 
-def _corrector(trial: ProcessTrial, truth: ProcessCell, zeroed_at: FloatArray) -> process.Corrector:
+def _compensator(trial: ProcessTrial, truth: ProcessCell, zeroed_at: FloatArray) -> Compensator:
     load = trial.load or _zeroed(trial.cell, truth, zeroed_at)
-    return process.ModelCorrector(Compensator.of(trial.model, trial.settings, load))
+    return Compensator.of(trial.model, trial.settings, load)
 
 
 def _zeroed(cell: Cell, truth: ProcessCell, q: FloatArray) -> SensorLoad:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal import procedure
-from elastocal.cell import Cell, Devices, certificate_of, load_cell, unstated
+from elastocal.cell import Cell, Devices, LineCounts, certificate_of, load_cell, unstated
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan
@@ -87,6 +87,8 @@ class RunFigures:
     warnings: tuple[str, ...]
     problem: str | None
     """Why nothing was derived of a run that is done."""
+    lines: tuple[LineCounts, ...] = ()
+    """What was counted on the lines of the devices in this session; none of simulated ones."""
 
     def counts(self) -> str:
         """Return the number of readings of each status, as a phrase."""
@@ -338,6 +340,7 @@ def _figures(
         dataset=str(job.folder.dataset) if summary is not None else None,
         warnings=tuple(job.warnings if summary is None else summary.warnings),
         problem=str(problem) if problem is not None else None,
+        lines=entries[-1].lines,
     )
 
 

@@ -24,7 +24,7 @@ from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
-from elastocal.workflows.process_trial import ProcessTrial, TrialRuns, run_budget, run_trial
+from elastocal.workflows.process_trial import ProcessTrial, TrialRuns, run_budget, run_loads
 
 __all__ = [
     "PROGRAMMED",
@@ -202,16 +202,15 @@ class _SeedRuns:
         """Run the courses of a seed, at every load."""
         name = f"seed {trial.seed}"
         if self.settings.posture == STIFFEST:
-            self.unturned.add(name, run_trial(trial, courses, progress))
+            found = run_loads((trial,), courses, (1.0,), progress)
+            self.unturned.add(name, found[1.0][0])
             self.stiffest = process.stiffest_posture(self.trials[0].model, self.cell, courses)
             courses = self.stiffest.courses
         self.programmed = self.programmed or courses
+        found = run_loads((trial,), courses, tuple(self.loads), progress)
         for load, lines in self.loads.items():
-            loaded = courses if load == 1.0 else tuple(process.at_load(c, load) for c in courses)
-            found = run_trial(trial, loaded, progress)
-            lines.add(name, found)
-            if load == 1.0:
-                self.deviations += found.deviations(trial.seed)
+            lines.add(name, found[load][0])
+        self.deviations += found[1.0][0].deviations(trial.seed)
         if self.settings.budget and not self.budget:
             self.budget = run_budget(trial, courses, progress)
 

@@ -1,6 +1,6 @@
 """The loop with a cell whose answer is known: a spring of 1 N/µm in every direction."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,9 +8,10 @@ import pytest
 from elastocal.compensation.process import (
     Controller,
     Course,
+    Passage,
     PerfectCorrector,
     air_shifts,
-    run_course,
+    run_courses,
 )
 from elastocal.compensation.process.course import Ripple
 from elastocal.errors import CompensationError
@@ -43,8 +44,8 @@ class Spring:
         return np.broadcast_to([0.0, 0.0, -1e-3], (*q.shape[:-1], 3))
 
     def press(self, q, force, path_base=None, outward_base=None):  # noqa: ARG002
-        self.joints.append(q)
-        felt = np.concatenate([force, np.zeros(3)])
+        self.joints.append(q[0])
+        felt = np.concatenate([force, np.zeros_like(force)], axis=-1)
         return Pressed(self.free_shift(q) + COMPLIANCE * force, felt + 5.0, felt)
 
     def read(self, since, wrench):  # noqa: ARG002
@@ -75,7 +76,8 @@ def course(force: np.ndarray, ripple: tuple[Ripple, ...] = ()) -> Course:
 
 def run(controller, corrector, force=None, ripple=()):
     cell, made = Spring(), course(np.linspace(0.0, 500.0, 26) if force is None else force, ripple)
-    return run_course(cell, robot(), made, air_shifts(cell, made), controller, corrector), cell
+    passage = Passage(made, air_shifts(cell, made), corrector)
+    return run_courses(cell, robot(), [passage], controller)[0], cell
 
 
 def test_without_correction_the_deviation_is_the_deflection_without_the_sag():
@@ -107,6 +109,32 @@ def test_a_lag_leaves_the_slope_times_its_time_constant():
     cycle = 0.004
     steady = cycle * np.exp(-cycle / lag) / (1.0 - np.exp(-cycle / lag))
     np.testing.assert_allclose(passage.deviation[-20:], COMPLIANCE * 500.0 * steady, rtol=1e-3)
+
+
+def test_courses_side_by_side_are_run_as_each_alone():
+    forces = [np.linspace(0.0, 500.0, 26), np.linspace(0.0, -300.0, 9), np.full(14, 200.0)]
+    ripples = [(), (Ripple(100.0, 0.5),), ()]
+    correctors = [None, PerfectCorrector(2), PerfectCorrector(4, lead=3.0)]
+    delayed = Controller(dead_cycles=3, lag=0.01)
+    courses = [course(force, ripple) for force, ripple in zip(forces, ripples, strict=True)]
+    cell = Spring()
+    passages = [
+        Passage(made, air_shifts(cell, made), corrector)
+        for made, corrector in zip(courses, correctors, strict=True)
+    ]
+    found = run_courses(cell, robot(), passages, delayed)
+    for each, passage in zip(found, passages, strict=True):
+        (alone,) = run_courses(cell, robot(), [passage], delayed)
+        assert len(alone.time) == 10 * (len(passage.course.q) - 1)
+        np.testing.assert_allclose(each.shift, alone.shift, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(each.deviation, alone.deviation, rtol=0.0, atol=1e-12)
+
+
+def test_courses_at_other_steps_of_time_cannot_go_side_by_side():
+    cell, made = Spring(), course(np.full(6, 100.0))
+    both = [Passage(each, air_shifts(cell, each)) for each in (made, replace(made, step=0.02))]
+    with pytest.raises(CompensationError, match="same step of time"):
+        run_courses(cell, robot(), both, Controller())
 
 
 def test_the_robot_is_commanded_to_where_the_correction_says():

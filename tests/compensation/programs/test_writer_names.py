@@ -2,8 +2,9 @@
 
 import pytest
 
-from elastocal.compensation.programs import KrlWriter, plain
+from elastocal.compensation.programs import KrlWriter
 from elastocal.errors import PlanningError
+from elastocal.templating import plain
 
 
 @pytest.mark.parametrize("name", ["calib", "_x", "Plan_2", 20 * "Z"])

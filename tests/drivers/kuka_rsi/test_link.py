@@ -184,3 +184,13 @@ def test_what_the_thread_caught_is_raised_at_the_next_call():
     with pytest.raises(DeviceError, match="the link broke: planted"):
         link.require()
     link.close()
+
+
+def test_the_counts_of_a_run_are_those_of_the_link():
+    link, _ = make()
+    for ipoc in (1000, 1004, 1016, 900_000):
+        link.answer(rob(ipoc), CONTROLLER)
+    counts = link.statistics().counts(3, link.source)
+    assert (counts.received, counts.lost, counts.jumps, counts.saturated) == (4, 2, 1, 3)
+    assert counts.device == f"kuka_rsi {ROBOT}"
+    assert counts.answer is not None

@@ -175,3 +175,13 @@ def test_whatever_comes_is_taken_or_refused(datagrams):
         return
     assert np.all(np.isfinite(block.force))
     assert np.all(np.diff(block.time) > 0.0)
+
+
+def test_what_is_wrong_with_the_stream_is_counted(stream):
+    stream.send()
+    stream.send(rdt=4)
+    stream.send(status=0x80020000)
+    stream.sensor.received(b"nonsense")
+    (counts,) = stream.sensor.lines()
+    assert (counts.received, counts.lost, counts.saturated, counts.malformed) == (3, 3, 1, 1)
+    assert counts.status == ("0x80020000: error, gauge saturated",)

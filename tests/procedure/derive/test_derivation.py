@@ -4,10 +4,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elastocal.cell import fingerprint, load_cell
+from elastocal.cell import LineCounts, fingerprint, load_cell
 from elastocal.dataset import read
 from elastocal.errors import DatasetError, ElastocalError, ProcedureError, SchemaError
-from elastocal.procedure import RunFolder, derive_run, read_journal, write_derived
+from elastocal.procedure import (
+    Event,
+    Journal,
+    RunFolder,
+    derive_run,
+    read_journal,
+    write_derived,
+)
 from elastocal.procedure.derive.derivation import DerivedRun
 from elastocal.procedure.record import ReadingStatus, Window
 from elastocal.records import to_data
@@ -332,3 +339,21 @@ def test_what_was_changed_in_the_folder_since_is_refused_by_name(tmp_path, chang
     with pytest.raises(SchemaError) as caught:
         derive_run(run.path)
     assert str(caught.value).startswith(f"{changed} is not what the run wrote: its SHA-256 is ")
+
+
+def test_counts_of_the_lines_are_those_of_all_sessions(tmp_path):
+    made = record_run(tmp_path / "run")
+    with Journal(RunFolder(made.path).journal) as journal:
+        for lost in (1, 2):
+            box = LineCounts(device="box", received=10, lost=lost)
+            others = (LineCounts(device="tracker", received=5, breaks=1),) * (lost == 1)
+            journal.write(1e4, Event.FINISH, lines=(box, *others))
+    lines = derive_run(made.path).summary.lines
+    assert [(each.device, each.received, each.lost) for each in lines] == [
+        ("box", 20, 3),
+        ("tracker", 5, 0),
+    ]
+
+
+def test_a_run_without_lines_says_nothing_of_them(derived):
+    assert derived.summary.lines == ()

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from elastocal.cell import LineCounts
 from elastocal.errors import FileAccessError
 from elastocal.procedure import Event, RunEnd, read_journal
 from elastocal.procedure.record import ReadingStatus, read_commits
 from elastocal.procedure.run.steps import ArmLocation
 from support import fake_faults as fault
+from support.fake_devices import FakeCell
 from support.fake_faults import when
 from support.fake_runs import FakeRun, MemoryRecorder, plan, replace
 
@@ -391,3 +393,12 @@ def test_the_presses_of_a_pose_that_is_tried_again_are_in_order_in_time(conditio
         names = [window.load_case for window in log.windows]
         assert names == [None, "conditioning", "light_contact", "normal", None]
         assert sorted(window.start for window in log.windows) == [w.start for w in log.windows]
+
+
+def test_the_end_of_a_session_holds_what_was_counted_on_the_lines(run, monkeypatch):
+    counts = (LineCounts(device="box", received=3, late=1),)
+    made = FakeCell.devices.fget
+    with_lines = property(lambda cell: replace(made(cell), lines=lambda: counts))
+    monkeypatch.setattr(FakeCell, "devices", with_lines)
+    run.start()
+    assert read_journal(run.journal)[-1].lines == counts

@@ -25,9 +25,10 @@ from elastocal.verdict import (
     reading_findings,
 )
 
-cell, poses, readings, instruments, compliances, codecs, process, _, provenance, not_verified = (
-    SECTIONS
-)
+(
+    in_full, uncertainty, cell, poses, readings, instruments, compliances, codecs, process, _,
+    provenance, not_verified,
+) = SECTIONS  # fmt: skip
 
 
 def words(section, parts):
@@ -81,8 +82,8 @@ def test_poses_stand_with_their_places_and_the_other_technique(parts):
     assert "ioops (not used)" in text
     x = 1e3 * parts.plan.poses[0].tcp_position[0]
     assert f"{x:.1f}" in text
-    data = poses.body(parts).data
-    assert len(data["postures"]) == len(parts.plan.poses) + 1
+    scene = poses.body(parts).scene
+    assert len(scene.view.places) == len(parts.plan.poses) + 1
     assert str(parts.plan.cell.file).rpartition("/")[0] not in text
 
 
@@ -349,3 +350,11 @@ def test_only_what_is_essential_holds_back_when_it_is_missing(parts, absence, ho
 
 def test_doubts_hold_back(parts):
     assert findings(missing_findings, replace(parts, missing=(), doubts=("odd",))) == ["odd"]
+
+
+def test_an_inspector_sees_what_was_counted_on_the_lines(parts):
+    assert "lines of the devices" not in words(readings, parts)
+    line = {"device": "kuka_rsi <arm>", "received": 7, "lost": 4, "status": ["cut"]}
+    text = words(readings, with_summary(parts, lines=[line | {"answer": [2e-4, 1e-3, 5e-3]}]))
+    assert "What was counted on the lines of the devices" in text
+    assert "kuka_rsi &lt;arm&gt; 7 4 0 0 0 0 0 0 0 cut 0.20 / 1.00 / 5.00" in text

@@ -89,3 +89,28 @@ def test_readings_end_at_the_range_of_the_sensor(q):
     assert cell.read(np.zeros(1), np.full((1, 6), 1e6))[0].tolist() == [
         2500.0, 2500.0, 6250.0, 400.0, 400.0, 400.0,
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("preset", ["typical", "harsh"])
+def test_runs_side_by_side_are_where_each_alone_is(q, preset):
+    described = example_cell("afp", simulation={"preset": preset})
+    courses, loads = ["a", "b", "a"], [0.4, 1.0, -0.6]
+    way = q + np.linspace(0.0, 0.05, 4)[:, None, None] * np.ones((3, 1))
+    path = ProcessCell(described, 2)._statics.robot.forward(way)[..., :3, 3]
+    many = ProcessCell(described, 2)
+    many.lift(courses, way[0])
+    force = np.multiply.outer(loads, FORCE)
+    share = np.array([0.3, 1.0, 0.2, 0.8])[:, None, None]
+    found = [many.press(*row) for row in zip(way, share * force, path, strict=True)]
+    time = np.linspace(0.1, 0.2, 5)
+    read = many.read(time, np.repeat(found[-1].wrench[:, None], 5, axis=1))
+    for run, course in enumerate(courses):
+        cell = ProcessCell(described, 2)
+        cell.lift(course, way[0, run])
+        for row, each in enumerate(found):
+            alone = cell.press(way[row, run], share[row, 0] * force[run], path[row, run])
+            np.testing.assert_allclose(each.shift[run], alone.shift, rtol=0.0, atol=1e-9)
+            np.testing.assert_allclose(each.wrench[run], alone.wrench, rtol=0.0, atol=1e-5)
+            np.testing.assert_allclose(each.felt[run], alone.felt, rtol=0.0, atol=1e-5)
+        own = cell.read(time, np.repeat(alone.wrench[None], 5, axis=0))
+        np.testing.assert_allclose(read[run], own, rtol=0.0, atol=1e-5)

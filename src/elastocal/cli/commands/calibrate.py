@@ -21,12 +21,12 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
     tool: options.ToolFrame = None,
     springs: Annotated[
         str,
-        typer.Option(
-            help="auto, actuated, bearing, bearing-joint, tensor, gears, or a .yaml file."
-        ),
+        options.choice("springs", "Springs of the model.", file=True),
     ] = "auto",
-    loss: Annotated[str, typer.Option(help="linear, huber or cauchy.")] = "linear",
-    weights: Annotated[str, typer.Option(help="none, or sigma from the dataset.")] = "none",
+    loss: Annotated[str, options.choice("loss", "How much readings far off count.")] = "linear",
+    weights: Annotated[
+        str, options.choice("weights", "Weigh readings by the dataset's sigmas.")
+    ] = "none",
     bounds: Annotated[
         str, typer.Option(help="Lowest and highest compliance in SI units.")
     ] = "0,inf",
@@ -43,10 +43,12 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
     ] = False,
     free_frame: Annotated[
         str,
-        typer.Option(
-            help="none, load_case or campaign: estimate a frame of tracker and marker for each."
-        ),
+        options.choice("free frame", "Estimate a frame of tracker and marker for each."),
     ] = "none",
+    geometry: Annotated[
+        Path | None,
+        typer.Option(help="Model file of geometry: springs are fitted on the arm as built."),
+    ] = None,
     budget: Annotated[
         bool,
         typer.Option("--budget", help="State also what the error at left-out poses is made of."),
@@ -78,6 +80,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         keep_blunders=keep_blunders,
         trust_conventions=trust_conventions,
         free_frame=free_frame,
+        geometry=geometry,
         budget=budget,
         process=process,
         draws=draws,

@@ -31,5 +31,5 @@ def _check(
         output.print_json({"file": result.file, "kind": result.kind, **result.holds})
         return
     output.console().print(f"{output.green('ok')} {result.file} is a {result.kind}")
-    for name, value in result.holds.items():
-        output.console().print(f"   {name.replace('_', ' ')}: {value}")
+    for name, text in result.lines():
+        output.console().print(f"   {name}: {text}", soft_wrap=True)

@@ -32,6 +32,12 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
     geometry: options.Geometry = None,
     payload: options.Payload = None,
     payload_centre: options.PayloadCentre = None,
+    program: Annotated[
+        str | None,
+        typer.Option(help="Of a .csv path: write it as a robot program of this name, too."),
+    ] = None,
+    language: options.Language = None,
+    speed: Annotated[str, typer.Option(help="Speed of the tool in that program.")] = "50 mm/s",
     force: options.Force = False,
     as_json: options.Figures = False,
 ) -> None:
@@ -42,6 +48,9 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
     limit = parse_quantity(largest, "length")
     if not limit > 0.0:
         raise UnitError(f"--limit {largest!r} must be above 0")
+    along = parse_quantity(speed, "speed")
+    if not along > 0.0:
+        raise UnitError(f"--speed {speed!r} must be above 0")
     given = workflows.CompensateSettings(
         model,
         path=path,
@@ -56,6 +65,9 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
         geometry=geometry,
         payload=payload,
         payload_centre=payload_centre,
+        program=program,
+        language=language,
+        speed=along,
         force=force,
     )
     with output.progress_bars() as progress:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from elastocal import workflows
-from elastocal.cli import output, tables
+from elastocal.cli import options, output, tables
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,7 +27,7 @@ def _demo(
     kind: Annotated[
         str,
         typer.Argument(
-            metavar="afp|machining", help="Fibre placement on a dome, or roughing of a block."
+            metavar="[afp|machining]", help="Fibre placement on a dome, or roughing of a block."
         ),
     ] = "afp",
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path(
@@ -38,6 +38,7 @@ def _demo(
     force: Annotated[
         bool, typer.Option("--force", help="Remove an earlier demo from the folder first.")
     ] = False,
+    as_json: options.KeyFigures = False,
 ) -> None:
     """Show the whole story on a simulated cell: from an empty folder to a signed-off report."""
     screen = output.console()
@@ -51,6 +52,9 @@ def _demo(
             yield _Display(log, out, _lines(screen, story))
 
     result = workflows.demo(kind, out=out, seed=seed, force=force, display=display)
+    if as_json:
+        output.print_json({"folder": str(out), "process": result.process})
+        return
     for line in result.closing():
         screen.print(line, soft_wrap=True)
 

@@ -13,7 +13,10 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
     positions: Annotated[Path, typer.Argument(help="CSV of joints and positions of markers.")],
     out: Annotated[Path, typer.Option(help="Model file (.json) to write.")],
     *,
-    robot: Annotated[str | None, typer.Option(help="URDF file or catalogue name.")] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(help="URDF file or catalogue name.", autocompletion=options.robot_names),
+    ] = None,
     tcp: Annotated[str | None, typer.Option(help="Link that carries the markers.")] = None,
     urdf: Annotated[Path | None, typer.Option(help="Calibrated URDF to write.")] = None,
     marker: Annotated[

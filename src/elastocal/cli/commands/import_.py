@@ -43,6 +43,9 @@ def _import(
         ask = _ask if sys.stdin.isatty() else None
         settings = workflows.GuessMapSettings(logs, out=map_file, cell=cell, force=force, ask=ask)
         guessed = workflows.guess_map(settings)
+        if as_json:
+            output.print_json({"map": str(map_file), "logs": guessed.logs})
+            return
         for label, text in guessed.facts():
             output.console().print(f"{label}: {text}", soft_wrap=True)
         output.console().print(f"wrote {map_file}: look at every line")

@@ -6,18 +6,21 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cli import output, tables
+from elastocal.cli import options, output, tables
 
 
 def _init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write into.")],
     like: Annotated[
         str,
-        typer.Option(
-            help="Which example: afp (dome on a rail), machining (block) or ur20 (force mode)."
-        ),
+        options.choice("example", "A dome on a rail, a block, or a cobot in force mode."),
     ] = "afp",
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    as_json: options.Written = False,
 ) -> None:
     """Write a commented example cell with its mesh."""
-    tables.show_example(output.console(), workflows.init(folder, kind=like, force=force))
+    result = workflows.init(folder, kind=like, force=force)
+    if as_json:
+        output.print_json(result)
+    else:
+        tables.show_example(output.console(), result)

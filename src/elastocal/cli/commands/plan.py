@@ -24,9 +24,9 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     *,
     compare: Annotated[
         str | None,
-        typer.Option(
-            help="Search technique to lay beside the cell's, or none."
-            " Default: ioops beside cover, else cover."
+        options.choice(
+            "technique or none",
+            "Search technique to lay beside the cell's. Default: ioops beside cover, else cover.",
         ),
     ] = None,
     purpose: Annotated[
@@ -39,7 +39,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
     ] = _Purpose.ELASTICITY,
     search: Annotated[
         str | None,
-        typer.Option(help="With --for geometry: search technique; default: i_optimal."),
+        options.choice("technique", "With --for geometry: search technique; default: i_optimal."),
     ] = None,
     poses: Annotated[
         int | None,
@@ -52,13 +52,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         str | None,
         typer.Option(help="Name of the robot program; default: calib, or positions."),
     ] = None,
-    language: Annotated[
-        str | None,
-        typer.Option(
-            help="Language of the robot program: krl, rapid, fanuc, urscript or none."
-            " Default: that of the robot's maker."
-        ),
-    ] = None,
+    language: options.Language = None,
     jobs: Annotated[
         int | None,
         typer.Option(min=1, max=1024, help="Processes for large pools; default: all cores."),

@@ -4,11 +4,16 @@ from typing import Annotated
 
 import typer
 
-from elastocal.cli import output, tables
+from elastocal.cli import options, output, tables
 
 
 def _robots(
-    name: Annotated[str | None, typer.Argument(help="Show one robot in full.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            help="Show one robot in full.", autocompletion=options.robot_names, show_default=False
+        ),
+    ] = None,
     urdf: Annotated[
         bool, typer.Option("--urdf", help="Print the named robot's URDF on standard output.")
     ] = False,
@@ -23,7 +28,11 @@ def _robots(
     if urdf:
         if name is None:
             raise RobotError("--urdf needs the name of a robot (see `elastocal robots`)")
-        typer.echo(catalogue.urdf(name), nl=False)
+        text = catalogue.urdf(name)
+        if as_json:
+            output.print_json({"robot": catalogue.entry(name).name, "urdf": text})
+        else:
+            typer.echo(text, nl=False)
         return
     chosen = [catalogue.entry(name).name] if name else list(catalogue.names())
     rows = [tables.robot_facts(robot) for robot in chosen]

@@ -27,11 +27,17 @@ def _simulate(
         int | None, typer.Option(min=0, help="Of the simulated cell; default: the cell's.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the ports as one JSON object.")
+    ] = False,
 ) -> None:
     """Let the simulated cell speak as real devices do, until Ctrl-C."""
 
     def show(found: workflows.SimulateResult) -> None:
-        output.print_lines(found.lines())
+        if as_json:
+            output.print_json(found)
+        else:
+            output.print_lines(found.lines())
         output.console().print("Ctrl-C ends it")
         found.wait()
 

@@ -18,7 +18,8 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write into.")],
     *,
     process: Annotated[
-        str | None, typer.Option(help="afp (courses) or machining (rings of a dome).")
+        str | None,
+        options.choice("process", "Courses of fibre, or rings of a dome."),
     ] = None,
     path: Annotated[
         Path | None,
@@ -32,7 +33,8 @@ def _simulate_process(  # noqa: PLR0913 (a command has as many options as it has
     ] = "lateral",
     start: Annotated[str | None, typer.Option(help=options.START_HELP)] = None,
     posture: Annotated[
-        str, typer.Option(help="programmed, or stiffest: the tool turned as the model says.")
+        str,
+        options.choice("posture", "As programmed, or the tool turned as the model says."),
     ] = "programmed",
     load: Annotated[
         str | None,

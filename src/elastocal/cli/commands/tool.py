@@ -17,7 +17,10 @@ def _tool(  # noqa: PLR0913 - one parameter an option
     *,
     robot: Annotated[
         str | None,
-        typer.Option(help="URDF, catalogue name or model (.json), for a CSV with joints."),
+        typer.Option(
+            help="URDF, catalogue name or model (.json), for a CSV with joints.",
+            autocompletion=options.robot_names,
+        ),
     ] = None,
     flange: Annotated[
         str | None, typer.Option(help="Link that the sensor sits on; default: flange.")

@@ -37,6 +37,9 @@ def _verify(
         from elastocal.verdict import make_key
 
         public = make_key(new_key)
+        if as_json:
+            output.print_json({"private": str(new_key), "public": str(public)})
+            return
         output.console().print(
             f"wrote {new_key} (keep it secret) and {public} (give it away)",
             soft_wrap=True,

@@ -75,7 +75,7 @@ def _show_fit(console: Console, figures: CalibrationSummary) -> None:
         f"at left-out poses ({held_out.folds} refits)",
         bold(mm(held_out.mean)),
         f"{held_out.mean / mean:.2%}",
-        "",
+        "" if held_out.p95 is None else mm(held_out.p95),
         mm(held_out.max),
     )
     table.add_row(
@@ -251,7 +251,7 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
                 f"rank {figures.rank} of {figures.springs_total}: what the readings leave open,"
                 " the bounds of the springs settle; "
             )
-        console.print(f"{every}condition number {figures.condition:.0f}", soft_wrap=True)
+        console.print(f"{every}condition number {_number(figures.condition)}", soft_wrap=True)
         return
     missing = figures.rank_attainable - figures.rank
     meaning = (
@@ -263,10 +263,15 @@ def _show_groups(console: Console, figures: CalibrationSummary) -> None:
     )
     console.print(
         f"\nrank {figures.rank} of {figures.springs_total} (condition number"
-        f" {figures.condition:.0f}): {meaning}"
+        f" {_number(figures.condition)}): {meaning}"
     )
     for number, group in enumerate(figures.unobservable, start=1):
         console.print(f"   group {number}, not by itself: {describe_briefly(group)}")
+
+
+def _number(condition: float) -> str:
+    """Return a condition number: its last digits mean nothing."""
+    return f"{float(f'{condition:.3g}'):.0f}"
 
 
 def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]) -> None:

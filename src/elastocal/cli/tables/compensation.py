@@ -18,6 +18,7 @@ from elastocal.compensation.process import (
     SeedMean,
     SimulateProcessResult,
 )
+from elastocal.wording import plus_minus, readable
 
 if TYPE_CHECKING:
     from elastocal.workflows import (
@@ -49,7 +50,7 @@ def show_tool(console: Console, record: ToolResult, out: Path) -> None:
         elif name.startswith("sensor") and record.rotation_known:
             table.add_row(name, f"{scale * value:.4g}", "as mounted", unit)
         else:
-            table.add_row(name, f"{scale * value:.4g}", f"{scale * width:.2g}", unit)
+            table.add_row(name, *plus_minus(scale * value, scale * width), unit)
     console.print(table)
     scatter = [
         ("not known" if x is None else f"{x:.3g}")
@@ -105,9 +106,11 @@ def show_compensation(console: Console, result: "CompensateResult", out: Path) -
     console.print(f"  {'tool:':30} {result.tool}", soft_wrap=True)
     for name, length in lengths:
         console.print(
-            f"  {name + ':':30} {1e3 * length.mean:.3g} mm mean, {1e3 * length.max:.3g} mm max"
-            f" ({length.at})"
+            f"  {name + ':':30} {readable(length.mean, 'm')} mean,"
+            f" {readable(length.max, 'm')} max ({length.at})"
         )
+    if result.program:
+        console.print(f"  {'program:':30} {', '.join(result.program)}", soft_wrap=True)
     for note in result.notes:
         console.print(f"Note: {note}")
 

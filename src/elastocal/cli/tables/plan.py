@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.cli.output import bold, dim, green, print_remarks, yellow
+from elastocal.cli.output import bold, dim, green, print_remarks, visible, yellow
 from elastocal.planning import PlanResult, ProductionRecord, SpreadRecord
 from elastocal.records import record
 from elastocal.robot import catalogue
@@ -181,6 +181,8 @@ def show_run(console: Console, result: RunResult) -> None:
     )
     if found.message:
         console.print(found.message, soft_wrap=True)
+    for line in found.lines:
+        console.print(visible(line.sentence()), soft_wrap=True)
     if found.dataset:
         print_remarks(console, "warning", found.warnings)
         console.print(

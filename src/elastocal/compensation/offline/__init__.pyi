@@ -6,6 +6,7 @@ from .correct import (
 )
 from .path_file import (
     CorrectionSettings as CorrectionSettings,
+    HearRows as HearRows,
     compensate_path as compensate_path,
     programmed_rows as programmed_rows,
 )

@@ -103,7 +103,8 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     Parameters
     ----------
     solver : InverseKinematics
-        Of the model's robot; used where a Newton step fails.
+        Of the arm as its controller knows it, which the path is programmed for: the model's, or
+        where that is the arm as built, as drawn. Used where a Newton step fails.
     calibrated : CalibratedModel
         The model.
     q : ndarray, shape (row, joint)
@@ -130,7 +131,7 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
         If a programmed or corrected row is outside the joint limits or out of reach, or deflects
         farther than can be meant.
     """
-    robot = calibrated.model.robot
+    robot = solver.robot
     check_limits(robot, q, where, "is programmed")
     load = _Load(calibrated, *wrench, memory, unloaded).along(q)
     deflection = load.deflection(q, np.arange(len(q)))

@@ -1,5 +1,6 @@
 """``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from elastocal.files import require_file
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 from elastocal.robot.inverse import (
     InverseKinematics,
     RowName,
@@ -36,6 +38,9 @@ _BYTES_AT_A_TIME = 1 << 20
 """Bytes that are read at a time when lines are counted."""
 _ADDED = tuple(f"deflection_{axis}{end}[m]" for end in ("", "_low", "_high") for axis in "xyz")
 
+HearRows = Callable[[FloatArray, FloatArray, RowName], None]
+"""Hears joints, shape (row, joint), and poses, shape (row, 4, 4), of rows with their names."""
+
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,8 @@ class CorrectionSettings:
     """Largest deflection that is taken for one, in m."""
     unloaded: Unloaded | None = None
     """Where the arm as built stands; by default where its controller believes."""
+    controller: Robot | None = None
+    """The arm as its controller knows it, which paths are written for; by default the model's."""
 
 
 def compensate_path(
@@ -56,6 +63,7 @@ def compensate_path(
     out: Path,
     settings: CorrectionSettings | None = None,
     progress: Progress = silent,
+    hear: HearRows | None = None,
 ) -> CorrectionSummary:
     """Correct a path file; write the same columns corrected, and the predicted deflection.
 
@@ -69,6 +77,9 @@ def compensate_path(
         Posture at the start, and the largest deflection.
     progress : Progress
         Hears how many rows are done.
+    hear : callable, optional
+        Hears joints and poses of the corrected rows, block by block, and their names; what it
+        raises leaves no file.
 
     Raises
     ------
@@ -78,7 +89,8 @@ def compensate_path(
         If a file cannot be read or written.
     """
     settings = CorrectionSettings() if settings is None else settings
-    robot, solver = calibrated.model.robot, inverse_for(calibrated.model.robot)
+    robot = settings.controller or calibrated.model.robot
+    solver = inverse_for(robot)
     with in_file(path):
         table = PathTable.open(path, lambda header: find_columns(header, robot))
         total = _count_lines(path) - len(table.layout.preamble) - 1
@@ -111,6 +123,8 @@ def compensate_path(
                 previous, memory = q[-1], found.memory
                 ends = np.hstack([found.deflection, found.low, found.high])
                 write(rows, ends, _corrected_columns(rows, found, robot.external_axes))
+                if hear is not None:
+                    hear(found.q, found.T_base_tcp, rows.label)
                 progress("rows", summary.rows, total)
     return summary
 

@@ -13,15 +13,15 @@ from .course import (
 from .loop import (
     Controller as Controller,
     Corrector as Corrector,
-    CourseDeviation as CourseDeviation,
     CourseRun as CourseRun,
     CycleInput as CycleInput,
     LoadedRobot as LoadedRobot,
     ModelCorrector as ModelCorrector,
+    Passage as Passage,
     PerfectCorrector as PerfectCorrector,
     TrueCell as TrueCell,
     air_shifts as air_shifts,
-    run_course as run_course,
+    run_courses as run_courses,
 )
 from .placement import FibrePlacement as FibrePlacement
 from .postures import (
@@ -43,6 +43,7 @@ from .result import (
     DEVIATIONS as DEVIATIONS,
     PROGRAMMED_PATH as PROGRAMMED_PATH,
     TABLE as TABLE,
+    CourseDeviation as CourseDeviation,
     ProcessRun as ProcessRun,
     SimulatedProcess as SimulatedProcess,
     SimulateProcessResult as SimulateProcessResult,

@@ -57,6 +57,13 @@ class Course:
         """Unit vectors away from the part, in base, shape (row, 3): a force reacts along them."""
         return -self.T_base_tcp[:, :3, 2] if self.normal is None else self.normal
 
+    def ripple_at(self, time: FloatArray) -> FloatArray:
+        """Return what swings about the mean force at times in s, over that force, (time,)."""
+        swing = np.zeros(len(time))
+        for ripple in self.ripple:
+            swing += ripple.share * np.sin(2.0 * np.pi * ripple.frequency * time)
+        return swing
+
 
 @dataclass(frozen=True)
 class Process(ABC):

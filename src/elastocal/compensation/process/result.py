@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.process.loop import CourseDeviation
+from elastocal.compensation.process.loop import CourseRun
 from elastocal.compensation.process.statistics import (
     DeviationComparison,
     DeviationStatistics,
@@ -111,6 +111,32 @@ class SimulateProcessResult(Result):
             *((f"{line.name}, 3-D", line.sentence) for line in self.spatial[-1:]),
             *(("note", text) for text in self.notes),
         )
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class CourseDeviation:
+    """One course of one seed, at every cycle, without and with correction."""
+
+    seed: int
+    course: str
+    time: FloatArray
+    """Since the course began, shape (cycle,), in s."""
+    position: FloatArray
+    """Programmed tool centre point in base, shape (cycle, 3), in m."""
+    before: FloatArray
+    """Signed deviation without correction, shape (cycle,), in m."""
+    after: FloatArray
+    """Signed deviation with correction, shape (cycle,), in m."""
+    spatial: FloatArray | None = None
+    """3-D deviation (length of the shift) without and with correction, shape (cycle, 2), in m."""
+
+    @classmethod
+    def of(cls, seed: int, before: CourseRun, after: CourseRun) -> "CourseDeviation":
+        """Return the deviations of a course that was run twice."""
+        name, position = before.course.name, before.position
+        spatial = np.stack([before.spatial, after.spatial], axis=1)
+        return cls(seed, name, before.time, position, before.deviation, after.deviation, spatial)
 
 
 @brief_repr

@@ -12,6 +12,11 @@ from .languages import (
     choose_writer as choose_writer,
     writer_named as writer_named,
 )
+from .path_program import (
+    BEFORE_PATH as BEFORE_PATH,
+    MOST_ROWS as MOST_ROWS,
+    PathProgram as PathProgram,
+)
 from .plan_program import (
     LIN_SPEED as LIN_SPEED,
     PTP_PERCENT as PTP_PERCENT,
@@ -33,6 +38,7 @@ from .urscript_writer import UrScriptWriter as UrScriptWriter
 from .writer import (
     AxisMove as AxisMove,
     Block as Block,
+    Mover as Mover,
     ProgramWords as ProgramWords,
     ProgramWriter as ProgramWriter,
     Remark as Remark,
@@ -43,6 +49,5 @@ from .writer import (
     controller_text as controller_text,
     in_shown_units as in_shown_units,
     number as number,
-    plain as plain,
     render_text as render_text,
 )

@@ -100,7 +100,8 @@ def compensate_program(
     with in_file(forces):
         table = _read_forces(forces)
     placed = np.eye(4) if T_base_frame is None else T_base_frame
-    follower = _PostureFollower(inverse_for(calibrated.model.robot), program, placed)
+    robot = settings.controller or calibrated.model.robot
+    follower = _PostureFollower(inverse_for(robot), program, placed)
     text, data = program.files
     with in_file(text):
         targets = _targets(program, table, forces)
@@ -108,7 +109,7 @@ def compensate_program(
     with in_file(data):
         found, summary = _corrected(calibrated, follower, table, postures, settings)
     T_frame_base = inverse_transform(placed)
-    arm = slice(calibrated.model.robot.external_axes, None)
+    arm = slice(robot.external_axes, None)
     corrected = {
         name: CorrectedPoint(found.q[row, arm], T_frame_base @ found.T_base_tcp[row])
         for row, name in enumerate(postures)

@@ -5,7 +5,7 @@ letters depend on the model. J3 is counted from the horizontal, as the pendant d
 ``J3 = q3 - q2``. Nothing here was tried on a real robot.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -13,18 +13,15 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.programs.writer import (
     AxisMove,
-    Block,
+    Mover,
     ProgramWords,
     ProgramWriter,
-    Remark,
     RobotProgram,
-    Step,
     Stop,
     StraightMove,
     controller_text,
     in_shown_units,
     number,
-    plain,
 )
 from elastocal.errors import PlanningError
 from elastocal.robot import Robot, xyzabc_from_T
@@ -60,8 +57,9 @@ class FanucWriter(ProgramWriter):
     title: ClassVar = "FANUC TP"
     suffixes: ClassVar = (".ls",)
     longest_name: ClassVar = 36
-    reserved: ClassVar = frozenset(f"{_TP_WORDS} AUX CON NUL PRN".split())
+    reserved: ClassVar = frozenset(_TP_WORDS.split())
     most_external: ClassVar = 3
+    comment: ClassVar = "  !"
     # A remark of more than 32 characters is cut by older controllers.
     width: ClassVar = 32
     axis_names: ClassVar = ("J", "E")
@@ -91,16 +89,13 @@ class FanucWriter(ProgramWriter):
 
     def texts(self, program: RobotProgram, head: Sequence[str]) -> tuple[bytes, ...]:
         """Return the file; see `ProgramWriter.texts`."""
-        numbers = {move.name: index for index, move in enumerate(program.targets, start=1)}
-        orders = [*(f"  !{line}" for line in head), "  UFRAME_NUM=1", "  UTOOL_NUM=1"]
-        for block in program.blocks:
-            orders += self._block(block, program.axis_percent, numbers)
+        orders = [*head, "  UFRAME_NUM=1", "  UTOOL_NUM=1", *self.body(program)]
         lines = [f"/PROG  {program.name.upper()}", "/ATTR"]
         lines += [*_ATTRIBUTES.format(count=len(orders)).split("\n"), "/APPL", "/MN"]
         lines += [f"{index:4d}:{order} ;" for index, order in enumerate(orders, start=1)]
         lines += ["/POS"]
-        for move in program.targets:
-            lines += _position(program.robot, numbers[move.name], move)
+        for index, move in enumerate(program.targets, start=1):
+            lines += _position(program.robot, index, move)
         return (controller_text([*lines, "/END"]),)
 
     def frame_text(self, T: FloatArray) -> str:
@@ -111,25 +106,23 @@ class FanucWriter(ProgramWriter):
             f"{key} {number(value, 3)}" for key, value in zip("XYZWPR", values, strict=True)
         )
 
-    def _block(self, block: Block, percent: int, numbers: dict[str, int]) -> Iterator[str]:
-        if block.title:
-            yield from (f"  !{line}" for line in self.wrapped(block.title))
-        for step in block.steps:
-            yield from self._step(step, percent, numbers)
+    def mover(self, program: RobotProgram) -> Mover:
+        """Return what says a move; see `ProgramWriter.mover`."""
+        numbers = {move.name: index for index, move in enumerate(program.targets, start=1)}
 
-    def _step(self, step: Step, percent: int, numbers: dict[str, int]) -> Iterator[str]:
-        match step:
-            case AxisMove():
-                yield f"J P[{numbers[step.name]}] {percent}% FINE   "
-            case StraightMove():
+        def lines(move: AxisMove | StraightMove) -> Iterator[str]:
+            if isinstance(move, AxisMove):
+                yield f"J P[{numbers[move.name]}] {program.axis_percent}% FINE   "
+            else:
                 # Whole mm/s, rounded down: never faster than the program means.
-                speed = int(1e3 * step.speed + 1e-9)
-                yield f"L P[{numbers[step.name]}] {speed}mm/sec FINE   "
-            case Remark():
-                yield from (f"  !{line}" for line in self.wrapped(plain(step.text)))
-            case Stop():
-                yield from (f"  !{line}" for line in self.wrapped(step.reason))
-                yield "  PAUSE"
+                speed = int(1e3 * move.speed + 1e-9)
+                yield f"L P[{numbers[move.name]}] {speed}mm/sec FINE   "
+
+        return lines
+
+    def halt(self, stop: Stop) -> Iterable[str]:  # noqa: ARG002 - of the protocol
+        """Return a PAUSE."""
+        return ("  PAUSE",)
 
 
 def _position(robot: Robot, index: int, move: AxisMove | StraightMove) -> Iterator[str]:

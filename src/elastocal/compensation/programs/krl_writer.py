@@ -5,7 +5,7 @@ Axis positions are for ``PTP``, frames for ``LIN``. A frame carries no status an
 S). The axis positions choose the posture. Nothing here was tried on a real robot.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -13,18 +13,15 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.compensation.programs.writer import (
     AxisMove,
-    Block,
+    Mover,
     ProgramWords,
     ProgramWriter,
-    Remark,
     RobotProgram,
-    Step,
     Stop,
     StraightMove,
     controller_text,
     in_shown_units,
     number,
-    plain,
 )
 from elastocal.robot import Robot, xyzabc_from_T
 
@@ -62,8 +59,6 @@ _KRL_WORDS = (
     " MINIMUM NOT OFF ON OR POS PRIO PTP PTP_REL PUBLIC PULSE REAL REPEAT RESUME RETURN SCIRC SEC"
     " SIGNAL SLIN SPLINE SPTP STRUC SWITCH THEN TO TOOL_DATA TRIGGER TRUE UNTIL WAIT WHEN WHILE"
 )
-_WINDOWS_NAMES = "AUX CON NUL PRN"
-"""The controller's disk is a Windows one."""
 
 
 class KrlWriter(ProgramWriter):
@@ -74,8 +69,9 @@ class KrlWriter(ProgramWriter):
     suffixes: ClassVar = (".src", ".dat")
     # A file name has 24 characters with its suffix; not verified on a controller.
     longest_name: ClassVar = 20
-    reserved: ClassVar = frozenset(f"{_KRL_WORDS} {_WINDOWS_NAMES}".split())
+    reserved: ClassVar = frozenset(_KRL_WORDS.split())
     most_external: ClassVar = _EXTERNAL_AXES
+    comment: ClassVar = "; "
     width: ClassVar = 96
     axis_names: ClassVar = ("A", "E")
     words: ClassVar = ProgramWords(
@@ -89,10 +85,8 @@ class KrlWriter(ProgramWriter):
 
     def texts(self, program: RobotProgram, head: Sequence[str]) -> tuple[bytes, ...]:
         """Return the ``.src`` and the ``.dat`` file; see `ProgramWriter.texts`."""
-        src = [*_HEADER, f"DEF {program.name}( )", *(f"; {line}" for line in head), *_INI]
-        src.append(f"BAS (#VEL_PTP,{program.axis_percent} )")
-        for block in program.blocks:
-            src += self._block(block)
+        src = [*_HEADER, f"DEF {program.name}( )", *head, *_INI]
+        src += [f"BAS (#VEL_PTP,{program.axis_percent} )", *self.body(program)]
         dat = [*_HEADER, f"DEFDAT {program.name}", *_EXT]
         dat += [_declaration(program.robot, target) for target in program.targets]
         return controller_text([*src, "END"]), controller_text([*dat, "ENDDAT"])
@@ -102,33 +96,30 @@ class KrlWriter(ProgramWriter):
         values = zip(_FRAME, _xyzabc(T), strict=True)
         return f"{{{', '.join(f'{key} {number(value, 3)}' for key, value in values)}}}"
 
-    def _block(self, block: Block) -> Iterator[str]:
-        lines = [*self._steps(block.steps)]
-        if not block.title:
-            yield from lines
-            return
-        yield f";FOLD {block.title}"
-        yield from (f"  {line}" for line in lines)
-        yield f";ENDFOLD ({block.title})"
-
-    def _steps(self, steps: Sequence[Step]) -> Iterator[str]:
+    def mover(self, program: RobotProgram) -> Mover:  # noqa: ARG002 - of the protocol
+        """Return what says a move; see `ProgramWriter.mover`."""
         # A block says its speeds anew: a person may begin in the middle of a program.
         speed: float | None = None
-        for step in steps:
-            match step:
-                case AxisMove():
-                    yield f"PTP {step.name}"
-                case StraightMove():
-                    if step.speed != speed:
-                        speed = step.speed
-                        yield f"$VEL.CP = {speed:.5f} ; m/s, {1e3 * speed:.4g} mm/s"
-                    yield f"LIN {step.name}"
-                case Remark():
-                    yield from (f"; {line}" for line in self.wrapped(plain(step.text)))
-                case Stop():
-                    yield from (f"; {line}" for line in self.wrapped(step.reason))
-                    # Keeps the interpreter from running ahead of the motion before it.
-                    yield from ("WAIT SEC 0", "HALT")
+
+        def lines(move: AxisMove | StraightMove) -> Iterator[str]:
+            nonlocal speed
+            if isinstance(move, AxisMove):
+                yield f"PTP {move.name}"
+                return
+            if move.speed != speed:
+                speed = move.speed
+                yield f"$VEL.CP = {speed:.5f} ; m/s, {1e3 * speed:.4g} mm/s"
+            yield f"LIN {move.name}"
+
+        return lines
+
+    def halt(self, stop: Stop) -> Iterable[str]:  # noqa: ARG002 - of the protocol
+        """Return a HALT that keeps the interpreter from running ahead of the motion before it."""
+        return "WAIT SEC 0", "HALT"
+
+    def titled(self, title: str, lines: Sequence[str]) -> Iterable[str]:
+        """Return the lines in a fold."""
+        return [f";FOLD {title}", *(f"  {line}" for line in lines), f";ENDFOLD ({title})"]
 
 
 def _declaration(robot: Robot, target: AxisMove | StraightMove) -> str:

@@ -22,13 +22,13 @@ from elastocal.compensation.programs.writer import (
     Step,
     Stop,
     StraightMove,
-    plain,
     render_text,
 )
 from elastocal.errors import PlanningError
 from elastocal.planning import PlanResult, PoseRecord, check_plan
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, inverse_for, joints_along_path
+from elastocal.templating import plain
 
 _SAME_PLACE = 1e-4
 """How far, in m, the two descriptions of one pose may be apart before a program is refused."""

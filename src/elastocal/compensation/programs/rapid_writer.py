@@ -5,7 +5,7 @@ monitored (``ConfL\Off``): a straight move goes on in the posture in which it be
 numbers of each ``robtarget`` say nothing. Nothing here was tried on a real robot.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -14,18 +14,15 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.compensation.programs.writer import (
     AxisMove,
-    Block,
+    Mover,
     ProgramWords,
     ProgramWriter,
-    Remark,
     RobotProgram,
-    Step,
     Stop,
     StraightMove,
     controller_text,
     in_shown_units,
     number,
-    plain,
 )
 from elastocal.robot import Robot
 
@@ -57,8 +54,9 @@ class RapidWriter(ProgramWriter):
     suffixes: ClassVar = (".mod",)
     # 32 characters with the M_ of the module; not verified on a controller.
     longest_name: ClassVar = 30
-    reserved: ClassVar = frozenset(f"{_RAPID_WORDS} AUX CON NUL PRN".split())
+    reserved: ClassVar = frozenset(_RAPID_WORDS.split())
     most_external: ClassVar = _EXTERNAL_AXES
+    comment: ClassVar = "! "
     width: ClassVar = 96
     axis_names: ClassVar = ("axis ", "eax ")
     words: ClassVar = ProgramWords(
@@ -76,7 +74,7 @@ class RapidWriter(ProgramWriter):
         lines = [
             *("%%%", "  VERSION:1", "  LANGUAGE:ENGLISH", "%%%", ""),
             f"MODULE M_{program.name}",
-            *(f"  ! {line}" for line in head),
+            *(f"  {line}" for line in head),
             f"  PERS tooldata tCalib := [TRUE,{_pose(T_parent_tcp)},{_LOAD}];",
             f'  PERS wobjdata wCalib := [FALSE,TRUE,"",{_pose(np.eye(4))},{_pose(np.eye(4))}];',
             *(f"  {line}" for line in self._speeds(program)),
@@ -87,9 +85,8 @@ class RapidWriter(ProgramWriter):
             ),
             f"  PROC {program.name}()",
             *("    ConfJ\\Off;", "    ConfL\\Off;"),
+            *(f"    {line}" for line in self.body(program)),
         ]
-        for block in program.blocks:
-            lines += [f"    {line}" for line in self._block(block)]
         return (controller_text([*lines, "  ENDPROC", "ENDMODULE"]),)
 
     def frame_text(self, T: FloatArray) -> str:
@@ -110,24 +107,21 @@ class RapidWriter(ProgramWriter):
             # A rail and a turntable keep up with the tool, whatever it does.
             yield f"CONST speeddata {name} := [{number(1e3 * speed, 3)},{_AXES_TURN},5000,1000];"
 
-    def _block(self, block: Block) -> Iterator[str]:
-        if block.title:
-            yield f"! {block.title}"
-        for step in block.steps:
-            yield from self._step(step)
+    def mover(self, program: RobotProgram) -> Mover:  # noqa: ARG002 - of the protocol
+        """Return what says a move; see `ProgramWriter.mover`."""
 
-    def _step(self, step: Step) -> Iterator[str]:
-        frames = "tCalib\\WObj:=wCalib;"
-        match step:
-            case AxisMove():
-                yield f"MoveAbsJ {step.name},{_AXES_SPEED},fine,{frames}"
-            case StraightMove():
-                yield f"MoveL {step.name},{_speed_name(step.speed)},fine,{frames}"
-            case Remark():
-                yield from (f"! {line}" for line in self.wrapped(plain(step.text)))
-            case Stop():
-                yield from (f"! {line}" for line in self.wrapped(step.reason))
-                yield "Stop;"
+        def lines(move: AxisMove | StraightMove) -> Iterator[str]:
+            if isinstance(move, AxisMove):
+                order = f"MoveAbsJ {move.name},{_AXES_SPEED}"
+            else:
+                order = f"MoveL {move.name},{_speed_name(move.speed)}"
+            yield f"{order},fine,tCalib\\WObj:=wCalib;"
+
+        return lines
+
+    def halt(self, stop: Stop) -> Iterable[str]:  # noqa: ARG002 - of the protocol
+        """Return a Stop."""
+        return ("Stop;",)
 
 
 def _speed_name(speed: float) -> str:

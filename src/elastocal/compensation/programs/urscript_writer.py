@@ -6,7 +6,7 @@ Nothing here was tried on a real robot.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -15,19 +15,17 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.compensation.programs.writer import (
     AxisMove,
-    Block,
+    Mover,
     ProgramWords,
     ProgramWriter,
-    Remark,
     RobotProgram,
-    Step,
     Stop,
     StraightMove,
     controller_text,
     number,
-    plain,
 )
 from elastocal.robot import Robot
+from elastocal.templating import plain
 
 _JOINT_ACCELERATION = 0.5
 """In rad/s²."""
@@ -49,8 +47,9 @@ class UrScriptWriter(ProgramWriter):
     title: ClassVar = "URScript"
     suffixes: ClassVar = (".script",)
     longest_name: ClassVar = 32
-    reserved: ClassVar = frozenset(f"{_UR_WORDS} AUX CON NUL PRN".split())
+    reserved: ClassVar = frozenset(_UR_WORDS.split())
     most_external: ClassVar = 0
+    comment: ClassVar = "# "
     width: ClassVar = 96
     axis_names: ClassVar = ("joint ", "")
     words: ClassVar = ProgramWords(
@@ -65,12 +64,10 @@ class UrScriptWriter(ProgramWriter):
     def texts(self, program: RobotProgram, head: Sequence[str]) -> tuple[bytes, ...]:
         """Return the file; see `ProgramWriter.texts`."""
         _, T_parent_tcp = program.tool()
-        speed = _joint_speed(program.robot, program.axis_percent)
         body = [f"set_tcp({_pose(T_parent_tcp)})"]
         body += [f"{target.name} = {_value(target)}" for target in program.targets]
-        for block in program.blocks:
-            body += self._block(block, speed)
-        lines = [*(f"# {line}" for line in head), f"def {program.name}():"]
+        body += self.body(program)
+        lines = [*head, f"def {program.name}():"]
         lines += [*(f"  {line}" for line in body), "end", f"{program.name}()"]
         return (controller_text(lines, "\n"),)
 
@@ -82,24 +79,22 @@ class UrScriptWriter(ProgramWriter):
         """Return the speed of the leading joint."""
         return f"at {_joint_speed(robot, percent):.4g} rad/s ({percent} percent)"
 
-    def _block(self, block: Block, speed: float) -> Iterator[str]:
-        if block.title:
-            yield f"# {block.title}"
-        for step in block.steps:
-            yield from self._step(step, speed)
+    def mover(self, program: RobotProgram) -> Mover:
+        """Return what says a move; see `ProgramWriter.mover`."""
+        speed = _joint_speed(program.robot, program.axis_percent)
 
-    def _step(self, step: Step, speed: float) -> Iterator[str]:
-        match step:
-            case AxisMove():
-                yield f"movej({step.name}, a={_JOINT_ACCELERATION}, v={number(speed, 5)})"
-            case StraightMove():
-                yield f"movel({step.name}, a={_TOOL_ACCELERATION}, v={number(step.speed, 6)})"
-            case Remark():
-                yield from (f"# {line}" for line in self.wrapped(plain(step.text)))
-            case Stop():
-                yield from (f"# {line}" for line in self.wrapped(step.reason))
-                reason = plain(step.reason).replace('"', "'").replace("\\", "/")
-                yield f'popup("{reason}", title="elastocal", blocking=True)'
+        def lines(move: AxisMove | StraightMove) -> Iterator[str]:
+            if isinstance(move, AxisMove):
+                yield f"movej({move.name}, a={_JOINT_ACCELERATION}, v={number(speed, 5)})"
+            else:
+                yield f"movel({move.name}, a={_TOOL_ACCELERATION}, v={number(move.speed, 6)})"
+
+        return lines
+
+    def halt(self, stop: Stop) -> Iterable[str]:
+        """Return a window that waits."""
+        reason = plain(stop.reason).replace('"', "'").replace("\\", "/")
+        return (f'popup("{reason}", title="elastocal", blocking=True)',)
 
 
 def _joint_speed(robot: Robot, percent: int) -> float:

@@ -7,13 +7,11 @@ A further language is a file with a `ProgramWriter` beside `krl_writer`, a text 
 import contextlib
 import re
 import textwrap
-import unicodedata
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,13 +22,12 @@ from elastocal.files import replacing
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, T_from_xyzabc, parse_urdf
 from elastocal.robot.inverse import arm_base
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from elastocal.templating import plain, templates
 
 _ARM_AXES = 6
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_LONGEST_TEXT = 80
+_WINDOWS_NAMES = frozenset({"AUX", "CON", "NUL", "PRN"})
+"""Controllers keep files on disks of Windows."""
 
 
 @brief_repr
@@ -73,6 +70,8 @@ class Stop:
 
 
 Step = AxisMove | StraightMove | Remark | Stop
+Mover = Callable[[AxisMove | StraightMove], Iterable[str]]
+"""Says one move in a language."""
 
 
 @brief_repr
@@ -155,6 +154,8 @@ class ProgramWriter(ABC):
     """Words in capitals that cannot name a program."""
     most_external: ClassVar[int]
     """Number of external axes that a target can name."""
+    comment: ClassVar[str]
+    """What stands before each line of a comment."""
     width: ClassVar[int]
     """Of a comment, in characters."""
     words: ClassVar[ProgramWords]
@@ -170,8 +171,40 @@ class ProgramWriter(ABC):
         program : RobotProgram
             A program that was checked.
         head : sequence of str
-            Lines that a person has to read first, no longer than ``width``.
+            Comments that a person has to read first.
         """
+
+    @abstractmethod
+    def mover(self, program: RobotProgram) -> Mover:
+        """Return what says the moves of one block; it is asked for anew for each block."""
+
+    @abstractmethod
+    def halt(self, stop: Stop) -> Iterable[str]:
+        """Return the lines at which the program waits for a person."""
+
+    def titled(self, title: str, lines: Sequence[str]) -> Iterable[str]:
+        """Return the lines of a block under its title."""
+        return [*self.remark(title), *lines]
+
+    def body(self, program: RobotProgram) -> Iterator[str]:
+        """Yield the lines of all blocks."""
+        for block in program.blocks:
+            move = self.mover(program)
+            lines = [line for step in block.steps for line in self._step(step, move)]
+            yield from self.titled(block.title, lines) if block.title else lines
+
+    def _step(self, step: Step, move: Mover) -> Iterable[str]:
+        match step:
+            case Remark():
+                return self.remark(plain(step.text))
+            case Stop():
+                return [*self.remark(step.reason), *self.halt(step)]
+            case _:
+                return move(step)
+
+    def remark(self, text: str) -> list[str]:
+        """Return a text as lines of comment."""
+        return [f"{self.comment}{line}" for line in textwrap.wrap(text, self.width)]
 
     @abstractmethod
     def frame_text(self, T: FloatArray) -> str:
@@ -233,8 +266,22 @@ class ProgramWriter(ABC):
                 f"{refused}: allowed are 1 to {self.longest_name} of the characters A-Z a-z 0-9 _,"
                 " not beginning with a digit"
             )
-        if name.upper() in self.reserved | taken:
+        if name.upper() in self.reserved | _WINDOWS_NAMES | taken:
             raise PlanningError(f"{refused}: the word has a meaning in it")
+
+    def check_speed(self, name: str, speed: float) -> None:
+        """Refuse a straight motion that the language cannot say, in m/s.
+
+        Raises
+        ------
+        PlanningError
+            If it is too slow.
+        """
+        if not speed >= self.slowest():
+            raise PlanningError(
+                f"{name} at {1e3 * speed:.4g} mm/s cannot be programmed in"
+                f" {self.title}: the slowest is {1e3 * self.slowest():.4g} mm/s"
+            )
 
     def paths(self, folder: Path, name: str) -> tuple[Path, ...]:
         """Return the files of a program in a folder, the main one first."""
@@ -253,13 +300,10 @@ class ProgramWriter(ABC):
         self.require_robot(program.robot)
         self.check_name(program.name, frozenset(each.name for each in program.targets))
         for move in program.targets:
-            if isinstance(move, StraightMove) and not move.speed >= self.slowest():
-                raise PlanningError(
-                    f"{move.name} at {1e3 * move.speed:.4g} mm/s cannot be programmed in"
-                    f" {self.title}: the slowest is {1e3 * self.slowest():.4g} mm/s"
-                )
+            if isinstance(move, StraightMove):
+                self.check_speed(move.name, move.speed)
         files = self.paths(folder, program.name)
-        texts = self.texts(program, self.head(program))
+        texts = self.texts(program, [f"{self.comment}{line}" for line in self.head(program)])
         with contextlib.ExitStack() as stack:
             for path, text in zip(files, texts, strict=True):
                 stack.enter_context(replacing(path)).write_bytes(text)
@@ -269,24 +313,22 @@ class ProgramWriter(ABC):
         """Return the lines that stand first: what has to hold on the controller."""
         robot, external = program.robot, program.robot.external_axes
         parent, T_parent_tcp = program.tool()
-        text = _environment().get_template(f"{self.language}.txt")
-        rendered = text.render(
-            program=program,
-            robot=robot,
-            words=self.words,
-            axes=self._axes(robot),
-            frame=self.frame_text,
-            tool_parent=parent,
-            T_parent_tcp=T_parent_tcp,
-            T_base_foot=arm_base(robot, np.zeros(external)) if external else None,
-            T_world=np.eye(4),
+        rendered = (
+            templates(__package__)
+            .get_template(f"{self.language}.txt")
+            .render(
+                program=program,
+                robot=robot,
+                words=self.words,
+                axes=self._axes(robot),
+                frame=self.frame_text,
+                tool_parent=parent,
+                T_parent_tcp=T_parent_tcp,
+                T_base_foot=arm_base(robot, np.zeros(external)) if external else None,
+                T_world=np.eye(4),
+            )
         )
-        paragraphs = re.split(r"\n\s*\n", rendered.strip())
-        return [line for each in paragraphs for line in self.wrapped(" ".join(each.split()))]
-
-    def wrapped(self, text: str) -> list[str]:
-        """Return a text as lines that fit into a comment."""
-        return textwrap.wrap(text, self.width)
+        return [line for each in _paragraphs(rendered) for line in textwrap.wrap(each, self.width)]
 
     def _axes(self, robot: Robot) -> list[str]:
         """Return each axis with its joint, in words."""
@@ -316,43 +358,16 @@ def number(value: float, decimals: int) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
-def plain(text: str) -> str:
-    r"""Return a text that may stand in a comment: ASCII, one line, without fold parameters.
-
-    >>> plain("Höhe 5 %\nneu")
-    'Hohe 5 ? neu'
-    """
-    folded = unicodedata.normalize("NFKD", text)
-    folded = "".join(sign for sign in folded if not unicodedata.combining(sign))
-    line = " ".join(folded.encode("ascii", "replace").decode("ascii").split())
-    # In the title of a KRL fold a percent sign begins its hidden parameters.
-    line = "".join(sign if sign.isprintable() and sign != "%" else "?" for sign in line)
-    return line[:_LONGEST_TEXT]
-
-
 def render_text(template: str, values: Mapping[str, object]) -> Iterator[str]:
-    """Yield the paragraphs of a text of this package, each one line."""
-    rendered = _environment().get_template(template).render(values)
-    for paragraph in re.split(r"\n\s*\n", rendered.strip()):
+    """Return the paragraphs of a text of this package, each one line."""
+    return _paragraphs(templates(__package__).get_template(template).render(values))
+
+
+def _paragraphs(text: str) -> Iterator[str]:
+    for paragraph in re.split(r"\n\s*\n", text.strip()):
         yield " ".join(paragraph.split())
 
 
 def controller_text(lines: Sequence[str], end: str = "\r\n") -> bytes:
     """Return lines as the bytes of a file: ASCII, by default with the line ends of Windows."""
     return "".join(f"{line}{end}" for line in lines).encode("ascii")
-
-
-@cache
-def _environment() -> "Environment":
-    # Takes long to import, and few commands write programs.
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("elastocal.compensation.programs"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {"plain": plain}
-    return environment

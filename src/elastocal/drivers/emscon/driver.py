@@ -123,7 +123,7 @@ class EmsconDriver:
         for station in stations.values():
             station.start()
         metrology = StationsMetrology(feeds, settings.rate, lambda name: stations[name].look())
-        return DeviceSet(metrology=metrology, close=_closing(stations))
+        return DeviceSet(metrology=metrology, close=_closing(stations), lines=metrology.lines)
 
 
 def _places(

@@ -18,11 +18,8 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
 from elastocal.drivers.kuka_rsi._commands import (
+    CHECKS,
     StraightMoveRules,
-    check_joint_move,
-    check_line,
-    check_vector,
-    require,
 )
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
@@ -98,7 +95,8 @@ class KukaArm:
         self.law = ForceLaw.design(stiffness, delay, settings.cycle, speed)
         self._rules = StraightMoveRules(self.bounds, self.law, delay + 2.0 * settings.cycle)
         self._postures = PostureReader(cell.robot, settings.signs)
-        self._guard = CorrectionGuard(self.bounds, settings.cycle, delay)
+        self.guard = CorrectionGuard(self.bounds, settings.cycle, delay)
+        """Bounds what is sent, and counts what the controller clamps."""
         self._reader, self._watch = self._feeling(feed)
         self._lock = threading.RLock()
         self._cycle: Cycle | None = None
@@ -157,7 +155,7 @@ class KukaArm:
             self._fault = None
             if self._state in _RESTING:
                 self._state = MotionState.IDLE
-                self._guard.restart(cycle.offset)
+                self.guard.restart(cycle.offset)
 
     def disable(self) -> None:
         """Take the release back; the arm stands."""
@@ -172,7 +170,8 @@ class KukaArm:
 
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a joint move; see `RobotArm.move_joints`."""
-        target = check_joint_move(self._cell.robot, q, speed)
+        names, limits = self.joint_names, self._cell.robot.limits
+        target = CHECKS.joint_move(q, speed, names, (limits.lower, limits.upper))
         with self._lock:
             self._allow("move_joints", _STANDING)
             if self._touched is not None:
@@ -190,8 +189,8 @@ class KukaArm:
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
     ) -> None:
         """Start a guarded straight move; see `RobotArm.approach`."""
-        direction = check_line("approach", direction_base, distance, speed)
-        require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
+        direction = CHECKS.line("approach", direction_base, distance, speed)
+        CHECKS.require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
         with self._lock:
             self._allow("approach", _STANDING, in_contact=False)
             way, cycle = distance * direction, self._newest()
@@ -205,11 +204,11 @@ class KukaArm:
 
     def hold(self, force_tcp: FloatArray, rate: float) -> None:
         """Start to build up a force and hold it; see `RobotArm.hold`."""
-        wanted = check_vector("force", force_tcp, 3)
-        require(wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press")
+        wanted = CHECKS.vector("force", force_tcp, 3)
+        CHECKS.require(wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press")
         size, most = float(np.linalg.norm(wanted)), self.bounds.force
-        require(size <= most, "force", size, f"at most {most:g} N, the force limit")
-        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        CHECKS.require(size <= most, "force", size, f"at most {most:g} N, the force limit")
+        CHECKS.require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
         with self._lock:
             self._allow("hold", _FORCED, in_contact=True)
             motion = partial(hold, press=self._press(wanted, rate), pace=self._pace)
@@ -217,7 +216,7 @@ class KukaArm:
 
     def release(self, rate: float) -> None:
         """Start to ramp the force to zero; see `RobotArm.release`."""
-        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        CHECKS.require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
         with self._lock:
             self._allow("release", _FORCED, in_contact=True)
             press, stiffness = self._press(np.zeros(3), rate), self._settings.contact_stiffness
@@ -226,7 +225,7 @@ class KukaArm:
 
     def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
         """Start a straight move away from the surface; see `RobotArm.retract`."""
-        direction = check_line("retract", direction_base, distance, speed)
+        direction = CHECKS.line("retract", direction_base, distance, speed)
         with self._lock:
             self._allow("retract", _FORCED)
             touched = self._touched
@@ -282,13 +281,13 @@ class KukaArm:
             return Step(order=Order.HOLD if self._state in _RESTING else Order.GUIDE)
         try:
             if self._running is None:
-                self._guard.restart(cycle.offset)
+                self.guard.restart(cycle.offset)
                 self._running = task.begin(cycle)
                 step = next(self._running)
             else:
                 step = self._running.send(cycle)
             if cycle.state == ProgramState.GUIDED:
-                self._guard.bounded(step.shift, cycle.offset)
+                self.guard.bounded(step.shift, cycle.offset)
             return step
         except StopIteration:
             self._task = self._running = None

@@ -7,9 +7,7 @@ RSIVisual or WorkVisual. Nothing here was tried on a controller; the programs sa
 import hashlib
 import math
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +18,7 @@ from elastocal.drivers.kuka_rsi.force_control import ForceLaw, overshoot
 from elastocal.drivers.kuka_rsi.settings import Bounds, RsiSettings, bounds_of
 from elastocal.files import filling
 from elastocal.robot import xyzabc_from_T
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from elastocal.templating import templates
 
 PROGRAMS = {"measure": "elcal_meas", "contact": "elcal_run", "compensation": "elcal_comp"}
 """Name of program, RSI context and ETHERNET file of each mode."""
@@ -141,36 +137,15 @@ def _frame(T: FloatArray) -> str:
     return f"{{{', '.join(parts)}}}"
 
 
-def _plain(text: str) -> str:
-    """Return a text for a comment on the controller: one line of ASCII without %."""
-    line = " ".join(text.encode("ascii", "replace").decode("ascii").split())
-    return line.replace("%", "?")[:80]
-
-
 def _millimetres(metres: float) -> str:
     return f"{1e3 * metres:.1f}"
 
 
 def _render(template: str, **values: object) -> str:
-    return _environment().get_template(template).render(values)
-
-
-@cache
-def _environment() -> "Environment":
-    # Takes long to import, and no run writes programs.
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("elastocal.drivers.kuka_rsi"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {
+    texts = templates(__package__)
+    texts.filters |= {
         "frame": _frame,
-        "plain": _plain,
         "mm": _millimetres,
         "deg": lambda radians: f"{math.degrees(radians):.1f}",
     }
-    return environment
+    return texts.get_template(template).render(values)

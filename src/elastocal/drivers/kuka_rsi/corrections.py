@@ -41,6 +41,8 @@ class CorrectionGuard:
         self._bounds, self._cycle = bounds, cycle
         self._recent: deque[FloatArray] = deque(maxlen=1 + math.ceil((2 * delay + _MEMORY) / cycle))
         self._astray = 0
+        self.saturated = 0
+        """Cycles in which the arm was short of every place that was commanded of late."""
 
     def restart(self, offset: FloatArray) -> None:
         """Begin at the correction that is in effect, base, shape (3,), in m; the arm stands."""
@@ -95,6 +97,7 @@ class CorrectionGuard:
                 self.restart(offset)
             return
         self._astray += 1
+        self.saturated += 1
         if self._astray >= _PATIENCE:
             raise DeviceError(
                 f"correction saturated: the arm is {1e3 * stray:.2f} mm short of it (RIst - RSol ="

@@ -4,7 +4,15 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from elastocal.cell import Cell, Clock, DeviceSet, DeviceSettings, RigContext, WrenchFeed
+from elastocal.cell import (
+    Cell,
+    Clock,
+    DeviceSet,
+    DeviceSettings,
+    LineCounts,
+    RigContext,
+    WrenchFeed,
+)
 from elastocal.drivers.kuka_rsi.arm import KukaArm
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.drivers.kuka_rsi.settings import RsiSettings
@@ -72,8 +80,13 @@ class KukaRsiDriver:
         settings = wanted["arm"]
         assert isinstance(settings, RsiSettings)
         arm = connect_arm(cell, settings, context.clock, context.feed)
-        assert arm.link is not None
-        return DeviceSet(arm=arm, close=arm.link.close)
+        link = arm.link
+        assert link is not None
+
+        def lines() -> tuple[LineCounts, ...]:
+            return (link.statistics().counts(arm.guard.saturated, link.source),)
+
+        return DeviceSet(arm=arm, close=link.close, lines=lines)
 
 
 DRIVER = KukaRsiDriver()

@@ -19,7 +19,7 @@ from typing import Protocol
 
 import numpy as np
 
-from elastocal.cell import Clock
+from elastocal.cell import Clock, LineCounts
 from elastocal.drivers.kuka_rsi.messages import (
     MOST_BYTES,
     RobMessage,
@@ -90,6 +90,30 @@ class LinkStatistics:
     answer_longest: float
     jitter: float
     """Standard deviation of the time between messages, in s."""
+
+    def counts(self, saturated: int, device: str) -> LineCounts:
+        """Return the counts as the record of a run has them.
+
+        Parameters
+        ----------
+        saturated : int
+            Cycles in which the controller clamped.
+        device : str
+            Name with address.
+        """
+        times = (self.answer_median, self.answer_p99, self.answer_longest)
+        return LineCounts(
+            device=device,
+            received=self.received,
+            lost=self.lost + self.skipped,
+            late=self.late,
+            out_of_order=self.out_of_order,
+            jumps=self.jumps,
+            malformed=self.malformed,
+            foreign=self.foreign,
+            saturated=saturated,
+            answer=times if self.answered else None,
+        )
 
     def sentence(self) -> str:
         """Return the counts in words."""
@@ -195,6 +219,8 @@ class RsiLink:
         self._from, self._heard_at = 0, -math.inf
         self.port = place.port
         """The port that it listens at."""
+        self.source = f"kuka_rsi {place.robot}"
+        """The controller, for people."""
 
     def start(self) -> None:
         """Bind the port and answer from now on.

@@ -342,7 +342,7 @@ class LineStreamDriver:
         for line in lines:
             line.start()
         metrology = LineMetrology(feeds, settings.rate, lines)
-        return DeviceSet(metrology=metrology, close=_closing(lines))
+        return DeviceSet(metrology=metrology, close=_closing(lines), lines=metrology.lines)
 
 
 def _closing(lines: list[_Line]) -> Callable[[], None]:

@@ -260,7 +260,8 @@ class NetFtDriver:
         settings = wanted["sensor"]
         assert isinstance(settings, NetFtSettings)
         line = BoxLine(settings, context.clock)
-        return DeviceSet(sensor=line.sensor, feed=line.sensor, close=line.close)
+        sensor = line.sensor
+        return DeviceSet(sensor=sensor, feed=sensor, close=line.close, lines=sensor.lines)
 
 
 DRIVER = NetFtDriver()

@@ -6,7 +6,7 @@ from collections import deque
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Clock, SensorStatus, WrenchBlock, WrenchSample
+from elastocal.cell import Clock, LineCounts, SensorStatus, WrenchBlock, WrenchSample
 from elastocal.drivers.net_ft.protocol import (
     CountScale,
     RdtRecord,
@@ -25,6 +25,8 @@ _WINDOW = 1000
 _MOST_LOST = 0.1
 _STANDING = 100
 """Records without progress of the box's own counter after which it counts as stalled."""
+_MOST_STATES = 16
+"""Words of status that are remembered."""
 _MOST_MALFORMED = 10
 """Datagrams in a row that are no records."""
 _FOLLOWS = 1e-3
@@ -59,6 +61,9 @@ class NetFtSensor:
         self.source = source
         self.lost = self.late = self.malformed = 0
         """Records that never came; that came after later ones; datagrams that were none."""
+        self.taken = self.saturated = 0
+        """Records that were taken; those of them beyond a range."""
+        self._states: set[int] = set()
         self._clock, self._scale = clock, scale
         self._lock = threading.Lock()
         self._rows: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=_NEWEST)
@@ -104,6 +109,9 @@ class NetFtSensor:
         if last is not None and not self._goes_on(last, record):
             return
         status = status_of(record.status)
+        self.taken += 1
+        if record.status not in (0, *self._states) and len(self._states) < _MOST_STATES:
+            self._states.add(record.status)
         if status is SensorStatus.FAULT:
             self.fail(f"status {status_names(record.status)}")
             return
@@ -111,6 +119,7 @@ class NetFtSensor:
         with self._lock:
             self._rows.append((self._time, record.counts))
             self._saturated |= status is SensorStatus.SATURATED
+            self.saturated += status is SensorStatus.SATURATED
             self._newest = self._time, record.counts, status
 
     def _goes_on(self, last: RdtRecord, record: RdtRecord) -> bool:
@@ -200,6 +209,19 @@ class NetFtSensor:
             status=SensorStatus.SATURATED if saturated else SensorStatus.OK,
             source=self.source,
         )
+
+    def lines(self) -> tuple[LineCounts, ...]:
+        """Return what was counted on the stream."""
+        counts = LineCounts(
+            device=self.source,
+            received=self.taken,
+            lost=self.lost,
+            late=self.late,
+            malformed=self.malformed,
+            saturated=self.saturated,
+            status=tuple(status_names(state) for state in sorted(self._states)),
+        )
+        return (counts,)
 
     def _require(self) -> None:
         if self._failure is not None:

@@ -80,7 +80,7 @@ class RtdeDriver:
                 raise DeviceError(f"cell {cell.name} describes no sensor (key 'sensor')")
             sensor = UrSensor(line, cell.file.sensor.force_range)
         feed = line if sensor is not None else None
-        return DeviceSet(arm=arm, sensor=sensor, feed=feed, close=close)
+        return DeviceSet(arm=arm, sensor=sensor, feed=feed, close=close, lines=line.lines)
 
     def _arm(self, cell: Cell, line: UrLine, settings: RtdeSettings, context: RigContext) -> UrArm:
         control = self._open_control(settings.address, _CONTROL_RATE)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Clock, SensorStatus, WrenchBlock, WrenchSample
+from elastocal.cell import Clock, LineCounts, SensorStatus, WrenchBlock, WrenchSample
 from elastocal.drivers.device_clock import DeviceClock
 from elastocal.drivers.rtde._ur_rtde import UrReceive
 from elastocal.errors import DeviceError
@@ -64,6 +64,8 @@ class UrLine:
         self._newest: WrenchSample | None = None
         self._sample: UrSample | None = None
         self._heard = time.monotonic()
+        self._received = self._skipped = 0
+        self._faults: dict[str, None] = {}
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._hear, daemon=True)
 
@@ -112,6 +114,20 @@ class UrLine:
             self._wrenches.clear()
         return taken
 
+    def lines(self) -> tuple[LineCounts, ...]:
+        """Return what was counted; of samples that a newer one overtook none was looked at."""
+        counts = LineCounts(
+            device="rtde", received=self._received, lost=self._skipped, status=tuple(self._faults)
+        )
+        return (counts,)
+
+    def _count(self, stamp: float, fault: str | None) -> None:
+        if self._received:
+            self._skipped += max(round((stamp - self._stamp) * self.rate) - 1, 0)
+        self._received += 1
+        if fault is not None:
+            self._faults[fault] = None
+
     def _hear(self) -> None:
         pause = 0.5 / self.rate
         while not self._closed.wait(pause):
@@ -132,6 +148,7 @@ class UrLine:
             fault=_fault(receive.getRobotMode(), receive.getSafetyMode()),
         )
         with self._lock:
+            self._count(stamp, sample.fault)
             self._stamp, self._heard = stamp, time.monotonic()
             self._sample, self._newest = sample, wrench
             self._wrenches.append(wrench)

@@ -16,7 +16,7 @@ from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.results import brief_repr
-from elastocal.robot import Robot, link_gap, probe_configurations, same_joints, tool_gap
+from elastocal.robot import Robot, link_gap, of_one_arm, probe_configurations, same_joints, tool_gap
 
 _WEIGHT = 1e-3
 """Largest difference of two weights of one arm, as a part of the largest gravity torque."""
@@ -91,7 +91,7 @@ def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
             f" {', '.join(old.joint_names)}, {new.name} has {', '.join(new.joint_names)}"
         )
     gap = link_gap(old, new)
-    if not gap.closed:
+    if not of_one_arm(gap, old, new):
         raise IdentificationError(
             f"{a} ({old.name}) and {b} ({new.name}) are of different robots: at the same joints"
             f" their last links are {gap} apart"

@@ -61,6 +61,15 @@ from elastocal.records import write_json
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
+_NUMBERS = (
+    "force",
+    "controller_displacement",
+    "marker_displacement",
+    "force_sigma",
+    "marker_sigma",
+)
+"""Numbers of a row along the axes of base, beside its joints."""
+
 
 @dataclass(frozen=True, eq=False)
 class DerivedRun:
@@ -291,6 +300,24 @@ def run_provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | No
     return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
+def _by_pose_and_case(
+    rows: Sequence[LoadRow], labels: Sequence[int], load_cases: Sequence[str], joints: int
+) -> tuple[np.ndarray, dict[str, FloatArray]]:
+    """Return status, shape (pose, load_case), and the numbers of rows; NaN where there are none."""
+    kept = [row for row in rows if row.load_case in load_cases]
+    shape = len(labels), len(load_cases)
+    status = np.full(shape, STATUSES.index(ReadingStatus.MISSING.value))
+    widths = dict.fromkeys(_NUMBERS, 3) | {"q": joints}
+    arrays = {name: np.full((*shape, width), np.nan) for name, width in widths.items()}
+    for row in kept:
+        place = labels.index(row.pose), load_cases.index(row.load_case)
+        status[place] = STATUSES.index(row.status.value)
+        for name, array in arrays.items():
+            if row.numbers is not None:
+                array[place] = getattr(row.numbers, name)
+    return status, arrays
+
+
 def dataset_of(
     poses: Sequence[PoseReadings],
     rows: Sequence[LoadRow],
@@ -331,34 +358,19 @@ def dataset_of(
     the example cell (preset typical, 5 N·m) it makes no difference (decision 72).
     """
     robot, labels = arm.robot, tuple(dict.fromkeys(row.pose for row in rows))
-    placed = {
-        (labels.index(r.pose), load_cases.index(r.load_case)): r
-        for r in rows
-        if r.load_case in load_cases
-    }
-    status = np.full((len(labels), len(load_cases)), STATUSES.index(ReadingStatus.MISSING.value))
-    for place, row in placed.items():
-        status[place] = STATUSES.index(row.status.value)
+    status, arrays = _by_pose_and_case(rows, labels, load_cases, len(robot.joint_names))
     ok = status == STATUSES.index(ReadingStatus.OK.value)
 
-    def array(name: str, width: int = 3) -> FloatArray:
-        values = np.full((*status.shape, width), np.nan)
-        for place, row in placed.items():
-            if row.numbers is not None:
-                values[place] = getattr(row.numbers, name)
-        return values
-
     def sigma(name: str) -> FloatArray | None:
-        values = array(name)
-        return values if np.all(values[ok] > 0) else None
+        return arrays[name] if np.all(arrays[name][ok] > 0) else None
 
     zero = unloaded_references(poses, labels, sensor)
-    displacement = array("marker_displacement")
+    displacement = arrays["marker_displacement"]
     is_unseen = bool(ok.any() and np.isnan(displacement[ok]).all())
     return Dataset.from_arrays(
-        joint_position=array("q", len(robot.joint_names)),
-        force=array("force"),
-        controller_displacement=array("controller_displacement"),
+        joint_position=arrays["q"],
+        force=arrays["force"],
+        controller_displacement=arrays["controller_displacement"],
         marker_displacement=None if is_unseen else displacement,
         force_sigma=sigma("force_sigma"),
         marker_sigma=sigma("marker_sigma"),

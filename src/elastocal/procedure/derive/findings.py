@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray
-from elastocal.cell import LIGHT_CONTACT, SensorLoad
+from elastocal.cell import LIGHT_CONTACT, LineCounts, SensorLoad
 from elastocal.dataset import Dataset
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive import summary
@@ -71,6 +71,7 @@ def summarise(found: RunFindings) -> summary.RunSummary:
         contact_moment=_moments(found.rows),
         noise=_noise(found.rows),
         attempts=_attempts(found.poses, found.entries),
+        lines=_lines(found.entries),
         times=_times(found.poses, found.entries),
         warnings=tuple(warnings),
     )
@@ -171,6 +172,15 @@ def _noise(rows: Sequence[LoadRow]) -> summary.NoiseSummary:
     good = _good(rows)
     forces, markers = ([getattr(each, name) for each in good] for name in _SIGMAS)
     return summary.NoiseSummary(len(good), _median(forces), _median(markers))
+
+
+def _lines(entries: Sequence[Entry]) -> tuple[LineCounts, ...]:
+    """Return the counts of each device, those of all sessions together."""
+    sums: dict[str, LineCounts] = {}
+    for counts in (each for entry in entries for each in entry.lines):
+        before = sums.get(counts.device)
+        sums[counts.device] = counts if before is None else before.plus(counts)
+    return tuple(sums.values())
 
 
 def _attempts(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> summary.AttemptSummary:

@@ -6,6 +6,7 @@ in rad, a time in s. None stands for a number that is not known.
 
 from pathlib import Path
 
+from elastocal.cell import LineCounts
 from elastocal.errors import SchemaError
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder
@@ -229,6 +230,9 @@ class RunSummary(Result):
     times: TimeSummary
     warnings: tuple[str, ...]
     """For people, a line each."""
+    lines: tuple[LineCounts, ...] = ()
+    """What was counted on the lines of the devices, all sessions together; none of simulated ones,
+    and of runs before it was."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -237,6 +241,7 @@ class RunSummary(Result):
             ("poses", f"{self.poses.committed} of {self.poses.planned} committed"),
             ("readings", counts),
             ("stations", ", ".join(each.station for each in self.registration.stations)),
+            *(("line", each.sentence()) for each in self.lines),
             *(("warning", warning) for warning in self.warnings),
         )
 

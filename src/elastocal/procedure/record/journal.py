@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer
 
-from elastocal.cell import Clock
+from elastocal.cell import Clock, LineCounts
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.records import StrictModel
 
@@ -79,7 +79,7 @@ class Event(Enum):
     GIVEN_UP = "given up"
     """All attempts at a pose failed; the run goes on without it."""
     FINISH = "finish"
-    """Last entry of a session."""
+    """Last entry of a session; holds what was counted on the lines of its devices."""
 
 
 class Action(Enum):
@@ -157,6 +157,8 @@ class Entry(StrictModel):
     log: PoseLog | None = None
     streams_sha256: str | None = None
     """SHA-256 of the file with the raw streams of a finished pose."""
+    lines: tuple[LineCounts, ...] = ()
+    """What was counted on the lines of the devices, at the end of a session."""
 
 
 Sync = Callable[[int], None]

@@ -30,6 +30,7 @@ from elastocal.procedure.run._stability import (
     SlideDetector,
     SlipReference,
     steadiness,
+    why_off,
     why_shaking,
     why_unsteady,
 )
@@ -103,7 +104,7 @@ def unloaded(a: Attempt) -> StepResult:
             continue
         _require_samples(a, forces, points)
         noisy = why_shaking(points.values, procedure.marker_sigma)
-        noisy = noisy or why_unsteady(steadiness(forces.time, forces.values), procedure) or ""
+        noisy = noisy or why_unsteady(steadiness(forces.time, forces.values), procedure)
         if not noisy:
             # The last tare before contact: from here on the force is that of the press alone.
             s.tare(forces.values.mean(axis=0))
@@ -157,11 +158,12 @@ def settle(a: Attempt) -> StepResult:
         if seen.time - begin < procedure.dwell - TIME_SLACK or len(samples) < LEAST_SAMPLES:
             continue
         found = steadiness(samples.time, samples.values)
-        why = why_unsteady(found, procedure, force) or ""
+        unsteady = why_unsteady(found, procedure)
+        why = why_off(found, force, a.settings.force_tolerance) or unsteady
         if not why and s.watchdog.sees:
             return StepResult.GOOD
         # Steady, and yet not there: it is not a matter of waiting, arm and sensor disagree.
-        if seen.time - begin > 2.0 * procedure.dwell and not why_unsteady(found, procedure):
+        if seen.time - begin > 2.0 * procedure.dwell and not unsteady:
             _require_force_followed(found.mean, force)
     note = f"not stable within {procedure.timeout:g} s: {why or 'the beam is broken'}"
     a.close_window(name, s.now, ReadingStatus.UNSTABLE, note)
@@ -187,7 +189,8 @@ def average(a: Attempt) -> StepResult:
     if len(forces) < LEAST_SAMPLES or len(points) < LEAST_SAMPLES:
         note = f"{len(forces)} samples of the force and {len(points)} of the marker"
         return _repeat(a, ReadingStatus.ABORTED, note)
-    why = why_unsteady(steadiness(forces.time, forces.values), procedure, force)
+    found = steadiness(forces.time, forces.values)
+    why = why_off(found, force, a.settings.force_tolerance) or why_unsteady(found, procedure)
     why = why or why_shaking(points.values, procedure.marker_sigma)
     if why:
         note = f"not stable in {_WINDOW_TRIES} windows: {why}"

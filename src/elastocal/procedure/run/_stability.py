@@ -61,29 +61,39 @@ def steadiness(time: FloatArray, force: FloatArray) -> Steadiness:
     return Steadiness(mean, float(np.sqrt(slope @ slope)), _SPREAD * float(np.sqrt(variance)))
 
 
-def why_unsteady(
-    found: Steadiness, limits: ProcedureSettings, target: FloatArray | None = None
-) -> str | None:
-    """Return why a force is not steady enough, or None when it is.
+def why_off(found: Steadiness, target: FloatArray, tolerance: float) -> str:
+    """Return why a force is not the one that is wanted; empty when it is.
+
+    Parameters
+    ----------
+    found : Steadiness
+        Of the dwell.
+    target : ndarray, shape (3,)
+        The mean that is wanted, in N.
+    tolerance : float
+        Largest distance from it, in N.
+    """
+    away = float(np.linalg.norm(found.mean - target))
+    return "" if away <= tolerance else f"force is off {away:.1f} N, limit {tolerance:g} N"
+
+
+def why_unsteady(found: Steadiness, limits: ProcedureSettings) -> str:
+    """Return why a force is not steady enough; empty when it is.
 
     Parameters
     ----------
     found : Steadiness
         Of the dwell.
     limits : ProcedureSettings
-        Tolerance, drift and spread that are allowed.
-    target : ndarray, shape (3,), optional
-        The mean that is wanted, in N; any when left out.
+        Drift and spread that are allowed.
     """
-    away = 0.0 if target is None else float(np.linalg.norm(found.mean - target))
     for value, limit, what, unit in (
-        (away, limits.force_tolerance, "force is off", "N"),
         (found.drift, limits.force_drift, "force drifts by", "N/s"),
         (found.spread, limits.force_spread, "force spreads over", "N"),
     ):
         if not value <= limit:
             return f"{what} {value:.1f} {unit}, limit {limit:g} {unit}"
-    return None
+    return ""
 
 
 def why_shaking(positions: FloatArray, limit: float) -> str:

@@ -295,7 +295,7 @@ class Runner:
         text = f"{result.end.value}, {result.location.value}"
         text = f"{text}: {result.message}" if result.message else text
         with contextlib.suppress(*EXPECTED_ERRORS):
-            self._log.write(Event.FINISH, text=text)
+            self._log.write(Event.FINISH, text=text, lines=self._devices.lines())
 
 
 def _save(recorder: StreamRecorder, path: Path) -> str | None:

@@ -21,6 +21,8 @@ from elastocal.robot import GRAVITY
 
 _LIMIT_PER_LOAD = 1.3
 """Default force limit, as a multiple of the largest load case."""
+_TOLERANCE_PER_LOAD, _LEAST_TOLERANCE = 0.01, 5.0
+"""Default force tolerance, as a part of the largest load case, and its least, in N."""
 _SAME_PLACE = 1e-5
 """Largest distance between a frame and where its joints lead, in m."""
 _SAME_TURN = 1e-5
@@ -43,6 +45,8 @@ class RunSettings:
     """Axes of the force sensor in the tcp frame, shape (3, 3)."""
     force_limit: float
     """Largest force that is let happen, in N."""
+    force_tolerance: float
+    """Largest distance of the mean force from its load case, in N."""
     tool_weight: float
     """In N."""
     near_contact: float
@@ -87,6 +91,7 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
         axes=AxisMotion(cell.axis_speeds, motion.acceleration_time),
         R_tcp_sensor=T_sensor_tcp[:3, :3].T,
         force_limit=_force_limit(cell, loads, T_sensor_tcp[:3, :3]),
+        force_tolerance=_force_tolerance(cell, loads),
         tool_weight=cell.file.tool.mass * float(np.linalg.norm(GRAVITY)),
         near_contact=plan.contact.near_contact,
         approach_distance=plan.contact.approach_distance,
@@ -106,6 +111,13 @@ def _check_contact_force(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) 
         )
 
 
+def _force_tolerance(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> float:
+    """Return how far a force may be from its load case: sensors err by a part of what they read."""
+    asked = cell.file.procedure.force_tolerance
+    largest = max(float(np.linalg.norm(force)) for _, force in loads)
+    return max(_TOLERANCE_PER_LOAD * largest, _LEAST_TOLERANCE) if asked is None else asked
+
+
 def _force_limit(
     cell: Cell, loads: tuple[tuple[str, FloatArray], ...], R_sensor_tcp: FloatArray
 ) -> float:
@@ -119,7 +131,7 @@ def _force_limit(
         for norm, (_, force) in zip(norms, loads, strict=True)
     )
     limit = min(_LIMIT_PER_LOAD * largest, within) if asked is None else asked
-    room = largest + cell.file.procedure.force_tolerance
+    room = largest + _force_tolerance(cell, loads)
     if not room < limit <= within:
         raise ProcedureError(
             f"{cell.path}: procedure.force_limit must be above {room:g} N (largest load case and"

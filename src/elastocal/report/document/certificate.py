@@ -17,8 +17,9 @@ from elastocal.verdict import (
 )
 from elastocal.wording import Phrase, counted, mm, phrase, sentences, um
 
-_MOST_REASONS, _LONGEST = 3, 190
+_MOST_REASONS, _LONGEST = 3, 150
 """Reasons on the sheet, and letters of one: the rest stands in the appendix."""
+_LONG_REASON, _LONG_NAME = 100, 60
 _NOT_STATED = phrase("not stated")
 _WIDE, _HIGH = 600.0, 190.0
 """Inner size of the picture before and after, in its own units."""
@@ -85,6 +86,13 @@ class Certificate:
     uncertainty: Phrase
     signature: Phrase
     run_signature: Phrase
+
+    @property
+    def is_full(self) -> bool:
+        """Whether so much is to be said that it fits on the sheet in small type only."""
+        long = [each for each in self.reasons if len(each) > _LONG_REASON]
+        names = [part for _, parts in self.identity for part in parts if len(part) > _LONG_NAME]
+        return len(long) > 1 or len(names) > 1
 
 
 def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = "") -> Certificate:

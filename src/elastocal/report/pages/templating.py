@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from elastocal.report.language import ENGLISH, Language, language_of
 from elastocal.report.plots import sequential_stops, themed_svg
+from elastocal.templating import templates
 from elastocal.wording import phrase
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def render(template: str, language: Language = ENGLISH, **values: Any) -> str:
     **values
         For the names in it; one that is missing is an error.
     """
-    made = _environment(language.code).get_template(template)
+    made = _pages(language.code).get_template(template)
     return made.render(values | {"language": language.code})
 
 
@@ -75,20 +76,17 @@ def embedded(data: Any) -> "Markup":
 
 
 @cache
-def _environment(code: str) -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("elastocal.report.pages"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals |= {"policy": _policy, "asset": _asset, "plotly": _plotly}
-    environment.globals["margin_scale"] = sequential_stops
-    say = language_of(code).say
-    environment.filters |= {
+def _pages(code: str) -> "Environment":
+    """Return the templates of pages, saying their words in a language."""
+    pages, say = templates("elastocal.report.pages", markup=True).overlay(), language_of(code).say
+    # An overlay shares these with what it lies over, and each language has its own.
+    pages.globals = pages.globals | {
+        "policy": _policy,
+        "asset": _asset,
+        "plotly": _plotly,
+        "margin_scale": sequential_stops,
+    }
+    pages.filters = pages.filters | {
         "embedded": embedded,
         "pieces": _pieces,
         "say": say,
@@ -96,7 +94,7 @@ def _environment(code: str) -> "Environment":
         "words": lambda text: say(phrase(text)),
         "drawn": partial(_data_url, say),
     }
-    return environment
+    return pages
 
 
 def _data_url(say: Callable[[object], str], draw: "Callable[[], Figure]") -> str:

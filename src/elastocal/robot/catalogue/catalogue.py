@@ -65,7 +65,7 @@ def entry(name: str) -> CatalogueEntry:
     known = by_key.get(_key(name))
     if known is None:
         raise RobotError(
-            f"no robot {name!r} in the catalogue{_suggestion(name, by_key)} (`elastocal robots`"
+            f"no robot {name!r} in the catalogue{_suggestion(name, table)} (`elastocal robots`"
             " lists them)"
         )
     return table[known]
@@ -179,7 +179,13 @@ def _key(name: str) -> str:
     return re.sub(r"[\s_./-]+", "", name).casefold()
 
 
-def _suggestion(name: str, by_key: dict[str, str]) -> str:
-    """Return the nearest names as a person writes them."""
-    keys = difflib.get_close_matches(_key(name), list(by_key), n=_SUGGESTED, cutoff=_ALIKE)
-    return f"; did you mean {', '.join(repr(by_key[key]) for key in keys)}?" if keys else ""
+def _suggestion(name: str, table: Mapping[str, CatalogueEntry]) -> str:
+    """Return what a name may stand for: the robots of that family or maker, or the nearest."""
+    key, by_key = _key(name), {_key(known): known for known in table}
+    family = [known for each, known in by_key.items() if key and key in each]
+    if not family:
+        family = [known for known, robot in table.items() if _key(robot.maker) == key]
+    if not family:
+        keys = difflib.get_close_matches(key, list(by_key), n=_SUGGESTED, cutoff=_ALIKE)
+        family = [by_key[key] for key in keys]
+    return f"; did you mean {', '.join(map(repr, family))}?" if family else ""

@@ -4,6 +4,7 @@ The masses of a robot may be estimated from those of a sister with sourced ones.
 """
 
 import math
+from abc import ABC, abstractmethod
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, FiniteFloat, model_validator
@@ -132,7 +133,7 @@ class Inertias(Group):
         return self
 
 
-class CatalogueEntry(StrictModel):
+class CatalogueEntry(StrictModel, ABC):
     """A robot of the catalogue, in the units a person reads (m, deg, deg/s, N·m, kg).
 
     Which kind of arm it is, its dimensions say: `WristEntry` or `ParallelEntry`.
@@ -147,9 +148,9 @@ class CatalogueEntry(StrictModel):
     inertia: Inertias
 
     @property
+    @abstractmethod
     def reach(self) -> float:
         """Largest distance of the wrist centre from the first axis, in m."""
-        raise NotImplementedError
 
     @property
     def groups(self) -> dict[str, Group]:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Fault, Motion
+from elastocal.cell import ArmState, CommandChecks, Fault, Motion
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._paths import ForceControl, guarded_move, joint_path, retract_path
@@ -23,9 +23,8 @@ from elastocal.sim.workcell._timeline import (
     to_microseconds,
 )
 
-_UNIT = 1e-6
-"""How far the length of a direction may be from 1."""
 _SOURCE = "simulated arm"
+_CHECKS = CommandChecks(_SOURCE)
 _STANDING = (Motion.IDLE,)
 _FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
 
@@ -92,12 +91,8 @@ class SimulatedArm:
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a synchronous joint-space move; see `RobotArm.move_joints`."""
         plant, linkage = self._plant, self._plant.statics.robot.linkage
-        target = check_vector("joint target", q, len(self.joint_names))
-        for name, value, low, high in zip(
-            self.joint_names, target, linkage.lower, linkage.upper, strict=True
-        ):
-            require(low <= value <= high, f"joint target {name}", value, f"{low:g} to {high:g}")
-        require(0.0 < speed <= 1.0, "speed", speed, "a part of the axis speeds in (0, 1]")
+        limits = linkage.lower, linkage.upper
+        target = _CHECKS.joint_move(q, speed, self.joint_names, limits)
         self._allow("move_joints", _STANDING, free=True)
         start = plant.robot_state()
         plant.begin_journey(target)
@@ -115,8 +110,8 @@ class SimulatedArm:
     ) -> None:
         """Start a guarded straight move; see `RobotArm.approach`."""
         plant = self._plant
-        direction = check_line("approach", direction_base, distance, speed)
-        require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
+        direction = _CHECKS.line("approach", direction_base, distance, speed)
+        _CHECKS.require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
         self._allow("approach", _STANDING, in_contact=False)
         start = plant.robot_state()
         self._begin_approach()
@@ -132,19 +127,21 @@ class SimulatedArm:
 
     def hold(self, force_tcp: FloatArray, rate: float) -> None:
         """Start to build up a force and hold it; see `RobotArm.hold`."""
-        wanted = check_vector("force", force_tcp, 3)
-        require(wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press")
+        wanted = _CHECKS.vector("force", force_tcp, 3)
+        _CHECKS.require(
+            wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press"
+        )
         most = self._plant.cell.file.simulation.controller.collision_force
         size = float(np.linalg.norm(wanted))
-        require(size <= most, "force", size, f"at most {most:g} N, what the drives give")
-        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        _CHECKS.require(size <= most, "force", size, f"at most {most:g} N, what the drives give")
+        _CHECKS.require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
         self._allow("hold", _FORCED, in_contact=True)
         self._control.hold(wanted, rate)
         self._begin("hold", self._control.load)
 
     def release(self, rate: float) -> None:
         """Start to ramp the force to zero; see `RobotArm.release`."""
-        require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
+        _CHECKS.require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
         self._allow("release", _FORCED, in_contact=True)
         self._control.release(rate)
         self._begin("release")
@@ -152,7 +149,7 @@ class SimulatedArm:
     def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
         """Start a straight move away from the surface; see `RobotArm.retract`."""
         plant = self._plant
-        direction = check_line("retract", direction_base, distance, speed)
+        direction = _CHECKS.line("retract", direction_base, distance, speed)
         self._allow("retract", _FORCED)
         if plant.contact is not None and not float(direction @ plant.contact.normal) > 0.0:
             raise DeviceError(
@@ -233,54 +230,3 @@ class SimulatedArm:
         lasts = FOREVER if fault.duration is None else to_microseconds(fault.duration)
         self._refused_until = self._plant.now + lasts
         self._freeze(Motion.STOPPED, self._fault)
-
-
-def require(holds: bool, what: str, value: object, allowed: str) -> None:
-    """Refuse a value.
-
-    Raises
-    ------
-    DeviceError
-        Naming it and what is allowed.
-    """
-    if not holds:
-        raise DeviceError(f"simulated arm: {what} is {value}: must be {allowed}")
-
-
-def check_vector(what: str, values: FloatArray, size: int) -> FloatArray:
-    """Return numbers as an array of their own.
-
-    Parameters
-    ----------
-    what : str
-        How the message names them.
-    values : ndarray, shape (size,)
-        Finite.
-    size : int
-        How many there must be.
-
-    Raises
-    ------
-    DeviceError
-        If they are not as they must be.
-    """
-    array = np.array(values, dtype=float)
-    fits = array.shape == (size,) and bool(np.all(np.isfinite(array)))
-    require(fits, what, array.tolist(), f"{size} finite numbers")
-    return array
-
-
-def check_line(what: str, direction: FloatArray, distance: float, speed: float) -> FloatArray:
-    """Return the direction of a straight move, of length 1 exactly.
-
-    Raises
-    ------
-    DeviceError
-        If it is no unit vector, or distance or speed is not above 0 and finite.
-    """
-    array = check_vector(f"{what} direction", direction, 3)
-    length = float(np.linalg.norm(array))
-    require(abs(length - 1.0) <= _UNIT, f"length of the {what} direction", length, "1")
-    require(0.0 < distance < math.inf, f"{what} distance", distance, "above 0 m and finite")
-    require(0.0 < speed < math.inf, f"{what} speed", speed, "above 0 m/s and finite")
-    return array / length

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import COUNTED, LineCounts
 from elastocal.dataset import Dataset
 from elastocal.identification import Calibration, CalibrationSummary, Reproduction, UnseenErrors
 from elastocal.procedure.derive import RunSummary
@@ -50,6 +51,7 @@ def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Blo
         return
     counts = tuple(summary.readings.counts.items())
     yield blocks.Table(phrase("Readings by status"), phrases("Status", "Readings"), counts)
+    yield from _lines(summary.lines)
     lost = tuple(
         phrase(
             "pose {pose} {load_case}: {status}",
@@ -62,6 +64,29 @@ def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Blo
     if lost:
         yield blocks.Heading(phrase("Readings that are not ok"))
         yield blocks.Bullets(lost)
+
+
+def _lines(lines: tuple[LineCounts, ...]) -> Iterator[blocks.Block]:
+    """Yield what was counted on the lines of the devices; nothing of simulated ones."""
+    if not lines:
+        return
+    rows = tuple(
+        (
+            each.device,
+            str(each.received),
+            *(str(getattr(each, key)) for key, _ in COUNTED),
+            "; ".join(each.status) or "ok",
+            "" if each.answer is None else " / ".join(f"{1e3 * t:.2f}" for t in each.answer),
+        )
+        for each in lines
+    )
+    names = (name.capitalize() for _, name in COUNTED)
+    heads = (
+        *phrases("Device", "Received"),
+        *names,
+        *phrases("Status", "Answer, ms: median / 99 % / longest"),
+    )
+    yield blocks.Table(phrase("What was counted on the lines of the devices"), heads, rows)
 
 
 def _residuals(calibration: Calibration) -> blocks.Block:

@@ -378,5 +378,8 @@ function showView(plan, rows) {
     pen.drawImage(tags, 0, 0);
     drawNow();
   }
-  return { draw, still: onPaper, place, eyeHeight: () => dot(add(place.centre, outward(), place.distance), up) };
+  return {
+    draw, drawNow, still: onPaper, floor: plan.floor, layers: () => layers.filter((layer) => layer.shown).length,
+    eyeHeight: () => dot(add(place.centre, outward(), place.distance), up),
+  };
 }

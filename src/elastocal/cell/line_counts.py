@@ -1,0 +1,73 @@
+"""What drivers count on the lines of their devices, for whoever inspects a run."""
+
+from elastocal.records import record
+from elastocal.results import brief_repr
+
+COUNTED = (
+    ("lost", "lost"),
+    ("late", "late"),
+    ("out_of_order", "out of order"),
+    ("jumps", "jumps"),
+    ("malformed", "malformed"),
+    ("foreign", "foreign"),
+    ("saturated", "saturated"),
+    ("breaks", "broken off"),
+)
+"""Fields of `LineCounts` that should be 0, with their names for people."""
+
+
+@brief_repr
+@record()
+class LineCounts:
+    """What a driver has counted on the line of a device since it was opened."""
+
+    device: str
+    """With its address."""
+    received: int
+    """Messages, records or points."""
+    lost: int = 0
+    """Those that never came, or that a newer one overtook."""
+    late: int = 0
+    """Answers, or samples, that came too late to be of use."""
+    out_of_order: int = 0
+    jumps: int = 0
+    """Times that the device's count has jumped: it was started anew."""
+    malformed: int = 0
+    foreign: int = 0
+    """Of others than the device; they are not read."""
+    saturated: int = 0
+    """Samples beyond a range; cycles in which the controller clamped a correction."""
+    breaks: int = 0
+    """Times that the beam, or the connection, was lost."""
+    status: tuple[str, ...] = ()
+    """What the device has said is wrong, by name."""
+    answer: tuple[float, float, float] | None = None
+    """Time of answers, median, 99 %, longest, in s; None where nothing is answered."""
+
+    def sentence(self) -> str:
+        """Return what was counted, in words; what did not happen is left out."""
+        counts = [(name, getattr(self, key)) for key, name in COUNTED]
+        wrong = [f"{count} {name}" for name, count in counts if count] + [*self.status]
+        text = f"{self.device}: {self.received} received, {', '.join(wrong) or 'none lost'}"
+        if self.answer is None:
+            return text
+        times = " / ".join(f"{1e3 * each:.2f}" for each in self.answer)
+        return f"{text}; answered in {times} ms (median, 99 %, longest)"
+
+    def plus(self, other: "LineCounts") -> "LineCounts":
+        """Return the counts of two sessions together; of times of answers the longer."""
+        sums = {key: getattr(self, key) + getattr(other, key) for key, _ in COUNTED}
+        times = [each for each in (self.answer, other.answer) if each is not None]
+        a, b, c = zip(*times, strict=True) if times else ((), (), ())
+        return LineCounts(
+            device=self.device,
+            received=self.received + other.received,
+            status=tuple(dict.fromkeys(self.status + other.status)),
+            answer=(max(a), max(b), max(c)) if times else None,
+            **sums,
+        )
+
+
+def no_lines() -> tuple[LineCounts, ...]:
+    """Return no counts: of devices without a line."""
+    return ()

@@ -1,0 +1,175 @@
+"""What every command has: a group in help, short forms, choices that a shell completes, JSON."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from unittest import mock
+
+import pytest
+import typer
+
+from elastocal.cell.examples import EXAMPLES
+from elastocal.cli import options
+from elastocal.cli.main import _GROUPS, COMMANDS, app
+from elastocal.compensation.process import PROCESSES
+from elastocal.compensation.programs import PROGRAM_WRITERS
+from elastocal.elastic import LAYOUTS
+from elastocal.identification import LOSSES
+from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
+from elastocal.planning.search import TECHNIQUES
+from elastocal.robot import catalogue
+from elastocal.workflows import SimulateResult
+from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
+from support import foreign_logs, kuka_bench, measured_arms, reported
+from support.cli import elastocal
+
+GROUP = typer.main.get_command(app)
+ELSEWHERE = {"codec", "demo", "measure-delay", "plan", "run", "simulate-process", "study"}
+"""They take long, or need a device: what they print is tested beside what they do."""
+
+
+def options_of(command: str) -> dict[str, list[str]]:
+    """Return the texts by which each parameter is given."""
+    return {param.name: [*param.opts] for param in GROUP.commands[command].params}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+class TestEveryCommand:
+    def test_stands_in_a_group_of_the_help(self, command):
+        members = [
+            name.rstrip("_").replace("_", "-") for group in _GROUPS.values() for name in group
+        ]
+        assert members.count(command) == 1
+
+    def test_prints_json(self, command):
+        assert ["--json"] in options_of(command).values()
+
+    def test_takes_short_forms(self, command):
+        shown = elastocal(command, "-h")
+        assert shown.code == 0
+        assert f"elastocal {command}" in shown.out
+        assert [*options_of(command).get("out", ["--out", "-o"])] == ["--out", "-o"]
+
+
+@pytest.fixture(scope="module")
+def lines(tmp_path_factory) -> dict[str, tuple[object, ...]]:
+    """A command line of each command that is quick, without its ``--json``."""
+    done, out = reported.finished(), tmp_path_factory.mktemp("commands")
+    run = reported.copied(done, out) / "run"
+    model, cell, data = done / "model.json", done / "cell/cell.yaml", run / "dataset.nc"
+    path = done / "process" / "path.csv"
+    logs = foreign_logs.write_logs(foreign_logs.rows_of(run), out)
+    log_map = foreign_logs.write_map(out, cell)
+    arm = measured_arms.measure(catalogue.load("KR 210 R2700-2"), 60)
+    positions = measured_arms.write_positions(out / "positions.csv", arm)
+    fit = ("--springs", "actuated", "--draws", 40)
+    assert elastocal("calibrate", data, "-o", out / "other.json", *fit).code == 0
+    geometry = ("--robot", "KR 210 R2700-2", "--tcp", "flange", "--draws", 40)
+    few = ("--spins", 4, "--stands", 3, "--stations", 5)
+    return {
+        "robots": (),
+        "init": (out / "new",),
+        "check": (run,),
+        "simulate": (cell,),
+        "krc-config": (kuka_bench.write_cell(out), "-o", out / "krc"),
+        "derive": (run,),
+        "import": (*logs, "--map", log_map, "-o", out / "imported.nc"),
+        "tool": (run, "-o", out / "made_tool.json"),
+        "geometry": (positions, "-o", out / "geometry.json", *geometry),
+        "calibrate": (data, "-o", out / "made.json", *fit),
+        "predict": (model, path, "-o", out / "predicted.csv"),
+        "compensate": (model, path, "-o", out / "corrected.csv"),
+        "stiffness": (model, path, "-o", out / "stiffness", *few),
+        "export": (model, "--c", out / "c"),
+        "report": (run, "-o", out / "report.html"),
+        "compare": (model, out / "other.json"),
+        "verify": (run,),
+    }
+
+
+def test_every_command_is_quick_or_tried_elsewhere(lines):
+    assert lines.keys() | ELSEWHERE == set(COMMANDS)
+
+
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - ELSEWHERE))
+def test_json_is_one_object_and_nothing_else(lines, command):
+    with mock.patch.object(SimulateResult, "wait"):
+        result = elastocal(command, *lines[command], "--json")
+    assert result.code == 0, result.err
+    assert isinstance(json.loads(result.out), dict)
+    assert result.out.count("\n") == 1
+
+
+def test_ways_of_a_command_that_write_something_else_print_json_too(lines, tmp_path):
+    pytest.importorskip("cryptography")
+    others = (
+        ("verify", "--new-key", tmp_path / "key"),
+        ("robots", "UR20", "--urdf"),
+        ("import", *lines["import"][:-4], "--map", tmp_path / "map.yaml", "--guess"),
+    )
+    for words in others:
+        assert json.loads(elastocal(*words, "--json").out), words
+
+
+def test_choices_that_help_lists_are_those_that_there_are():
+    assert {
+        "technique": tuple(TECHNIQUES),
+        "technique or none": (*TECHNIQUES, "none"),
+        "springs": ("auto", *LAYOUTS, "gears"),
+        "process": tuple(PROCESSES),
+        "example": tuple(EXAMPLES),
+        "language": (*PROGRAM_WRITERS, "none"),
+        "loss": tuple(LOSSES),
+        "weights": _WEIGHTS,
+        "free frame": _FREE_FRAMES,
+        "posture": (PROGRAMMED, STIFFEST),
+    } == options.CHOICES
+
+
+class TestCompletion:
+    def asked(self, *words: str) -> list[str]:
+        """Return what bash is offered for the last word."""
+        variables = {"COMP_WORDS": " ".join(("elastocal", *words)), "COMP_CWORD": str(len(words))}
+        code = "import sys; sys.argv = ['elastocal']; from elastocal.cli.main import run; run()"
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "_ELASTOCAL_COMPLETE": "complete_bash", **variables},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert not done.stderr
+        return done.stdout.splitlines()
+
+    def test_commands_choices_and_robots(self):
+        assert self.asked("cal") == ["calibrate"]
+        assert self.asked("calibrate", "--springs", "bear") == [
+            "bearing", "bearing-joint", "bearing-ends",
+        ]  # fmt: skip
+        assert self.asked("robots", "UR") == ["UR10e", "UR20"]
+
+    @pytest.mark.parametrize(
+        ("shell", "file"),
+        [
+            ("bash", ".bash_completions/elastocal.sh"),
+            ("zsh", ".zfunc/_elastocal"),
+            ("fish", ".config/fish/completions/elastocal.fish"),
+        ],
+    )
+    def test_it_installs(self, shell, file, tmp_path):
+        code = (
+            "import sys; sys.argv = ['elastocal', '--install-completion', sys.argv[1]]\n"
+            "from elastocal.cli.main import run; run()"
+        )
+        told = {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+        done = subprocess.run(
+            [sys.executable, "-c", code, shell],
+            env={**os.environ, **told},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert f"_ELASTOCAL_COMPLETE=complete_{shell}" in Path(tmp_path, file).read_text()
