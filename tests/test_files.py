@@ -6,8 +6,17 @@ import sys
 
 import pytest
 
-from elastocal.errors import FileAccessError
-from elastocal.files import filling, read_text, remove_leftovers, replacing, sha256, write_text
+from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import (
+    Limit,
+    filling,
+    read_bytes,
+    read_text,
+    remove_leftovers,
+    replacing,
+    sha256,
+    write_text,
+)
 from support.cli import elastocal
 
 
@@ -176,6 +185,21 @@ def test_a_pipe_is_refused_instead_of_waited_for(tmp_path):
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(FileAccessError, match=r"a\.json: it is a pipe or a device, not a file"):
         read_text(tmp_path / "a.json")
+    with pytest.raises(FileAccessError, match=r"a\.json: it is a pipe or a device, not a file"):
+        read_bytes(tmp_path / "a.json")
+
+
+def test_no_file_is_read_whole_that_is_larger_than_its_kind_may_be(tmp_path):
+    with (tmp_path / "a.src").open("wb") as file:
+        file.truncate(3_000_001)
+    few = Limit("ELASTOCAL_MAX_OF_A_TEST", 3, "MB")
+    assert len(read_bytes(tmp_path / "a.src")) == 3_000_001
+    with pytest.raises(SchemaError, match=r"a\.src has 3 MB, which is more than 3 MB .*OF_A_TEST"):
+        read_bytes(tmp_path / "a.src", few)
+    with (tmp_path / "a.src").open("r+b") as file:
+        file.truncate(100_000_001)
+    with pytest.raises(SchemaError, match=r"100 MB .*ELASTOCAL_MAX_FILE_MB"):
+        read_bytes(tmp_path / "a.src")
 
 
 def test_a_folder_is_still_called_one(tmp_path):

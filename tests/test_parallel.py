@@ -183,7 +183,13 @@ def test_guarded_work_comes_back():
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere nothing is guarded")
 @pytest.mark.parametrize(
-    ("work", "reason"), [(spin, "more than 1 s"), (crash, "crashed"), (fill, "more than 100 MB")]
+    ("work", "reason"),
+    [
+        (spin, "more than 1 s"),
+        (signal.pause, "more than 1 s"),
+        (crash, "crashed"),
+        (fill, "more than 100 MB"),
+    ],
 )
 def test_what_takes_too_much_is_ended_without_a_word(work, reason, capfd):
     with pytest.raises(GuardedError, match=reason):

@@ -163,3 +163,17 @@ def test_no_text_is_written_that_a_spreadsheet_would_compute(tmp_path, text):
     with opened_table(tmp_path / "a.csv") as table:
         assert table.layout.header[0] == text
         assert plain_text(table.rows().cells[0][0]) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "row"),
+    [("a,b\n1," + 4_000_000 * "2", "row 2"), ("\n" * 4_000_001 + "a\n1\n", "row 4000001")],
+    ids=["a line", "the head"],
+)
+def test_no_line_and_no_head_fills_the_memory(tmp_path, text, row):
+    (tmp_path / "a.csv").write_text(text)
+    with (
+        pytest.raises(TableError, match=rf"^{row}\b.* is more than 4000 kB .*ROW_KB"),
+        opened_table(tmp_path / "a.csv") as table,
+    ):
+        table.rows()

@@ -33,6 +33,7 @@ _DESCRIPTORS = (Path("/dev/fd"), Path("/proc/self/fd"))
 """Where a shell puts what it pipes into a command by name (``<(...)``)."""
 _UNDER_WAY = ".elastocal-"
 """In the names of what is being written, behind a dot and the name that it will have."""
+_NO_FILE = "it is a folder or a device, not a file"
 _LONGEST_NAME = 200
 """Letters of a name that are kept there: file systems take 255 bytes."""
 
@@ -81,7 +82,7 @@ class Limit:
         return f"is more than {self.most} {self.unit} (the variable {self.variable} raises this)"
 
 
-_MOST_READ = Limit("ELASTOCAL_MAX_FILE_MB", 256, "MB")
+_MOST_READ = Limit("ELASTOCAL_MAX_FILE_MB", 100, "MB")
 """Size of a file that is read whole: texts, meshes, streams."""
 _MEGABYTE = 1_000_000
 
@@ -105,7 +106,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
     try:
         if path.exists() and not path.is_file():
-            raise IsADirectoryError("it is a folder or a device, not a file")
+            raise IsADirectoryError(_NO_FILE)
         if rule is not None:
             rule.require(path)
         temporary, lock = _locked(make)
@@ -127,6 +128,26 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         temporary.unlink(missing_ok=True)
         os.close(lock)
+
+
+def require_place(path: Path) -> None:
+    """Refuse a place at which no file can be written, before there is anything to write.
+
+    Raises
+    ------
+    FileAccessError
+        If its folder is not there or cannot be written into, or it is itself no file.
+    """
+    path = Path(path)
+    try:
+        if not stat.S_ISDIR(path.parent.stat().st_mode):
+            raise NotADirectoryError(f"{path.parent} is a file, not a folder")
+        if path.exists() and not path.is_file():
+            raise IsADirectoryError(_NO_FILE)
+        if not os.access(path.parent, os.W_OK | os.X_OK):
+            raise PermissionError(f"nobody may write into {path.parent}")
+    except OSError as error:
+        raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 @contextlib.contextmanager
@@ -289,6 +310,31 @@ def read_text(path: Path) -> str:
     return text
 
 
+def read_bytes(path: Path, most: Limit | None = None) -> bytes:
+    """Return the content of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    most : Limit, optional
+        Its largest size in MB; by default that of every file that is read whole.
+
+    Raises
+    ------
+    FileAccessError
+        If the file is missing or unreadable, or is a pipe or a device.
+    SchemaError
+        If it is too large to be read whole.
+    """
+    require_file(path)
+    try:
+        require_size(path, most or _MOST_READ)
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
 def require_file(path: Path) -> None:
     """Refuse a pipe, a socket or a device: reading it may wait for ever, or never end.
 
@@ -314,7 +360,7 @@ def require_file(path: Path) -> None:
         rule.note_input(path)
 
 
-def require_size(path: Path) -> None:
+def require_size(path: Path, most: Limit = _MOST_READ) -> None:
     """Refuse a file that is too large to be read whole.
 
     Raises
@@ -325,7 +371,7 @@ def require_size(path: Path) -> None:
         If it is not there.
     """
     size = Path(path).stat().st_size / _MEGABYTE
-    _MOST_READ.require(size, f"{path} has {size:.0f} MB, which")
+    most.require(size, f"{path} has {size:.0f} MB, which")
 
 
 def sha256(text: str) -> str:

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import require_size
+from elastocal.errors import SchemaError
+from elastocal.files import read_bytes
 
 SUFFIXES = (".stl", ".obj", ".ply")
 """Kinds of mesh files."""
@@ -82,11 +82,7 @@ def says_inches(path: Path) -> bool:
 
 
 def _bytes_of(path: Path) -> bytes:
-    try:
-        require_size(path)
-        return path.read_bytes().removeprefix(b"\xef\xbb\xbf")  # the mark of Windows
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    return read_bytes(path).removeprefix(b"\xef\xbb\xbf")  # the mark of Windows
 
 
 def _check_stl(data: bytes, what: str) -> int | None:

@@ -311,6 +311,10 @@ class GuardedError(ElastocalError, RuntimeError):
     """Work in a child process that came to no end: it took too long, or crashed."""
 
 
+_PATIENCE = 5
+"""How long a child may wait and be kept waiting, over the time that it may work."""
+
+
 def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Result:
     """Return what ``work`` returns, done in a child process with bounded time and memory.
 
@@ -354,7 +358,7 @@ def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Resul
         if child:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
-    if status == signal.SIGXCPU:
+    if status in (signal.SIGXCPU, signal.SIGALRM):
         raise GuardedError(f"it takes more than {seconds} s")
     raise GuardedError(f"the library that reads it crashed, or takes more than {megabytes} MB")
 
@@ -371,8 +375,10 @@ def _work_guarded(
     gc.disable()  # looking for garbage would copy all memory of the parent
     try:
         # By default the system ends a process that has used its time, whatever it is doing.
-        for number in (signal.SIGXCPU, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        ending = (signal.SIGXCPU, signal.SIGALRM, signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        for number in ending:
             signal.signal(number, signal.SIG_DFL)
+        signal.alarm(_PATIENCE * seconds)
         nothing = os.open(os.devnull, os.O_RDWR)
         os.dup2(nothing, 1)
         os.dup2(nothing, 2)

@@ -12,9 +12,10 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain, islice
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from elastocal.errors import ElastocalError, FileAccessError
 from elastocal.files import Limit, replacing, require_file
 from elastocal.units import parse_number
 
+_MOST_ROW = Limit("ELASTOCAL_MAX_ROW_KB", 4_000, "kB")
 _MOST_CELL = Limit("ELASTOCAL_MAX_CELL_KB", 128, "kB")
 _KILOBYTE = 1_000
 DELIMITERS = ",;\t"
@@ -155,12 +157,15 @@ class TableReader:
     def __init__(self, lines: Iterable[str]) -> None:
         remaining = iter(lines)
         preamble: list[str] = []
-        first = ""
+        first, above, most = "", 0, _MOST_ROW.most * _KILOBYTE
         for line in remaining:
             if line.strip() and not line.startswith("#"):
                 first = line
                 break
             preamble.append(line)
+            above += len(line)
+            if above > most:
+                raise TableError(f"row {len(preamble)}: what stands above it {_MOST_ROW.exceeded}")
         self._above = len(preamble)
         csv.field_size_limit(_MOST_CELL.most * _KILOBYTE)
         self._delimiter = max(DELIMITERS, key=first.count)
@@ -205,6 +210,21 @@ class TableReader:
             raise TableError(f"row {self._above + self._reader.line_num}: {reason}") from error
 
 
+def _bounded_lines(file: TextIO) -> Iterator[str]:
+    """Yield the lines of a file, none of which fills the memory.
+
+    Raises
+    ------
+    TableError
+        If one is too long.
+    """
+    most = _MOST_ROW.most * _KILOBYTE
+    for number, line in enumerate(iter(partial(file.readline, most), ""), start=1):
+        if len(line) == most:
+            raise TableError(f"row {number} {_MOST_ROW.exceeded}")
+        yield line
+
+
 @contextmanager
 def opened_table(path: Path) -> Iterator[TableReader]:
     """Yield the reader of a table file of any length.
@@ -219,7 +239,7 @@ def opened_table(path: Path) -> Iterator[TableReader]:
     require_file(path)
     try:
         with Path(path).open(encoding="utf-8-sig", newline="") as file:
-            yield TableReader(file)
+            yield TableReader(_bounded_lines(file))
     except UnicodeDecodeError as error:
         raise FileAccessError(f"cannot read {path}: not a UTF-8 text file") from error
     except OSError as error:

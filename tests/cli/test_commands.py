@@ -1,14 +1,19 @@
 """The commands as a user meets them: output, exit codes, one-line refusals."""
 
 import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+import typer
 
 from elastocal import dataset
+from elastocal.cli import main
 from elastocal.identification import write_model
 from support.cells import Cell, linear_truth, robot, unseen, urdf
 from support.cli import elastocal
@@ -278,6 +283,12 @@ def test_check_says_what_a_good_file_is(folder, name):
         ("a.json", "{}", "states no schema (known: elastocal.codec_verdicts, "),
         ("a.json", "[" * 100_000, "not valid JSON: its brackets are nested too deeply"),
         ("a.json", '{"a": ' + 5000 * "9" + "}", "JSON: it holds a number of thousands of digits"),
+        (
+            "a.json",
+            '{"schema": "elastocal.model/1", "a": [' + 2_000_001 * "0," + "0]}",
+            "JSON_VALUES",
+        ),
+        ("a.json", '{"schema": [[1, 2]]}', "states no schema (known: "),
         ("a.yaml", "schema: elastocal.spring/1\n", "did you mean 'elastocal.springs'? (known: "),
         ("a.yaml", "robot: x\n", "states no schema (known: elastocal.catalogue, elastocal.cell"),
         ("a.yaml", "a: [1\nb: 2", "while parsing a flow sequence line 1, column 4"),
@@ -340,3 +351,24 @@ def test_calibrate_takes_the_marker_of_the_dataset_unless_told_otherwise(folder,
     told = residual("--marker", "0 mm, 30 mm, -20 mm")
     assert residual() == told
     assert residual("--marker", "0 mm, 0 mm, 0 mm") != told
+
+
+def test_a_dataset_whose_schema_is_no_text_states_none(folder, tmp_path):
+    shutil.copy(folder / "data.nc", tmp_path / "data.nc")
+    with h5py.File(tmp_path / "data.nc", "r+") as file:
+        file.attrs["schema"] = np.array([1.0, 2.0])
+    assert "states no schema" in elastocal("check", tmp_path / "data.nc").reason
+
+
+def test_every_number_of_repetitions_has_a_bound():
+    """Draws, splits, poses: a seed may be any number, and rates are judged by their command."""
+    commands = typer.main.get_command(main.app).commands
+    counts = {
+        f"{name} {each.name}": each.max
+        for name, command in commands.items()
+        for each in command.params
+        if "int" in re.findall(r"\bint\b", str(each.type_descriptor.annotation))
+        and each.name != "seed"
+    }
+    assert len(counts) > 12
+    assert [name for name, most in counts.items() if most is None] == []

@@ -13,7 +13,8 @@ from elastocal.codec.study import (
     write_study,
 )
 from elastocal.errors import SchemaError
-from elastocal.workflows import describe_file
+from elastocal.records import write_json
+from elastocal.workflows import Ports, describe_file
 from elastocal.workflows.check import _UNITS
 from support import reported
 from support.cli import elastocal
@@ -57,6 +58,13 @@ def test_a_row_that_lacks_a_cell_is_refused_by_its_line(study):
     table.write_text("\n".join(lines))
     with pytest.raises(SchemaError, match=r"study\.csv, line 3: 10 cells, not 11"):
         describe_file(table)
+
+
+def test_the_ports_of_a_simulated_cell_are_known(tmp_path):
+    write_json(tmp_path / "ports.json", Ports("127.0.0.1", {"net_ft": {"udp": 49152}}))
+    kind, facts = describe_file(tmp_path / "ports.json")
+    assert kind == "ports of simulated devices"
+    assert facts["ports"] == {"net_ft": {"udp": 49152}}
 
 
 def test_check_shows_numbers_with_their_units_and_no_more_digits_than_mean_something(study):

@@ -17,7 +17,7 @@ from elastocal.outputs import RUN_RECORD, OutputRule, ruled
 from elastocal.procedure import JOURNAL, RunFolder
 from support.cli import elastocal
 
-WRITTEN = {"out", "c", "figure", "picture", "ports", "urdf"}
+WRITTEN = {"out", "c", "figure", "picture", "ports", "report", "table", "urdf"}
 """Parameters that name what is written; every other path is an input."""
 FLAGS = {"map_file": "map"}
 EITHER = {"robot", "springs"}
@@ -100,7 +100,7 @@ SAME = {
 
 
 def test_every_command_that_writes_is_looked_at():
-    silent = {"check", "robots", "derive", "verify"}
+    silent = {"check", "robots", "derive", "verify", "studio"}
     assert {name for name, *_ in PAIRS} == COMMANDS.keys() - silent - {"init", "demo"}
 
 
@@ -223,3 +223,17 @@ class TestWhatIsReadAndWritten:
         write_text(tmp_path / "a.json", "old")
         read_text(tmp_path / "a.json")
         write_text(tmp_path / "a.json", "new")
+
+
+@pytest.mark.parametrize("name", ["calibrate", "compare", "geometry", "predict", "simulate"])
+@pytest.mark.parametrize("place", ["no/such/out.json", "plain/out.json", "folder"])
+def test_a_place_where_no_file_can_be_is_refused_before_the_work(tmp_path, name, place):
+    """Inputs are not there either: were they read first, they would be what is refused."""
+    (tmp_path / "plain").write_text("x")
+    (tmp_path / "folder").mkdir()
+    out = {each.name: each for each in PLACES[name]}.get("out", Place("ports", "--ports", False))
+    words = [str(word) for word in _words(name)]
+    words = [word for word in words if word != out.option and word != "no_out.json"]
+    shown = elastocal(*words, out.option, tmp_path / place)
+    assert shown.code == 1
+    assert f"cannot write {tmp_path / place}: " in shown.reason

@@ -12,7 +12,7 @@ from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
 from elastocal.robot import catalogue
-from support import foreign_logs, kuka_bench, measured_arms, plans, reported, studies
+from support import foreign_logs, kuka_bench, live_bench, measured_arms, plans, reported, studies
 
 CLASSES = {
     name: getattr(workflows, name)
@@ -27,7 +27,9 @@ WITHOUT = {
     "ExportResult",
     "InitResult",
     "KrcConfigResult",
+    "LiveResult",
     "MeasureDelayResult",
+    "NewResult",
     "ReportResult",
     "SimulateResult",
     "ToolResult",
@@ -70,6 +72,8 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.import_logs(logs, map=log_map),
         workflows.init(out / "new"),
         workflows.krc_config(kuka_bench.write_cell(out), out=out / "krc"),
+        workflows.NewResult(out / "cell.yaml", "UR20", ("an open mesh",)),
+        live_bench.result(),
         workflows.MeasureDelayResult(out / "record.json", kuka_bench.record()),
         plans.plan(),
         workflows.predict(model, rows=path),

@@ -207,6 +207,9 @@ _PLAIN = {
     "import": "import {s}/controller.csv {s}/force.csv {s}/tracker.txt --map {s}/map.yaml"
     " --out {o}.nc",
     "verify": "verify {s}/report.html",
+    "krc-config": "krc-config {s}/kuka.yaml --out {o}",
+    "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
+    "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
     "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
 }
 """Commands that work, to which absurd options are added; an option that stands twice: the last."""
@@ -343,10 +346,12 @@ def _ended(case: Case, seeds: Path, folder: Path, err: Path) -> dict[str, object
 
 
 def _exit_code(words: list[str]) -> int:
-    # Typer builds the same commands anew at each call, which takes longer than most cases.
+    # Typer builds the same commands anew at each call, which takes longer than most cases;
+    # servers that would wait for Ctrl-C end at once.
     with (
         mock.patch.object(sys, "argv", ["elastocal", *words]),
         mock.patch.object(main, "app", _commands()),
+        mock.patch.object(elastocal.workflows.SimulateResult, "wait", return_value=None),
     ):
         try:
             main.run()

@@ -3,14 +3,22 @@
 import importlib.resources
 import json
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from openpyxl import Workbook
 
 from elastocal import dataset
-from elastocal.cell import ArmState, BeamState, Motion, PointBlock, SensorStatus, WrenchBlock
+from elastocal.cell import (
+    ArmState,
+    BeamState,
+    Motion,
+    PointBlock,
+    SensorStatus,
+    WrenchBlock,
+    load_cell,
+)
 from elastocal.codec.study import (
     StudyStore,
     one_after_the_other,
@@ -18,14 +26,18 @@ from elastocal.codec.study import (
     study_summary,
     write_study,
 )
-from elastocal.identification import read_model
+from elastocal.geometry import plan_positions
+from elastocal.identification import read_model, write_model
 from elastocal.planning import read_plan
 from elastocal.planning.export import write_table
 from elastocal.procedure import PoseRecorder, file_sha256
+from elastocal.records import write_json
 from elastocal.robot import catalogue, xyzabc_from_T
 from elastocal.verdict import OF_RUN, make_key, read_private_key, sign, write_signature
-from support import foreign_logs, reported, studies
+from elastocal.workflows import Ports
+from support import foreign_logs, kuka_bench, reported, studies
 from support.cli import elastocal
+from support.compensated import calibrated
 from support.foreign_bags import write_bag
 from support.measured_arms import measure, write_positions
 
@@ -65,6 +77,11 @@ _MODEL = (
     "stiffness {f} {s}/path.csv --spins 2 --stands 1 --stations 2 --out {o}",
     "report {f} --out {o}.html",
 )
+_AS_BUILT = (
+    "predict {s}/arm.json {s}/arm.csv --geometry {f} --out {o}.csv",
+    "compensate {s}/arm.json {s}/arm.csv --geometry {f} --payload 80kg --out {o}.csv",
+)
+_KUKA = ("dome.stl", "commissioning.json")
 _DATA = (
     "check {f}",
     "calibrate {f} --out {o}.json --draws 40",
@@ -98,6 +115,39 @@ KINDS: dict[str, Kind] = {
         0.0,
         0.5,
     ),
+    "kuka": Kind(
+        "kuka.yaml",
+        "yaml",
+        (
+            "krc-config {f} --out {o}",
+            "check {f}",
+            "run {f} --plan {s}/plan --out {o} --dry-run",
+            "simulate {f} --ports {o}.json",
+        ),
+        _KUKA,
+        0.1,
+        0.7,
+    ),
+    "trackers": Kind(
+        "trackers.yaml",
+        "yaml",
+        ("run {f} --plan {s}/plan --out {o} --dry-run", "simulate {f} --ports {o}.json"),
+        ("dome.stl",),
+        0.1,
+        0.3,
+    ),
+    "controller's file": Kind(
+        "elcal_run.xml", "xml", ("krc-config {s}/kuka.yaml --check {f}",), (), 0.0, 0.7
+    ),
+    "commissioning": Kind(
+        "commissioning.json",
+        "json",
+        ("check {f}", "krc-config kuka.yaml --out {o}"),
+        ("kuka.yaml", "dome.stl"),
+        0.5,
+        0.5,
+    ),
+    "ports": Kind("ports.json", "json", ("check {f}",), (), 0.0, 0.2),
     "springs": Kind(
         "springs.yaml",
         "yaml",
@@ -240,7 +290,8 @@ KINDS: dict[str, Kind] = {
         0.0,
         0.7,
     ),
-    "geometry": Kind("geometry.json", "json", ("check {f}",), (), 0.0, 0.5),
+    "geometry": Kind("geometry.json", "json", ("check {f}", *_AS_BUILT), (), 0.5, 0.7),
+    "position plan": Kind("positions.json", "json", ("check {f}",), (), 0.0, 0.3),
     "plan table": Kind("plan.csv", "csv", ("check {f}",), (), 0.0, 0.3),
     "study settings": Kind(
         "study/settings.json", "json", ("check {f}", "check study"), _STUDY, 0.3, 0.3
@@ -277,6 +328,31 @@ _DEVICES = """devices:
   arm: simulated
   sensor: {driver: net_ft, address: 127.0.0.1, port: 49152, tcp_port: null, rate: 1000.0}
   clock_rate: 2
+"""
+_KUKA_DEVICES = """devices:
+  arm:
+    driver: kuka_rsi
+    mode: contact
+    address: "127.0.0.1"
+    port: 0
+    robot: "127.0.0.1"
+    cycle: "12 ms"
+    signs: [1, -1, 1, 1, 1, -1]
+    commissioning: commissioning.json
+    largest_correction: "150 mm"
+    correction_speed: "50 mm/s"
+    ptp_percent: 30
+    contact_stiffness: "1 MN/m"
+    wait: "0.1 s"
+"""
+_TRACKER_DEVICES = """devices:
+  metrology:
+    driver: line_stream
+    stations: {station_1: {address: 127.0.0.1, port: 7000}, station_2: {port: 7001}}
+    columns: ["t[s]", "x[mm]", "y[mm]", "z[mm]"]
+    rate: "100 Hz"
+    silence: "0.2 s"
+  sensor: {driver: net_ft, tool_transform: [0, 0, 0, 0, 0, 0]}
 """
 _SPRINGS = """schema: elastocal.springs/1
 include: actuated
@@ -345,6 +421,8 @@ def make_seeds(folder: Path) -> None:
     )
     (folder / "meshed.yaml").write_text(cell.replace("\nfixtures:", f"\nfixtures:{meshes}", 1))
     (folder / "rig.yaml").write_text(f"{cell}\n{_DEVICES}")
+    (folder / "trackers.yaml").write_text(f"{cell}\n{_TRACKER_DEVICES}")
+    _write_kuka(folder, f"{cell}\n{_KUKA_DEVICES}")
     data = dataset.read(folder / "dataset.nc")
     dataset.write(data, folder / "dataset.csv")
     (folder / "robot.urdf").write_text(str(data.attributes["robot_urdf"]))
@@ -361,6 +439,16 @@ def make_seeds(folder: Path) -> None:
     _done(
         "compare", folder / "old.json", folder / "model.json", "--out", folder / "comparison.json"
     )
+
+
+def _write_kuka(folder: Path, cell: str) -> None:
+    """Write a cell with a KUKA, the record of its delay, its controller's file, and ports."""
+    (folder / "kuka.yaml").write_text(cell)
+    robot = load_cell(folder / "kuka.yaml").robot.name
+    write_json(folder / "commissioning.json", replace(kuka_bench.record(cycle=0.012), robot=robot))
+    _done("krc-config", folder / "kuka.yaml", "--out", folder / "krc")
+    shutil.copy(folder / "krc" / "elcal_run.xml", folder)
+    write_json(folder / "ports.json", Ports("127.0.0.1", {"net_ft": {"udp": 1, "http": 2}}))
 
 
 def _write_paths(folder: Path) -> None:
@@ -469,6 +557,12 @@ def _write_geometry(folder: Path) -> None:
     _done(
         *("geometry", folder / "positions.csv", "--robot", folder / "arm.urdf", "--tcp", "flange"),
         *("--draws", 40, "--out", folder / "geometry.json"),
+    )
+    write_model(folder / "arm.json", calibrated(robot))
+    heads = [f"{name}[rad]" for name in robot.joint_names] + [f"force_{a}[N]" for a in "xyz"]
+    (folder / "arm.csv").write_text(f"{','.join(heads)}\n0,-1,1,0,0.5,0,0,0,-500\n")
+    write_json(
+        folder / "positions.json", plan_positions(load_cell(folder / "cell.yaml"), 6, seed=1)
     )
     table = importlib.resources.files(catalogue) / "robots.yaml"
     (folder / "catalogue.yaml").write_text(table.read_text(encoding="utf-8"))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import elastocal as ec
 from elastocal.geometry import (
     ArmErrors,
     GeometryProblem,
@@ -17,7 +18,8 @@ from elastocal.geometry import (
 )
 from elastocal.progress import silent
 from elastocal.robot import T_from_xyzabc, catalogue
-from support.measured_arms import ARMS, MARKERS, kuka, measure, universal
+from support.cli import elastocal
+from support.measured_arms import ARMS, MARKERS, kuka, measure, universal, write_positions
 
 
 def ladder(data, robot):
@@ -125,3 +127,45 @@ def test_planted_link_numbers_are_found_with_their_intervals():
     assert table["j2", "d"].low is None
     assert "beta" in {number for joint, number in table if joint == "j2"}
     assert ("j1", "beta") not in table
+
+
+def test_report_and_table_say_what_was_found(tmp_path):
+    path = write_positions(tmp_path / "positions.csv", measure(kuka(), 60, blunders=3))
+    page, table = tmp_path / "report.html", tmp_path / "links.csv"
+    arm = ("--robot", "KR 210 R2700-2", "--tcp", "flange", "--draws", 40)
+    command = ("geometry", path, *arm, "--out", tmp_path / "model.json")
+    for _ in range(2):  # what it wrote itself it may replace
+        assert elastocal(*command, "--report", page, "--table", table).code == 0
+    text = page.read_text(encoding="utf-8")
+    assert "default-src &#39;none&#39;" in text
+    assert "http" not in text.replace("http://www.w3.org", "").split("</style>")[1][:2000]
+    for expected in (
+        "<title>Geometry report: KR 210 R2700-2</title>",
+        "Errors by axis in mm, of poses left out",
+        "No repeated visits",
+        "9 positions of 180 more than seven standard deviations",
+        "Rz(theta + q) Tz(d) Tx(a) Rx(alpha)",
+        "What they go together with",
+    ):
+        assert expected in text, expected
+    rows = table.read_text(encoding="utf-8").splitlines()
+    assert rows[0] == "joint,number,unit,nominal,calibrated,difference,low,high"
+    a2 = next(row.split(",") for row in rows if row.startswith("joint_a2,a,mm"))
+    assert float(a2[3]) == pytest.approx(1150.0)
+    assert float(a2[6]) < float(a2[4]) < float(a2[7])
+
+
+def test_a_report_of_a_sound_arm_says_that_it_is_kept(tmp_path):
+    path = write_positions(tmp_path / "positions.csv", measure(kuka(), 40, error=0.0))
+    found = ec.geometry(
+        path, robot="KR 210 R2700-2", tcp="flange", draws=40, report_file=tmp_path / "report.html"
+    )
+    assert not found.model.parameters
+    assert "The nominal arm was kept" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("option", "name"), [("--report", "a.json"), ("--table", "a.xlsx")])
+def test_other_kinds_of_files_are_refused_before_the_work(tmp_path, option, name):
+    command = ("geometry", "none.csv", "--robot", "KR 210 R2700-2", "--tcp", "flange")
+    result = elastocal(*command, "--out", tmp_path / "model.json", option, tmp_path / name)
+    assert "its name must end in" in result.reason

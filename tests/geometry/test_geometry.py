@@ -191,7 +191,8 @@ def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
         *("--urdf", tmp_path / "out.urdf", "--json"),
     )
     figures = json.loads(result.out)
-    assert set(figures) == {"held_out", "ladder", "parameters", "fixed", "blunders"}
+    contract = {"held_out", "ladder", "parameters", "fixed", "blunders"}
+    assert set(figures) == contract | {"axes", "iso_9283"}
     assert figures["held_out"]["chosen"]["mean"] < 1.2 * FLOOR
     assert figures["held_out"]["registration"]["mean"] > 5e-4
     assert set(figures["blunders"]) == measured.blunders

@@ -24,7 +24,7 @@ CYCLES = 40
 
 
 class Nothing:
-    def correction(self, _message, _now):
+    def correction(self, _message, _now, _begins):
         return np.zeros(3)
 
 

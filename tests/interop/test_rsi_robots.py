@@ -37,7 +37,7 @@ class Steady:
 
     heard: list = field(default_factory=list)
 
-    def correction(self, message, _now):
+    def correction(self, message, _now, _begins):
         self.heard.append(message)
         return WANTED
 

@@ -1,8 +1,10 @@
 """MCAP and ROS bags, written by the programs that others use, are tables of their topics."""
 
+import os
+
 import pytest
 
-from elastocal.errors import LogError
+from elastocal.errors import FileAccessError, LogError
 from elastocal.logs import guess_logs, read_recording, read_topics
 from support import reported
 from support.foreign_bags import write_bag
@@ -55,3 +57,19 @@ def test_a_damaged_recording_is_one_refusal(tmp_path, name):
     path.write_bytes(b"\x89MCAP0\r\n" + b"damage" * 40)
     with pytest.raises(LogError, match=r"is no recording, or damaged|has no summary"):
         read_topics(path)
+
+
+def test_a_pipe_in_the_folder_of_a_bag_is_not_waited_for(tmp_path):
+    write_bag(tmp_path, "ros2")
+    (database,) = (tmp_path / "log").glob("*.db3")
+    database.unlink()
+    os.mkfifo(database)
+    with pytest.raises(FileAccessError, match="it is a pipe or a device"):
+        read_topics(tmp_path / "log")
+
+
+def test_gigabytes_without_the_end_of_a_line_are_no_bag(tmp_path):
+    with (tmp_path / "a.bag").open("wb") as file:
+        file.truncate(3 << 30)
+    with pytest.raises(LogError, match="does not begin like one"):
+        read_topics(tmp_path / "a.bag")

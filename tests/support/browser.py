@@ -64,7 +64,7 @@ def look(
             tab.call(f"{domain}.enable")
         width = None
         for each in looks:
-            _emulate(tab, each, height)
+            emulate(tab, each, height)
             if each.width != width:
                 tab.open(page)
                 tab.evaluate(before)
@@ -73,10 +73,11 @@ def look(
             shot = tab.call("Page.captureScreenshot", format="png")
             screenshots[each] = base64.b64decode(shot["data"])
         events = list(tab.events)
-    return Seen(frames, _complaints(events), _requests(events), screenshots)
+    return Seen(frames, complaints_of(events), requests_of(events), screenshots)
 
 
-def _emulate(tab: Tab, look: Look, height: int) -> None:
+def emulate(tab: Tab, look: Look, height: int) -> None:
+    """Show a tab as a screen of that width, in that colour scheme."""
     tab.call(
         "Emulation.setDeviceMetricsOverride",
         width=look.width,
@@ -88,7 +89,8 @@ def _emulate(tab: Tab, look: Look, height: int) -> None:
     tab.call("Emulation.setEmulatedMedia", features=[scheme])
 
 
-def _complaints(events: Sequence[Message]) -> list[str]:
+def complaints_of(events: Sequence[Message]) -> list[str]:
+    """Return errors and warnings among the events of a tab."""
     found = []
     for event in events:
         method, told = event.get("method"), event.get("params", {})
@@ -104,7 +106,8 @@ def _complaints(events: Sequence[Message]) -> list[str]:
     return found
 
 
-def _requests(events: Sequence[Message]) -> list[str]:
+def requests_of(events: Sequence[Message]) -> list[str]:
+    """Return the addresses that were asked of the network among the events of a tab."""
     asked = {}
     for event in events:
         told = event.get("params", {})

@@ -1,10 +1,13 @@
 """Tasks for processes, which find them by the name of this module."""
 
 import os
+import time
 
 import numpy as np
 import scipy.linalg  # noqa: F401 (brings a BLAS of its own)
 from threadpoolctl import threadpool_info
+
+from elastocal.errors import ProcedureError
 
 
 def blas_threads():
@@ -30,3 +33,17 @@ def nothing():
 
 def die(_):
     os._exit(3)
+
+
+def tick_until_stopped(outbox):
+    """Work for the studio: nothing, until it is stopped."""
+    outbox.progress("ticking", 1, 2)
+    while not outbox.stopped():
+        time.sleep(0.01)
+    outbox.tell({"heard": "stop"})
+    return {"ended": "well"}
+
+
+def fail(outbox):
+    """Work for the studio that cannot be done."""
+    raise ProcedureError("it cannot be done")

@@ -93,6 +93,16 @@ from .motion import (
     joint_positions as joint_positions,
     torque_limits as torque_limits,
 )
+from .path_arm import (
+    AnswerTimes as AnswerTimes,
+    CorrectedArm as CorrectedArm,
+    CycleStatistics as CycleStatistics,
+    PathCycle as PathCycle,
+    PathDriver as PathDriver,
+    PathLimits as PathLimits,
+    PathSource as PathSource,
+    Shift as Shift,
+)
 from .presets import (
     PRESET_FIGURES as PRESET_FIGURES,
     PRESETS as PRESETS,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from elastocal.cell.cell import Cell
-from elastocal.errors import FileAccessError
+from elastocal.files import read_bytes
 from elastocal.robot import is_relative
 
 RUN_SECTIONS = ("acceptance", "certificate", "procedure", "devices", "simulation", "faults")
@@ -96,8 +96,4 @@ def named_files(cell: Cell) -> Iterator[str]:
 
 
 def _bytes_of(cell: Cell, name: str) -> bytes:
-    path = cell.find(name)
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    return read_bytes(cell.find(name))

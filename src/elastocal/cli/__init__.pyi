@@ -21,6 +21,7 @@ from .options import (
     ToolMass as ToolMass,
     Written as Written,
     choice as choice,
+    only_tool as only_tool,
     parse_direction as parse_direction,
     parse_limit as parse_limit,
     parse_loads as parse_loads,

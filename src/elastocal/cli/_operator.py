@@ -6,6 +6,7 @@ the program ask the run to stop instead: the arm is brought to safety first.
 
 import abc
 import contextlib
+import math
 import signal
 import sys
 import threading
@@ -23,13 +24,15 @@ from rich.text import Text
 from elastocal.cell import read_statements
 from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure import Progress
-from elastocal.workflows import Supervision
+from elastocal.workflows import LiveReport, Supervision
 
 REFRESH = 0.1
 """Shortest time between two changes of the line, in s of the wall."""
 PATIENCE = 2.0
 """How long the end of a run waits for its view to be written, in s of the wall."""
 _BAR = 20
+_LIVE_LINES = 10.0
+"""Between two lines of a live compensation where no terminal is, in s."""
 
 
 def progress_text(step: Progress) -> str:
@@ -266,3 +269,34 @@ class TerminalOperator:
         """Show every step; signals that end a program stop the run instead."""
         with interruption() as interrupted, watching(self._console, poses) as show:
             yield Supervision(show, interrupted)
+
+
+class LiveView:
+    """Shows how a live compensation is going: a line that changes, a line each 10 s elsewhere.
+
+    Parameters
+    ----------
+    console : Console
+        Where the person looks.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console, self._shown = console, -math.inf
+        self._live = Live(console=console, transient=True, auto_refresh=False)
+
+    def __enter__(self) -> "LiveView":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            self._live.stop()
+
+    def tell(self, report: LiveReport) -> None:
+        """Show a report; a terminal that is gone is left alone."""
+        with contextlib.suppress(OSError, ValueError):
+            if self._console.is_terminal:
+                self._live.start()
+                self._live.update(Text(report.sentence()), refresh=True)
+            elif report.seconds >= self._shown + _LIVE_LINES:
+                self._shown = report.seconds
+                self._console.print(report.sentence(), soft_wrap=True)

@@ -86,10 +86,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _GROUPS = {
-    "Prepare": ("robots", "init", "check", "plan", "study"),
+    "Prepare": ("robots", "new", "init", "check", "studio", "plan", "study"),
     "Measure": ("run", "simulate", "krc_config", "measure_delay", "derive", "import_"),
     "Identify": ("tool", "geometry", "calibrate", "codec"),
-    "Use": ("predict", "compensate", "stiffness", "simulate_process", "export"),
+    "Use": ("predict", "compensate", "live", "stiffness", "simulate_process", "export"),
     "Judge and hand over": ("report", "compare", "verify"),
     "See all of it": ("demo",),
 }

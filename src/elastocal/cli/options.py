@@ -215,3 +215,16 @@ def split_tools(given: list[str] | None) -> tuple[tuple[Path, ...], str | None]:
         raise CompensationError(f"--tool names {len(frames)} tcps: a model is for one tool")
     files = tuple(Path(text) for text in given or () if text not in frames)
     return files, frames[0] if frames else None
+
+
+def only_tool(files: tuple[Path, ...]) -> Path | None:
+    """Return the only tool file; None where there is none.
+
+    Raises
+    ------
+    CompensationError
+        If there are several.
+    """
+    if len(files) > 1:
+        raise CompensationError(f"--tool names {len(files)} tool files: a compensator has one")
+    return files[0] if files else None

@@ -31,6 +31,8 @@ TOOL_NUMBERS = ("x", "y", "z", "rz", "ry", "rx")
 """Of the tool behind the last joint: lengths in m, then turns in rad, ``Rz Ry Rx``."""
 _PARALLEL = np.radians(5.0)
 """Smaller angles between axes as drawn count as none: the common normal jumps there."""
+_NOTHING = 2e-6
+"""Smaller changes, in m or rad, are rounding of the second order, not an error of the arm."""
 _MEET = 1e-6
 """Axes that pass one another at less, in m, meet."""
 
@@ -74,7 +76,8 @@ def link_table(problem: GeometryProblem, found: GeometryLadder) -> tuple[LinkNum
     """
     robot, joints = problem.robot, len(problem.robot.joint_names)
     ways = tuple(_ways(robot))
-    nominal = link_numbers(robot, ArmErrors.none(joints), ways)
+    nominal = np.round(link_numbers(robot, ArmErrors.none(joints), ways), 12) + 0.0
+    nominal = np.where(nominal == np.round(-np.pi, 12), -nominal, nominal)
     calibrated = link_numbers(robot, found.fit.state.errors, ways)
     drawn = State(found.fit.state.T_station_base, found.fit.state.markers, ArmErrors.none(joints))
     draws = np.array(
@@ -89,9 +92,9 @@ def link_table(problem: GeometryProblem, found: GeometryLadder) -> tuple[LinkNum
     low, high = interval(draws)
     rows = []
     for index, (joint, name) in enumerate(_names(robot)):
-        told = high[index] - low[index] > 0.0
+        told = max(high[index] - low[index], abs(calibrated[index] - nominal[index])) > _NOTHING
         ends = (float(low[index]), float(high[index])) if told else (None, None)
-        values = float(nominal[index]), float(calibrated[index])
+        values = float(nominal[index]), float((calibrated if told else nominal)[index])
         rows.append(LinkNumber(joint, name, _unit(name), *values, *ends))
     is_used = [_is_used(row, ways, robot.joint_names) for row in rows]
     return tuple(row for row, used in zip(rows, is_used, strict=True) if used)

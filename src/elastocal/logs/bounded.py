@@ -23,6 +23,8 @@ _MEMORY_PER_SIZE, _SECONDS_PER_MEGABYTE = 100, 5
 """What reading an honest file may take beside these, in terms of its size: a packed workbook of
 1 MB has some 100 000 cells, each an object of Python."""
 _MEGABYTE = 1_000_000
+_BEGINS = {".bag": b"#ROSBAG V", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
+"""How files begin; a library may look for the end of the line in gigabytes without any."""
 _DAMAGE = (
     OSError,
     ValueError,
@@ -62,11 +64,17 @@ def read_bounded(path: Path, what: str, read: Callable[[], _Result]) -> _Result:
     ElastocalError
         Whatever ``read`` raises of ours.
     """
-    require_file(path)
     try:
-        parts = [path, *path.iterdir()] if path.is_dir() else [path]
+        parts = [*path.iterdir()] if path.is_dir() else [path]
+        for part in parts:
+            require_file(part)
+            begin = _BEGINS.get(part.suffix.lower(), b"")
+            if begin and part.is_file() and _first(part, len(begin)) != begin:
+                raise LogError(f"{part} is no {what}, or damaged: it does not begin like one")
         size = sum(part.stat().st_size for part in parts) / _MEGABYTE
     except OSError as error:
+        if isinstance(error, FileAccessError):
+            raise
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
     seconds = _MOST_SECONDS.most + int(_SECONDS_PER_MEGABYTE * size)
     memory = _MOST_MEMORY.most + int(_MEMORY_PER_SIZE * size)
@@ -82,6 +90,11 @@ def read_bounded(path: Path, what: str, read: Callable[[], _Result]) -> _Result:
             raise found.error
         raise LogError(f"{path} is no {what}, or damaged: {found.reason}")
     return found
+
+
+def _first(path: Path, count: int) -> bytes:
+    with path.open("rb") as file:
+        return file.read(count)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from elastocal.errors import SchemaError
 from elastocal.files import Limit, read_text
 
 T = TypeVar("T")
+_MOST_VALUES = Limit("ELASTOCAL_MAX_JSON_VALUES", 2_000_000, "values")
 _MOST_NESTING = Limit("ELASTOCAL_MAX_NESTING", 64, "levels")
 _CONFIG = {"extra": "forbid", "allow_inf_nan": False}
 SEAL = "content_sha256"
@@ -164,6 +165,8 @@ def read_json_data(path: Path) -> Any:
         If it cannot be read.
     """
     text = read_text(path)
+    # A comma takes a byte, the value behind it a hundred times as much.
+    _MOST_VALUES.require(text.count(","), f"{path} has {text.count(',')} commas, which")
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -22,7 +22,7 @@ import numpy as np
 import pinocchio as pin
 
 from elastocal.errors import FileAccessError, RobotError, nearest
-from elastocal.files import require_file
+from elastocal.files import read_bytes
 from elastocal.robot._urdf_elements import (
     check_elements,
     is_movable,
@@ -79,11 +79,7 @@ def read_urdf(path: Path) -> str:
     FileAccessError
         If the file is missing, unreadable, or not text in that encoding.
     """
-    require_file(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    data = read_bytes(path)
     for encoding in _encodings(data):
         try:
             text = data.decode(encoding).removeprefix("\ufeff")

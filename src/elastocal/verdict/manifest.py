@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
-from elastocal.files import require_file, sha256
+from elastocal.files import read_bytes, sha256
 from elastocal.procedure import file_sha256
 from elastocal.records import from_data, json_sha256, record, to_data
 from elastocal.results import brief_repr
@@ -94,11 +94,8 @@ def embed_manifest(page: str, manifest: Manifest) -> str:
 
 def _text(path: Path) -> str:
     """Return the text of a page, every end of a line as it is."""
-    require_file(path)
     try:
-        return path.read_bytes().decode("utf-8")
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+        return read_bytes(path).decode("utf-8")
     except UnicodeDecodeError as error:
         raise FileAccessError(f"cannot read {path}: not a UTF-8 text file") from error
 

@@ -12,7 +12,9 @@ __all__ = [
     "import_logs",
     "init",
     "krc_config",
+    "live",
     "measure_delay",
+    "new",
     "plan",
     "predict",
     "report",
@@ -20,6 +22,7 @@ __all__ = [
     "simulate",
     "simulate_process",
     "stiffness",
+    "studio",
     "study",
     "tool",
     "verify",
@@ -27,6 +30,7 @@ __all__ = [
 
 from ._file_kinds import FileDescription as FileDescription
 from ._inputs import NewTool as NewTool, find_robot as find_robot
+from ._live_session import LiveReport as LiveReport
 from ._operator_and_devices import (
     GROUP as GROUP,
     Operator as Operator,
@@ -96,10 +100,26 @@ from .krc_config import (
     krc_config as krc_config,
     kuka_settings as kuka_settings,
 )
+from .live import (
+    LIVE_LOG as LIVE_LOG,
+    LIVE_RECORD as LIVE_RECORD,
+    LiveResult as LiveResult,
+    LiveSettings as LiveSettings,
+    live as live,
+)
 from .measure_delay import (
     MeasureDelayResult as MeasureDelayResult,
     MeasureDelaySettings as MeasureDelaySettings,
     measure_delay as measure_delay,
+)
+from .new import (
+    NONE as NONE,
+    NewResult as NewResult,
+    NewSettings as NewSettings,
+    filled as filled,
+    new as new,
+    offered as offered,
+    parse_answer as parse_answer,
 )
 from .plan import (
     POSITION_PLAN as POSITION_PLAN,
@@ -163,6 +183,12 @@ from .stiffness import (
     StiffnessSettings as StiffnessSettings,
     StiffnessSummary as StiffnessSummary,
     stiffness as stiffness,
+)
+from .studio import (
+    StudioFigures as StudioFigures,
+    StudioResult as StudioResult,
+    StudioSettings as StudioSettings,
+    studio as studio,
 )
 from .study import (
     DEFAULT_VARIATION as DEFAULT_VARIATION,

@@ -3,6 +3,7 @@
 A new kind is a function here and its entry in a table of `elastocal.workflows.check`.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,6 @@ from elastocal.robot import (
     refusals_naming,
     tip_links,
 )
-from elastocal.verdict import read_signature
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._table_kinds import dataset_file
 
@@ -273,13 +273,12 @@ def process_folder(path: Path) -> FileDescription:
     return kind, {**facts, "courses": courses}
 
 
-def signature_file(path: Path) -> FileDescription:
-    """Describe the signature of a run."""
-    found = read_signature(path)
-    return "signature", {
-        "schema": "elastocal.signature/1",
-        **_picked(found, "of", "sha256", "made", "key"),
-    }
+def record_file(kind: str, record: type[object], *names: str) -> Callable[[Path], FileDescription]:
+    """Return what describes a file of a record by some of its figures."""
+    return lambda path: (
+        kind,
+        {"schema": schema_of(record), **_picked(read_json(path, record), *names)},
+    )
 
 
 def commissioning_file(path: Path) -> FileDescription:

@@ -13,8 +13,15 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset, require_joint_names
-from elastocal.errors import ElastocalError, GeometryError, RobotError, UnitError
+from elastocal.errors import (
+    CompensationError,
+    ElastocalError,
+    GeometryError,
+    RobotError,
+    UnitError,
+)
 from elastocal.identification import (
+    MOST_UNEXPLAINED,
     CalibratedModel,
     attainable_rank,
     describe_briefly,
@@ -205,6 +212,21 @@ def _require_near(what: str, point: ArrayLike, origin: str) -> None:
         raise RobotError(
             f"the tool's {what} lies {distance:.4g} m from {origin}: at most {_LONGEST_TOOL:g} m"
             " are allowed"
+        )
+
+
+def require_model_of_arm(calibrated: CalibratedModel, file: Path) -> None:
+    """Refuse a model that leaves too much unexplained for an arm to be corrected by it.
+
+    Raises
+    ------
+    CompensationError
+        With how much.
+    """
+    if calibrated.unexplained > MOST_UNEXPLAINED:
+        raise CompensationError(
+            f"{file} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
+            f" poses, at most {MOST_UNEXPLAINED:.0%} is allowed: it is no model of this arm"
         )
 
 

@@ -27,6 +27,7 @@ from elastocal.cell import (
     DeviceSettings,
     Driver,
     LineCounts,
+    PathDriver,
     RigContext,
     WallClock,
 )
@@ -178,6 +179,42 @@ class Rig:
             return tuple(counts for each in made for counts in each.lines())
 
         return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
+
+    def path_arm(self) -> tuple[PathDriver, DeviceSettings]:
+        """Return the driver of the arm, which takes corrections of a path, and its settings.
+
+        Raises
+        ------
+        DeviceError
+            If it takes none.
+        """
+        name = self.cell.file.devices.arm.driver
+        driver = self.drivers[name]
+        if not isinstance(driver, PathDriver):
+            raise DeviceError(
+                f"{self.cell.path}: devices.arm: driver {name!r} takes no corrections of a path"
+            )
+        return driver, self.wanted[name]["arm"]
+
+    def connect_sensor(self, context: RigContext) -> DeviceSet:
+        """Return the force sensor alone, with its feed; to be closed by whoever asked.
+
+        Raises
+        ------
+        DeviceError
+            If it cannot be used, or its driver gives no newest wrench.
+        """
+        name = self.cell.file.devices.sensor.driver
+        found = self.drivers[name].connect(
+            self.cell, {"sensor": self.wanted[name]["sensor"]}, context
+        )
+        if found.sensor is None or found.feed is None:
+            found.close()
+            raise DeviceError(
+                f"{self.cell.path}: devices.sensor: driver {name!r} gives no newest wrench in"
+                " between, which a correction needs each cycle"
+            )
+        return found
 
     def _only(self, kind: str, made: Sequence[DeviceSet]) -> Any:
         (device,) = (

@@ -23,7 +23,7 @@ from typing import (
 )
 
 from elastocal.errors import nearest
-from elastocal.files import remove_leftovers
+from elastocal.files import remove_leftovers, require_place
 from elastocal.outputs import OutputRule, ruled
 from elastocal.progress import Progress, silent
 
@@ -88,6 +88,8 @@ def workflow(
             written = [path for name in (*outputs, record) for path in places.pop(name, ())]
             for path in written:
                 remove_leftovers(path)
+                if marks:  # a file; folders are made
+                    require_place(path)
             rule = OutputRule(
                 force=getattr(chosen, "force", False),
                 marks=marks,

@@ -11,11 +11,11 @@ from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import design
 from elastocal.errors import CompensationError
-from elastocal.identification import MOST_UNEXPLAINED, PredictionDoubt
+from elastocal.identification import PredictionDoubt
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
-from elastocal.workflows._inputs import NewTool, coverage_notes
+from elastocal.workflows._inputs import NewTool, coverage_notes, require_model_of_arm
 from elastocal.workflows._workflow import workflow
 
 
@@ -96,11 +96,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     """
     model = Path(settings.model)
     calibrated = settings.read_model(model)
-    if calibrated.unexplained > MOST_UNEXPLAINED:
-        raise CompensationError(
-            f"{model} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
-            f" poses, at most {MOST_UNEXPLAINED:.0%} is allowed: it is no model of this arm"
-        )
+    require_model_of_arm(calibrated, model)
     chosen = None if settings.compensator is None else read_settings(settings.compensator)
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     try:

@@ -6,24 +6,32 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal.errors import FileAccessError
 from elastocal.files import write_text
 from elastocal.geometry import (
+    GeometryAccuracy,
     GeometryModel,
     GeometryProblem,
+    LinkNumber,
+    accuracy_figures,
     climb,
     geometry_model,
+    link_table,
     read_positions,
 )
 from elastocal.progress import Progress
 from elastocal.records import write_json
+from elastocal.report.document import REPORT_TITLE, GeometryFindings, write_geometry_page
 from elastocal.results import Result, brief_repr
 from elastocal.robot import BUILT_MARK
+from elastocal.tables import write_table
 from elastocal.units import parse_point
 from elastocal.wording import counted
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
-_MM = 1e3
+_MM, _DEGREES = 1e3, float(np.degrees(1.0))
+_TABLE = ("joint", "number", "unit", "nominal", "calibrated", "difference", "low", "high")
 
 
 @brief_repr
@@ -41,6 +49,10 @@ class GeometrySettings:
     """Model file to write; none: the model is only returned."""
     urdf: Path | None = None
     """Calibrated URDF to write."""
+    report_file: Path | None = None
+    """Report to write, ``.html``."""
+    table: Path | None = None
+    """Table of links as drawn and as built to write, ``.csv``."""
     markers: tuple[str, ...] = ()
     """Where on the tool each marker is, ``"x, y, z"`` in the tcp with units, where that is known:
     then an error of the tcp is found too."""
@@ -57,6 +69,8 @@ class GeometryResult(Result):
     """A calibrated geometry."""
 
     model: GeometryModel
+    accuracy: GeometryAccuracy
+    """Errors of every position before and after, at poses that were left out."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -73,7 +87,11 @@ class GeometryResult(Result):
         )
 
 
-@workflow(GeometrySettings, outputs=("out", "urdf"), marks=("elastocal.geometry/", BUILT_MARK))
+@workflow(
+    GeometrySettings,
+    outputs=("out", "urdf", "report_file", "table"),
+    marks=("elastocal.geometry/", BUILT_MARK, f"<title>{REPORT_TITLE}", ",".join(_TABLE)),
+)
 def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     """Find the geometric errors of an arm, and what it yields under its weight and payloads.
 
@@ -91,8 +109,9 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     RobotError
         If there is no such robot or link.
     FileAccessError
-        If a file cannot be read or written.
+        If a file cannot be read or written, or its name says another kind.
     """
+    _check_suffixes(settings)
     path = Path(settings.positions)
     robot = find_robot(settings.robot, settings.tcp, None)
     problem = GeometryProblem(robot, read_positions(path, robot))
@@ -105,7 +124,32 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
         write_json(settings.out, model)
     if settings.urdf is not None:
         write_text(settings.urdf, model.calibrated_urdf())
-    return GeometryResult(model)
+    accuracy = accuracy_figures(problem, found)
+    if settings.report_file is not None or settings.table is not None:
+        links = link_table(problem, found)
+        if settings.table is not None:
+            write_table(settings.table, _TABLE, map(_cells, links))
+        if settings.report_file is not None:
+            write_geometry_page(settings.report_file, GeometryFindings(model, accuracy, links))
+    return GeometryResult(model, accuracy)
+
+
+def _check_suffixes(settings: GeometrySettings) -> None:
+    """Refuse names of files that say another kind, before the work."""
+    for name, path, suffix in (
+        ("report", settings.report_file, ".html"),
+        ("table", settings.table, ".csv"),
+    ):
+        if path is not None and path.suffix.lower() != suffix:
+            raise FileAccessError(f"--{name} {path}: its name must end in {suffix}")
+
+
+def _cells(row: LinkNumber) -> tuple[object, ...]:
+    """Return a row of the table, in mm and degrees."""
+    scale, unit = (_MM, "mm") if row.unit == "m" else (_DEGREES, "deg")
+    values = (row.nominal, row.calibrated, row.calibrated - row.nominal, row.low, row.high)
+    shown = ("" if value is None else round(scale * value, 9) + 0.0 for value in values)
+    return (row.joint, row.number, unit, *shown)
 
 
 def _phrase(mean: float, p95: float, largest: float) -> str:

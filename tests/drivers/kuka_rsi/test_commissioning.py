@@ -100,3 +100,15 @@ def test_a_record_of_another_cycle_or_none_is_refused(record):
         settings.motion_delay(cell)
     with pytest.raises(ElastocalError, match=r"nothing\.json"):
         RsiSettings(mode="contact", commissioning="nothing.json").motion_delay(cell)
+
+
+@pytest.mark.parametrize("delay", [-0.03, 0.0, 1.5])
+def test_a_record_that_would_turn_the_force_control_round_is_refused(record, delay):
+    """Its gain is one over the delay: below 0 the arm would press the harder it is pressed."""
+    cell = example_cell("afp")
+    path = cell.path.parent / "commissioning.json"
+    write_json(path, record)
+    path.write_text(path.read_text().replace('"delay": 0.025', f'"delay": {delay}'))
+    settings = RsiSettings(mode="contact", commissioning="commissioning.json")
+    with pytest.raises(ElastocalError, match=r"delay is .* s: must be above 0, at most 1 s"):
+        settings.motion_delay(cell)

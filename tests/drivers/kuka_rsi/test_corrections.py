@@ -84,7 +84,7 @@ def test_a_few_lost_answers_are_made_up_for_and_are_no_saturation():
 class Wants:
     wanted: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
-    def correction(self, _message, _now):
+    def correction(self, _message, _now, _begins):
         return self.wanted
 
 
@@ -111,3 +111,23 @@ def test_a_program_that_was_started_anew_begins_without_correction():
         handler.step(RobMessage(k), Arrival.NEXT, 0.0)
     again = handler.step(RobMessage(90), Arrival.JUMPED, 0.0)
     assert again.correction[0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("lost", "anew"), [(9, False), (11, True)])
+def test_who_was_without_an_answer_beyond_the_timeout_begins_without_correction(lost, anew):
+    handler = PathCorrections(Wants(np.array([1e-3, 0.0, 0.0])), BOUNDS, CYCLE, timeout=10)
+    for k in range(10):
+        handler.step(RobMessage(4 * k), Arrival.NEXT, 0.0)
+    after = handler.step(RobMessage(4 * (10 + lost)), Arrival.AFTER_LOSS, 0.0)
+    assert after.correction[0] == pytest.approx(0.2 if anew else 1.0)
+
+
+def test_corrections_that_are_over_raise_stop_and_go_back_at_the_same_speed():
+    wants = Wants(np.array([4e-4, 0.0, 0.0]))
+    handler = PathCorrections(wants, BOUNDS, CYCLE)
+    for k in range(5):
+        assert not handler.step(RobMessage(k), Arrival.NEXT, 0.0).stop
+    wants.wanted = None
+    told = [handler.step(RobMessage(5 + k), Arrival.NEXT, 0.0) for k in range(3)]
+    assert [each.stop for each in told] == [True] * 3
+    assert [each.correction[0] for each in told] == pytest.approx([0.2, 0.0, 0.0])

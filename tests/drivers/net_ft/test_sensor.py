@@ -177,6 +177,17 @@ def test_whatever_comes_is_taken_or_refused(datagrams):
     assert np.all(np.diff(block.time) > 0.0)
 
 
+def test_a_stream_that_was_silent_has_a_hole_for_a_run_and_goes_on_for_a_correction(stream):
+    stream.send()
+    stream.sensor.fall_silent("no record for 0.25 s")
+    assert stream.sensor.newest().time == pytest.approx(5.001), "as old as it is"
+    stream.clock.sleep(1.0)
+    stream.send()
+    assert stream.sensor.newest().time == pytest.approx(6.002, abs=0.06)
+    with pytest.raises(DeviceError, match=r"no record for 0\.25 s"):
+        stream.sensor.read()
+
+
 def test_what_is_wrong_with_the_stream_is_counted(stream):
     stream.send()
     stream.send(rdt=4)

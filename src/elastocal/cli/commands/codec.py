@@ -43,7 +43,10 @@ def _codec(  # noqa: PLR0913 - one parameter an option
         int | None, typer.Option(max=100_000, help="Verification sets; default: as many as poses.")
     ] = None,
     poses: Annotated[
-        int, typer.Option(help="Most poses; of a larger dataset as many are drawn by the seed.")
+        int,
+        typer.Option(
+            max=1_000_000, help="Most poses; of a larger dataset as many are drawn by the seed."
+        ),
     ] = 100,
     ratio: Annotated[
         str, typer.Option(metavar="A/B", help="Training to verification poses.")

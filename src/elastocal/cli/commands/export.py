@@ -21,16 +21,12 @@ def _export(
     as_json: options.Written = False,
 ) -> None:
     """Write a model as dependency-free C99 with filters, limits and a self-test."""
-    from elastocal.errors import CompensationError
-
     files, frame = options.split_tools(tool)
-    if len(files) > 1:
-        raise CompensationError(f"--tool names {len(files)} tool files: a compensator has one")
     result = workflows.export(
         model,
         out=c,
         compensator=settings,
-        tool=files[0] if files else None,
+        tool=options.only_tool(files),
         force=force,
         tool_frame=frame,
         tool_mass=tool_mass,

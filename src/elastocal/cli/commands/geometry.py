@@ -19,6 +19,13 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
     ] = None,
     tcp: Annotated[str | None, typer.Option(help="Link that carries the markers.")] = None,
     urdf: Annotated[Path | None, typer.Option(help="Calibrated URDF to write.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Report (.html) to write: before and after, maps, figures.")
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(help="Table (.csv) of Denavit-Hartenberg numbers as drawn and as built."),
+    ] = None,
     marker: Annotated[
         list[str] | None,
         typer.Option(
@@ -26,7 +33,7 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
             " for each: then the error of the tcp is found too."
         ),
     ] = None,
-    draws: Annotated[int, typer.Option(min=40, help="Draws of the bootstrap.")] = 200,
+    draws: Annotated[int, typer.Option(min=40, max=100_000, help="Draws of the bootstrap.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Of these draws.")] = 0,
     force: options.Force = False,
     as_json: options.Figures = False,
@@ -40,6 +47,8 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
         tcp=tcp,
         out=out,
         urdf=urdf,
+        report_file=report,
+        table=table,
         markers=tuple(marker or ()),
         draws=draws,
         seed=seed,
@@ -50,6 +59,8 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
     if as_json:
         data = to_data(result.model)
         keys = ("held_out", "ladder", "parameters", "fixed", "blunders")
-        output.print_json({key: data[key] for key in keys})
+        found = result.accuracy
+        more = {"axes": to_data(found.axes), "iso_9283": to_data(found.poses)}
+        output.print_json({key: data[key] for key in keys} | more)
         return
-    tables.show_geometry(output.console(), result.model, out)
+    tables.show_geometry(output.console(), result.model, result.accuracy, out)

@@ -45,6 +45,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         int | None,
         typer.Option(
             min=1,
+            max=100_000,
             help="Number of poses; default: search.poses of the cell file; 60 for geometry.",
         ),
     ] = None,

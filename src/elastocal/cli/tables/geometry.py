@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from elastocal.cli.output import yellow
-from elastocal.geometry import GeometryModel, GeometryParameter, PositionPlan
+from elastocal.geometry import GeometryAccuracy, GeometryModel, GeometryParameter, PositionPlan
 from elastocal.wording import counted
 
 _UNITS = {
@@ -20,7 +20,9 @@ _MOST_ROWS = 12
 """Rows with blunders that are named."""
 
 
-def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
+def show_geometry(
+    console: Console, model: GeometryModel, accuracy: GeometryAccuracy, out: Path
+) -> None:
     """Print a calibrated geometry for a person."""
     rungs = Table(title="errors at poses left out, mm", title_justify="left", box=None)
     for heading in ("model", "unknowns", "mean", "95 %", "largest", ""):
@@ -37,6 +39,7 @@ def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
     for parameter in model.parameters:
         table.add_row(*_cells(parameter))
     console.print(table)
+    _show_accuracy(console, accuracy)
     for finding in model.findings:
         console.print(f"{yellow('warning:')} {finding}", soft_wrap=True)
     blunders = model.blunders
@@ -51,6 +54,24 @@ def show_geometry(console: Console, model: GeometryModel, out: Path) -> None:
     fixed = counted(len(model.fixed), "error")
     written = f"{fixed} not told apart from others; wrote {out}"
     console.print(written, soft_wrap=True)
+
+
+def _show_accuracy(console: Console, accuracy: GeometryAccuracy) -> None:
+    parts = (
+        f"{each.axis} {1e3 * each.registration.rms:.3f} to {1e3 * each.chosen.rms:.3f}"
+        for each in accuracy.axes
+    )
+    console.print(f"root mean square by axis before and after, mm: {', '.join(parts)}")
+    if poses := accuracy.poses:
+        largest = [
+            1e3 * max(getattr(each, name) for each in poses)
+            for name in ("registration", "chosen", "repeatability")
+        ]
+        console.print(
+            f"ISO 9283, {counted(len(poses), 'repeated pose')}: AP at most {largest[0]:.3f} mm"
+            f" before, {largest[1]:.3f} mm after; RP at most {largest[2]:.3f} mm",
+            soft_wrap=True,
+        )
 
 
 def show_position_plan(console: Console, plan: PositionPlan, folder: Path) -> None:

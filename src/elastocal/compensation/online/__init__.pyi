@@ -6,6 +6,17 @@ from .design import (
     design as design,
     draws_factor as draws_factor,
 )
+from .live import (
+    LiveCounts as LiveCounts,
+    LiveCycle as LiveCycle,
+    LiveLoop as LiveLoop,
+    LivePhase as LivePhase,
+    LiveSample as LiveSample,
+    Tare as Tare,
+    every_sample as every_sample,
+    newest_sample as newest_sample,
+)
+from .live_log import LIVE_LOG_SCHEMA as LIVE_LOG_SCHEMA, LiveLog as LiveLog
 from .state import (
     Correction as Correction,
     Reading as Reading,

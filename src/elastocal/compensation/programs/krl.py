@@ -17,10 +17,11 @@ from elastocal.arrays import FloatArray
 from elastocal.compensation.programs.program import CorrectedPoint, Move, Words
 from elastocal.dataset import in_file
 from elastocal.errors import FileAccessError, PathError
-from elastocal.files import replacing, require_file
+from elastocal.files import Limit, read_bytes, replacing
 from elastocal.results import brief_repr
 from elastocal.robot import T_from_xyzabc
 
+_MOST_PROGRAM = Limit("ELASTOCAL_MAX_PROGRAM_MB", 32, "MB")
 _CODE = re.compile(r'(?:"[^"]*"|[^";])*')
 _AXIS_KINDS = ("E6AXIS", "AXIS")
 _FRAME_NUMBERS = ("X", "Y", "Z", "A", "B", "C")
@@ -124,11 +125,7 @@ def _read_lines(path: Path) -> list[str]:
     FileAccessError
         If the file cannot be read.
     """
-    require_file(path)
-    try:
-        text = Path(path).read_bytes().decode("latin-1")
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    text = read_bytes(path, _MOST_PROGRAM).decode("latin-1")
     # Not splitlines(): it also splits at bytes that only look like line ends, such as 0x85.
     return re.findall(r"[^\n]*\n|[^\n]+", text)
 

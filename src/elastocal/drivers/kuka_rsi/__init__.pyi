@@ -18,6 +18,7 @@ from .controller_files import (
     write_controller_files as write_controller_files,
 )
 from .corrections import (
+    CorrectedKuka as CorrectedKuka,
     CorrectionGuard as CorrectionGuard,
     CorrectionSource as CorrectionSource,
     PathCorrections as PathCorrections,
@@ -42,9 +43,7 @@ from .force_control import (
     overshoot as overshoot,
 )
 from .link import (
-    Arrival as Arrival,
     Handler as Handler,
-    IpocWatch as IpocWatch,
     LinkAddress as LinkAddress,
     LinkStatistics as LinkStatistics,
     RsiLink as RsiLink,
@@ -53,6 +52,8 @@ from .messages import (
     MOST_BYTES as MOST_BYTES,
     NO_CORRECTION as NO_CORRECTION,
     Answerer as Answerer,
+    Arrival as Arrival,
+    IpocWatch as IpocWatch,
     MoveTarget as MoveTarget,
     Order as Order,
     ProgramState as ProgramState,

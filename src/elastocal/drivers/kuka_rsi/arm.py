@@ -24,8 +24,9 @@ from elastocal.drivers.kuka_rsi._commands import (
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
 from elastocal.drivers.kuka_rsi.force_control import CollisionWatch, ForceLaw, ForceReader
-from elastocal.drivers.kuka_rsi.link import Arrival, RsiLink
+from elastocal.drivers.kuka_rsi.link import RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
+    Arrival,
     MoveTarget,
     Order,
     ProgramState,

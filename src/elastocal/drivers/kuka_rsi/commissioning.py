@@ -18,7 +18,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.drivers.kuka_rsi.link import LinkStatistics
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, SchemaError
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -28,6 +28,8 @@ _RAMP = 0.25
 """Part of the chirp over which it grows, and falls again."""
 _LONGEST = 0.5
 """Longest dead time that is looked for, in s."""
+_LONGEST_DELAY = 1.0
+"""Longest delay from command to motion that is taken for one, in s."""
 _LEAST_GAIN, _MOST_UNEXPLAINED = 0.5, 0.2
 """Gain and unexplained part of the motion at which an answer is none."""
 
@@ -72,6 +74,13 @@ class CommissioningRecord:
     """One along each axis of base."""
     link: LinkStatistics
     """Of the line meanwhile."""
+
+    def __post_init__(self) -> None:
+        # The gain of force control follows from it: of a delay below 0 the arm would push harder.
+        if not 0.0 < self.delay <= _LONGEST_DELAY:
+            raise SchemaError(
+                f"delay is {self.delay:g} s: must be above 0, at most {_LONGEST_DELAY:g} s"
+            )
 
 
 @brief_repr

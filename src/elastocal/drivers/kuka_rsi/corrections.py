@@ -1,16 +1,29 @@
-"""The last look at every correction before it is sent: speed, size, and whether it is followed."""
+"""The last look at every correction before it is sent: speed, size, and whether it is followed.
+
+And the arm whose programmed path is corrected, which needs nothing else of this package.
+"""
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.drivers.kuka_rsi.link import Arrival
-from elastocal.drivers.kuka_rsi.messages import NO_CORRECTION, Order, RobMessage, SenMessage, Six
-from elastocal.drivers.kuka_rsi.settings import FASTEST, Bounds
+from elastocal.cell import Cell, Clock, CycleStatistics, PathCycle, PathSource, Shift
+from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
+from elastocal.drivers.kuka_rsi.messages import (
+    NO_CORRECTION,
+    Arrival,
+    Order,
+    RobMessage,
+    SenMessage,
+    Six,
+)
+from elastocal.drivers.kuka_rsi.posture import PostureReader
+from elastocal.drivers.kuka_rsi.settings import FASTEST, Bounds, RsiSettings, bounds_of
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
@@ -108,8 +121,18 @@ class CorrectionGuard:
 class CorrectionSource(Protocol):
     """Computes corrections of a path in the loop."""
 
-    def correction(self, message: RobMessage, now: float) -> FloatArray:
-        """Return the whole correction in the axes of ``RefCorrSys``, shape (3,), in m, at once."""
+    def correction(self, message: RobMessage, now: float, begins: bool) -> Shift | None:
+        """Return the whole correction in the axes of ``RefCorrSys``, in m, at once; None: no more.
+
+        Parameters
+        ----------
+        message : RobMessage
+            Of this cycle.
+        now : float
+            When it came, in s of the clock.
+        begins : bool
+            Whether no correction is in effect.
+        """
 
 
 @brief_repr
@@ -126,31 +149,113 @@ class PathCorrections:
     bounds: Bounds
     cycle: float
     sentype: str = "elastocal"
+    timeout: int = 10
+    """Of the controller's ETHERNET object: whoever was without an answer for more cycles begins
+    anew, without correction."""
     clamped: int = 0
     """Cycles in which the source wanted more than the largest correction."""
     held: int = 0
     """Cycles in which it wanted what is not finite."""
-    _sent: FloatArray | None = None
+    _sent: Shift | None = None
+    _ipoc: int = 0
 
     def step(self, message: RobMessage, arrival: Arrival, now: float) -> SenMessage | None:
         """Return the answer; see `elastocal.drivers.kuka_rsi.Handler`."""
+        gap, self._ipoc = message.ipoc - self._ipoc, message.ipoc
         before = self._sent
-        if before is None or arrival is Arrival.JUMPED:
+        begins = arrival is Arrival.JUMPED or gap > 1e3 * self.timeout * self.cycle
+        if before is None or begins:
             # A program that was started anew begins without correction.
-            before = np.zeros(3)
-        wanted = self.source.correction(message, now)
-        if not np.isfinite(wanted).all():
-            self.held, wanted = self.held + 1, before
-        size = float(np.linalg.norm(wanted))
-        if size > self.bounds.correction:
-            self.clamped, wanted = self.clamped + 1, wanted * (self.bounds.correction / size)
-        way = wanted - before
-        length, most = float(np.linalg.norm(way)), self.bounds.speed * self.cycle
-        self._sent = wanted if length <= most else before + way * (most / length)
+            before, begins = (0.0, 0.0, 0.0), True
+        wanted = self.source.correction(message, now, begins)
+        if wanted is None:
+            # Over: STOP rises, and what is left of the correction is taken back at the same speed.
+            self._sent = self._bounded((0.0, 0.0, 0.0), before)
+            return SenMessage(as_millimetres(self._sent), Order.HOLD, sentype=self.sentype)
+        self._sent = self._bounded(wanted, before)
         return SenMessage(as_millimetres(self._sent), Order.GUIDE, sentype=self.sentype)
 
+    def _bounded(self, wanted: Shift, before: Shift) -> Shift:
+        # Plain floats: arrays of three would take longer than the whole of it.
+        x, y, z = wanted
+        size = math.sqrt(x * x + y * y + z * z)
+        if not size < math.inf:
+            self.held += 1
+            return before
+        if size > self.bounds.correction:
+            self.clamped += 1
+            share = self.bounds.correction / size
+            x, y, z = share * x, share * y, share * z
+        x0, y0, z0 = before
+        dx, dy, dz = x - x0, y - y0, z - z0
+        length, most = math.sqrt(dx * dx + dy * dy + dz * dz), self.bounds.speed * self.cycle
+        if length <= most:
+            return x, y, z
+        share = most / length
+        return x0 + share * dx, y0 + share * dy, z0 + share * dz
 
-def as_millimetres(shift: FloatArray) -> Six:
+
+def as_millimetres(shift: Iterable[float]) -> Six:
     """Return a translation in m as RKorr has it, without turn."""
-    x, y, z = (1e3 * shift).tolist()
-    return (x, y, z, *NO_CORRECTION[3:])
+    x, y, z = shift
+    return (1e3 * x, 1e3 * y, 1e3 * z, *NO_CORRECTION[3:])
+
+
+class CorrectedKuka:
+    """A KUKA on its own program, corrected; see `elastocal.cell.CorrectedArm`.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    settings : RsiSettings
+        Of its arm, in mode ``compensation``.
+    clock : Clock
+        Of the rig.
+    source : PathSource
+        Computes the corrections.
+    """
+
+    def __init__(self, cell: Cell, settings: RsiSettings, clock: Clock, source: PathSource) -> None:
+        self._settings, self._source = settings, source
+        self._reader = PostureReader(cell.robot, settings.signs)
+        bounds = bounds_of(cell, settings)
+        self._corrections = PathCorrections(
+            self, bounds, settings.cycle, settings.sentype, settings.timeout
+        )
+        place = LinkAddress(settings.address, settings.port, settings.robot, settings.cycle)
+        self._link = RsiLink(place, self._corrections, clock)
+        self._link.start()
+        self.wait, self.require, self.close = self._link.wait, self._link.require, self._link.close
+        self.port = self._link.port
+        """The port that it listens at."""
+
+    def correction(self, message: RobMessage, now: float, begins: bool) -> Shift | None:
+        """Return what the source wants; see `CorrectionSource`."""
+        if begins:
+            # Once a program: tool, base and signs of the axes are those of the description.
+            cycle = self._reader.read(message, now, "compensation")
+            self._reader.require_model(cycle, self._settings.model_tolerance)
+        return self._source.correction(PathCycle(now, self._reader.joints(message), begins))
+
+    def statistics(self) -> CycleStatistics:
+        """Return the counts so far."""
+        counts, times = self._link.statistics(), self._link.times
+        return CycleStatistics(
+            received=counts.received,
+            answered=counts.answered,
+            lost=counts.lost,
+            skipped=counts.skipped,
+            out_of_order=counts.out_of_order,
+            jumps=counts.jumps,
+            malformed=counts.malformed,
+            foreign=counts.foreign,
+            late=counts.late,
+            saturated=self._corrections.clamped,
+            controller_delay=counts.controller_delay,
+            answer_p50=times.quantile(0.5),
+            answer_p99=times.quantile(0.99),
+            answer_p999=times.quantile(0.999),
+            answer_longest=times.longest if times.count else None,
+            jitter=None if math.isnan(counts.jitter) else counts.jitter,
+        )

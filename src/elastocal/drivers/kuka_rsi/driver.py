@@ -10,17 +10,22 @@ from elastocal.cell import (
     DeviceSet,
     DeviceSettings,
     LineCounts,
+    PathLimits,
+    PathSource,
     RigContext,
     WrenchFeed,
 )
 from elastocal.drivers.kuka_rsi.arm import KukaArm
+from elastocal.drivers.kuka_rsi.corrections import CorrectedKuka
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
-from elastocal.drivers.kuka_rsi.settings import RsiSettings
+from elastocal.drivers.kuka_rsi.settings import RsiSettings, bounds_of
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
 _TO_THE_LOOP = 1.0
 """From RSI_ON to the loop of the controller's program, at most, in s of the wall."""
+_LIMITS = ("largest_correction", "correction_speed")
+"""Keys without which no path is corrected."""
 
 
 def connect_arm(
@@ -87,6 +92,31 @@ class KukaRsiDriver:
             return (link.statistics().counts(arm.guard.saturated, link.source),)
 
         return DeviceSet(arm=arm, close=link.close, lines=lines)
+
+    def path_limits(self, cell: Cell, settings: DeviceSettings) -> PathLimits:
+        """Return the limits of corrections; see `elastocal.cell.PathDriver`."""
+        assert isinstance(settings, RsiSettings)
+        place = f"{cell.path}: devices.arm"
+        if settings.mode != "compensation":
+            raise DeviceError(
+                f"{place}.mode is {settings.mode}: must be compensation to correct a path"
+            )
+        missing = [key for key in _LIMITS if getattr(settings, key) is None]
+        missing += [key for key in _LIMITS if key not in settings.model_fields_set]
+        if missing:
+            raise DeviceError(
+                f"{place} states no {' and no '.join(dict.fromkeys(missing))}: corrections of a"
+                " path need limits that somebody has chosen, and no default is one"
+            )
+        bounds = bounds_of(cell, settings)
+        return PathLimits(bounds.correction, bounds.speed, settings.cycle, "base")
+
+    def correct_path(
+        self, cell: Cell, settings: DeviceSettings, context: RigContext, source: PathSource
+    ) -> CorrectedKuka:
+        """Return the arm, listened to and answered; see `elastocal.cell.PathDriver`."""
+        assert isinstance(settings, RsiSettings)
+        return CorrectedKuka(cell, settings, context.clock, source)
 
 
 DRIVER = KukaRsiDriver()

@@ -9,19 +9,22 @@ bounds the motion are the controller's own limits, not this thread.
 
 import math
 import socket
+import struct
+import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Protocol
 
 import numpy as np
 
-from elastocal.cell import Clock, LineCounts
+from elastocal.cell import AnswerTimes, Clock, LineCounts
 from elastocal.drivers.kuka_rsi.messages import (
     MOST_BYTES,
+    Arrival,
+    IpocWatch,
     RobMessage,
     SenMessage,
     is_overture,
@@ -35,25 +38,18 @@ _PATIENCE = 0.1
 """How long the thread waits for a datagram before it looks whether it is to end, in s."""
 _LATE = 0.875
 """Part of the cycle after which an answer is likely to miss it: 3.5 ms of 4 ms."""
-_FAR = 250
-"""Cycles by which an IPOC that is no jump may be off: a second at 4 ms."""
 _KEPT = 20_000
-"""Answers whose times are kept for the statistics."""
+"""Messages whose distances are kept for the statistics."""
 _SESSION = 0.5
 """Time after the last message at which a controller may come back from another port, in s."""
+_STAMP, _STAMPED = 35, struct.Struct("@qq")
+"""SO_TIMESTAMPNS of Linux, which the module `socket` does not name, and what it gives."""
+_OLDEST = 1.0
+"""A stamp of the kernel that is older, in s, is none: the clock of the wall was set meanwhile."""
+_Arrived = tuple[bytes, tuple[str, int], float]
+"""A datagram, its sender, and how long it had waited, in s."""
 _MOST_BACKLOG = 64
 """Datagrams that are skipped at once at most, before one is answered."""
-
-
-class Arrival(Enum):
-    """How a message follows the one before it."""
-
-    FIRST = "first"
-    NEXT = "next"
-    AFTER_LOSS = "after loss"
-    OUT_OF_ORDER = "out of order"
-    JUMPED = "jumped"
-    """The controller's time has jumped: its program was started anew."""
 
 
 class Handler(Protocol):
@@ -126,35 +122,6 @@ class LinkStatistics:
         )
 
 
-class IpocWatch:
-    """Tells from IPOC how messages follow one another.
-
-    IPOC counts milliseconds: it grows by the cycle. Some simulators count messages, by 1.
-    """
-
-    def __init__(self, cycle: float) -> None:
-        self._step = round(1e3 * cycle)
-        self._last: int | None = None
-        self.lost = 0
-
-    def classify(self, ipoc: int) -> Arrival:
-        """Return how a message follows; one out of order does not count as the last."""
-        if self._last is None:
-            self._last = ipoc
-            return Arrival.FIRST
-        change = ipoc - self._last
-        if change == 1:
-            self._step = 1
-        if -_FAR * self._step <= change <= 0:
-            return Arrival.OUT_OF_ORDER
-        steps, rest = divmod(change, self._step)
-        self._last = ipoc
-        if rest or not 0 < steps <= _FAR:
-            return Arrival.JUMPED
-        self.lost += steps - 1
-        return Arrival.NEXT if steps == 1 else Arrival.AFTER_LOSS
-
-
 @dataclass(frozen=True)
 class LinkAddress:
     """Where a link listens, and to whom."""
@@ -183,7 +150,7 @@ class _Counts:
     foreign: int = 0
     overtures: int = 0
     controller_delay: int | None = None
-    took: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    took: AnswerTimes = field(default_factory=AnswerTimes)
     between: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
 
 
@@ -240,6 +207,8 @@ class RsiLink:
                 f"kuka_rsi: cannot listen at {place.address}:{place.port}:"
                 f" {error.strerror or error}"
             ) from error
+        if sys.platform == "linux":
+            found.setsockopt(socket.SOL_SOCKET, _STAMP, 1)
         found.settimeout(_PATIENCE)
         self._socket, self.port = found, found.getsockname()[1]
         self._thread = threading.Thread(target=self._listen, name="kuka_rsi", daemon=True)
@@ -272,7 +241,7 @@ class RsiLink:
     def statistics(self) -> LinkStatistics:
         """Return the counts so far."""
         counts = self._counts
-        took = np.array(list(counts.took) or [np.nan])
+        median, p99 = counts.took.quantile(0.5), counts.took.quantile(0.99)
         between = list(counts.between)
         return LinkStatistics(
             received=counts.received,
@@ -286,11 +255,16 @@ class RsiLink:
             foreign=counts.foreign,
             overtures=counts.overtures,
             controller_delay=counts.controller_delay,
-            answer_median=float(np.median(took)),
-            answer_p99=float(np.quantile(took, 0.99)),
-            answer_longest=float(took.max()),
+            answer_median=math.nan if median is None else median,
+            answer_p99=math.nan if p99 is None else p99,
+            answer_longest=counts.took.longest if counts.took.count else math.nan,
             jitter=float(np.std(between)) if between else float("nan"),
         )
+
+    @property
+    def times(self) -> AnswerTimes:
+        """Times of the answers so far, from datagram in to datagram out."""
+        return self._counts.took
 
     def answer(self, datagram: bytes, sender: tuple[str, int]) -> bytes | None:
         """Return the answer to a datagram; None where there is none.
@@ -303,7 +277,14 @@ class RsiLink:
             Address and port that it came from. The port is the controller's own choice at each
             start: another one counts as somebody else's until the one before falls silent.
         """
-        counts, came = self._counts, self._timer()
+        came = self._timer()
+        data = self._answer(datagram, sender, came)
+        if data is not None:
+            self._note_time(came)
+        return data
+
+    def _answer(self, datagram: bytes, sender: tuple[str, int], came: float) -> bytes | None:
+        counts = self._counts
         if not self._is_controller(sender, came):
             counts.foreign += 1
             return None
@@ -319,9 +300,7 @@ class RsiLink:
         reply = self._reply(message)
         if reply is None or not self._place.answers:
             return None
-        data = write_sen(reply, message.ipoc)
-        self._note_time(came)
-        return data
+        return write_sen(reply, message.ipoc)
 
     def _is_controller(self, sender: tuple[str, int], came: float) -> bool:
         """Return whether the controller sends; remember its port."""
@@ -352,7 +331,7 @@ class RsiLink:
         self._came = came
         took = self._timer() - came
         counts.answered += 1
-        counts.took.append(took)
+        counts.took.add(took)
         counts.late += took > _LATE * self._place.cycle
 
     def _listen(self) -> None:
@@ -370,22 +349,35 @@ class RsiLink:
         """Answer the newest datagram; those of others do not hide it."""
         assert self._socket is not None
         try:
-            waiting = self._socket.recvfrom(MOST_BYTES + 1)
+            waiting = self._receive()
         except TimeoutError:
             return
-        for datagram, sender in self._newest(waiting):
-            data = self.answer(datagram, sender)
+        for datagram, sender, waited in self._newest(waiting):
+            came = self._timer() - waited
+            data = self._answer(datagram, sender, came)
             if data is not None:
                 self._socket.sendto(data, sender)
+                self._note_time(came)
 
-    def _newest(self, first: tuple[bytes, tuple[str, int]]) -> list[tuple[bytes, tuple[str, int]]]:
+    def _receive(self) -> _Arrived:
+        """Return a datagram; where the kernel stamps them, time that it had to wait counts too."""
+        assert self._socket is not None
+        datagram, stamps, _, sender = self._socket.recvmsg(MOST_BYTES + 1, 64)
+        for level, kind, data in stamps:
+            if (level, kind) == (socket.SOL_SOCKET, _STAMP) and len(data) == _STAMPED.size:
+                seconds, rest = _STAMPED.unpack(data)
+                waited = time.time() - (seconds + 1e-9 * rest)
+                return datagram, sender, waited if 0.0 <= waited < _OLDEST else 0.0
+        return datagram, sender, 0.0
+
+    def _newest(self, first: _Arrived) -> list[_Arrived]:
         """Return what is waiting, of the controller the newest alone."""
         assert self._socket is not None
         waiting = [first]
         self._socket.setblocking(False)
         try:
             while len(waiting) < _MOST_BACKLOG:
-                waiting.append(self._socket.recvfrom(MOST_BYTES + 1))
+                waiting.append(self._receive())
         except BlockingIOError:
             pass
         finally:

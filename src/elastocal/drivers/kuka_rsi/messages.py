@@ -13,7 +13,7 @@ both messages). Verified against simulators and public layouts, not on hardware.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import Enum, IntEnum
 from xml.parsers import expat
 
 from elastocal.errors import DeviceError
@@ -39,6 +39,8 @@ _OPTIONAL = frozenset({"eipos"})
 _LARGEST = 1e7
 """Largest number of a controller, in mm or deg; the command numbers of a program are below it."""
 _MOST_DIGITS = 20
+_FAR = 250
+"""Cycles by which an IPOC that is no jump may be off: a second at 4 ms."""
 _SHORT = 100
 """Controllers with RSI 2 begin with an empty message that is shorter than this, in bytes."""
 Six = tuple[float, float, float, float, float, float]
@@ -132,6 +134,46 @@ class SenMessage:
     def stop(self) -> bool:
         """The channel of the STOP object; its rising edge ends ``RSI_MOVECORR``."""
         return self.order is not Order.GUIDE and not self.rearm
+
+
+class Arrival(Enum):
+    """How a message follows the one before it."""
+
+    FIRST = "first"
+    NEXT = "next"
+    AFTER_LOSS = "after loss"
+    OUT_OF_ORDER = "out of order"
+    JUMPED = "jumped"
+    """The controller's time has jumped: its program was started anew."""
+
+
+class IpocWatch:
+    """Tells from IPOC how messages follow one another.
+
+    IPOC counts milliseconds: it grows by the cycle. Some simulators count messages, by 1.
+    """
+
+    def __init__(self, cycle: float) -> None:
+        self._step = round(1e3 * cycle)
+        self._last: int | None = None
+        self.lost = 0
+
+    def classify(self, ipoc: int) -> Arrival:
+        """Return how a message follows; one out of order does not count as the last."""
+        if self._last is None:
+            self._last = ipoc
+            return Arrival.FIRST
+        change = ipoc - self._last
+        if change == 1:
+            self._step = 1
+        if -_FAR * self._step <= change <= 0:
+            return Arrival.OUT_OF_ORDER
+        steps, rest = divmod(change, self._step)
+        self._last = ipoc
+        if rest or not 0 < steps <= _FAR:
+            return Arrival.JUMPED
+        self.lost += steps - 1
+        return Arrival.NEXT if steps == 1 else Arrival.AFTER_LOSS
 
 
 def is_overture(datagram: bytes) -> bool:

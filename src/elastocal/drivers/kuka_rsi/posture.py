@@ -45,6 +45,23 @@ class PostureReader:
         self._robot, self._external = robot, external
         scale = [math.radians(1.0) if turns else 1e-3 for turns in revolute[:external]]
         self._scale = np.array([*scale, *(math.radians(1.0) * sign for sign in signs)])
+        self._scales = tuple(self._scale.tolist())
+
+    def joints(self, message: RobMessage) -> list[float]:
+        """Return the joint positions of a message, in rad or m: what a correction needs of it.
+
+        Raises
+        ------
+        DeviceError
+            If the controller does not send them.
+        """
+        if message.axes is None:
+            raise _not_sent("AIPos")
+        external = (message.external or ())[: self._external]
+        if len(external) < self._external:
+            raise _not_sent(f"EIPos.E{len(external) + 1}")
+        given = (*external, *message.axes)
+        return [scale * value for scale, value in zip(self._scales, given, strict=True)]
 
     def read(self, message: RobMessage, now: float, mode: str) -> Cycle:
         """Return the state of a message.
@@ -63,24 +80,21 @@ class PostureReader:
         DeviceError
             If the controller does not send what is needed.
         """
-        axes, actual = message.axes, message.actual
-        if axes is None or actual is None:
-            raise _not_sent("RIst" if actual is None else "AIPos")
+        actual = message.actual
+        if actual is None:
+            raise _not_sent("RIst")
         if message.decimals < _DECIMALS:
             raise DeviceError(
                 f"the controller sends RIst with {message.decimals} decimals, at least {_DECIMALS}"
                 " are needed: set Precision of its ETHERNET object to 6"
             )
-        external = message.external or ()
-        if len(external) < self._external:
-            raise _not_sent(f"EIPos.E{len(external) + 1}")
+        q = np.array(self.joints(message))
         setpoint = message.setpoint
         if mode == "contact":
             if setpoint is None:
                 raise _not_sent("RSol")
             if message.state is None:
                 raise _not_sent("Krl.State")
-        q = np.array([*external[: self._external], *axes]) * self._scale
         place = np.array(actual[:3])
         return Cycle(
             time=now,

@@ -108,7 +108,7 @@ class RsiSettings(DeviceSettings):
     signs: tuple[Literal[-1, 1], ...] = (1, 1, 1, 1, 1, 1)
     """Sense of A1 to A6 against the joints of the robot's description; those of the catalogue have
     the pendant's."""
-    delay: PositiveTime | None = None
+    delay: Annotated[PositiveTime, Field(le=1.0)] | None = None
     """From command to motion, in s, where there is no record of it."""
     commissioning: str | None = None
     """File of `elastocal measure-delay`, relative to the cell file."""

@@ -138,7 +138,8 @@ class BoxLine:
             try:
                 self.sensor.received(self._socket.recv(MOST_PAGE))
             except TimeoutError:
-                self._end_or_go_on()
+                if not self.sensor.silence:
+                    self._end_or_go_on()
             except OSError as error:
                 self.sensor.fail(f"{error.strerror or error}")
 
@@ -149,7 +150,7 @@ class BoxLine:
             self.sensor.received(self._socket.recv(MOST_PAGE))
         except TimeoutError:
             if not self._closed.is_set():
-                self.sensor.fail(why)
+                self.sensor.fall_silent(why)
 
     def _why_silent(self) -> str:
         text = f"no record for {_SILENCE:g} s"

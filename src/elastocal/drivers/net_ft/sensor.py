@@ -70,6 +70,8 @@ class NetFtSensor:
         self._saturated = False
         self._newest: tuple[float, tuple[int, ...], SensorStatus] | None = None
         self._failure: str | None = None
+        self.silence = ""
+        """Why nothing came for too long; empty as long as it came."""
         self._last: RdtRecord | None = None
         self._time = self._arrived = -np.inf
         self._count = 0
@@ -98,6 +100,15 @@ class NetFtSensor:
         """Refuse every further `read`; the first reason stands."""
         with self._lock:
             self._failure = self._failure or why
+
+    def fall_silent(self, why: str) -> None:
+        """Refuse every further `read`, too: the stream has ended.
+
+        `newest` goes on. Its time says how old it is; where the stream comes again by itself, who
+        corrects a process may go on, whereas readings of a procedure have a hole.
+        """
+        with self._lock:
+            self.silence = self.silence or why
 
     @property
     def failed(self) -> bool:
@@ -194,6 +205,8 @@ class NetFtSensor:
             If the stream cannot be trusted: why.
         """
         self._require()
+        if self.silence:
+            raise DeviceError(f"{self.source}: {self.silence}")
         with self._lock:
             rows, saturated = list(self._rows), self._saturated
             self._rows.clear()

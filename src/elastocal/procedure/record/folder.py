@@ -12,7 +12,7 @@ from pathlib import Path
 
 from elastocal.cell import Cell, fingerprint, load_cell, named_files
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import read_text, replacing, sha256
+from elastocal.files import read_bytes, read_text, replacing, sha256
 from elastocal.planning import PLAN, POOL, PlanResult, read_plan
 from elastocal.procedure.record.journal import Entry, RunRecord
 from elastocal.wording import counted
@@ -229,8 +229,8 @@ def signs_of_a_cut(folder: RunFolder, entries: Sequence[Entry]) -> tuple[str, ..
     FileAccessError
         If the journal or the folder of streams cannot be read.
     """
+    data = read_bytes(folder.journal)
     try:
-        data = folder.journal.read_bytes()
         recorded = {place.name for place in folder.streams.glob("pose_*.mcap")}
     except OSError as error:
         raise FileAccessError(f"cannot read {folder.path}: {error.strerror or error}") from error

@@ -17,6 +17,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, mode
 
 from elastocal.cell import Clock, LineCounts
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import read_bytes
 from elastocal.records import StrictModel
 
 
@@ -277,10 +278,7 @@ def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
 
 def _read(path: Path) -> tuple[tuple[Entry, ...], int]:
     """Return the complete entries and the number of bytes that they take."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise _cannot("read", path, error) from error
+    data = read_bytes(path)
     whole = data.rfind(b"\n") + 1
     lines = data[:whole].splitlines()
     entries = tuple(_entry(path, number, line) for number, line in enumerate(lines))

@@ -274,6 +274,8 @@ class Runner:
             force=float(np.linalg.norm(force)),
             slip=0.0 if a is None else a.slip,
             left=max(float(left), 0.0),
+            q=tuple(seen.arm.q.tolist()),
+            marker=tuple(seen.points.position[-1].tolist()) if len(seen.points) else None,
         )
 
     def _given_up_message(self) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from elastocal.errors import DeviceError, FileAccessError, ProcedureError
+from elastocal.results import brief_repr
 
 
 class Step(Enum):
@@ -103,6 +104,7 @@ class BackOffResult:
     """Why it could not be brought off the surface; empty when it could or need not."""
 
 
+@brief_repr
 @dataclass(frozen=True, slots=True)
 class Progress:
     """Stage of a run, reported several times a second."""
@@ -124,6 +126,10 @@ class Progress:
     """Lateral movement of the marker since the unloaded reference, in m."""
     left: float
     """Estimated time to the end of the run, in s."""
+    q: tuple[float, ...] = ()
+    """Joint positions of the controller, in rad or m."""
+    marker: tuple[float, float, float] | None = None
+    """In the frame of the station that measures, in m; None while the beam is broken."""
 
 
 class FaultScope(Enum):

@@ -30,6 +30,11 @@ from .chromium import (
     open_tab as open_tab,
     write_pdf as write_pdf,
 )
+from .geometry_page import (
+    REPORT_TITLE as REPORT_TITLE,
+    GeometryFindings as GeometryFindings,
+    write_geometry_page as write_geometry_page,
+)
 from .page import (
     SECTIONS as SECTIONS,
     WrittenReport as WrittenReport,

@@ -1,4 +1,10 @@
 from . import style as style
+from ._solids import (
+    CoarseSolid as CoarseSolid,
+    Solid as Solid,
+    coarsened as coarsened,
+    triangles_of as triangles_of,
+)
 from .analysis_charts import (
     INDEX_NAMES as INDEX_NAMES,
     KIND_TITLES as KIND_TITLES,
@@ -22,6 +28,10 @@ from .codec_chart import (
     saturation_words as saturation_words,
     study_figure as study_figure,
     write_study_figures as write_study_figures,
+)
+from .geometry_figures import (
+    error_maps as error_maps,
+    parameter_figure as parameter_figure,
 )
 from .interactive_codec import compliance_views as compliance_views, error_views as error_views
 from .path_figures import (

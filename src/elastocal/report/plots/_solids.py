@@ -19,6 +19,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import TOOLING, Cell
 from elastocal.planning import collision_scene
 from elastocal.planning.surface import Surface
+from elastocal.results import brief_repr
 
 _SECTIONS = 24
 """Sides of a drawn cylinder."""
@@ -34,6 +35,7 @@ _BEAM, _BEAM_APART = 0.12, 0.56
 """Side of a rail's two beams, and from the middle of one to that of the other, in m."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class Solid:
     """Triangles; vertices in m."""
@@ -67,6 +69,7 @@ class RobotSolids:
         return joined([part.placed(T) for part, T in places])
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class CoarseSolid:
     """A mesh as it is drawn."""

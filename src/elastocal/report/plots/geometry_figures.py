@@ -1,0 +1,124 @@
+"""Figures of a calibrated geometry: where in the workspace it was and is wrong, and what is known.
+
+Maps show every position from above and from the side, coloured by its error at poses that were left
+out; before and after share one scale, so that they can be held against one another.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from elastocal.arrays import FloatArray
+from elastocal.geometry import GeometryAccuracy, GeometryParameter
+from elastocal.report.plots import style
+
+_WIDTH = 10.5
+_MAP, _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN = 2.6, 0.6, 0.8, 0.35, 0.5, 0.75
+"""Height of a map, margins, and what is between rows of maps, in inches."""
+_GAPS = (0.4, 1.25)
+"""After the maps of before and after, and after their bar, in inches."""
+_ROW, _AXIS = 0.17, 0.62
+"""Height of a parameter's line, and of what belongs to a group of them, in inches."""
+_VIEWS = (("y in m", 1, "from above"), ("z in m", 2, "from the side"))
+_TOP = 98.0
+"""Percentile of the errors at which a scale ends."""
+_GROUPS = (
+    ("shift", 1e3, "shifts of joints in mm"),
+    ("turn", 1e3, "turns of joints in mrad"),
+    ("offset", 1e3, "zeros of joints in mrad (mm)"),
+    ("compliance", 1e6, "yielding of joints in µrad/(N·m) (µm/N)"),
+    ("scale", 1e3, "transmission in per mille"),
+    ("gear", 1e3, "gears once and twice a turn in mrad"),
+)
+"""Kinds of errors, the scale that they are shown in, and what they are."""
+
+
+def error_maps(accuracy: GeometryAccuracy) -> Figure:
+    """Return the maps of the errors before and after, from above and from the side.
+
+    Before and after on one scale; what is left once more on a scale of its own.
+    """
+    before, after = (
+        1e3 * np.linalg.norm(e, axis=1) for e in (accuracy.registration, accuracy.chosen)
+    )
+    both, own = _scale(before), _scale(after)
+    across = (_WIDTH - _LEFT - _RIGHT - sum(_GAPS)) / 3.0
+    figure = style.new_figure(_WIDTH, _HEAD + 2 * _MAP + _BETWEEN + _FOOT)
+    size = float(np.clip(1000.0 / np.sqrt(len(before)), 3.0, 30.0))
+    columns = ((before, "before", both), (after, "after", both), (after, "after, enlarged", own))
+    left = _LEFT
+    for column, (error, when, scale) in enumerate(columns):
+        for row, (label, axis, view) in enumerate(_VIEWS):
+            bottom = _FOOT + (1 - row) * (_MAP + _BETWEEN)
+            axes = figure.add_panel(left, bottom, across, _MAP)
+            _draw_map(axes, accuracy.place[:, [0, axis]], error, scale, size)
+            axes.set_title(f"{when}, {view}", fontsize=9)
+            axes.set_xlabel("x in m")
+            if not column:
+                axes.set_ylabel(label)
+        if column:
+            bar = figure.add_panel(left + across + 0.1, _FOOT, 0.14, 2 * _MAP + _BETWEEN)
+            figure.colorbar(scale, cax=bar, extend="max").set_label("Error in mm", size=8)
+        left += across + (_GAPS[column] if column < len(_GAPS) else 0.0)
+    return figure
+
+
+def _scale(error: FloatArray) -> ScalarMappable:
+    top = max(float(np.percentile(error, _TOP)), 1e-6)
+    return ScalarMappable(Normalize(0.0, top), style.SEQUENTIAL)
+
+
+def _draw_map(
+    axes: Axes, place: FloatArray, error: FloatArray, scale: ScalarMappable, size: float
+) -> None:
+    """Draw positions, the worst on top, so that none of them hides."""
+    order = np.argsort(error)
+    x, y = place[order].T
+    axes.scatter(x, y, c=scale.to_rgba(error[order]), s=size, lw=0.2, edgecolors=style.MUTED)
+    axes.set_aspect("equal", adjustable="datalim")
+    style.open_frame(axes, "both")
+
+
+def parameter_figure(parameters: Sequence[GeometryParameter]) -> Figure:
+    """Return the errors of the arm with their intervals, a panel a kind."""
+    panels = []
+    for kind, factor, label in _GROUPS:
+        own = [each for each in parameters if _kind_of(each.name) == kind]
+        if own:
+            panels.append((own, factor, label))
+    heights = [_ROW * len(own) + 0.1 for own, *_ in panels]
+    figure = style.new_figure(7.0, sum(heights) + _AXIS * len(panels) + 0.15)
+    top = float(figure.get_size_inches()[1]) - 0.1
+    for (own, factor, label), height in zip(panels, heights, strict=True):
+        axes = figure.add_panel(1.9, top - height, 4.9, height)
+        _draw_parameters(axes, own, factor)
+        axes.set_xlabel(label, fontsize=8)
+        top -= height + _AXIS
+    return figure
+
+
+def _kind_of(name: str) -> str:
+    """Return the kind of an error by its name.
+
+    >>> _kind_of("joint_a2.shift_x"), _kind_of("joint_a2.sin2")
+    ('shift', 'gear')
+    """
+    last = name.rpartition(".")[2].partition("_")[0]
+    return last if last in {kind for kind, *_ in _GROUPS} else "gear"
+
+
+def _draw_parameters(axes: Axes, own: Sequence[GeometryParameter], factor: float) -> None:
+    for row, each in enumerate(own):
+        colour = style.BLUE if each.known else style.REFUSED
+        axes.plot([factor * each.low, factor * each.high], [row, row], color=colour, lw=2.0)
+        fill = colour if each.known else style.PAPER
+        axes.plot(factor * each.value, row, "o", ms=4.5, mfc=fill, mec=colour)
+    axes.axvline(0.0, color=style.MUTED, lw=0.8)
+    axes.set_yticks(range(len(own)), [style.literal(each.name) for each in own], fontsize=7)
+    axes.tick_params(axis="x", labelsize=7)
+    axes.set_ylim(len(own) - 0.4, -0.6)
+    style.open_frame(axes, "both")

@@ -1,0 +1,163 @@
+"""The springs by which the studio predicts: of a calibrated model, else a rule of thumb."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
+from elastocal.elastic import ElasticModel, layout
+from elastocal.identification import CalibratedModel
+from elastocal.planning.surface import arm_reach
+from elastocal.records import record
+from elastocal.results import brief_repr
+from elastocal.wording import mm
+
+_WIND_UP = 2e-3
+"""By how much a gear is taken to wind up under the torque that its joint may use, in rad: makers of
+gears for robots state 1 to 3 mrad."""
+_DRIVE = 4e7
+"""Stiffness of a linear drive, in N/m."""
+_MICROMETRES = 1e-6
+_RIGID = 1e-12
+"""Compliance in m/N that is none."""
+
+
+@record()
+class CaseFigure:
+    """One load case at a posture."""
+
+    name: str
+    force: str
+    """In the tcp frame."""
+    size: str
+    """Norm of the predicted deflection."""
+    parts: str
+    """Along x, y, z of base."""
+    interval: str
+    """95 % of a measurement along each axis; empty where nothing is known of it."""
+    deflection: tuple[float, float, float]
+    """In base, in m."""
+
+
+@record()
+class StiffnessFigure:
+    """Stiffness of the tool centre point along one direction."""
+
+    name: str
+    text: str
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class StudioSprings:
+    """An elastic model with compliances, and where they come from."""
+
+    model: ElasticModel
+    compliance: FloatArray
+    """Shape (parameter,)."""
+    source: str
+    """In words, for whoever reads a prediction."""
+    calibrated: CalibratedModel | None = None
+    """With intervals; none of springs by rule of thumb."""
+
+    def stiffness(self, q: FloatArray, T: FloatArray) -> tuple[StiffnessFigure, ...]:
+        """Return the stiffness of the tool centre point at a posture, without load.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,)
+            In rad or m.
+        T : ndarray, shape (4, 4)
+            Tool centre point in base there.
+        """
+        model, c = self.model, self.compliance
+        along = float(model.directional_rows(q, T[:3, 2]) @ c)
+        ellipsoid = np.linalg.eigvalsh(model.cartesian_compliance(c, q).translation)
+        rows = (
+            ("along the tool's axis", along),
+            ("in the softest direction", float(ellipsoid[-1])),
+            ("in the stiffest direction", float(ellipsoid[0])),
+        )
+        return tuple(
+            StiffnessFigure(name, _stiffness_text(compliance)) for name, compliance in rows
+        )
+
+    def cases(
+        self, q: FloatArray, T: FloatArray, levels: Mapping[str, FloatArray]
+    ) -> tuple[CaseFigure, ...]:
+        """Return the predicted deflection at a posture under each load case.
+
+        Parameters
+        ----------
+        q, T
+            As for `stiffness`.
+        levels : mapping
+            Force on the robot in each case, tcp frame, shape (3,), in N.
+        """
+        force_tcp = np.array(list(levels.values()))
+        rows, force = np.tile(q, (len(force_tcp), 1)), force_tcp @ T[:3, :3].T
+        intervals = [""] * len(levels)
+        if self.calibrated is None:
+            deflection = self.model.deflection(self.compliance, rows, force)
+        else:
+            found = self.calibrated.predict(rows, force)
+            deflection = found.deflection
+            ends = zip(found.measured_low, found.measured_high, strict=True)
+            intervals = [_interval_text(low, high) for low, high in ends]
+        return tuple(
+            CaseFigure(
+                name=name,
+                force=f"{_round(load)} N",
+                size=mm(float(np.linalg.norm(each))),
+                parts=", ".join(f"{1e3 * part + 0.0:.3f}" for part in each),
+                interval=interval,
+                deflection=(float(each[0]), float(each[1]), float(each[2])),
+            )
+            for (name, load), each, interval in zip(
+                levels.items(), deflection, intervals, strict=True
+            )
+        )
+
+
+def calibrated_springs(calibrated: CalibratedModel, file: str) -> StudioSprings:
+    """Return the springs of a calibrated model, named after its file."""
+    source = f"calibrated model {file}, with 95 % intervals of a measurement"
+    return StudioSprings(calibrated.model, calibrated.compliance, source, calibrated)
+
+
+def default_springs(cell: Cell) -> StudioSprings:
+    """Return a spring a joint by rule of thumb, for a cell that is not calibrated yet.
+
+    A gear winds up by `_WIND_UP` under the torque that its joint may use; where that is not known,
+    under the largest load case at the arm's full reach. Good for comparing postures; the size may
+    be wrong by a factor of three.
+    """
+    robot = cell.robot
+    largest = max(float(np.linalg.norm(force)) for force in cell.file.presses.values())
+    torque = np.where(
+        np.isfinite(cell.torque_limits), cell.torque_limits, largest * arm_reach(robot)
+    )
+    stiffness = np.where(robot.revolute, torque / _WIND_UP, _DRIVE)
+    source = (
+        "default springs, not calibrated: one a joint, whose gear winds up"
+        f" {1e3 * _WIND_UP:g} mrad under the torque it may use. Sizes may be wrong by a factor of 3"
+    )
+    return StudioSprings(ElasticModel(robot, layout(robot, "actuated")), 1.0 / stiffness, source)
+
+
+def _stiffness_text(compliance: float) -> str:
+    if not compliance > _RIGID:
+        return "rigid in this model"
+    return f"{_MICROMETRES / compliance:.3g} N/µm"
+
+
+def _interval_text(low: FloatArray, high: FloatArray) -> str:
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        return ""
+    return ", ".join(f"{1e3 * a:.3f} to {1e3 * b:.3f}" for a, b in zip(low, high, strict=True))
+
+
+def _round(force: FloatArray) -> str:
+    return ", ".join(f"{part + 0.0:.0f}" for part in force)

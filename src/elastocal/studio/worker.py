@@ -1,0 +1,210 @@
+"""Work that takes its time, in a process of its own: its progress, its end, and how it is stopped.
+
+One work at a time. Planning is ended at once; a run is asked to stop, and brings the arm to safety
+first. A worker whose studio is gone takes that for the wish to stop.
+"""
+
+import contextlib
+import multiprocessing
+import signal
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from multiprocessing.connection import Connection
+from types import FrameType
+
+from elastocal.errors import ElastocalError, ProcedureError
+from elastocal.results import brief_repr
+
+_GRACE = 5.0
+"""How long a worker that was ended may clean up, in s."""
+
+Data = Mapping[str, object]
+"""JSON-ready."""
+
+
+class WorkState(Enum):
+    """How far a work has come."""
+
+    NONE = "none"
+    BUSY = "busy"
+    DONE = "done"
+    FAILED = "failed"
+    STOPPED = "stopped"
+    """By a person."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class WorkNews:
+    """What is known of the work that was begun last."""
+
+    kind: str = ""
+    """plan, compare, survey or run."""
+    state: WorkState = WorkState.NONE
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+    live: Data = field(default_factory=dict)
+    """What it said last of itself, beside its progress."""
+    result: Data = field(default_factory=dict)
+    message: str = ""
+    """Why it failed or stopped."""
+
+
+class Outbox:
+    """The worker's line to the studio.
+
+    Parameters
+    ----------
+    line : Connection
+        Of a pipe.
+    """
+
+    def __init__(self, line: "Connection[object, object]") -> None:
+        self._line, self._stopped = line, False
+        self._stage: tuple[str, int, int] | None = None
+
+    def progress(self, stage: str, done: int, total: int, /) -> None:
+        """Say how far a stage is; it is an `elastocal.progress.Progress`."""
+        if (stage, done, total) != self._stage:
+            self._stage = (stage, done, total)
+            with contextlib.suppress(OSError):
+                self._line.send(("progress", *self._stage))
+
+    def tell(self, live: Data) -> None:
+        """Say something else of the work."""
+        with contextlib.suppress(OSError):
+            self._line.send(("live", live))
+
+    def stopped(self) -> bool:
+        """Return whether the studio wants the work to stop, or is gone."""
+        if not self._stopped:
+            try:
+                self._stopped = self._line.poll()
+            except OSError:
+                self._stopped = True
+        return self._stopped
+
+
+Work = Callable[[Outbox], Data]
+"""Can be pickled: a `functools.partial` of a function of a module."""
+
+
+class Worker:
+    """Does one work at a time.
+
+    Parameters
+    ----------
+    changed : callable
+        Called, from any thread, whenever `news` is another.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        self._changed, self.news = changed, WorkNews()
+        self._process: multiprocessing.process.BaseProcess | None = None
+        self._line: Connection[object, object] | None = None
+        self._reader: threading.Thread | None = None
+        self._lock = threading.Lock()
+        self._asked_to_stop = False
+
+    def begin(self, kind: str, work: Work) -> None:
+        """Begin a work.
+
+        Raises
+        ------
+        ProcedureError
+            If another is still going on.
+        """
+        with self._lock:
+            if self.news.state is WorkState.BUSY:
+                raise ProcedureError(f"{self.news.kind} is still going on: stop it first")
+            if self._reader is not None:
+                # Its work has come to its result, but its process may not have ended yet.
+                self._reader.join()
+            ours, theirs = multiprocessing.Pipe()
+            spawning = multiprocessing.get_context("spawn")
+            self._process = spawning.Process(target=_carry_out, args=(theirs, work), name=kind)
+            self._line, self._asked_to_stop = ours, False
+            self._process.start()
+            theirs.close()
+            self._set(WorkNews(kind, WorkState.BUSY, "starting"))
+            self._reader = threading.Thread(target=self._read, name="worker", daemon=True)
+            self._reader.start()
+
+    def stop(self) -> None:
+        """Stop the work: a run in its own way, anything else at once."""
+        with self._lock:
+            if self.news.state is not WorkState.BUSY or self._process is None:
+                return
+            self._asked_to_stop = True
+            if self.news.kind == "run":
+                if self._line is not None:
+                    with contextlib.suppress(OSError):
+                        self._line.send("stop")
+            else:
+                self._process.terminate()
+
+    def close(self) -> None:
+        """Stop the work and wait for its end: a run for as long as its arm needs."""
+        self.stop()
+        if self._reader is not None:
+            self._reader.join(None if self.news.kind == "run" else 2.0 * _GRACE)
+
+    def _read(self) -> None:
+        """Take in what the worker says until it has ended."""
+        assert self._line is not None
+        assert self._process is not None
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                self._take(self._line.recv())
+        self._process.join(_GRACE)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._line.close()
+        if self.news.state is WorkState.BUSY:
+            state = WorkState.STOPPED if self._asked_to_stop else WorkState.FAILED
+            reason = "stopped" if self._asked_to_stop else "the worker ended without a word"
+            self._set(self._with(state=state, message=reason))
+
+    def _take(self, said: object) -> None:
+        match said:
+            case ("progress", str(stage), int(done), int(total)):
+                self._set(self._with(stage=stage, done=done, total=total))
+            case ("live", dict(live)):
+                self._set(self._with(live=live))
+            case ("done", dict(result)):
+                stopped = self._asked_to_stop and self.news.kind == "run"
+                state = WorkState.STOPPED if stopped else WorkState.DONE
+                self._set(self._with(state=state, result=result))
+            case ("failed", str(message)):
+                self._set(self._with(state=WorkState.FAILED, message=message))
+
+    def _with(self, **changes: object) -> WorkNews:
+        return replace(self.news, **changes)  # type: ignore[arg-type]
+
+    def _set(self, news: WorkNews) -> None:
+        self.news = news
+        self._changed()
+
+
+def _carry_out(line: "Connection[object, object]", work: Work) -> None:
+    """Do a work and send its result; this is the worker's process."""
+    # Ctrl-C in a terminal goes to both; the studio says what is to become of the worker.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave)
+    try:
+        said: tuple[object, ...] = ("done", work(Outbox(line)))
+    except ElastocalError as error:
+        said = ("failed", str(error))
+    with contextlib.suppress(OSError):
+        line.send(said)
+    line.close()
+
+
+def _leave(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signal's form
+    # As an exception: what fills a folder removes what it has begun.
+    sys.exit(128 + number)

@@ -1,0 +1,348 @@
+"""A live compensation at work: devices, loop and log, and the thread that watches them."""
+
+import contextlib
+import gc
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.cell import (
+    Cell,
+    CorrectedArm,
+    CycleStatistics,
+    DeviceSet,
+    PathDriver,
+    PathLimits,
+    RigContext,
+    WallClock,
+)
+from elastocal.compensation.online import (
+    Compensator,
+    Design,
+    LiveCounts,
+    LiveCycle,
+    LiveLog,
+    LiveLoop,
+    LivePhase,
+    Status,
+    Tare,
+    every_sample,
+    newest_sample,
+)
+from elastocal.errors import CompensationError, DeviceError
+from elastocal.identification import CalibratedModel
+from elastocal.workflows._operator_and_devices import Rig
+
+_LOOK = 0.05
+"""Between two looks of the thread that watches, in s of the wall."""
+_REPORT = 0.5
+"""Between two reports, in s of the wall."""
+_WAIT = 60.0
+"""For the first message of the controller, in s of the wall."""
+_STOPPING = 0.2
+"""Time for which the controller is told that corrections are over, in s."""
+_SLACK = 2.0
+"""Beyond the time that a fade takes, in s, after which a controller that is silent is left."""
+_PRIORITY = 40
+"""Of the loop's thread under SCHED_FIFO: below the kernel's own at 50."""
+_SWITCH = 1e-4
+"""Time after which another thread of Python lets the loop's pass, in s; 5 ms by default."""
+_LOADED = 20.0
+"""Force below which a cycle says nothing of where a process presses, in N."""
+_SAME_RATE = 0.02
+"""Largest difference of the sensor's rate from that of the filters, as a share."""
+_MOST_ROWS = 2000
+"""Cycles that are kept to say how much of the process was calibrated."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveReport:
+    """How a live compensation is going."""
+
+    phase: LivePhase
+    seconds: float
+    """Since the controller's first message, of the wall."""
+    force: float
+    """Size of the conditioned force, in N."""
+    correction: float
+    """Length of the correction, in m."""
+    status: int
+    """`elastocal.compensation.online.Status` of the last cycle."""
+    refusal: str
+    """Why the sensor gives nothing; empty as long as it does."""
+    line: CycleStatistics
+    dropped: int
+    """Cycles that the log does not hold."""
+
+    def sentence(self) -> str:
+        """Return it as one line."""
+        flags = " ".join(
+            flag.name.lower() for flag in Status if flag.name and self.status & flag.value
+        )
+        line = self.line
+        times = (line.answer_p50, line.answer_p99, line.answer_longest)
+        shown = " / ".join("-" if each is None else f"{1e3 * each:.2f}" for each in times)
+        return (
+            f"{self.seconds:.0f} s {self.phase.value}  {self.force:.0f} N"
+            f"  {1e3 * self.correction:.3f} mm  {flags or 'ok'}  answers {shown} ms"
+            f"  {line.late} late  {line.lost} lost  {line.jumps} jumps"
+            + (f"  log: {self.dropped} dropped" if self.dropped else "")
+            + (f"  SENSOR: {self.refusal}" if self.refusal else "")
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """A live compensation before anything is connected: all of it has been checked."""
+
+    cell: Cell
+    rig: Rig
+    driver: PathDriver
+    limits: PathLimits
+    calibrated: CalibratedModel
+    numbers: Design
+    duration: float
+    """In s."""
+    tares: bool
+    """Whether the sensor's bias is taken at the beginning."""
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveEnd:
+    """What a live compensation has come to."""
+
+    why: str
+    problem: str | None
+    seconds: float
+    bias: tuple[float, ...] | None
+    scheduling: str
+    line: CycleStatistics
+    loop: LiveCounts
+    logged: int
+    dropped: int
+    notes: tuple[str, ...]
+
+
+@contextlib.contextmanager
+def quiet_interpreter() -> Iterator[None]:
+    """Keep Python out of the loop's way: no search for garbage, threads that let one another pass.
+
+    What is there when it begins is never looked through; what the loop makes goes by itself.
+    """
+    collects, switch = gc.isenabled(), sys.getswitchinterval()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    sys.setswitchinterval(_SWITCH)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(switch)
+        gc.unfreeze()
+        if collects:
+            gc.enable()
+
+
+def ask_priority() -> str:
+    """Ask that this thread goes before others; return how it is scheduled now, in words."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    except (AttributeError, OSError) as error:
+        reason = getattr(error, "strerror", None) or "not on this system"
+        return f"like any program (SCHED_FIFO: {reason})"
+    return f"SCHED_FIFO {_PRIORITY}"
+
+
+class LiveSession:
+    """One live compensation.
+
+    Parameters
+    ----------
+    ready : Prepared
+        What is to be done.
+    report : callable
+        Called twice a second.
+    interrupted : callable
+        Whether it is to end now.
+    """
+
+    def __init__(
+        self,
+        ready: Prepared,
+        report: Callable[[LiveReport], None],
+        interrupted: Callable[[], bool],
+    ) -> None:
+        self._ready, self._tell, self._interrupted = ready, report, interrupted
+        self._scheduling = "not begun"
+        self._log: LiveLog | None = None
+        self._rows: list[LiveCycle] = []
+        self._stride = self._looks = 0
+
+    def run(self, log: Path | None, started: str = "") -> LiveEnd:
+        """Correct until it ends; the devices are closed whatever happens.
+
+        Parameters
+        ----------
+        log : Path or None
+            File for the log.
+        started : str
+            Date and time, for the log.
+        """
+        ready = self._ready
+        clock = WallClock(rate=ready.cell.file.devices.clock_rate)
+        context = RigContext(clock, 0, 0.0, None)
+        with contextlib.ExitStack() as opened:
+            sensor = ready.rig.connect_sensor(context)
+            opened.callback(sensor.close)
+            if log is not None:
+                self._log = LiveLog(log, ready.cell.robot.joint_names, self._facts(started))
+                self._log.start()
+                opened.callback(self._log.close)
+            tare, loop = self._loop(sensor)
+            opened.enter_context(quiet_interpreter())
+            arm = ready.driver.correct_path(
+                ready.cell, ready.rig.path_arm()[1], replace(context, feed=sensor.feed), loop
+            )
+            opened.callback(arm.close)
+            why, problem, seconds = self._watch(arm, loop)
+            line = arm.statistics()
+        return LiveEnd(
+            why=why,
+            problem=problem or loop.refusal or None,
+            seconds=seconds,
+            bias=None if tare is None else tare.bias,
+            scheduling=self._scheduling,
+            line=line,
+            loop=loop.counts(),
+            logged=0 if self._log is None else self._log.written,
+            dropped=0 if self._log is None else self._log.dropped,
+            notes=tuple(self._found(tare)),
+        )
+
+    def _facts(self, started: str) -> dict[str, str]:
+        cell = self._ready.cell
+        names = {"cell": cell.name, "robot": cell.robot.name}
+        return {**names, "started": started, "elastocal": __version__}
+
+    def _loop(self, devices: DeviceSet) -> tuple[Tare | None, LiveLoop]:
+        numbers, feed, sensor = self._ready.numbers, devices.feed, devices.sensor
+        assert feed is not None
+        assert sensor is not None
+        cycle, sample = numbers.settings.cycle, numbers.filters.sample
+        if sample > cycle or (sample < cycle and abs(sensor.rate * sample - 1.0) > _SAME_RATE):
+            raise CompensationError(
+                f"filter.sample is {1e3 * sample:g} ms: must be the cycle of {1e3 * cycle:g} ms or"
+                f" that of the sensor, which sends {sensor.rate:g} a second"
+            )
+        tare = None
+        if self._ready.tares:
+            tare = Tare(numbers.load, numbers.functions().orientation)
+        return tare, LiveLoop(
+            Compensator(numbers),
+            newest_sample(feed) if sample == cycle else every_sample(sensor),
+            tare,
+            None if self._log is None else self._log.put,
+            self._begin,
+        )
+
+    def _begin(self) -> None:
+        self._scheduling = ask_priority()
+
+    def _watch(self, arm: CorrectedArm, loop: LiveLoop) -> tuple[str, str | None, float]:
+        """Watch until it ends; return why it did, what went wrong, and how long it was, in s."""
+        begun = time.monotonic()
+        try:
+            begun = self._first_message(arm)
+            why = self._until_the_end(arm, loop, begun)
+        except KeyboardInterrupt:
+            why = "interrupted"
+        except DeviceError as error:
+            # Nobody answers any more: there is nothing to fade out.
+            return "the line has failed", str(error), time.monotonic() - begun
+        loop.finish()
+        # A second Ctrl-C must not take the correction away at once.
+        with contextlib.suppress(KeyboardInterrupt):
+            self._fade_out(arm, loop)
+        return why, None, time.monotonic() - begun
+
+    def _first_message(self, arm: CorrectedArm) -> float:
+        end = time.monotonic() + _WAIT
+        while not arm.wait(_LOOK):
+            arm.require()
+            if self._interrupted():
+                raise KeyboardInterrupt
+            if time.monotonic() > end:
+                raise DeviceError(
+                    f"nothing from the controller for {_WAIT:g} s: start its program now, while"
+                    " elastocal listens"
+                )
+        return time.monotonic()
+
+    def _until_the_end(self, arm: CorrectedArm, loop: LiveLoop, begun: float) -> str:
+        shown = begun
+        while (now := time.monotonic()) < begun + self._ready.duration:
+            if self._interrupted():
+                return "interrupted"
+            arm.require()
+            self._remember(loop)
+            if now >= shown:
+                self._tell(self._report(arm, loop, now - begun))
+                shown += _REPORT
+            time.sleep(min(_LOOK, begun + self._ready.duration - now))
+        return "the duration is over"
+
+    def _fade_out(self, arm: CorrectedArm, loop: LiveLoop) -> None:
+        """Wait until the correction has faded and the controller has heard that it is over."""
+        limits = self._ready.numbers.settings.limits
+        if arm.wait(0.0) and loop.over.wait(limits.correction / limits.fade + _SLACK):
+            time.sleep(_STOPPING)
+
+    def _report(self, arm: CorrectedArm, loop: LiveLoop, seconds: float) -> LiveReport:
+        last = loop.last
+        return LiveReport(
+            phase=loop.phase,
+            seconds=seconds,
+            force=0.0 if last is None else float(np.linalg.norm(last.wrench[:3])),
+            correction=0.0 if last is None else float(np.linalg.norm(last.correction)),
+            status=0 if last is None else last.status,
+            refusal=loop.refusal,
+            line=arm.statistics(),
+            dropped=0 if self._log is None else self._log.dropped,
+        )
+
+    def _remember(self, loop: LiveLoop) -> None:
+        """Keep a cycle now and then, the farther apart the longer it takes."""
+        self._looks += 1
+        if loop.last is None or loop.phase is not LivePhase.CORRECTING:
+            return
+        if self._looks >> self._stride << self._stride == self._looks:
+            self._rows.append(loop.last)
+        if len(self._rows) > _MOST_ROWS:
+            self._rows, self._stride = self._rows[::2], self._stride + 1
+
+    def _found(self, tare: Tare | None) -> Iterator[str]:
+        """Yield what has come to light meanwhile."""
+        if tare is not None and tare.bias is None:
+            scatter = "" if tare.scatter is None else f" (it scatters by {tare.scatter[0]:.1f} N)"
+            yield f"nothing was corrected: the sensor's bias was never quiet{scatter}"
+        if self._log is not None and self._log.failure:
+            yield f"the log ends early: {self._log.failure}"
+        robot, rows = self._ready.calibrated.model.robot, self._rows
+        loads = np.array([row.wrench for row in rows]).reshape(-1, 6)
+        loaded = np.linalg.norm(loads[:, :3], axis=1) > _LOADED
+        if loaded.any():
+            q = np.array([row.q for row in rows])[loaded]
+            R = robot.forward(q)[:, :3, :3]
+            force, moment = (
+                np.einsum("rij,rj->ri", R, part[loaded]) for part in (loads[:, :3], loads[:, 3:])
+            )
+            covered = self._ready.calibrated.coverage(q, force, moment)
+            if covered is not None and not covered.is_enough:
+                yield covered.sentence("of this process, as measured,")

@@ -1,0 +1,296 @@
+"""``live``: a programmed path corrected while it is run: wrench in, correction out, each cycle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.cell import Cell, CycleStatistics, PathLimits, load_cell
+from elastocal.compensation import CompensatorSettings, read_settings
+from elastocal.compensation.conditioning import read_sensor_load
+from elastocal.compensation.online import LiveCounts, design
+from elastocal.errors import CompensationError, DeviceError, UnitError
+from elastocal.files import filling
+from elastocal.identification import CalibratedModel
+from elastocal.procedure.derive import sensor_load
+from elastocal.progress import Progress
+from elastocal.records import record, validate, write_json
+from elastocal.results import Result
+from elastocal.units import parse_number, parse_quantity
+from elastocal.workflows._inputs import (
+    NewTool,
+    coverage_notes,
+    require_model_of_arm,
+    require_same_robot,
+)
+from elastocal.workflows._live_session import LiveEnd, LiveReport, LiveSession, Prepared
+from elastocal.workflows._operator_and_devices import rig_of
+from elastocal.workflows._workflow import workflow
+
+LIVE_RECORD, LIVE_LOG = "live.json", "live.mcap"
+"""Files of a live compensation, in its folder."""
+_FADE = 0.005
+"""Default speed of the fade, in m/s, where the limits allow it."""
+
+
+@dataclass(frozen=True)
+class LiveSettings(NewTool):
+    """Which cell is corrected by which model, and who watches."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``, whose arm takes corrections of a path."""
+    model: Path
+    """Model file of `calibrate`."""
+    arm: bool = False
+    """Somebody has looked at the cell, and the arm may be corrected; refused without."""
+    duration: str | float | None = None
+    """Time with its unit, or in s, after which it ends; none: when it is interrupted."""
+    out: Path | None = None
+    """Folder for log and record; none: neither is written."""
+    compensator: Path | None = None
+    """Settings of the compensator (.yaml); default: the limits of the cell file."""
+    tool: Path | None = None
+    """Tool file of `tool`; none: the tool of the cell file, and the bias that the sensor has at
+    the beginning, when the tool must be free."""
+    force: bool = False
+    """Replace files in the folder."""
+    report: Callable[[LiveReport], None] = lambda _report: None
+    """Called twice a second."""
+    warn: Callable[[str], None] = lambda _text: None
+    """Called with each thing that a person should know, before the first cycle."""
+    interrupted: Callable[[], bool] = lambda: False
+    """Whether it is to end now; Ctrl-C ends it, too."""
+
+
+@record("elastocal.live/1")
+class LiveResult(Result):
+    """The record of a live compensation."""
+
+    cell: str
+    model: str
+    robot: str
+    started: str
+    """Date and time, UTC."""
+    seconds: float
+    """From the controller's first message to the end, of the wall."""
+    ended: str
+    """Why it ended."""
+    problem: str | None
+    """What went wrong; none: nothing."""
+    limits: PathLimits
+    filter_delay: float
+    """Delay of a slow wrench by the filters, in s."""
+    tool: str
+    """The tool that the model is for, in words."""
+    bias: tuple[float, ...] | None
+    """Bias that was taken at the beginning, in N and N·m; none: that of the tool file."""
+    scheduling: str
+    """How the loop's thread was scheduled."""
+    line: CycleStatistics
+    loop: LiveCounts
+    logged: int
+    """Cycles in the log."""
+    dropped: int
+    """Cycles that it could not take."""
+    notes: tuple[str, ...]
+    """Sentences that a person must know."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        loop, limits = self.loop, self.limits
+        longest = f"{1e3 * loop.largest_correction:.3f} of {1e3 * limits.correction:g} mm"
+        step = 1e3 * loop.largest_step
+        return (
+            ("ended", f"{self.ended}, after {self.seconds:.1f} s"),
+            *((("problem", self.problem),) if self.problem else ()),
+            ("line", self.line.sentence()),
+            ("later than 7/8 of a cycle", f"{self.line.late_share:.3%}"),
+            (
+                "cycles",
+                f"{loop.cycles}: {loop.corrected} corrected, {loop.held} held, {loop.faded} faded",
+            ),
+            ("largest correction", f"{longest}, {step:.3g} mm in a cycle"),
+            (
+                "saturated",
+                f"{loop.limited} cycles by the limit, {loop.rate_limited} by the rate,"
+                f" {self.line.saturated} at the arm; sensor {loop.saturated}",
+            ),
+            ("scheduling", self.scheduling),
+            ("log", f"{self.logged} cycles, {self.dropped} dropped"),
+            *(("note", text) for text in self.notes),
+        )
+
+
+@workflow(LiveSettings, marks=("elastocal.live/",))
+def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG001 - it reports
+    """Correct the path that an arm's own program follows, by the measured wrench, cycle by cycle.
+
+    Soft real time: the answers are counted, and the late ones among them. It ends after the
+    duration or when it is interrupted: the correction fades to zero, the controller is told that
+    corrections are over, and the record is written.
+
+    Parameters
+    ----------
+    settings : LiveSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Not called: `LiveSettings.report` is.
+
+    Raises
+    ------
+    DeviceError
+        If the cell file states no limits, its arm takes no corrections, ``arm`` is not given, or
+        a device cannot be used.
+    RobotError, CompensationError
+        If model, cell, tool and settings do not belong together.
+    FileAccessError
+        If a file cannot be read or written.
+    """
+    ready = _prepare(settings)
+    for text in ready.notes:
+        settings.warn(text)
+    if not settings.arm:
+        limits = ready.limits
+        raise DeviceError(
+            f"nothing was started: {ready.cell.robot.name} would be corrected by up to"
+            f" {1e3 * limits.correction:g} mm at up to {1e3 * limits.rate:g} mm/s; give --arm when"
+            " somebody has looked at the cell"
+        )
+    session = LiveSession(ready, settings.report, settings.interrupted)
+    started = datetime.now(UTC).isoformat(timespec="seconds")
+    if settings.out is None:
+        return _result(settings, ready, session.run(None), started)
+    with filling(settings.out, LIVE_RECORD, settings.force) as folder:
+        end = session.run(folder / LIVE_LOG, started)
+        found = _result(settings, ready, end, started)
+        write_json(folder / LIVE_RECORD, found)
+    return found
+
+
+def _result(settings: LiveSettings, ready: Prepared, end: LiveEnd, started: str) -> LiveResult:
+    return LiveResult(
+        cell=ready.cell.name,
+        model=str(settings.model),
+        robot=ready.cell.robot.name,
+        started=started,
+        seconds=end.seconds,
+        ended=end.why,
+        problem=end.problem,
+        limits=ready.limits,
+        filter_delay=float(np.asarray(ready.numbers.filters.delay())),
+        tool=ready.calibrated.tool_name,
+        bias=end.bias,
+        scheduling=end.scheduling,
+        line=end.line,
+        loop=end.loop,
+        logged=end.logged,
+        dropped=end.dropped,
+        notes=(*ready.notes, *end.notes),
+    )
+
+
+def _prepare(settings: LiveSettings) -> Prepared:
+    """Read and check everything that needs no device."""
+    cell, duration = load_cell(Path(settings.cell)), _seconds(settings.duration)
+    rig = rig_of(cell)
+    driver, arm = rig.path_arm()
+    limits = driver.path_limits(cell, arm)
+    calibrated = settings.read_model(settings.model)
+    require_same_robot(calibrated.model.robot, cell.robot, (str(settings.model), cell.name))
+    require_model_of_arm(calibrated, settings.model)
+    chosen = _compensator_settings(settings.compensator, limits, cell)
+    load = read_sensor_load(settings.tool, calibrated.model.robot) or sensor_load(cell)
+    try:
+        numbers = design(calibrated, chosen, load)
+    except CompensationError as error:
+        raise CompensationError(f"{settings.model}: {error}") from error
+    return Prepared(
+        cell=cell,
+        rig=rig,
+        driver=driver,
+        limits=limits,
+        calibrated=calibrated,
+        numbers=numbers,
+        duration=duration,
+        tares=settings.tool is None,
+        notes=_notes(settings, cell, calibrated),
+    )
+
+
+def _seconds(duration: str | float | None) -> float:
+    """Return a duration in s; a number alone is in s.
+
+    Raises
+    ------
+    UnitError
+        If it is none above 0.
+    """
+    if duration is None:
+        return float("inf")
+    try:
+        found = parse_number(str(duration))
+    except ValueError:
+        found = parse_quantity(duration, "time")
+    if not 0.0 < found < float("inf"):
+        raise UnitError(f"duration {duration!r} must be a time above 0, such as '60 s'")
+    return found
+
+
+def _compensator_settings(file: Path | None, limits: PathLimits, cell: Cell) -> CompensatorSettings:
+    """Return the settings of a file, within the limits of the cell; or what these make."""
+    if file is None:
+        data: dict[str, object] = {
+            "cycle": f"{limits.cycle!r} s",
+            "frame": limits.frame,
+            "limits": {
+                "correction": f"{limits.correction!r} m",
+                "rate": f"{limits.rate!r} m/s",
+                "fade": f"{min(_FADE, limits.rate)!r} m/s",
+            },
+        }
+        if (sensor := cell.file.sensor) is not None:
+            data["sensor"] = {
+                "force": [f"{value!r} N" for value in sensor.force_range],
+                "moment": [f"{value!r} N*m" for value in sensor.moment_range],
+            }
+        return validate(data, CompensatorSettings, f"{cell.path}: limits of corrections")
+    found = read_settings(file)
+    for what, ours, theirs in (
+        ("cycle", found.cycle, limits.cycle),
+        ("frame", found.frame, limits.frame),
+    ):
+        if ours != theirs:
+            raise CompensationError(f"{file}: {what} is {ours}: must be {theirs}, the arm's")
+    for what, ours, theirs in (
+        ("limits.correction", found.limits.correction, limits.correction),
+        ("limits.rate", found.limits.rate, limits.rate),
+    ):
+        if not ours <= theirs:
+            raise CompensationError(
+                f"{file}: {what} is {1e3 * ours:g} mm{'/s' if what.endswith('rate') else ''}: at"
+                f" most {1e3 * theirs:g}, which the cell file allows"
+            )
+    return found
+
+
+def _notes(settings: LiveSettings, cell: Cell, calibrated: CalibratedModel) -> tuple[str, ...]:
+    notes = list(coverage_notes(calibrated)) if calibrated.tool is not None else []
+    names = calibrated.model.robot.name, cell.robot.name
+    if names[0] != names[1]:
+        notes.append(f"the model is of a robot named {names[0]}, the cell's is {names[1]}")
+    if settings.tool is None:
+        notes.append(
+            "no tool file: the tool's weight is that of the cell file, and the sensor's bias is"
+            " what it reads in the first half second, in which the tool must be free"
+        )
+    if calibrated.on_production is not None:
+        notes += calibrated.on_production.warnings
+    if cell.process is not None:
+        path = cell.process
+        covered = calibrated.coverage(path.joint_position, path.force, path.moment, path.course)
+        if covered is not None and not covered.is_enough:
+            notes.append(covered.sentence())
+    return tuple(notes)

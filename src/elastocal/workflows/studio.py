@@ -1,0 +1,270 @@
+"""``studio``: a page in the browser on a cell, before, while and after it is calibrated."""
+
+import contextlib
+import ipaddress
+import threading
+import time
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+from elastocal.cell import LOOPBACK, SIMULATED, Cell, load_cell
+from elastocal.planning import read_plan
+from elastocal.procedure import Progress as RunProgress, RunEnd
+from elastocal.procedure.run import PlannedStep
+from elastocal.progress import Progress
+from elastocal.records import record, to_data
+from elastocal.results import Result, brief_repr
+from elastocal.studio import (
+    Data,
+    Outbox,
+    PlanMessage,
+    RunMessage,
+    Session,
+    StudioServer,
+    StudioSprings,
+    calibrated_springs,
+    default_springs,
+)
+from elastocal.wording import duration
+from elastocal.workflows._inputs import NewTool, require_same_robot
+from elastocal.workflows._operator_and_devices import Supervision, Unattended, rig_of
+from elastocal.workflows._workflow import workflow
+from elastocal.workflows.check import describe_file
+from elastocal.workflows.plan import plan
+from elastocal.workflows.run import RunSettings, dry_run, run
+
+_PAUSE = 0.1
+"""Shortest time between two reports of a run to the page, in s of the wall."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class StudioSettings:
+    """Which cell the studio opens, and who may see it."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``; edits are written back to it."""
+    model: Path | None = None
+    """Model file of `calibrate`, of the same robot; none: default springs."""
+    host: str = LOOPBACK
+    """Address to answer on; another than this machine's own lets its network in."""
+    port: int = 0
+    """0: one that is free."""
+    arm: bool = False
+    """Let a run move devices that are not simulated."""
+    browser: bool = True
+    """Open the page."""
+    while_open: Callable[["StudioResult"], None] = lambda found: found.wait()
+    """What is done while the page is answered, which ends when it returns. By default: wait for
+    Ctrl-C."""
+
+
+@brief_repr
+@record()
+class StudioFigures:
+    """What ``studio --json`` prints."""
+
+    address: str
+    """With its token: whoever knows it may do what the page can."""
+    cell: str
+    notes: tuple[str, ...]
+    """What a person must know of who may come in."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StudioResult(Result):
+    """Where the page is, and what it can ask for."""
+
+    figures: StudioFigures
+    session: Session
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know first."""
+        found = self.figures
+        return (("cell", found.cell), ("page", found.address), *(("note", n) for n in found.notes))
+
+    def wait(self) -> None:
+        """Wait for Ctrl-C."""
+        with contextlib.suppress(KeyboardInterrupt):
+            threading.Event().wait()
+
+
+@workflow(StudioSettings, outputs=("cell",), marks=("elastocal.cell/",))
+def studio(
+    settings: StudioSettings,
+    progress: Progress,  # noqa: ARG001 - it runs until it is stopped
+) -> StudioResult:
+    """Serve the page of a cell on this machine until somebody stops it.
+
+    Parameters
+    ----------
+    settings : StudioSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    DeviceError
+        If it cannot listen there.
+    ElastocalError
+        If cell or model cannot be used.
+    """
+    path = Path(settings.cell)
+    session = Session(path, _Commands(settings.model), settings.arm)
+    server = StudioServer(session.actions, session.news, settings.host, settings.port)
+    figures = StudioFigures(server.address, session.name, tuple(_notes(settings)))
+    result = StudioResult(figures, session)
+    server.start()
+    try:
+        if settings.browser:
+            webbrowser.open(server.address)
+        settings.while_open(result)
+    finally:
+        session.close()
+        server.close()
+    return result
+
+
+def _notes(settings: StudioSettings) -> Iterator[str]:
+    if not ipaddress.ip_address(settings.host).is_loopback:
+        yield (
+            f"--host {settings.host} lets everybody on that network in who learns the address,"
+            " which goes over it unencrypted"
+        )
+    if settings.arm:
+        yield "armed: whoever has the page can start a run on the devices that the cell names"
+
+
+@dataclass(frozen=True)
+class _Commands:
+    """The commands that the studio has done, as `elastocal.studio.StudioWork` wants them."""
+
+    model: Path | None
+
+    def check(self, cell: Path) -> object:
+        return describe_file(cell)
+
+    def springs(self, cell: Cell) -> StudioSprings:
+        if self.model is None:
+            return default_springs(cell)
+        calibrated = NewTool().read_model(self.model)
+        require_same_robot(calibrated.model.robot, cell.robot, (str(self.model), cell.name))
+        return calibrated_springs(calibrated, self.model.name)
+
+    def plan(self, cell: Path, message: PlanMessage) -> Callable[[Outbox], Data]:
+        return partial(_plan, cell, message)
+
+    def run(self, cell: Path, message: RunMessage) -> Callable[[Outbox], Data]:
+        return partial(_run, cell, message)
+
+    def is_real(self, cell: Cell) -> bool:
+        return rig_of(cell).real
+
+
+def _plan(cell: Path, message: PlanMessage, outbox: Outbox) -> Data:
+    """Plan, in the worker's process."""
+    folder = cell.resolve().parent / message.folder
+    plan(cell, progress=outbox.progress, out=folder, force=message.replace)
+    return {"folder": message.folder}
+
+
+def _run(cell: Path, message: RunMessage, outbox: Outbox) -> Data:
+    """Carry a plan out, in the worker's process."""
+    beside = cell.resolve().parent
+    settings = RunSettings(
+        cell,
+        beside / message.plan,
+        beside / message.folder,
+        resume=message.resume,
+        confirmed=message.confirmed,
+    )
+    loaded = load_cell(cell)
+    simulated = set(rig_of(loaded).wanted) == {SIMULATED}
+    operator = _PageOperator(
+        outbox,
+        dry_run(settings).steps,
+        [pose.seen_by or "" for pose in read_plan(beside / message.plan).poses],
+        message.rate if simulated else 0.0,
+    )
+    found = run(settings, progress=outbox.progress, operator=operator)
+    ended = found.end is RunEnd.INTERRUPTED
+    return {"folder": message.folder, "figures": to_data(found.figures), "interrupted": ended}
+
+
+class _PageOperator(Unattended):
+    """The person at the page: agreed before, sees the run there, and stops it there.
+
+    Parameters
+    ----------
+    outbox : Outbox
+        To the page.
+    steps : sequence of PlannedStep
+        Of the run, in order.
+    stations : sequence of str
+        Station of each pose.
+    rate : float
+        Seconds of a simulated cell a second of the wall, at most; 0: as fast as it goes.
+    """
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        steps: Sequence[PlannedStep],
+        stations: Sequence[str],
+        rate: float,
+    ) -> None:
+        self._outbox, self._steps, self._stations, self._rate = outbox, steps, stations, rate
+        self._shown_at = -_PAUSE
+        self._begun: tuple[float, float] | None = None
+
+    def warn(self, lines: Sequence[str]) -> None:
+        """Show what should be known, with the next report."""
+        self._outbox.tell({"warnings": list(lines)})
+
+    @contextlib.contextmanager
+    def supervise(self, poses: int) -> Iterator[Supervision]:  # noqa: ARG002 - the protocol's form
+        """Show every step on the page, and heed its stop button."""
+        yield Supervision(self._show, self._outbox.stopped)
+
+    def _show(self, step: RunProgress) -> None:
+        now = time.monotonic()
+        if now - self._shown_at < _PAUSE:
+            return
+        self._shown_at = now
+        self._outbox.tell(self._figures(step))
+        if self._rate > 0.0:
+            # The simulated clock waits for nothing, so that nothing is late by this.
+            began, showed = self._begun = self._begun or (now, step.time)
+            time.sleep(max(0.0, (step.time - showed) / self._rate - (now - began)))
+
+    def _figures(self, step: RunProgress) -> Data:
+        station = "" if step.pose is None else self._stations[step.pose]
+        return {
+            "time": step.time,
+            "pose": step.pose,
+            "number": step.number,
+            "count": step.count,
+            "attempt": step.attempt,
+            "step": f"{step.step.value} {step.load_case or ''}".strip(),
+            "next": self._next(step),
+            "force": step.force,
+            "slip": step.slip,
+            "marker": step.marker,
+            "station": station,
+            "left": duration(step.left),
+            "q": step.q,
+        }
+
+    def _next(self, step: RunProgress) -> str:
+        """Return the step behind the one that is reported, in words."""
+        case = step.load_case or ""
+        for number, planned in enumerate(self._steps[:-1]):
+            same = planned.pose == step.pose and planned.step is step.step
+            if same and (not case or case in planned.what):
+                return f"{self._steps[number + 1].step.value}: {self._steps[number + 1].what}"
+        return "HOME"

@@ -1,0 +1,92 @@
+"""`elastocal new`: a cell file that `check` passes, by options or by answers; and its preview."""
+
+import io
+import sys
+from pathlib import Path
+from unittest import mock
+
+import pytest
+
+from elastocal.cell import load_cell
+from elastocal.cell.examples import binary_stl, block_mesh, dome_section
+from elastocal.robot import catalogue
+from support.cli import elastocal
+
+
+@pytest.fixture
+def dome(tmp_path) -> Path:
+    path = tmp_path / "parts of today" / "dome.stl"
+    path.parent.mkdir()
+    path.write_bytes(binary_stl(dome_section()))
+    return path
+
+
+@pytest.mark.parametrize("robot", ["KR 300 R2700-2", "UR20", "RX160", "R-2000iC/210F"])
+def test_a_robot_and_a_mesh_make_a_cell_that_check_passes(tmp_path, dome, robot):
+    cell = tmp_path / "cell.yaml"
+    begun = elastocal("new", "--robot", robot, "--mesh", dome, "-o", cell)
+    assert begun.code == 0, begun.err
+    assert elastocal("check", cell).code == 0
+    assert load_cell(cell).surface_path.samefile(dome)
+    assert not [line for line in cell.read_text().splitlines() if line.endswith(" ")]
+
+
+def test_a_foreign_urdf_is_taken_by_its_flange_and_metres_by_their_size(tmp_path):
+    urdf = catalogue.urdf("IRB 6700-200/2.60").replace('"flange"', '"tool0"')
+    (tmp_path / "abb.urdf").write_text(urdf)
+    (tmp_path / "block.stl").write_bytes(binary_stl(block_mesh() / 1e3))
+    cell = tmp_path / "cell.yaml"
+    begun = elastocal(
+        *("new", "--robot", tmp_path / "abb.urdf", "--mesh", tmp_path / "block.stl"),
+        *("-o", cell, "--press", "800 N", "--tracker", "none"),
+    )
+    assert begun.code == 0, begun.err
+    file = load_cell(cell).file
+    assert (file.robot.flange, file.surface.unit, file.trackers) == ("tool0", "m", ())
+    assert file.load_cases.fz == 800.0
+
+
+def test_no_file_is_replaced_and_none_is_left_behind_by_a_refusal(tmp_path, dome):
+    cell = tmp_path / "cell.yaml"
+    cell.write_text("mine")
+    known = ("new", "--robot", "UR20", "--mesh", dome, "-o")
+    assert "--force" in elastocal(*known, cell).reason
+    assert cell.read_text() == "mine"
+    far = elastocal(*known, tmp_path / "far.yaml", "--place", "9 m, 0 m, 0 m, 0 deg, 0 deg, 0 deg")
+    assert "no cell that check passes" in far.reason
+    assert {each.name for each in tmp_path.iterdir()} == {"cell.yaml", dome.parent.name}
+    assert elastocal(*known, cell, "--force").code == 0
+
+
+def test_what_is_missing_is_named(tmp_path, dome):
+    out = tmp_path / "cell.yaml"
+    assert "--robot is missing" in elastocal("new", "--mesh", dome, "-o", out).reason
+    assert "--mesh is missing" in elastocal("new", "--robot", "UR20", "-o", out).reason
+    assert "'UR20'" in elastocal("new", "--robot", "UR 2", "--mesh", dome, "-o", out).reason
+
+
+def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
+    cell = tmp_path / "cell.yaml"
+    answers = ["UR 2", "UR20", "none.stl", str(dome), *[""] * 5, "80 kg", "80 N", "none", "", ""]
+    with mock.patch.object(sys, "stdin", io.StringIO("\n".join([*answers, ""]))):
+        begun = elastocal("new", "-o", cell, "--ask")
+    assert begun.code == 0, begun.err
+    for complaint in ("no robot 'UR 2'", "none.stl", "unit 'kg' is not a force"):
+        assert complaint in begun.err
+    file = load_cell(cell).file
+    assert (file.robot.model, file.load_cases.fz, file.sensor) == ("UR20", 80.0, None)
+
+
+def test_a_preview_shows_a_cell_and_replaces_only_its_own_page(tmp_path, dome):
+    cell, page = tmp_path / "cell.yaml", tmp_path / "look here.html"
+    assert elastocal("new", "--robot", "UR20", "--mesh", dome, "-o", cell).code == 0
+    for _ in range(2):
+        shown = elastocal("check", cell, "--preview", page)
+        assert shown.code == 0, shown.err
+    assert "a first look" in page.read_text(encoding="utf-8")
+    page.write_text("mine")
+    assert "look here.html" in elastocal("check", cell, "--preview", page).reason
+    assert page.read_text() == "mine"
+    robot = tmp_path / "arm.urdf"
+    robot.write_text(catalogue.urdf("UR20"))
+    assert "a preview is of a cell" in elastocal("check", robot, "--preview", "p.html").reason

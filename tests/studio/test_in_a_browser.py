@@ -1,0 +1,254 @@
+"""The studio in a real browser, through its own page: seen, dragged, edited, planned, run, stopped.
+
+Screenshots go to the folder that the environment names in ``ELASTOCAL_ARTEFACTS``.
+"""
+
+import base64
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from elastocal import workflows
+from elastocal.errors import FileAccessError
+from elastocal.procedure import Event, read_journal
+from elastocal.report.document import find_browser, open_tab
+from support.browser import PROBE, Look, complaints_of, emulate, requests_of
+from support.run_cells import planned_cell
+
+LEAST_CONTRAST = 4.5
+"""Of text, by WCAG 2.2, success criterion 1.4.3."""
+WAIT = """new Promise((done, fail) => {
+  const start = performance.now();
+  const look = () => {
+    if (%s) done(true);
+    else if (performance.now() - start > 60000) fail(new Error("never"));
+    else setTimeout(look, 30);
+  };
+  look();
+})"""
+
+
+class Page:
+    """The page of a studio."""
+
+    def __init__(self, tab, address):
+        self.tab, self.address = tab, address
+        for domain in ("Runtime", "Log", "Network"):
+            tab.call(f"{domain}.enable")
+
+    def open(self, look, height=900):
+        emulate(self.tab, look, height)
+        self.tab.call("Page.navigate", url=self.address)
+        self.wait("document.documentElement?.dataset.ready === 'yes'")
+
+    def wait(self, condition):
+        try:
+            self.tab.evaluate(WAIT % condition)
+        except FileAccessError as error:
+            self.keep("never")
+            shown = "document.getElementById('message')?.textContent"
+            raise AssertionError(f"{condition}: {self.get(shown)}") from error
+
+    def get(self, expression):
+        return self.tab.evaluate(expression)
+
+    def text(self, name):
+        return self.get(f"document.getElementById({json.dumps(name)}).textContent")
+
+    def click(self, selector):
+        self.get(f"document.querySelector({json.dumps(selector)}).click()")
+
+    def drag(self, start, end):
+        (x, y), (u, v) = start, end
+        for kind, at in (
+            ("mousePressed", (x, y)),
+            ("mouseMoved", (u, v)),
+            ("mouseReleased", (u, v)),
+        ):
+            buttons = 0 if kind == "mouseReleased" else 1
+            self.tab.call(
+                "Input.dispatchMouseEvent", type=kind, x=at[0], y=at[1], button="left",
+                buttons=buttons, clickCount=1,
+            )  # fmt: skip
+
+    def keep(self, name):
+        folder = os.environ.get("ELASTOCAL_ARTEFACTS")
+        if folder:
+            shot = self.tab.call("Page.captureScreenshot", format="png")
+            Path(folder, f"studio-{name}.png").write_bytes(base64.b64decode(shot["data"]))
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    return planned_cell(tmp_path_factory.mktemp("studio"), poses=3).cell
+
+
+@pytest.fixture(scope="module")
+def told(cell):
+    """Everything at once: a browser and a studio are dear."""
+    try:
+        browser = find_browser()
+    except FileAccessError as error:
+        pytest.skip(str(error))
+    told = {}
+
+    def while_open(found):
+        with open_tab(browser) as tab:
+            page = Page(tab, found.figures.address)
+            for part in (look_at_it, drag_it, edit_it, plan_it, run_it):
+                part(page, cell, told)
+            told["complaints"] = complaints_of(tab.events)
+            told["foreign"] = [
+                url for url in requests_of(tab.events) if not url.startswith(page.address)
+            ]
+
+    workflows.studio(cell, browser=False, while_open=while_open)
+    return told
+
+
+def look_at_it(page, cell, told):
+    for look in (Look(390, "dark"), Look(1440, "dark"), Look(1440, "light")):
+        page.open(look)
+        told[look] = page.get(PROBE)
+        page.keep(f"{look.width}-{look.scheme}")
+    told["name"] = page.text("name")
+    told["drawn"] = page.get(
+        """(() => {
+          const canvas = document.getElementById("view"), gl = canvas.getContext("webgl2");
+          const pixels = new Uint8Array(4 * canvas.width * canvas.height), colours = new Set();
+          gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+          for (let k = 0; k < pixels.length; k += 4) colours.add(pixels.slice(k, k + 3).join());
+          return colours.size;
+        })()"""
+    )
+
+
+def drag_it(page, cell, told):
+    moved = "document.documentElement.dataset.moved > "
+    told["before"] = page.text("tool")
+    # By the ring at the tool, as a person does.
+    x, y = page.get(
+        """import(new URL("studio.js", location)).then(({ view }) => {
+          const [x, y] = view.project(view.tool), box = view.canvas.getBoundingClientRect();
+          return [x + box.left, y + box.top];
+        })"""
+    )
+    page.drag((x, y), (x + 40, y - 30))
+    page.wait(f"{moved} 0")
+    told["dragged"] = page.text("tool")
+    page.get(
+        """(() => {
+          const slider = document.getElementById("joint-1");
+          slider.value = 0.2;
+          slider.dispatchEvent(new Event("input"));
+        })()"""
+    )
+    page.wait(f"{moved} 1")
+    told["slid"] = (page.text("tool"), page.text("cases"))
+    page.keep("dragged")
+
+
+def edit_it(page, cell, told):
+    page.click("#tab-cell")
+    page.get('document.getElementById("loads").elements.fz.value = "1000 N"')
+    page.click("#loads button")
+    page.wait("document.getElementById('text').value.includes('1000 N')")
+    told["edited"] = cell.read_text("utf-8")
+    page.get('document.getElementById("loads").elements.fz.value = "1000"')
+    page.click("#loads button")
+    page.wait("document.getElementById('message').textContent.includes('unit')")
+    told["refused"] = (page.text("message"), cell.read_text("utf-8"))
+    page.keep("cell")
+
+
+def plan_it(page, cell, told):
+    page.click("#tab-plan")
+    page.get("document.getElementById('plan-form').elements.folder.value = 'planned'")
+    page.click("#plan-form button")
+    page.wait("document.documentElement.dataset.work === 'plan busy'")
+    page.wait("document.documentElement.dataset.work !== 'plan busy'")
+    page.wait("document.getElementById('poses').children.length > 0")
+    told["planned"] = (page.text("plan-text"), page.text("poses"))
+    page.click("#poses button:nth-child(2)")
+    page.wait("document.getElementById('tool').textContent.includes('on the tooling')")
+    told["at a pose"] = page.text("tool")
+    page.keep("plan")
+
+
+def run_it(page, cell, told):
+    page.click("#tab-run")
+    page.wait("document.getElementById('run-plan').options.length > 0")
+    page.get("document.getElementById('run-form').elements.rate.value = '0'")
+    page.click("#run-form button")
+    page.wait("document.getElementById('live-figures').textContent.includes('settle')")
+    told["live"] = page.text("live-figures")
+    page.keep("run")
+    stopped = time.monotonic()
+    page.click("#run-stop")
+    page.wait("document.documentElement.dataset.work === 'run stopped'")
+    told["seconds to stop"] = time.monotonic() - stopped
+    told["stopped"] = page.text("message")
+    page.wait("document.getElementById('record-state').textContent !== ''")
+    told["record"] = page.text("record-state")
+    page.keep("stopped")
+
+
+def test_the_page_complains_of_nothing_and_asks_nobody_else(told):
+    # The browser notes each refusal that a page is told, whatever the page makes of it.
+    assert [text for text in told["complaints"] if "422" not in text] == []
+    assert told["foreign"] == []
+
+
+@pytest.mark.parametrize(
+    "look", [Look(390, "dark"), Look(1440, "dark"), Look(1440, "light")], ids=str
+)
+def test_the_page_fits_and_can_be_read(told, look):
+    frame = told[look]
+    assert frame["dark"] is (look.scheme == "dark")
+    assert frame["scrollWidth"] <= look.width
+    assert frame["text"]["count"] > 80
+    assert frame["text"]["ratio"] >= LEAST_CONTRAST, frame["text"]
+
+
+def test_the_cell_is_drawn(told):
+    assert told["name"] == "afp: KR 120 R2700 extra HA"
+    assert told["drawn"] > 100
+
+
+def test_the_tool_is_dragged_and_the_deflection_follows(told):
+    assert told["dragged"] != told["before"]
+    assert told["slid"][0] != told["dragged"]
+    assert "mm" in told["slid"][1]
+
+
+def test_an_edit_is_in_the_file_with_its_comments_and_a_wrong_one_is_not(told):
+    data = yaml.safe_load(told["edited"])
+    assert data["load_cases"]["fz"] == "1000 N"
+    assert "# " in told["edited"]
+    message, text = told["refused"]
+    assert "fz" in message
+    assert text == told["edited"]
+
+
+def test_a_plan_is_made_and_its_poses_are_shown(told):
+    summary, poses = told["planned"]
+    assert summary.startswith("3 poses by ")
+    assert poses == "012"
+    assert "on the tooling" in told["at a pose"]
+
+
+def test_a_run_is_watched_and_stopped_in_position_control_and_can_be_gone_on_with(told, cell):
+    for name in ("Force", "Slip", "Marker", "Next"):
+        assert name in told["live"]
+    assert "The run was stopped: 0 of 3 poses committed" in told["stopped"]
+    assert "AT THE SURFACE" not in told["stopped"]
+    assert "interrupted" in told["record"]
+    entries = read_journal(cell.with_name("run") / "journal.jsonl")
+    assert entries[-1].event is Event.FINISH
+    assert entries[-1].text.startswith("interrupted, ")
+    resumed = workflows.dry_run(cell, plan=cell.with_name("planned"), out=cell.with_name("run"))
+    assert resumed.poses == 3

@@ -1,0 +1,239 @@
+"""What a page can ask of a session: figures of postures, edits, work."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from elastocal.cell import load_cell, write_example
+from elastocal.errors import ProcedureError, RobotError, SchemaError
+from elastocal.studio import (
+    CellView,
+    Session,
+    Worker,
+    WorkState,
+    default_springs,
+    form_of,
+)
+from elastocal.workflows import describe_file
+from support.tasks import fail, tick_until_stopped
+
+
+class Commands:
+    """The work of commands, of which none is done."""
+
+    real = False
+
+    def check(self, cell):
+        return describe_file(cell)
+
+    def springs(self, cell):
+        return default_springs(cell)
+
+    def is_real(self, _cell):
+        return self.real
+
+    def plan(self, _cell, _message):
+        raise AssertionError("nobody planned")
+
+    run = plan
+
+
+@pytest.fixture
+def session(tmp_path):
+    (path, *_) = write_example(tmp_path / "cell", "afp")
+    return Session(path, Commands())
+
+
+@pytest.fixture(scope="module")
+def view(tmp_path_factory):
+    (path, *_) = write_example(tmp_path_factory.mktemp("afp"), "afp")
+    cell = load_cell(path)
+    return CellView.of(cell, default_springs(cell))
+
+
+def test_the_deflection_is_that_of_the_model_at_the_tool(view):
+    q = view.cell.home
+    found = view.at(q)
+    R = view.cell.robot.forward(q)[:3, :3]
+    levels = view.cell.file.load_cases.levels
+    springs = view.springs
+    for case in found.cases:
+        expected = springs.model.deflection(springs.compliance, q, R @ levels[case.name])
+        assert case.deflection == pytest.approx(expected, abs=1e-12)
+        assert case.size == f"{1e3 * np.linalg.norm(expected):.3f} mm"
+    assert "not calibrated" in springs.source
+
+
+def test_margins_are_those_of_planning(view):
+    plain = view.at(view.cell.home)
+    names = [each.name for each in plain.checks]
+    assert names == [check.name for check in view.builder.solver.checks.all]
+    assert plain.joints[0].margin == "1500.0 mm"
+    bent = np.array(view.cell.home)
+    bent[5] = view.cell.robot.limits.upper[5] - np.radians(1.0)
+    joint = view.at(bent).joints[5]
+    assert (joint.margin, joint.passes) == ("1.0°", False)
+
+
+def test_joints_beyond_their_limits_are_set_to_them(view):
+    q = np.array(view.cell.home)
+    q[1] = 100.0
+    assert view.at(q).q[1] == pytest.approx(view.cell.robot.limits.upper[1])
+    with pytest.raises(RobotError):
+        view.at([0.0])
+
+
+def test_the_tool_goes_where_it_is_dragged_and_stays_where_it_cannot(view):
+    T = view.cell.robot.forward(view.cell.home)
+    T[:3, 3] += (0.05, -0.1, 0.05)
+    found = view.towards(view.cell.home, T)
+    assert view.cell.robot.forward(found.q) == pytest.approx(T, abs=1e-6)
+    assert found.refusal == ""
+    T[:3, 3] += 20.0
+    stays = view.towards(view.cell.home, T)
+    assert stays.q == pytest.approx(view.cell.home)
+    assert "out of reach" in stays.refusal
+
+
+def test_a_press_is_a_pose_that_planning_would_take(view):
+    found = view.press(view.cell.home, (1.85, 0.1, 3.0), (0.0, 0.0, -2.0))
+    assert found.refusal == ""
+    assert found.surface.startswith("on the tooling, 0.0°")
+    assert all(each.passes for each in found.checks)
+    edge = view.press(view.cell.home, (1.85, 0.55, 3.0), (0.0, 0.0, -1.0))
+    assert edge.refusal == "" or "refused by" in edge.refusal
+
+
+def test_an_edit_is_written_with_its_comments_and_seen(session):
+    before = session.actions["scene"]({})
+    text = before["text"]
+    loads = before["form"]["loads"] | {"fz": "900 N"}
+    assert session.actions["edit"]({"loads": loads}) == {"changed": True}
+    after = session.actions["scene"]({})
+    assert after["text"] == text.replace('fz: "1100 N"', 'fz: "900 N"')
+    assert after["number"] == before["number"] + 1
+    assert "0, 0, -900 N" in [case["force"] for case in after["posture"]["cases"]]
+    assert session.actions["edit"]({"loads": loads}) == {"changed": False}
+
+
+def test_stations_region_and_home_are_edited(session):
+    form = session.actions["scene"]({})["form"]
+    more = {"name": "station_2", "position": ["1 m", "2 m", "3 m"], "range": ["1 m", "15 m"]}
+    session.actions["edit"]({"stations": [*form["stations"], more]})
+    region = {"min": ["-0.2 m"] * 3, "max": ["0.2 m"] * 3}
+    session.actions["edit"]({"region": region})
+    home = session.actions["scene"]({})["home"]
+    home[1] = 0.1
+    session.actions["edit"]({"home": home})
+    found = session.actions["scene"]({})
+    assert [each["name"] for each in found["scene"]["stations"]] == ["station_1", "station_2"]
+    assert len(found["scene"]["region"]["points"]) == 24
+    assert found["form"]["region"] == region
+    assert found["home"][1] == pytest.approx(0.1, abs=1e-3)
+    assert "# in base" in found["text"]
+    session.actions["edit"]({"stations": form["stations"], "whole_surface": True})
+    assert session.actions["scene"]({})["form"]["region"] is None
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        {"text": "schema: elastocal.cell/1\n"},
+        {"loads": {"fx": "1 N", "fy": "1 N", "fz": "900", "level": "", "cases": ["normal"]}},
+        {"loads": {"fx": "1 N", "fy": "1 N", "fz": "9 N", "level": "", "cases": []}},
+        {"region": {"min": ["50 m"] * 3, "max": ["51 m"] * 3}},
+        {"stations": [{"name": "a", "position": ["1", "2", "3"], "range": ["1 m", "2 m"]}]},
+        {"home": [0.0]},
+        {"house": 1},
+    ],
+)
+def test_what_would_not_pass_check_is_refused_and_nothing_written(session, tmp_path, edit):
+    path = tmp_path / "cell" / "cell.yaml"
+    before = path.read_bytes()
+    with pytest.raises((SchemaError, ValueError)) as refusal:
+        session.actions["edit"](edit)
+    assert ".elastocal-" not in str(refusal.value)
+    assert path.read_bytes() == before
+    assert {each.name for each in path.parent.iterdir()} == {
+        "cell.yaml",
+        "dome.stl",
+        "process.csv",
+    } & {each.name for each in path.parent.iterdir()}
+
+
+def test_a_file_that_somebody_else_changed_is_not_overwritten(session, tmp_path):
+    path = tmp_path / "cell" / "cell.yaml"
+    path.write_text(path.read_text() + "\n# mine\n")
+    loads = session.actions["scene"]({})["form"]["loads"] | {"fz": "900 N"}
+    with pytest.raises(SchemaError, match="changed by somebody else"):
+        session.actions["edit"]({"loads": loads})
+    session.actions["reload"]({})
+    session.actions["edit"]({"loads": loads})
+    assert path.read_text().endswith("# mine\n")
+    assert form_of(load_cell(path)).loads.fz == "900 N"
+
+
+@pytest.mark.parametrize("folder", ["../out", "/tmp/out", "", ".hidden", "a/b", "x" * 100])
+def test_folders_lie_beside_the_cell_file(session, folder):
+    for action, message in (
+        ("plan", {"folder": folder}),
+        ("record", {"folder": folder}),
+        ("poses", {"folder": folder}),
+        ("run", {"plan": "plan", "folder": folder}),
+        ("run", {"plan": folder, "folder": "run"}),
+    ):
+        with pytest.raises(SchemaError, match="no name for a folder"):
+            session.actions[action](message)
+
+
+@pytest.mark.parametrize(
+    ("armed", "confirmed", "reason"),
+    [(False, True, "started with --arm"), (True, False, "not confirmed")],
+)
+def test_nothing_real_moves_without_being_armed_and_confirmed(tmp_path, armed, confirmed, reason):
+    (path, *_) = write_example(tmp_path / "cell", "afp")
+    commands = Commands()
+    commands.real = True
+    session = Session(path, commands, armed)
+    with pytest.raises(ProcedureError, match=reason):
+        session.actions["run"]({"plan": "plan", "folder": "run", "confirmed": confirmed})
+    assert session.worker.news.state is WorkState.NONE
+
+
+def worked(kind, work, stop=False):
+    """Return the last news of a work."""
+    busy, ended = threading.Event(), threading.Event()
+
+    def changed():
+        if worker.news.stage == "ticking":
+            busy.set()
+        if worker.news.state not in (WorkState.NONE, WorkState.BUSY):
+            ended.set()
+
+    worker = Worker(changed)
+    worker.begin(kind, work)
+    if stop:
+        assert busy.wait(60.0)
+        with pytest.raises(ProcedureError, match="still going on"):
+            worker.begin(kind, work)
+        worker.stop()
+    assert ended.wait(60.0)
+    worker.close()
+    return worker.news
+
+
+def test_a_run_that_is_stopped_comes_to_its_own_end():
+    news = worked("run", tick_until_stopped, stop=True)
+    assert (news.state, news.result) == (WorkState.STOPPED, {"ended": "well"})
+    assert news.live == {"heard": "stop"}
+
+
+def test_other_work_ends_at_once():
+    news = worked("plan", tick_until_stopped, stop=True)
+    assert (news.state, news.message, news.result) == (WorkState.STOPPED, "stopped", {})
+
+
+def test_a_work_that_fails_says_why():
+    news = worked("plan", fail)
+    assert (news.state, news.message) == (WorkState.FAILED, "it cannot be done")
