@@ -20,8 +20,6 @@ from elastocal.wording import counted, mm, point
 
 REPORT_TITLE = "Geometry report"
 """How the title of every such page begins."""
-_MANY = 2000
-"""Positions from which maps are drawn as pixels."""
 _MOST_ROWS = 200
 _DEGREES = float(np.degrees(1.0))
 _AXES = {"x": "x of the base", "y": "y of the base", "z": "z of the base", "norm": "distance"}
@@ -85,9 +83,8 @@ def write_geometry_page(path: Path, found: GeometryFindings) -> Path:
         title=f"{REPORT_TITLE}: {model.robot.name}",
         subtitle=f"{counted(model.positions, 'position')} of markers, {model.provenance}. Errors"
         " are those at poses that were left out of the fit.",
-        styles=("report.css",),
+        styles=("page.css",),
         scripts=(),
-        interactive=False,
         data={},
         sections=sections,
         version=__version__,
@@ -136,16 +133,14 @@ def _result(found: GeometryFindings) -> Iterator[blocks.Block]:
 
 def _maps(found: GeometryFindings) -> Iterator[blocks.Block]:
     accuracy = found.accuracy
-    kind = ".png" if len(accuracy.row) > _MANY else ".svg"
     before, after = (each.mean for each in vars(found.model.held_out).values())
-    yield blocks.picture(
+    yield blocks.Picture(
         partial(error_maps, accuracy),
         f"Positions in the base of the robot, coloured by their error: {mm(before)} mean before,"
         f" {mm(after)} after",
         "Every position that was fitted, where its marker was measured, in the base of the robot."
         " Before and after have one scale, which ends where 98 % of the errors before lie below;"
         " enlarged is what is left, on a scale of its own.",
-        kind,
     )
 
 
@@ -201,7 +196,7 @@ def _errors(found: GeometryFindings) -> Iterator[blocks.Block]:
     if not model.parameters:
         yield blocks.Paragraph("The nominal arm was kept: the positions speak for no error of it.")
         return
-    yield blocks.picture(
+    yield blocks.Picture(
         partial(parameter_figure, model.parameters),
         f"{counted(len(model.parameters), 'error')} of the arm with 95 % intervals",
         "Filled: known, its 95 % interval is narrower than what one would guess without measuring"
