@@ -7,12 +7,12 @@ BIN := $(VENV)/bin
 # Neighbours stay together, so that what a file prepares is seldom prepared twice.
 SHARED_OUT := -n auto --dist worksteal
 
-.PHONY: demo test lint units end-to-end browser docs-strict nightly slow process-figures coverage lowest lock mutation docs bench house fuzz clean
+.PHONY: demo test lint units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation docs docs-version bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
 
-test: lint units end-to-end browser docs-strict
+test: lint units end-to-end browser docs-strict fuzz-lines
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
@@ -32,7 +32,12 @@ browser: $(VENV)/installed-dev
 docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-nightly: slow process-figures coverage lowest mutation
+# Every parser of what devices send, under Atheris; `make fuzz-lines UNTIL=-runs=1000000` is longer.
+UNTIL ?= -max_total_time=20
+fuzz-lines: $(VENV)/installed-fuzz
+	cd tests && ../$(BIN)/python -m fuzz.lines $(UNTIL) -max_len=4096 -verbosity=0 -print_final_stats=1
+
+nightly: slow process-figures coverage lowest package mutation
 
 slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
@@ -57,6 +62,19 @@ TESTING := 'pytest>=8.3' 'pytest-xdist>=3.6' 'hypothesis>=6.120' 'py-opw-kinemat
 QUICK := tests/test_units.py tests/test_files.py tests/test_meshes.py tests/test_tables.py \
 	$(addprefix tests/,cell dataset elastic records robot shapes sim)
 
+# Wheel and packed sources as they are released, each installed without anything else, and tried.
+PACKAGE := .venv-package
+package: $(VENV)/installed-nightly
+	rm -rf dist
+	$(BIN)/uv build --quiet --out-dir dist
+	set -e; for built in dist/*.whl dist/*.tar.gz; do \
+		$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(PACKAGE); \
+		$(BIN)/uv pip install --quiet --python $(PACKAGE)/bin/python $$built; \
+		$(PACKAGE)/bin/elastocal --version; \
+		$(PACKAGE)/bin/elastocal init $(PACKAGE)/cell --json; \
+		$(PACKAGE)/bin/python -m elastocal check $(PACKAGE)/cell/cell.yaml --json; \
+	done
+
 # What developers share, with hashes: `pip install --require-hashes -r requirements/dev.lock`.
 lock: $(VENV)/installed-nightly
 	$(BIN)/uv pip compile pyproject.toml --extra dev --extra docs --universal \
@@ -72,6 +90,14 @@ mutation: $(VENV)/installed-nightly
 
 docs: $(VENV)/installed-dev
 	$(BIN)/mkdocs serve
+
+# The documentation of this version on the branch gh-pages, beside those of others: `latest` of them.
+# Nothing is pushed. `$(BIN)/mike serve -F mkdocs-versions.yml` shows them.
+docs-version: $(VENV)/installed-dev
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[versions]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mike deploy -F mkdocs-versions.yml --update-aliases \
+		"$$($(BIN)/python -c 'import elastocal; print(".".join(elastocal.__version__.split(".")[:2]))')" latest
+	$(BIN)/mike set-default -F mkdocs-versions.yml latest
 
 bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/run.py
@@ -94,7 +120,7 @@ house:
 	$(PYTHON) tools/house.py
 
 clean:
-	rm -rf $(VENV) $(LOWEST) demo site mutants
+	rm -rf $(VENV) $(LOWEST) $(PACKAGE) dist demo site mutants
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
@@ -106,6 +132,11 @@ $(VENV)/installed: pyproject.toml | $(VENV)/bin/python
 $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,docs]'
 	touch $@ $(VENV)/installed
+
+# Where it cannot be had nothing is fuzzed, and that is said.
+$(VENV)/installed-fuzz: $(VENV)/installed-dev
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[fuzz]' || true
+	touch $@
 
 $(VENV)/installed-nightly: $(VENV)/installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[nightly]'

@@ -74,7 +74,7 @@ def ready_processes(session: int) -> int:
 
 def busy_seconds() -> float:
     """Return the CPU time that all processes of the machine have used; Linux only."""
-    fields = Path("/proc/stat").read_text().splitlines()[0].split()[1:]
+    fields = Path("/proc/stat").read_text("ascii").splitlines()[0].split()[1:]
     user, nice, system, _, _, irq, softirq, steal = map(int, fields[:8])
     return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
 

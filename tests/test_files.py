@@ -202,6 +202,12 @@ def test_no_file_is_read_whole_that_is_larger_than_its_kind_may_be(tmp_path):
         read_bytes(tmp_path / "a.src")
 
 
+def test_a_name_that_is_no_text_is_refused_in_the_words_of_the_file(tmp_path):
+    with pytest.raises(FileAccessError, match=r"a\.yaml: a name in it is no text in UTF-8"):
+        write_text(tmp_path / "a.yaml", "log: " + os.fsdecode(b"\xff.csv"))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_folder_is_still_called_one(tmp_path):
     with pytest.raises(FileAccessError, match="Is a directory"):
         read_text(tmp_path)

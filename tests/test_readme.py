@@ -177,6 +177,20 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     assert not [text for text in quoted if not any(text in message for message in known)]
 
 
+def test_the_faults_that_drivers_are_held_against_have_their_messages_and_their_tests():
+    page = (ROOT / "docs/how-to/write-a-driver.md").read_text(encoding="utf-8")
+    table = page.split("{ #faults }")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", table, flags=re.MULTILINE)
+    assert len(rows) > 10
+    known = messages()
+    for _, told, tests in rows:
+        for text in re.findall(r"`([^`]+)`", told):
+            assert any(text in message for message in known), text
+        for path, name in re.findall(r"`([^`:]+)::(\w+)`", tests):
+            assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8"), name
+        assert "::" in tests
+
+
 def test_every_face_has_its_page_in_the_reference():
     pages = (ROOT / "docs/reference/api").glob("*.md")
     marked = [m for page in pages for m in FACE.findall(page.read_text(encoding="utf-8"))]
@@ -222,6 +236,8 @@ def test_every_default_of_the_procedure_is_the_one_that_the_reference_tells():
     told, defaults = dict(rows), ProcedureSettings()
     assert set(told) == set(ProcedureSettings.model_fields)
     assert told.pop("force_limit").startswith("1.3 times the largest load case")
+    assert told.pop("force_tolerance").startswith("1 % of the largest load case")
+    assert told.pop("collision_force") == "50 N and a fifth of the tool's weight"
     assert told.pop("reference") == f"`{defaults.reference}`"
     assert told.pop("conditioning") == f"`{str(defaults.conditioning).lower()}`"
     for key, text in told.items():

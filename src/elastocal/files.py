@@ -12,7 +12,6 @@ memory, or time, than there is.
 """
 
 import contextlib
-import fcntl
 import glob
 import hashlib
 import json
@@ -26,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.errors import FileAccessError, SchemaError
+from elastocal.locks import show_life, taken_over
 from elastocal.outputs import current_rule
 
 _STANDARD_INPUT = Path("/dev/stdin")
@@ -109,7 +109,7 @@ def replacing(path: Path) -> Iterator[Path]:
             raise IsADirectoryError(_NO_FILE)
         if rule is not None:
             rule.require(path)
-        temporary, lock = _locked(make)
+        temporary, release = _locked(make)
     except OSError as error:
         if isinstance(error, FileAccessError):
             raise
@@ -123,11 +123,15 @@ def replacing(path: Path) -> Iterator[Path]:
             rule.note_output(path)
     except FileAccessError:
         raise  # of another file: it says so itself
+    except UnicodeEncodeError as error:
+        raise FileAccessError(
+            f"cannot write {path}: a name in it is no text in UTF-8: rename that file"
+        ) from error
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
-        os.close(lock)
+        release()
 
 
 def require_place(path: Path) -> None:
@@ -186,7 +190,7 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
         if rule is not None:
             rule.require(folder / last)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary, lock = _locked(
+        temporary, release = _locked(
             lambda: tempfile.mkdtemp(prefix=_prefix(folder), dir=folder.parent)
         )
     except OSError as error:
@@ -205,7 +209,7 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
         raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-        os.close(lock)
+        release()
 
 
 def _move_all(source: Path, folder: Path, last: str) -> None:
@@ -230,32 +234,22 @@ def remove_leftovers(output: Path) -> None:
     pattern = f".*{_UNDER_WAY}*"
     inside = [*output.glob(pattern), *output.glob(f"*/{pattern}")]
     for place in (*output.parent.glob(f"{glob.escape(_prefix(output))}*"), *inside):
-        with contextlib.suppress(OSError):
-            handle = os.open(place, os.O_RDONLY | os.O_NOFOLLOW)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if place.is_dir():
-                    shutil.rmtree(place)
-                else:
-                    place.unlink()
-            finally:
-                os.close(handle)
+        with contextlib.suppress(OSError), taken_over(place) as abandoned:
+            if abandoned and place.is_dir():
+                shutil.rmtree(place)
+            elif abandoned:
+                place.unlink()
 
 
-def _locked(make: Callable[[], str]) -> tuple[Path, int]:
-    """Return a new temporary file or folder, and the descriptor whose lock says that we live.
-
-    Where a file system knows no locks, nobody can tell it from one at work, and it is left alone.
-    """
+def _locked(make: Callable[[], str]) -> tuple[Path, Callable[[], None]]:
+    """Return a new temporary file or folder, and what ends its sign that we live."""
     while True:
         place = Path(make())
-        handle = os.open(place, os.O_RDONLY)
-        with contextlib.suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        release = show_life(place)
         # Between the two, another process may have taken it for a leftover.
         if place.exists():
-            return place, handle
-        os.close(handle)
+            return place, release
+        release()
 
 
 def _prefix(path: Path) -> str:

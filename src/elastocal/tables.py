@@ -241,7 +241,9 @@ def opened_table(path: Path) -> Iterator[TableReader]:
         with Path(path).open(encoding="utf-8-sig", newline="") as file:
             yield TableReader(_bounded_lines(file))
     except UnicodeDecodeError as error:
-        raise FileAccessError(f"cannot read {path}: not a UTF-8 text file") from error
+        raise FileAccessError(
+            f"cannot read {path}: not a UTF-8 text file (Excel saves one as CSV UTF-8)"
+        ) from error
     except OSError as error:
         if isinstance(error, FileAccessError):
             raise

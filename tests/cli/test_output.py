@@ -2,11 +2,13 @@
 
 import io
 import json
+import sys
 
 import pytest
 
-from elastocal.cli import bold, console
+from elastocal.cli import bold, console, output
 from elastocal.cli.commands.demo import _log_console
+from elastocal.errors import FileAccessError
 from support.cli import elastocal
 
 WICKED = "a\x1b[2J\x1b]0;title\x07b\x9b31m\u202e"
@@ -33,3 +35,10 @@ def test_a_refusal_is_one_line_without_any(tmp_path):
     reason = elastocal("check", path).reason
     assert reason.isprintable()
     assert r"\x1b[2J" in reason
+
+
+@pytest.mark.parametrize("show", [lambda: output.print_lines(["a"]), lambda: output.print_json({})])
+def test_closed_standard_output_is_a_refusal(monkeypatch, show):
+    monkeypatch.setattr(sys, "stdout", None)  # as a shell's >&- leaves it
+    with pytest.raises(FileAccessError, match="standard output is closed"):
+        show()

@@ -385,6 +385,16 @@ def test_a_fault_ends_the_run_with_one_line_that_says_where_the_arm_is(planned, 
     assert run(planned, tmp_path / "run", "--resume", "--yes").code == 0
 
 
+def test_a_soft_collision_on_the_way_to_the_next_pose_ends_the_run(planned, tmp_path):
+    # The arm leaves for the next pose 4.9 s after it begins to retract, and is there 2 s later.
+    fault = 'kind: soft_collision, pose: 0, step: retract, after: "5.8 s", amplitude: "250 N"'
+    cell = planned.with_text("collision.yaml", f"faults: [{{{fault}}}]")
+    result = run(cell, tmp_path / "run")
+    last = result.err.strip().splitlines()[-1]
+    assert last.startswith("elastocal: pose 1, attempt 1, move: hit something on the way: ")
+    assert last.endswith("limit 168 N. The arm is on its way between poses, off every surface")
+
+
 def test_files_above_the_cell_file_keep_their_places(planned, tmp_path):
     (tmp_path / "cells").mkdir()
     (tmp_path / "meshes").mkdir()

@@ -20,7 +20,7 @@ from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
 from elastocal.planning.search import TECHNIQUES
 from elastocal.robot import catalogue
-from elastocal.workflows import SimulateResult, StudioResult
+from elastocal.workflows import EXPORT_TARGETS, SimulateResult, StudioResult
 from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
 from support import foreign_logs, kuka_bench, measured_arms, reported
 from support.cli import elastocal
@@ -130,6 +130,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "weights": _WEIGHTS,
         "free frame": _FREE_FRAMES,
         "posture": (PROGRAMMED, STIFFEST),
+        "target": EXPORT_TARGETS,
     } == options.CHOICES
 
 

@@ -6,6 +6,7 @@ Screenshots go to the folder that the environment names in ``ELASTOCAL_ARTEFACTS
 import base64
 import json
 import os
+import re
 import time
 from pathlib import Path
 
@@ -106,7 +107,7 @@ def told(cell):
                 url for url in requests_of(tab.events) if not url.startswith(page.address)
             ]
 
-    workflows.studio(cell, browser=False, while_open=while_open)
+    workflows.studio(cell, while_open=while_open)
     return told
 
 
@@ -244,7 +245,8 @@ def test_a_plan_is_made_and_its_poses_are_shown(told):
 def test_a_run_is_watched_and_stopped_in_position_control_and_can_be_gone_on_with(told, cell):
     for name in ("Force", "Slip", "Marker", "Next"):
         assert name in told["live"]
-    assert "The run was stopped: 0 of 3 poses committed" in told["stopped"]
+    # How far it came until then depends on how busy the machine is.
+    assert re.match(r"The run was stopped: [0-2] of 3 poses committed", told["stopped"])
     assert "AT THE SURFACE" not in told["stopped"]
     assert "interrupted" in told["record"]
     entries = read_journal(cell.with_name("run") / "journal.jsonl")

@@ -9,13 +9,19 @@ from elastocal.cell import load_cell, write_example
 from elastocal.errors import ProcedureError, RobotError, SchemaError
 from elastocal.studio import (
     CellView,
+    RunView,
     Session,
     Worker,
     WorkState,
+    compare_techniques,
     default_springs,
+    find_runs,
     form_of,
+    survey_reach,
 )
 from elastocal.workflows import describe_file
+from support.recorded_runs import record_run
+from support.run_cells import planned_cell
 from support.tasks import fail, tick_until_stopped
 
 
@@ -237,3 +243,54 @@ def test_other_work_ends_at_once():
 def test_a_work_that_fails_says_why():
     news = worked("plan", fail)
     assert (news.state, news.message) == (WorkState.FAILED, "it cannot be done")
+
+
+def test_a_run_on_disk_is_opened_pose_by_pose(tmp_path):
+    run = record_run(tmp_path / "run", poses=2)
+    found = RunView.read(run.path)
+    assert found.live  # its journal has no last entry
+    assert [each["pose"] for each in found.summary()["poses"]] == [0, 1]
+    pose = found.pose(1)
+    time, force = (np.array(pose["force"][key]) for key in ("time", "value"))
+    windows = {
+        each["name"]: (time >= each["start"]) & (time <= each["end"]) for each in pose["windows"]
+    }
+    pressed = run.plan.contact.load_cases["normal"]
+    expected = np.linalg.norm(pressed)
+    assert force[windows["normal"]].mean() == pytest.approx(expected, rel=0.05)
+    assert force[windows["unloaded"]].mean() < 5.0
+    assert len(pose["q"]) == len(pose["time"]) > 10
+    with pytest.raises(ProcedureError, match="pose 99 is not committed"):
+        found.pose(99)
+
+
+def test_runs_are_listed_those_that_cannot_be_read_with_the_reason(tmp_path):
+    record_run(tmp_path / "run", poses=1)
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "journal.jsonl").write_text("nonsense\n")
+    good, torn = find_runs(tmp_path)
+    assert (good.folder, good.state, good.live) == ("run", "1 pose committed, goes on", True)
+    assert "line 1" in torn.state
+    with pytest.raises(ProcedureError, match="holds no run"):
+        RunView.read(tmp_path)
+
+
+class Silent:
+    """A line to a studio that nobody listens to."""
+
+    def progress(self, *_):
+        pass
+
+
+def test_a_survey_and_a_comparison_are_made_of_the_pool_of_the_cell(tmp_path):
+    path = planned_cell(tmp_path, poses=3).cell
+    found = survey_reach(path, Silent())
+    free = [p for p, name in zip(found["points"], found["refused"], strict=True) if not name]
+    assert len(free) == 40
+    assert found["summary"].startswith(f"40 of {len(found['points'])} points can be pressed on")
+    compared = compare_techniques(path, Silent())
+    rows = {each["technique"]: each for each in compared["rows"]}
+    assert {each["poses"] for each in rows.values()} == {"3"}
+    radius = {name: float(each["covering_radius"].split()[0]) for name, each in rows.items()}
+    assert radius["cover"] == min(radius.values())
+    assert float(rows["ioops"]["o1"]) == max(float(each["o1"]) for each in rows.values())

@@ -71,6 +71,8 @@ class World:
     force: np.ndarray = field(default_factory=lambda: np.zeros(3))
     wanted: np.ndarray = field(default_factory=lambda: np.zeros(3))
     ramp: float = 0.0
+    hit: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """Force of what the tool has run into, in N."""
     aside: float = 0.0
     """Slip so far, in m."""
     since: int = 0
@@ -270,7 +272,7 @@ class FakeSensor(_Sampled):
     def sample(self) -> None:
         w = self.world
         self.times.append(w.clock.ticks)
-        force = w.force + WEIGHT + 0.5 * self.noise(1)
+        force = w.force + w.hit + WEIGHT + 0.5 * self.noise(1)
         if w.motion is Motion.HOLDING:
             force = force + np.array([0.0, 0.0, w.wobble * math.sin(9.0 * w.age)])
         if not self.frozen:

@@ -75,6 +75,10 @@ def moving(world: World) -> bool:
     return world.motion is Motion.MOVING and world.age > 0.1
 
 
+def hit_something(cell: FakeCell) -> None:
+    cell.world.hit = np.array([220.0, 0.0, 0.0])
+
+
 def break_beam(seconds: float = np.inf) -> Change:
     """Break the beam; the tracker finds the marker again when it looks after some time."""
 

@@ -130,7 +130,7 @@ def settings(of: PlanResult, **changes: Any) -> RunSettings:
         R_tcp_sensor=np.eye(3),
         force_limit=450.0,
         force_tolerance=5.0,
-        tool_weight=600.0,
+        weight_base=np.array([0.0, 0.0, -600.0]),
         near_contact=NEAR,
         approach_distance=APPROACH,
         loads=loads,

@@ -16,9 +16,12 @@ from elastocal.cell import (
     WrenchSample,
     load_cell,
 )
+from elastocal.compensation.conditioning import ToolResult, write_tool
 from elastocal.compensation.online import LiveCounts
 from elastocal.errors import DeviceError
 from elastocal.identification import write_model
+from elastocal.procedure.derive import sensor_load
+from elastocal.robot import parse_urdf
 from elastocal.workflows import LiveResult
 from support import compensated, drivers
 from support.simulated import example_cell
@@ -122,6 +125,26 @@ def write_cell(path: Path, arm: object = "live_bench", sensor: object = "live_be
 def write_model_of(cell: Path, path: Path) -> Path:
     """Write a made-up model of a cell's robot; return its file."""
     write_model(path, compensated.calibrated(load_cell(cell).robot))
+    return path
+
+
+def write_tool_of(cell: Path, path: Path, bias: float = 0.0) -> Path:
+    """Write the tool file of a cell's tool as it is described, with a bias of each force in N."""
+    described = load_cell(cell)
+    load, sensor = sensor_load(described), described.file.sensor
+    flange = [link.get("name") for link in parse_urdf(described.robot.urdf).findall("link")]
+    pose = sensor.T_flange_sensor
+    write_tool(
+        path,
+        ToolResult(
+            flange="flange" if "flange" in flange else "tool0", mass=load.mass,
+            centre=tuple(load.centre.tolist()), force_bias=(bias,) * 3, moment_bias=(0.0,) * 3,
+            R_flange_sensor=tuple(map(tuple, pose[:3, :3].tolist())),
+            sensor_origin=tuple(pose[:3, 3].tolist()), gravity=tuple(load.gravity.tolist()),
+            half_width={}, undetermined=(), postures=8, force_scatter=0.1, moment_scatter=0.01,
+            source="the cell file",
+        ),
+    )  # fmt: skip
     return path
 
 

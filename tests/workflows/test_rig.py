@@ -118,6 +118,21 @@ def test_time_runs_faster_only_on_this_machine(bench):
         rig_of(example_cell(devices=devices))
 
 
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("metrology", {"driver": "emscon", "stations": {"station_1": {"address": "10.0.0.7"}}}),
+        ("metrology", {"driver": "line_stream", "role": "server", "port": 7, "peer": "10.0.0.7"}),
+        ("arm", {"driver": "kuka_rsi", "robot": "10.0.0.7"}),
+    ],
+)
+def test_no_device_is_far_away_where_time_runs_faster(kind, told):
+    devices = {kind: told, "clock_rate": 2.0}
+    with pytest.raises(DeviceError, match=rf"clock_rate is 2, .*devices.{kind} is at 10.0.0.7"):
+        rig_of(example_cell(devices=devices))
+    assert rig_of(example_cell(devices=devices | {"clock_rate": 1.0}))
+
+
 def test_where_all_is_simulated_the_devices_are_those_of_before():
     cell = example_cell()
     by_rig, before = rig_of(cell).connect(3, 5.0), simulated_devices(cell, 3, 5.0)

@@ -33,6 +33,7 @@ from .certificate import (
     read_statements as read_statements,
     unstated as unstated,
 )
+from .collision import CollisionWatch as CollisionWatch
 from .devices import (
     ArmState as ArmState,
     AskedMetrology as AskedMetrology,

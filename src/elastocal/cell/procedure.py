@@ -303,6 +303,10 @@ class ProcedureSettings(StrictModel):
     force_limit: PositiveForce | None = None
     """Largest force that is let happen, in N; by default 1.3 times the largest load case, and
     never more than the sensor's range allows."""
+    collision_force: Annotated[PositiveForce, Field(le=5e3)] | None = None
+    """Change of the force beyond that of the tool's weight, within 0.1 s of a free move, that is a
+    collision, in N; by default 50 N and a fifth of the tool's weight. A slow one is found when it
+    is as much and a third of the weight more."""
     travel_limit: Annotated[PositiveLength, Field(le=50e-3)] = 15e-3
     """How far the tool may go beyond the expected contact, or aside, in m."""
     contact_compliance: Annotated[TranslationalCompliance, Field(le=10e-6)] = 0.5e-6

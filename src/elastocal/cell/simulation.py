@@ -286,6 +286,7 @@ FaultKind = Literal[
     "never_stable",
     "contact_missed",
     "robot_stop",
+    "soft_collision",
     "stale_clock",
     "station_bumped",
     "tool_weight",
@@ -303,6 +304,7 @@ _KEYS: dict[str, set[str]] = {
     "never_stable": {"load", "amplitude"},
     "contact_missed": set(),
     "robot_stop": {*_WHEN, "duration"},
+    "soft_collision": {*_WHEN, "duration", "amplitude"},
     "stale_clock": {*_WHEN, "duration"},
     "station_bumped": {"station", "offset"},
     "tool_weight": {"mass"},
@@ -333,7 +335,7 @@ class Fault(StrictModel):
     distance: PositiveLength = 1e-3
     """How far the contact slips, in m."""
     amplitude: Force = 40.0
-    """Amplitude of the force that never comes to rest, in N."""
+    """Amplitude of the force that never comes to rest; force of a soft collision; in N."""
     offset: Point = (0.5e-3, 0.0, 0.0)
     """How far the station is moved, in base, in m."""
     mass: Annotated[Mass, Field(le=1e3)] = 2.0

@@ -4,6 +4,7 @@ Importing this module makes Ctrl-C end the program at once, until `heard_again`:
 command line come between, and a traceback from within them tells nobody anything.
 """
 
+import _thread
 import contextlib
 import signal
 import sys
@@ -119,9 +120,17 @@ def _number_of(raised: BaseException | None) -> int | None:
     return None
 
 
+def _send(number: int) -> None:
+    ident = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and ident is not None:
+        signal.pthread_kill(ident, number)
+    else:
+        _thread.interrupt_main(signal.Signals(number))
+
+
 def _send_soon(number: int) -> None:
     _waiting.add(number)
     # Sent to the main thread itself, or it would not wake up from what it waits for.
-    timer = threading.Timer(_PAUSE, signal.pthread_kill, (threading.main_thread().ident, number))
+    timer = threading.Timer(_PAUSE, _send, (number,))
     timer.daemon = True
     timer.start()

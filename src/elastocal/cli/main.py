@@ -149,6 +149,8 @@ def run() -> None:
     # Warnings of libraries (an overflow, a division by zero) are for whoever looks for a mistake in
     # the program, with -W; what a user is to know is a note of ours.
     warnings.simplefilter("ignore", append=True)
+    # Figures go into files; Matplotlib would refuse a name here that it does not know.
+    os.environ["MPLBACKEND"] = "agg"
     try:
         _check_output()
         with ended_cleanly():

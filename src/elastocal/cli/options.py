@@ -27,6 +27,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "weights": ("none", "sigma"),
     "free frame": ("none", "load_case", "campaign"),
     "posture": ("programmed", "stiffest"),
+    "target": ("linux",),
 }  # fmt: skip
 """What help lists without importing what knows them; tests/contracts/test_commands.py holds it."""
 

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from elastocal.errors import FileAccessError
 from elastocal.progress import Progress
 from elastocal.results import counted_alike
 
@@ -86,14 +87,19 @@ def print_json(data: object) -> None:
     """Print a record as one JSON object on standard output, and nothing else there."""
     from elastocal.records import to_data
 
-    sys.stdout.write(json.dumps(to_data(data), allow_nan=False) + "\n")
-    # A disk that is full is to be known now, not when Python ends.
-    sys.stdout.flush()
+    _hand_over(json.dumps(to_data(data), allow_nan=False) + "\n")
 
 
 def print_lines(lines: Iterable[str]) -> None:
     """Print lines on standard output, for programs."""
-    sys.stdout.writelines(f"{visible(line)}\n" for line in lines)
+    _hand_over("".join(f"{visible(line)}\n" for line in lines))
+
+
+def _hand_over(text: str) -> None:
+    if sys.stdout is None:  # closed by a shell: >&-
+        raise FileAccessError("cannot write output: standard output is closed")
+    sys.stdout.write(text)
+    # A disk that is full is to be known now, not when Python ends.
     sys.stdout.flush()
 
 

@@ -28,6 +28,8 @@ from elastocal.results import brief_repr
 
 _SAMPLES, _FRAMES = 800, 160
 """Points of a curve, and postures of the arm, that a page gets of a pose."""
+_AROUND = 1.0
+"""Time before the first window of a pose and after the last that is shown, in s."""
 _LISTED = 50
 """Runs that are looked for, at most."""
 
@@ -114,10 +116,12 @@ class RunView:
         log = next((each for each in commits(self.entries) if each.pose == pose), None)
         if log is None:
             raise ProcedureError(f"pose {pose} is not committed")
-        streams = read_streams(self.folder.streams / log.streams)
+        # Of the way there and back a curve would show nothing else.
+        start = min(each.start for each in log.windows) - _AROUND
+        end = max(each.end for each in log.windows) + _AROUND
+        streams = read_streams(self.folder.streams / log.streams, [(start, end)])
         reference = next(each for each in log.windows if each.load_case is None)
         span = (reference.start, reference.end)
-        start = float(streams.arm.time[0]) if len(streams.arm.time) else 0.0
         frames = _thinned(len(streams.arm.time), _FRAMES)
         return {
             "pose": pose,

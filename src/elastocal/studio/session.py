@@ -25,7 +25,7 @@ from elastocal.studio.posture import CellView
 from elastocal.studio.recorded import RunView, find_runs
 from elastocal.studio.springs import StudioSprings
 from elastocal.studio.trials import compare_techniques, survey_reach
-from elastocal.studio.worker import Data, Outbox, Worker
+from elastocal.studio.worker import Data, Outbox, Worker, WorkState
 from elastocal.wording import duration, readable
 
 _FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -178,6 +178,12 @@ class Session:
     def name(self) -> str:
         """Name of the cell."""
         return self._opened.view.cell.name
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a run is going on."""
+        news = self.worker.news
+        return news.kind == "run" and news.state is WorkState.BUSY
 
     def news(self, number: int, patience: float) -> tuple[int, Mapping[str, object]]:
         """Return the newest news and its number, as soon as it is another than ``number``.

@@ -20,6 +20,8 @@ from elastocal.results import brief_repr
 
 _GRACE = 5.0
 """How long a worker that was ended may clean up, in s."""
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
+"""Signals by which a person, a terminal or a system ends a program, or halts it."""
 
 Data = Mapping[str, object]
 """JSON-ready."""
@@ -79,6 +81,10 @@ class Outbox:
         with contextlib.suppress(OSError):
             self._line.send(("live", live))
 
+    def stop(self) -> None:
+        """Take note that the work is to stop."""
+        self._stopped = True
+
     def stopped(self) -> bool:
         """Return whether the studio wants the work to stop, or is gone."""
         if not self._stopped:
@@ -126,7 +132,9 @@ class Worker:
                 self._reader.join()
             ours, theirs = multiprocessing.Pipe()
             spawning = multiprocessing.get_context("spawn")
-            self._process = spawning.Process(target=_carry_out, args=(theirs, work), name=kind)
+            self._process = spawning.Process(
+                target=_carry_out, args=(theirs, work, kind == "run"), name=kind
+            )
             self._line, self._asked_to_stop = ours, False
             self._process.start()
             theirs.close()
@@ -191,13 +199,33 @@ class Worker:
         self._changed()
 
 
-def _carry_out(line: "Connection[object, object]", work: Work) -> None:
-    """Do a work and send its result; this is the worker's process."""
-    # Ctrl-C in a terminal goes to both; the studio says what is to become of the worker.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _leave)
+def _carry_out(line: "Connection[object, object]", work: Work, orderly: bool) -> None:
+    """Do a work and send its result; this is the worker's process.
+
+    Parameters
+    ----------
+    line : Connection
+        To the studio.
+    work : callable
+        What is to be done.
+    orderly : bool
+        Whether it has an arm to bring to safety: signals that end or halt a program then are the
+        wish to stop. A terminal sends them to the studio and to the worker alike.
+    """
+    outbox = Outbox(line)
+
+    def heed(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signal's form
+        outbox.stop()
+
+    for name in _ENDING:
+        if hasattr(signal, name) and orderly:
+            signal.signal(getattr(signal, name), heed)
+    if not orderly:
+        # The studio says what is to become of it.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, _leave)
     try:
-        said: tuple[object, ...] = ("done", work(Outbox(line)))
+        said: tuple[object, ...] = ("done", work(outbox))
     except ElastocalError as error:
         said = ("failed", str(error))
     with contextlib.suppress(OSError):

@@ -78,7 +78,12 @@ from .demo import (
     finish as finish,
 )
 from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
-from .export import ExportResult as ExportResult, ExportSettings as ExportSettings, export as export
+from .export import (
+    EXPORT_TARGETS as EXPORT_TARGETS,
+    ExportResult as ExportResult,
+    ExportSettings as ExportSettings,
+    export as export,
+)
 from .geometry import (
     GeometryResult as GeometryResult,
     GeometrySettings as GeometrySettings,

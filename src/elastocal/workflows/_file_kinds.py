@@ -147,9 +147,8 @@ def streams_file(path: Path) -> FileDescription:
 def summary_file(path: Path) -> FileDescription:
     """Describe a summary of a run."""
     summary = procedure.read_summary(path)
-    counts, warnings = summary.readings.counts, len(summary.warnings)
-    schema = schema_of(procedure.RunSummary)
-    return "summary of a run", {"schema": schema, "readings": counts, "warnings": warnings}
+    found = {"readings": summary.readings.counts, "warnings": len(summary.warnings)}
+    return "summary of a run", {"schema": schema_of(procedure.RunSummary)} | found
 
 
 def robot_file(path: Path, tcp: str | None = None) -> FileDescription:
@@ -176,8 +175,8 @@ def robot_file(path: Path, tcp: str | None = None) -> FileDescription:
 def springs_file(path: Path) -> FileDescription:
     """Describe a file of springs."""
     file = read_springs(path)
-    facts = {"include": file.include, "springs": len(file.springs)}
-    return "spring file", {"schema": "elastocal.springs/1", **facts}
+    schema = {"schema": "elastocal.springs/1"}
+    return "spring file", schema | {"include": file.include, "springs": len(file.springs)}
 
 
 def catalogue_file(path: Path) -> FileDescription:
@@ -236,8 +235,8 @@ def model_file(path: Path) -> FileDescription:
 
 def tool_file(path: Path) -> FileDescription:
     """Describe a tool file."""
-    facts = _picked(read_tool(path), "flange", "mass", "postures", "undetermined")
-    return "tool file", {"schema": "elastocal.tool/1", **facts}
+    found = _picked(read_tool(path), "flange", "mass", "postures", "undetermined")
+    return "tool file", {"schema": "elastocal.tool/1"} | found
 
 
 def compensator_file(path: Path) -> FileDescription:
@@ -273,12 +272,16 @@ def process_folder(path: Path) -> FileDescription:
     return kind, {**facts, "courses": courses}
 
 
-def record_file(kind: str, record: type[object], *names: str) -> Callable[[Path], FileDescription]:
-    """Return what describes a file of a record by some of its figures."""
-    return lambda path: (
-        kind,
-        {"schema": schema_of(record), **_picked(read_json(path, record), *names)},
-    )
+def record_file(
+    kind: str, record: Callable[[], type], *names: str
+) -> Callable[[Path], FileDescription]:
+    """Return what describes files of a record, imported only then, by some of its figures."""
+
+    def describe(path: Path) -> FileDescription:
+        found: object = read_json(path, record())
+        return kind, {"schema": schema_of(type(found)), **_picked(found, *names)}
+
+    return describe
 
 
 def commissioning_file(path: Path) -> FileDescription:

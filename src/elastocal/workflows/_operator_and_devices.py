@@ -18,7 +18,6 @@ from typing import Any, Protocol, cast
 from elastocal import drivers
 from elastocal.cell import (
     KINDS,
-    LOOPBACK,
     SIMULATED,
     Cell,
     Clock,
@@ -33,7 +32,7 @@ from elastocal.cell import (
 )
 from elastocal.errors import DeviceError, ElastocalError, ProcedureError, nearest
 from elastocal.procedure import Progress as RunProgress
-from elastocal.records import validate
+from elastocal.records import StrictModel, validate
 from elastocal.results import brief_repr
 
 
@@ -89,6 +88,8 @@ class Unattended:
         yield Supervision(lambda _step: None, lambda: False)
 
 
+_ADDRESSES = ("address", "robot", "peer")
+"""Keys under which drivers take addresses."""
 GROUP = "elastocal.drivers"
 """Group of entry points that name drivers."""
 
@@ -287,9 +288,20 @@ def _require_real_time(rig: Rig) -> None:
     rate = rig.cell.file.devices.clock_rate
     for kinds in rig.wanted.values():
         for kind, settings in kinds.items():
-            address = getattr(settings, "address", LOOPBACK)
-            if rate != 1.0 and not _is_loopback(address):
+            far = next((each for each in _addresses(settings) if not _is_loopback(each)), None)
+            if rate != 1.0 and far is not None:
                 raise DeviceError(
                     f"{rig.cell.path}: devices.clock_rate is {rate:g}, for simulators on this"
-                    f" machine alone; devices.{kind} is at {address}"
+                    f" machine alone; devices.{kind} is at {far}"
                 )
+
+
+def _addresses(settings: StrictModel) -> Iterator[str]:
+    """Yield all addresses that settings name, those of single stations too."""
+    for key, value in settings:
+        if key in _ADDRESSES:
+            yield str(value)
+        elif isinstance(value, Mapping):
+            for each in value.values():
+                if isinstance(each, StrictModel):
+                    yield from _addresses(each)

@@ -60,7 +60,8 @@ def workflow(
         The record of settings; its first positional field is what the work starts from.
     marks : tuple of str, optional
         Texts by which a file is known as a former output, which may be replaced. Without any, no
-        file is replaced but in a folder of ours, or where the settings have ``force``.
+        file is replaced but in a folder of ours, or where the settings have ``force``. With some,
+        the outputs are files, in folders that are there; a folder that is an output is made.
     outputs : tuple of str, optional
         Fields that name what is written; every other one that names a file or folder, an input.
     record : str, optional

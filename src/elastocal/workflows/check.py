@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from elastocal import planning
+from elastocal import planning, verdict, workflows
 from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
@@ -20,23 +20,19 @@ from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.records import read_arrays, read_json, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
-from elastocal.verdict import Signature
 from elastocal.wording import plainly
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
 from elastocal.workflows._inputs import ROBOT_SUFFIXES
 from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
-from elastocal.workflows.live import LiveResult
-from elastocal.workflows.simulate import Ports
-from elastocal.workflows.stiffness import StiffnessSummary
 
 _Describe = Callable[[Path], FileDescription]
 
 
 def _live_record(path: Path) -> FileDescription:
     """Describe the record of a live compensation."""
-    found = read_json(path, LiveResult)
+    found = read_json(path, workflows.LiveResult)
     names = ("cell", "robot", "started", "seconds", "ended", "problem")
     facts = {name: getattr(found, name) for name in names}
     schema = {"schema": "elastocal.live/1"}
@@ -56,10 +52,16 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.commissioning": kinds.commissioning_file,
     "elastocal.live": _live_record,
     "elastocal.model": kinds.model_file,
-    "elastocal.signature": kinds.record_file("signature", Signature, "of", "sha256", "made", "key"),
-    "elastocal.ports": kinds.record_file("ports of simulated devices", Ports, "address", "ports"),
+    "elastocal.signature": kinds.record_file(
+        "signature", lambda: verdict.Signature, "of", "sha256", "made", "key"
+    ),
+    "elastocal.ports": kinds.record_file(
+        "ports of simulated devices", lambda: workflows.Ports, "address", "ports"
+    ),
     "elastocal.stiffness": kinds.record_file(
-        "stiffness along a path", StiffnessSummary, "direction", "stations", "files"
+        "stiffness along a path",
+        lambda: workflows.StiffnessSummary,
+        *("direction", "stations", "files"),
     ),
     "elastocal.geometry": kinds.geometry_file,
     "elastocal.position-plan": kinds.position_plan_file,

@@ -6,17 +6,32 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal.cell import Cell, PathLimits, load_cell
 from elastocal.compensation import CorrectionLimits, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
-from elastocal.compensation.export import write_c
+from elastocal.compensation.export import LinuxTarget, linux_files, write_c
 from elastocal.compensation.online import design
-from elastocal.errors import CompensationError
+from elastocal.drivers.kuka_rsi import DRIVER as KUKA, PostureReader
+from elastocal.drivers.net_ft import NetFtSettings
+from elastocal.errors import CompensationError, nearest
 from elastocal.identification import PredictionDoubt
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
-from elastocal.workflows._inputs import NewTool, coverage_notes, require_model_of_arm
+from elastocal.robot import Robot
+from elastocal.workflows._inputs import (
+    NewTool,
+    coverage_notes,
+    require_model_of_arm,
+    require_same_robot,
+)
+from elastocal.workflows._live_session import settings_within
+from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.krc_config import kuka_settings
+
+EXPORT_TARGETS = ("linux",)
+"""Machines that a whole program is written for."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +46,10 @@ class ExportSettings(NewTool):
     """Settings of the compensator (.yaml)."""
     tool: Path | None = None
     """Tool file of `tool`: weight, bias, sensor."""
+    target: str | None = None
+    """Besides, a program for a real-time Linux: RSI and Net F/T around the compensator."""
+    cell: Path | None = None
+    """Cell file, whose addresses and limits that program holds."""
     force: bool = False
     """Replace files that are there."""
 
@@ -97,14 +116,18 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     model = Path(settings.model)
     calibrated = settings.read_model(model)
     require_model_of_arm(calibrated, model)
+    around = _around(settings, calibrated.model.robot)
     chosen = None if settings.compensator is None else read_settings(settings.compensator)
+    if around is not None:
+        chosen = settings_within(settings.compensator, *around[1:])
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     try:
         numbers = design(calibrated, chosen, load)
     except CompensationError as error:
         raise CompensationError(f"{model}: {error}") from error
     on_production = calibrated.on_production
-    files = write_c(settings.out, numbers, settings.force)
+    beside = {} if around is None else linux_files(numbers, around[0])
+    files = write_c(settings.out, numbers, settings.force, beside)
     return ExportResult(
         folder=str(settings.out),
         files=tuple(files),
@@ -121,3 +144,50 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         ),
         on_production=on_production,
     )
+
+
+def _around(settings: ExportSettings, model: Robot) -> tuple[LinuxTarget, PathLimits, Cell] | None:
+    """Return what the program of a target is told of the cell; None without one.
+
+    Raises
+    ------
+    CompensationError, DeviceError
+        If the cell is not one that the program is for.
+    """
+    if settings.target is None:
+        if settings.cell is not None:
+            raise CompensationError("a cell file is for --target linux, which holds its addresses")
+        return None
+    if settings.target not in EXPORT_TARGETS:
+        raise CompensationError(
+            f"target {settings.target!r} is none{nearest(settings.target, EXPORT_TARGETS)}"
+            f" (known: {', '.join(EXPORT_TARGETS)})"
+        )
+    if settings.cell is None or settings.tool is None:
+        raise CompensationError(
+            "--target linux needs --cell, for addresses and limits, and --tool: a Net F/T gives"
+            " raw wrenches"
+        )
+    cell = load_cell(settings.cell)
+    require_same_robot(model, cell.robot, (str(settings.model), cell.name))
+    arm = kuka_settings(cell)
+    limits = KUKA.path_limits(cell, arm)
+    sensor = rig_of(cell).wanted.get("net_ft", {}).get("sensor")
+    if not isinstance(sensor, NetFtSettings) or sensor.tcp_port is None:
+        raise CompensationError(
+            f"{cell.path}: devices.sensor: --target linux reads a Net F/T (driver net_ft) that"
+            " tells its counts by TCP (tcp_port)"
+        )
+    target = LinuxTarget(
+        cell=cell.name,
+        rsi=(arm.address, arm.port),
+        controller=arm.robot,
+        sentype=arm.sentype,
+        timeout=arm.timeout,
+        sensor=(sensor.address, sensor.port, sensor.tcp_port),
+        external=cell.robot.external_axes,
+        scale=PostureReader(cell.robot, arm.signs).scales,
+        correction=limits.correction,
+        rate=limits.rate,
+    )
+    return target, limits, cell

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.cell import Cell, CycleStatistics, PathLimits, load_cell
-from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.online import LiveCounts, design
 from elastocal.errors import CompensationError, DeviceError, UnitError
@@ -17,7 +16,7 @@ from elastocal.files import filling
 from elastocal.identification import CalibratedModel
 from elastocal.procedure.derive import sensor_load
 from elastocal.progress import Progress
-from elastocal.records import record, validate, write_json
+from elastocal.records import record, write_json
 from elastocal.results import Result
 from elastocal.units import parse_number, parse_quantity
 from elastocal.workflows._inputs import (
@@ -26,14 +25,18 @@ from elastocal.workflows._inputs import (
     require_model_of_arm,
     require_same_robot,
 )
-from elastocal.workflows._live_session import LiveEnd, LiveReport, LiveSession, Prepared
+from elastocal.workflows._live_session import (
+    LiveEnd,
+    LiveReport,
+    LiveSession,
+    Prepared,
+    settings_within,
+)
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._workflow import workflow
 
 LIVE_RECORD, LIVE_LOG = "live.json", "live.mcap"
 """Files of a live compensation, in its folder."""
-_FADE = 0.005
-"""Default speed of the fade, in m/s, where the limits allow it."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +127,7 @@ class LiveResult(Result):
         )
 
 
-@workflow(LiveSettings, marks=("elastocal.live/",))
+@workflow(LiveSettings)
 def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG001 - it reports
     """Correct the path that an arm's own program follows, by the measured wrench, cycle by cycle.
 
@@ -201,7 +204,7 @@ def _prepare(settings: LiveSettings) -> Prepared:
     calibrated = settings.read_model(settings.model)
     require_same_robot(calibrated.model.robot, cell.robot, (str(settings.model), cell.name))
     require_model_of_arm(calibrated, settings.model)
-    chosen = _compensator_settings(settings.compensator, limits, cell)
+    chosen = settings_within(settings.compensator, limits, cell)
     load = read_sensor_load(settings.tool, calibrated.model.robot) or sensor_load(cell)
     try:
         numbers = design(calibrated, chosen, load)
@@ -236,43 +239,6 @@ def _seconds(duration: str | float | None) -> float:
         found = parse_quantity(duration, "time")
     if not 0.0 < found < float("inf"):
         raise UnitError(f"duration {duration!r} must be a time above 0, such as '60 s'")
-    return found
-
-
-def _compensator_settings(file: Path | None, limits: PathLimits, cell: Cell) -> CompensatorSettings:
-    """Return the settings of a file, within the limits of the cell; or what these make."""
-    if file is None:
-        data: dict[str, object] = {
-            "cycle": f"{limits.cycle!r} s",
-            "frame": limits.frame,
-            "limits": {
-                "correction": f"{limits.correction!r} m",
-                "rate": f"{limits.rate!r} m/s",
-                "fade": f"{min(_FADE, limits.rate)!r} m/s",
-            },
-        }
-        if (sensor := cell.file.sensor) is not None:
-            data["sensor"] = {
-                "force": [f"{value!r} N" for value in sensor.force_range],
-                "moment": [f"{value!r} N*m" for value in sensor.moment_range],
-            }
-        return validate(data, CompensatorSettings, f"{cell.path}: limits of corrections")
-    found = read_settings(file)
-    for what, ours, theirs in (
-        ("cycle", found.cycle, limits.cycle),
-        ("frame", found.frame, limits.frame),
-    ):
-        if ours != theirs:
-            raise CompensationError(f"{file}: {what} is {ours}: must be {theirs}, the arm's")
-    for what, ours, theirs in (
-        ("limits.correction", found.limits.correction, limits.correction),
-        ("limits.rate", found.limits.rate, limits.rate),
-    ):
-        if not ours <= theirs:
-            raise CompensationError(
-                f"{file}: {what} is {1e3 * ours:g} mm{'/s' if what.endswith('rate') else ''}: at"
-                f" most {1e3 * theirs:g}, which the cell file allows"
-            )
     return found
 
 

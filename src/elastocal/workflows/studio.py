@@ -56,8 +56,6 @@ class StudioSettings:
     """0: one that is free."""
     arm: bool = False
     """Let a run move devices that are not simulated."""
-    browser: bool = True
-    """Open the page."""
     while_open: Callable[["StudioResult"], None] = lambda found: found.wait()
     """What is done while the page is answered, which ends when it returns. By default: wait for
     Ctrl-C."""
@@ -86,6 +84,10 @@ class StudioResult(Result):
         """Return what a person wants to know first."""
         found = self.figures
         return (("cell", found.cell), ("page", found.address), *(("note", n) for n in found.notes))
+
+    def open_page(self) -> None:
+        """Show the page in the browser of whoever sits here, if there is one."""
+        webbrowser.open(self.figures.address)
 
     def wait(self) -> None:
         """Wait for Ctrl-C."""
@@ -121,8 +123,6 @@ def studio(
     result = StudioResult(figures, session)
     server.start()
     try:
-        if settings.browser:
-            webbrowser.open(server.address)
         settings.while_open(result)
     finally:
         session.close()

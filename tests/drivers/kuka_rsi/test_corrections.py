@@ -5,14 +5,19 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from elastocal.cell import PathCycle, WallClock
 from elastocal.drivers.kuka_rsi import (
     Arrival,
     Bounds,
+    CorrectedKuka,
     CorrectionGuard,
     PathCorrections,
     RobMessage,
+    RsiSettings,
 )
 from elastocal.errors import DeviceError
+from elastocal.robot import xyzabc_from_T
+from support.simulated import example_cell
 
 CYCLE = 0.004
 BOUNDS = Bounds(0.003, 0.005, 0.006, 0.017, 0.05, 1000.0, 0.015)
@@ -131,3 +136,67 @@ def test_corrections_that_are_over_raise_stop_and_go_back_at_the_same_speed():
     told = [handler.step(RobMessage(5 + k), Arrival.NEXT, 0.0) for k in range(3)]
     assert [each.stop for each in told] == [True] * 3
     assert [each.correction[0] for each in told] == pytest.approx([0.2, 0.0, 0.0])
+
+
+class Cycles:
+    """Notes what it is asked, and wants nothing."""
+
+    def __init__(self) -> None:
+        self.seen: list[PathCycle] = []
+
+    def correction(self, cycle):
+        self.seen.append(cycle)
+        return (1e-4, 0.0, 0.0)
+
+
+@pytest.fixture
+def corrected():
+    """An arm whose path is corrected, its source, and what its controller would send."""
+    cell = example_cell("afp")
+    settings = RsiSettings.model_validate(
+        {"mode": "compensation", "port": 0, "largest_correction": "1 mm"}
+    )
+    source = Cycles()
+    arm = CorrectedKuka(cell, settings, WallClock(), source)
+    place = xyzabc_from_T(cell.robot.forward(cell.home))
+    yield arm, source, message_at(cell.home, place)
+    arm.close()
+
+
+def message_at(q, place):
+    frame = [*(1e3 * place[:3]), *np.degrees(place[3:])]
+    axes = np.degrees(q[1:])
+
+    def element(name, keys, values):
+        inside = " ".join(f'{k}="{v:.6f}"' for k, v in zip(keys, values, strict=True))
+        return f"<{name} {inside}/>"
+
+    def message(ipoc, shift=0.0):
+        moved = [frame[0] + shift, *frame[1:]]
+        parts = element("RIst", "XYZABC", moved)
+        parts += element("AIPos", [f"A{k}" for k in range(1, 7)], axes)
+        parts += element("EIPos", [f"E{k}" for k in range(1, 7)], [1e3 * q[0], 0, 0, 0, 0, 0])
+        return f'<Rob Type="KUKA">{parts}<IPOC>{ipoc}</IPOC></Rob>'.encode()
+
+    return message
+
+
+SENDER = ("127.0.0.1", 50_000)
+
+
+def test_a_kuka_on_its_path_gives_joints_and_takes_what_its_source_wants(corrected):
+    arm, source, message = corrected
+    answers = [arm._link.answer(message(4 * k), SENDER) for k in range(1, 4)]
+    assert all(b'RKorr X="0.100000"' in each for each in answers)
+    assert [each.begins for each in source.seen] == [True, False, False]
+    np.testing.assert_allclose(source.seen[-1].q, example_cell("afp").home, atol=1e-7)
+    counts = arm.statistics()
+    assert (counts.received, counts.answered, counts.late) == (3, 3, 0)
+    assert counts.answer_p50 is not None
+
+
+def test_a_program_whose_tool_is_elsewhere_gets_no_answer(corrected):
+    arm, source, message = corrected
+    with pytest.raises(DeviceError, match=r"RIst is 40\.0 mm .* check \$TOOL, \$BASE"):
+        arm._link.answer(message(4, shift=40.0), SENDER)
+    assert not source.seen

@@ -57,6 +57,8 @@ ENDING = [
      "arm stopped: arm says: safety gate opened"),
     ("robot stop on the way", fault.moving, fault.stop_arm, ArmLocation.BETWEEN_POSES,
      "pose 0, attempt 1, move: arm stopped: arm says: safety gate opened"),
+    ("soft collision", fault.moving, fault.hit_something, ArmLocation.BETWEEN_POSES,
+     "pose 0, attempt 1, move: hit something on the way: the force changed by"),
     ("line dead", fault.engaging, fault.deafen_arm, ArmLocation.AT_SURFACE,
      "device refused: arm: the line is dead"),
     ("clock stands", fault.pressing(), fault.stop_clock, ArmLocation.AT_SURFACE,

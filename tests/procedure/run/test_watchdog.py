@@ -8,6 +8,7 @@ import pytest
 from elastocal.cell import (
     ArmState,
     BeamState,
+    CollisionWatch,
     Motion,
     PointBlock,
     SensorStatus,
@@ -17,6 +18,7 @@ from elastocal.procedure.run._watchdog import Guard, Snapshot, Watchdog
 from elastocal.procedure.run.steps import Fault, FaultError
 
 STALE, BEAM = 0.3, 2.0
+WEIGHT = np.array([0.0, 0.0, -600.0])
 
 
 def seen(now, *, arm=None, sensor=None, force=0.0, points=None, beam=BeamState.LOCKED, row=None):
@@ -38,7 +40,7 @@ def seen(now, *, arm=None, sensor=None, force=0.0, points=None, beam=BeamState.L
 
 @pytest.fixture
 def watch():
-    watch = Watchdog(STALE, BEAM)
+    watch = Watchdog(STALE, BEAM, CollisionWatch(WEIGHT, 100.0, 300.0), np.eye(3))
     watch.restart(0.0)
     return watch
 
@@ -116,3 +118,18 @@ def test_another_station_is_let_pass_only_for_a_moment(watch):
     watch.station = "other"
     watch.check(seen(0.2), Guard(beam=True))
     assert fault_of(watch, seen(0.4)) is Fault.TRACKER_FAULT
+
+
+def test_a_blow_on_a_free_move_is_a_collision_and_near_the_surface_is_none(watch):
+    watch.check(seen(0.04), Guard(free=True))
+    blow = seen(0.08, row=400.0)
+    assert fault_of(watch, blow, Guard(free=True)) is Fault.COLLISION
+    assert watch.check(blow, Guard()) is False
+
+
+def test_a_force_that_grows_over_the_way_is_a_collision_in_the_end(watch):
+    for step in range(33):
+        watch.check(seen(0.04 * step, row=5.0 * step), Guard(free=True))
+    # Three axes grow by 5 N a cycle, 17 N in 50 ms: 300 N are there after 35.
+    with pytest.raises(FaultError, match=r"hit something on the way: the force is 3\d\d N off"):
+        watch.check(seen(0.04 * 33, row=180.0), Guard(free=True))

@@ -9,7 +9,7 @@ from elastocal import workflows
 from elastocal.cli import options, output, tables
 
 
-def _export(
+def _export(  # noqa: PLR0913 - one parameter an option
     model: Annotated[Path, typer.Argument(help="Model file from calibrate.")],
     c: Annotated[Path, typer.Option("--c", help="Folder to write the C files into.")],
     *,
@@ -17,6 +17,13 @@ def _export(
     tool: options.NewToolOrFile = None,
     tool_mass: options.ToolMass = None,
     tool_centre: options.ToolCentre = None,
+    target: Annotated[
+        str | None,
+        options.choice("target", "Besides, a program with the wire around it; needs --cell."),
+    ] = None,
+    cell: Annotated[
+        Path | None, typer.Option(help="With --target: cell file, for addresses and limits.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     as_json: options.Written = False,
 ) -> None:
@@ -27,6 +34,8 @@ def _export(
         out=c,
         compensator=settings,
         tool=options.only_tool(files),
+        target=target,
+        cell=cell,
         force=force,
         tool_frame=frame,
         tool_mass=tool_mass,

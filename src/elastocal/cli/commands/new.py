@@ -71,7 +71,7 @@ def _new(  # noqa: PLR0913 - one parameter an option
     marker: Annotated[
         str | None, typer.Option(help="From the tool tip: 'x, y, z' with units.")
     ] = None,
-    poses: Annotated[int, typer.Option(min=1, help="Number of poses.")] = 15,
+    poses: Annotated[int, typer.Option(min=1, max=100_000, help="Number of poses.")] = 15,
     ask: Annotated[
         bool | None,
         typer.Option("--ask/--no-ask", help="Ask for what is not given; default: on a terminal."),

@@ -43,8 +43,10 @@ def _studio(
             output.print_lines([found.figures.address])
         output.print_remarks(output.console(), "warning", found.figures.notes)
         output.console().print("Ctrl-C ends it; whoever has the address can use it")
+        if not no_browser:
+            found.open_page()
         found.wait()
+        if found.session.is_running:
+            output.console().print("stopping the run: the arm is brought to safety")
 
-    workflows.studio(
-        cell, model=model, host=host, port=port, arm=arm, browser=not no_browser, while_open=show
-    )
+    workflows.studio(cell, model=model, host=host, port=port, arm=arm, while_open=show)

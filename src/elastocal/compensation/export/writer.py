@@ -1,14 +1,15 @@
 """A compensator as a folder of C: model, header, self-test, CMake file and page for integrators."""
 
-from collections.abc import Sequence
-from importlib import resources
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from elastocal import __version__
 from elastocal.compensation.export._constants import checksum, constants_of, remark, turns_arcs
 from elastocal.compensation.export._selftest import selftest_tables
+from elastocal.compensation.export._templates import filled, template
 from elastocal.compensation.kernel import (
     Assignment,
     Call,
@@ -50,7 +51,12 @@ _REMOVED = (
 )
 
 
-def write_c(folder: Path, numbers: Design, force: bool = False) -> tuple[str, ...]:
+def write_c(
+    folder: Path,
+    numbers: Design,
+    force: bool = False,
+    beside: Mapping[str, str] = MappingProxyType({}),
+) -> tuple[str, ...]:
     """Write the C files of a compensator and return their names.
 
     Parameters
@@ -61,6 +67,8 @@ def write_c(folder: Path, numbers: Design, force: bool = False) -> tuple[str, ..
         The compensator.
     force : bool
         Whether files in the folder may be replaced.
+    beside : mapping of str to str
+        Further files by name, such as `linux_files`.
 
     Raises
     ------
@@ -69,7 +77,7 @@ def write_c(folder: Path, numbers: Design, force: bool = False) -> tuple[str, ..
     CompensationError
         If what would be exported does not agree with the model.
     """
-    files = c_files(numbers)
+    files = c_files(numbers) | dict(beside)
     with filling(folder, "elastocal_model.c", force) as temporary:
         for name, text in files.items():
             (temporary / name).write_text(text, encoding="utf-8", newline="\n")
@@ -91,7 +99,7 @@ def c_files(numbers: Design) -> dict[str, str]:
     mixing = "\n".join(line for constant in constants for line in constant.mixing())
     values |= data | {"MIXING": mixing, "CHECKSUM": str(checksum(constants))}
     head, sin_cos, arc, condition, correct, selftest = (
-        _filled(part, values, remembers) for part in _PARTS
+        filled(part, values, remembers) for part in _PARTS
     )
     definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
     model = "".join(
@@ -107,7 +115,7 @@ def c_files(numbers: Design) -> dict[str, str]:
         ]
     )
     values |= _readme_values(numbers)
-    beside = {name: _filled(name, values, remembers) for name in _BESIDE}
+    beside = {name: filled(name, values, remembers) for name in _BESIDE}
     return {"elastocal_model.c": model} | beside
 
 
@@ -134,7 +142,7 @@ def _values(numbers: Design) -> dict[str, str]:
         "SECTIONS": str(len(numbers.filters.sections)),
         "MEDIAN": str(median),
         "MEMORY": str(len(numbers.deflection.memory)),
-        "MEDIAN_CODE": _template(f"median_{median}.c").rstrip("\n"),
+        "MEDIAN_CODE": template(f"median_{median}.c").rstrip("\n"),
         "CYCLE": repr(numbers.settings.cycle),
         "SAMPLE": repr(numbers.filters.sample),
         "DELAY": repr(float(numbers.filters.delay())),
@@ -169,24 +177,6 @@ def _readme_values(numbers: Design) -> dict[str, str]:
         "LIBRARY": "`fabs`, `copysign`, " if turns_arcs(numbers) else "",
         "FREE_MS": f"{1e3 * settings.friction.free_after:g}",
     }
-
-
-def _template(name: str) -> str:
-    return (resources.files(__package__) / "templates" / name).read_text(encoding="utf-8")
-
-
-def _filled(name: str, values: dict[str, str], remembers: bool) -> str:
-    """Return a template with its places filled.
-
-    Lines that begin with ``@FRICTION@`` are for models that remember friction only, those with
-    ``@PLAIN@`` for the others.
-    """
-    kept, dropped = ("@FRICTION@", "@PLAIN@") if remembers else ("@PLAIN@", "@FRICTION@")
-    lines = _template(name).splitlines(keepends=True)
-    text = "".join(line.removeprefix(kept) for line in lines if not line.startswith(dropped))
-    for key, value in values.items():
-        text = text.replace(f"@{key}@", value)
-    return text
 
 
 def _routines(numbers: Design) -> str:

@@ -6,7 +6,7 @@
 `settings`       what stands in the cell file, and the bounds that follow from it
 `posture`        joints and tool frame in SI, from and to the pendant's numbers
 `motions`        free moves, guarded moves, force control, cycle by cycle
-`force_control`  the admittance law and its margins; the watch for collisions
+`force_control`  the admittance law and its margins
 `corrections`    the last look at each correction; corrections of a programmed path
 `arm`            the arm as `elastocal run` sees it
 `commissioning`  the delay from command to motion, measured and kept

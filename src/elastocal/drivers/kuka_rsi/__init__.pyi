@@ -37,7 +37,6 @@ from .ethernet_file import (
 )
 from .force_control import (
     SILENT as SILENT,
-    CollisionWatch as CollisionWatch,
     ForceLaw as ForceLaw,
     ForceReader as ForceReader,
     overshoot as overshoot,

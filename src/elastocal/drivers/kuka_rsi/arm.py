@@ -16,14 +16,14 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
+from elastocal.cell import ArmState, Cell, Clock, CollisionWatch, Motion as MotionState, WrenchFeed
 from elastocal.drivers.kuka_rsi._commands import (
     CHECKS,
     StraightMoveRules,
 )
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
-from elastocal.drivers.kuka_rsi.force_control import CollisionWatch, ForceLaw, ForceReader
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
 from elastocal.drivers.kuka_rsi.link import RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
     Arrival,

@@ -182,7 +182,8 @@ class PathCorrections:
         if not size < math.inf:
             self.held += 1
             return before
-        if size > self.bounds.correction:
+        # A source with the same limit may exceed it by a rounding.
+        if size > self.bounds.correction * (1.0 + 1e-9):
             self.clamped += 1
             share = self.bounds.correction / size
             x, y, z = share * x, share * y, share * z

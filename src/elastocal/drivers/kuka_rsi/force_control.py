@@ -1,4 +1,4 @@
-"""Force control on the PC: a bounded admittance law, its stability, and the watch for collisions.
+"""Force control on the PC: a bounded admittance law, and its stability.
 
 The tool's commanded speed is proportional to the missing force, in the tcp frame, each axis alike:
 
@@ -17,14 +17,12 @@ that is expected: 75.7° and 6.3. A softer contact has more of both and is slowe
 """
 
 import math
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import SensorStatus, WrenchFeed
-from elastocal.errors import DeviceError
 
 _PRODUCT = 0.25
 """Gain times stiffness times delay."""
@@ -37,8 +35,6 @@ SILENT = 1.0
 _TARE_SAMPLES = 10
 _TARE_TIME = 0.2
 """Samples and time over which the zero of the force is taken, in s."""
-_COLLISION_WINDOW = 0.05
-"""Time over which the change of a force is looked at, in s."""
 
 
 @dataclass(frozen=True)
@@ -192,47 +188,3 @@ class ForceReader:
             return f"force sensor silent for {silent:.2f} s"
         bad = self._status is SensorStatus.OK
         return f"force sensor says {'NaN' if bad else self._status.value}"
-
-
-class CollisionWatch:
-    """Finds that a tool which moves freely has hit something.
-
-    In free air the sensor feels the tool's weight, which turns with the tool, and a bias, which
-    stays. What is left when both are taken off hardly changes while the arm moves slowly: a change
-    of it within 50 ms by more than the limit is a collision. Accelerating the tool counts too, so
-    that the limit must be above mass times acceleration of the fastest free move.
-    """
-
-    def __init__(self, weight_base: FloatArray, limit: float) -> None:
-        if not limit > 0.0:
-            raise DeviceError(f"kuka_rsi: collision force is {limit:g} N: must be above 0 N")
-        self._weight_base, self._limit = weight_base, limit
-        self._rest: deque[tuple[float, FloatArray]] = deque()
-
-    def restart(self) -> None:
-        """Forget what was felt before: something else moves now."""
-        self._rest.clear()
-
-    def look(self, time: float, force_sensor: FloatArray, R_base_sensor: FloatArray) -> str | None:
-        """Return what was hit, in words; None when nothing was.
-
-        Parameters
-        ----------
-        time : float
-            In s.
-        force_sensor : ndarray, shape (3,)
-            As measured, in N.
-        R_base_sensor : ndarray, shape (3, 3)
-            Orientation of the sensor.
-        """
-        rest = R_base_sensor @ force_sensor - self._weight_base
-        while self._rest and time - self._rest[0][0] > _COLLISION_WINDOW:
-            self._rest.popleft()
-        self._rest.append((time, rest))
-        change = float(np.linalg.norm(rest - self._rest[0][1]))
-        if change <= self._limit:
-            return None
-        return (
-            f"collision: the force changed by {change:.0f} N within"
-            f" {1e3 * _COLLISION_WINDOW:.0f} ms while moving freely, limit {self._limit:.0f} N"
-        )

@@ -45,7 +45,8 @@ class PostureReader:
         self._robot, self._external = robot, external
         scale = [math.radians(1.0) if turns else 1e-3 for turns in revolute[:external]]
         self._scale = np.array([*scale, *(math.radians(1.0) * sign for sign in signs)])
-        self._scales = tuple(self._scale.tolist())
+        self.scales: tuple[float, ...] = tuple(self._scale.tolist())
+        """From mm and deg of the controller to each joint, in m and rad."""
 
     def joints(self, message: RobMessage) -> list[float]:
         """Return the joint positions of a message, in rad or m: what a correction needs of it.
@@ -61,7 +62,7 @@ class PostureReader:
         if len(external) < self._external:
             raise _not_sent(f"EIPos.E{len(external) + 1}")
         given = (*external, *message.axes)
-        return [scale * value for scale, value in zip(self._scales, given, strict=True)]
+        return [scale * value for scale, value in zip(self.scales, given, strict=True)]
 
     def read(self, message: RobMessage, now: float, mode: str) -> Cycle:
         """Return the state of a message.

@@ -138,7 +138,7 @@ class BoxLine:
             try:
                 self.sensor.received(self._socket.recv(MOST_PAGE))
             except TimeoutError:
-                if not self.sensor.silence:
+                if not self.sensor.hole:
                     self._end_or_go_on()
             except OSError as error:
                 self.sensor.fail(f"{error.strerror or error}")
@@ -150,7 +150,7 @@ class BoxLine:
             self.sensor.received(self._socket.recv(MOST_PAGE))
         except TimeoutError:
             if not self._closed.is_set():
-                self.sensor.fall_silent(why)
+                self.sensor.leave_hole(why)
 
     def _why_silent(self) -> str:
         text = f"no record for {_SILENCE:g} s"

@@ -70,8 +70,8 @@ class NetFtSensor:
         self._saturated = False
         self._newest: tuple[float, tuple[int, ...], SensorStatus] | None = None
         self._failure: str | None = None
-        self.silence = ""
-        """Why nothing came for too long; empty as long as it came."""
+        self.hole = ""
+        """Why too much is missing in the stream; empty as long as it is not."""
         self._last: RdtRecord | None = None
         self._time = self._arrived = -np.inf
         self._count = 0
@@ -101,14 +101,14 @@ class NetFtSensor:
         with self._lock:
             self._failure = self._failure or why
 
-    def fall_silent(self, why: str) -> None:
-        """Refuse every further `read`, too: the stream has ended.
+    def leave_hole(self, why: str) -> None:
+        """Refuse every further `read`: too much is missing in the stream.
 
         `newest` goes on. Its time says how old it is; where the stream comes again by itself, who
         corrects a process may go on, whereas readings of a procedure have a hole.
         """
         with self._lock:
-            self.silence = self.silence or why
+            self.hole = self.hole or why
 
     @property
     def failed(self) -> bool:
@@ -175,7 +175,9 @@ class NetFtSensor:
         self._window, self._window_lost = self._window + lost + 1, self._window_lost + lost
         if self._window >= _WINDOW:
             if self._window_lost > _MOST_LOST * self._window:
-                self.fail(f"{self._window_lost} of {self._window} records were lost on the way")
+                self.leave_hole(
+                    f"{self._window_lost} of {self._window} records were lost on the way"
+                )
             self._window = self._window_lost = 0
 
     def _wrenches(self, counts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -205,8 +207,8 @@ class NetFtSensor:
             If the stream cannot be trusted: why.
         """
         self._require()
-        if self.silence:
-            raise DeviceError(f"{self.source}: {self.silence}")
+        if self.hole:
+            raise DeviceError(f"{self.source}: {self.hole}")
         with self._lock:
             rows, saturated = list(self._rows), self._saturated
             self._rows.clear()

@@ -6,7 +6,6 @@ and cut off before the next entry is written.
 
 import contextlib
 import errno
-import fcntl
 import os
 from collections.abc import Callable, Iterator
 from enum import Enum
@@ -18,6 +17,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, mode
 from elastocal.cell import Clock, LineCounts
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_bytes
+from elastocal.locks import lock_file
 from elastocal.records import StrictModel
 
 
@@ -59,6 +59,8 @@ class PoseLog(StrictModel):
     windows: tuple[Window, ...]
 
 
+_BYTES: int = getattr(os, "O_BINARY", 0)
+"""Keeps Windows from writing another line end than it is given."""
 _JOURNAL_SCHEMA = "elastocal.journal/1"
 
 
@@ -189,7 +191,7 @@ class Journal:
     def __init__(self, path: Path, sync: Sync = os.fsync) -> None:
         self.path, self._sync = Path(path), sync
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | _BYTES, 0o666)
         except OSError as error:
             raise _cannot("write", self.path, error) from error
         try:
@@ -241,7 +243,7 @@ class Journal:
 
     def _lock(self) -> None:
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(self._file)
         except OSError as error:
             raise FileAccessError(f"{self.path} is in use: another process runs here") from error
 

@@ -102,7 +102,8 @@ class Attempt:
                 limit = min(limit, self._engage_limit)
             return Guard(limit, self.line, beam, self.step in MAY_TOUCH)
         # The weight of the tool turns with its orientation: at most twice itself.
-        return Guard(self.settings.force_limit + 2.0 * self.settings.tool_weight, None, beam)
+        limit = self.settings.force_limit + 2.0 * self.settings.tool_weight
+        return Guard(limit, None, beam, free=self.step is Step.MOVE)
 
     @property
     def noise(self) -> float:
@@ -174,6 +175,7 @@ def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> Non
             force = seen.wrenches.force.mean(axis=0)
             require_tool_weight(force, settings)
             supervisor.tare(force)
+            supervisor.watchdog.collisions.restart()
         goal = np.array(target)
         limit = 2.0 * float(settings.axes.duration(seen.arm.q, goal)) + settings.procedure.timeout
         with supervisor.actuation(Action.MOVE, target):

@@ -65,7 +65,12 @@ class Supervisor:
         self.devices, self.settings, self.logbook = devices, settings, logbook
         self._observers = observers
         procedure = settings.procedure
-        self.watchdog = Watchdog(procedure.stale, procedure.beam_timeout)
+        self.watchdog = Watchdog(
+            procedure.stale,
+            procedure.beam_timeout,
+            settings.collision_watch(),
+            settings.R_tcp_sensor,
+        )
         self.recorder: StreamRecorder | None = None
         self.station: str | None = None
         self._tare = np.zeros(3)

@@ -14,6 +14,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import (
     ArmState,
     BeamState,
+    CollisionWatch,
     Motion,
     PointBlock,
     SensorStatus,
@@ -24,6 +25,8 @@ from elastocal.procedure.run.steps import Fault, FaultError
 
 _LOOK_AGAIN = 1.0
 """Time after which a tracker that has not found the marker is told again to look, in s."""
+_MOST_LOOKED_AT = 20
+"""Samples of a cycle that are looked at for a collision."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -50,6 +53,8 @@ class Guard:
     """Whether the marker must be seen."""
     pressing: bool = False
     """Whether the tool may press: a sensor that is overloaded then ends the run."""
+    free: bool = False
+    """Whether the tool moves through the air, so that it feels its weight alone."""
 
 
 class Watchdog:
@@ -61,9 +66,20 @@ class Watchdog:
         Oldest data that are trusted, in s.
     beam_timeout : float
         Longest time without beam, in s.
+    collisions : CollisionWatch
+        Of free moves.
+    R_tcp_sensor : ndarray, shape (3, 3)
+        Axes of the sensor in the tcp frame.
     """
 
-    def __init__(self, stale: float, beam_timeout: float) -> None:
+    def __init__(
+        self,
+        stale: float,
+        beam_timeout: float,
+        collisions: CollisionWatch,
+        R_tcp_sensor: FloatArray,
+    ) -> None:
+        self.collisions, self._R_tcp_sensor = collisions, R_tcp_sensor
         self._stale, self._beam_timeout = stale, beam_timeout
         self._sensor_time = self._changed = self._point_time = -np.inf
         self._row: tuple[float, ...] = ()
@@ -99,6 +115,8 @@ class Watchdog:
         self._check_arm(seen.arm, seen.time)
         self._check_sensor(seen.wrenches, seen.time, guard.pressing)
         self._check_force(seen.force_tcp, guard.force)
+        if guard.free:
+            self._check_collision(seen)
         if guard.line is not None:
             guard.line.check(seen.arm.T_base_tcp)
         return guard.beam and self._check_beam(seen.points, seen.time)
@@ -139,6 +157,14 @@ class Watchdog:
             if np.isnan(largest):
                 raise FaultError(Fault.SENSOR_FAULT, "it says NaN")
             raise FaultError(Fault.FORCE_LIMIT, f"{largest:.0f} N, limit {limit:.0f} N")
+
+    def _check_collision(self, seen: Snapshot) -> None:
+        block, R_base_tcp = seen.wrenches, seen.arm.T_base_tcp[:3, :3]
+        R_base_sensor = R_base_tcp @ self._R_tcp_sensor
+        for i in range(0, len(block), 1 + len(block) // _MOST_LOOKED_AT):
+            hit = self.collisions.look(float(block.time[i]), block.force[i], R_base_sensor)
+            if hit is not None:
+                raise FaultError(Fault.COLLISION, hit.removeprefix("collision: "))
 
     def _check_beam(self, block: PointBlock, now: float) -> bool:
         if block.beam is BeamState.LOCKED:

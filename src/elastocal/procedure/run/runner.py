@@ -125,7 +125,7 @@ class Runner:
             height = self._settings.approach_distance
             retract_to(s, ApproachLine.of_pose(home.retract_from, limit), Guard(), height)
         self._location = ArmLocation.BETWEEN_POSES
-        drive(s, home.legs, Guard(self._free_limit))
+        drive(s, home.legs, Guard(self._free_limit, free=True))
 
     def _visit_all(self) -> None:
         in_a_row = 0
@@ -218,7 +218,8 @@ class Runner:
             return
         self._enable()
         self._pose_start = self._supervisor.now
-        drive(self._supervisor, route(self._plan, self._stop, end), Guard(self._free_limit))
+        guard = Guard(self._free_limit, free=True)
+        drive(self._supervisor, route(self._plan, self._stop, end), guard)
         self._location = ArmLocation.HOME
 
     def _enter(self, a: Attempt) -> None:

@@ -11,18 +11,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import LIGHT_CONTACT, Cell, ProcedureSettings
+from elastocal.cell import LIGHT_CONTACT, Cell, CollisionWatch, ProcedureSettings
 from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
 from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
 from elastocal.planning.motion import AxisMotion
 from elastocal.results import brief_repr
-from elastocal.robot import GRAVITY
 
 _LIMIT_PER_LOAD = 1.3
 """Default force limit, as a multiple of the largest load case."""
 _TOLERANCE_PER_LOAD, _LEAST_TOLERANCE = 0.01, 5.0
 """Default force tolerance, as a part of the largest load case, and its least, in N."""
+_COLLISION, _COLLISION_PER_WEIGHT = 50.0, 0.2
+"""Default force of a collision, in N and as a part of the tool's weight: its inertia at 2 m/s²."""
+_COLLISION_WINDOW = 0.1
+"""Time over which its change is looked at, in s: two cycles and a half."""
+_WRONG_WEIGHT = 0.35
+"""Part of the weight that may be missing on a way: a mass a quarter off, turned by 90 deg."""
 _SAME_PLACE = 1e-5
 """Largest distance between a frame and where its joints lead, in m."""
 _SAME_TURN = 1e-5
@@ -47,14 +52,27 @@ class RunSettings:
     """Largest force that is let happen, in N."""
     force_tolerance: float
     """Largest distance of the mean force from its load case, in N."""
-    tool_weight: float
-    """In N."""
+    weight_base: FloatArray
+    """Weight of the tool in base, shape (3,), in N."""
     near_contact: float
     """Distance from the surface at the unloaded reference, in m."""
     approach_distance: float
     """Distance from the surface at the approach pose, in m."""
     loads: tuple[tuple[str, FloatArray], ...]
     """Name of each press and force on the robot in the tcp frame, shape (3,), in N, in order."""
+
+    @property
+    def tool_weight(self) -> float:
+        """In N."""
+        return float(np.linalg.norm(self.weight_base))
+
+    def collision_watch(self) -> CollisionWatch:
+        """Return what finds collisions of free moves."""
+        weight, asked = self.tool_weight, self.procedure.collision_force
+        limit = _COLLISION + _COLLISION_PER_WEIGHT * weight if asked is None else asked
+        # What is wrong with the mass turns with the tool; without one all of its weight does.
+        largest = limit + _WRONG_WEIGHT * weight if weight > 0.0 else np.inf
+        return CollisionWatch(self.weight_base, limit, largest, _COLLISION_WINDOW)
 
 
 def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
@@ -92,7 +110,7 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
         R_tcp_sensor=T_sensor_tcp[:3, :3].T,
         force_limit=_force_limit(cell, loads, T_sensor_tcp[:3, :3]),
         force_tolerance=_force_tolerance(cell, loads),
-        tool_weight=cell.file.tool.mass * float(np.linalg.norm(GRAVITY)),
+        weight_base=cell.file.tool.mass * cell.gravity_base,
         near_contact=plan.contact.near_contact,
         approach_distance=plan.contact.approach_distance,
         loads=loads,

@@ -153,6 +153,7 @@ class Fault(Enum):
     UNSTABLE = (FaultScope.ATTEMPT, "no load case settles: {}")
     REFERENCE_LOST = (FaultScope.ATTEMPT, "reference not had: {}")
     SENSOR_OVERLOAD = (FaultScope.RUN, "force sensor saturated in contact: {}")
+    COLLISION = (FaultScope.RUN, "hit something on the way: {}")
     FORCE_LIMIT = (FaultScope.RUN, "force limit exceeded: {}")
     TRAVEL_LIMIT = (FaultScope.RUN, "travel limit exceeded: {}")
     TIME_LIMIT = (FaultScope.RUN, "time limit exceeded: {}")

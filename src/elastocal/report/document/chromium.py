@@ -6,7 +6,6 @@ any port, and nothing is asked of the network.
 """
 
 import base64
-import fcntl
 import json
 import os
 import select
@@ -22,8 +21,15 @@ from typing import Any
 from elastocal.errors import FileAccessError
 from elastocal.files import replacing
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
 """Names that are looked for on the search path, in order."""
+_APPLICATIONS = (
+    "Google Chrome.app/Contents/MacOS/Google Chrome",
+    "Chromium.app/Contents/MacOS/Chromium",
+    "Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
+)
+"""Where macOS has them, in its folders of applications: no search path knows these."""
+_APPLICATION_FOLDERS = (Path("/Applications"), Path.home() / "Applications")
 _SECONDS = 180.0
 """Longest wait for an answer: a software renderer on a busy machine is slow."""
 _GRACE = 5.0
@@ -55,10 +61,18 @@ def find_browser() -> str:
     FileAccessError
         If there is none.
     """
+    if os.name != "posix":
+        raise FileAccessError(
+            "--pdf needs Linux or macOS: open the report in a browser and print it, it is made for"
+            " paper"
+        )
     for name in BROWSERS:
         found = shutil.which(name)
         if found is not None:
             return found
+    for place in (folder / name for folder in _APPLICATION_FOLDERS for name in _APPLICATIONS):
+        if place.is_file():
+            return str(place)
     raise FileAccessError(f"--pdf needs a Chromium: none of {', '.join(BROWSERS)} is on the path")
 
 
@@ -205,6 +219,8 @@ def _tab(browser: str, *flags: str) -> Iterator[Tab]:
 
 def _high(end: int) -> int:
     """Return a copy of a descriptor that is none of those that the child needs."""
+    import fcntl  # not on Windows, where no tab is opened
+
     copy = fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10)
     os.close(end)
     return copy

@@ -226,6 +226,7 @@ class SimulatedForceSensor(_SimulatedInstrument):
         return values
 
     def _with_faults(self, times: IndexArray, values: FloatArray) -> tuple[IndexArray, FloatArray]:
+        values[:, 0] += self._plant.schedule.collision_force(times)
         frozen = self._plant.schedule.struck("ft_frozen", times)
         if len(frozen):
             values[frozen] = values[frozen[0] - 1] if frozen[0] > 0 else self._last

@@ -29,8 +29,12 @@ from elastocal.sim.workcell._timeline import (
 
 FOREVER = 1 << 62
 """Later than any time, in µs."""
-SPANS = ("beam_break", "ft_dropout", "ft_frozen", "ft_saturation", "stale_clock")
+SPANS = (
+    *("beam_break", "ft_dropout", "ft_frozen", "ft_saturation", "soft_collision", "stale_clock"),
+)
 """Faults that last for a while, whatever the arm does."""
+_COLLISION_RISE = 100_000
+"""Time in which the force of a soft collision comes, in µs."""
 _DONE = 1.0 - 1e-3
 """A change of force this far along counts as made when the gears' memory is asked."""
 
@@ -46,6 +50,8 @@ class FaultSpan:
     """In µs, not itself in it."""
     station: str | None
     """Tracker station; None: all."""
+    force: float = 0.0
+    """Of a soft collision, in N."""
 
     def holds(self, now: int) -> bool:
         """Return whether a time in µs lies in it."""
@@ -97,7 +103,8 @@ class FaultSchedule:
             start = now + to_microseconds(fault.after)
             if fault.kind in SPANS:
                 last = FOREVER if fault.duration is None else to_microseconds(fault.duration)
-                self.active.append(FaultSpan(fault.kind, start, start + last, fault.station))
+                place, force = fault.station, fault.amplitude
+                self.active.append(FaultSpan(fault.kind, start, start + last, place, force))
             elif fault.kind in ("slip", "robot_stop"):
                 moments.append((start, fault))
         return moments
@@ -113,6 +120,14 @@ class FaultSchedule:
     def spans(self, kind: str) -> list[FaultSpan]:
         """Return the spans of a kind of fault."""
         return [span for span in self.active if span.kind == kind]
+
+    def collision_force(self, times: IndexArray) -> FloatArray:
+        """Return the force of soft collisions along x of the sensor at times in µs, in N."""
+        force = np.zeros(len(times))
+        for hit in self.spans("soft_collision"):
+            grown = np.clip((times - hit.begin) / _COLLISION_RISE, 0.0, 1.0)
+            force += hit.force * grown * (times < hit.end)
+        return force
 
     def struck(self, kind: str, times: IndexArray, station: str | None = None) -> IndexArray:
         """Return which samples a span of some kind of fault covers, as indices.

@@ -167,7 +167,11 @@ async function openPose(folder, pose, button) {
   if (streams.q.length) play.oninput();
 }
 
+let charted = null;
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charted && chart(...charted));
+
 function chart(title, first, force, second, slip, windows = [], now = null) {
+  charted = [title, first, force, second, slip, windows, now];
   $("charts").hidden = false;
   $("charts-title").textContent = title;
   plot($("force-chart"), first, force, "region", windows, now);
@@ -193,9 +197,9 @@ function plot(canvas, label, points, name, windows, now) {
   pen.strokeStyle = colour("line");
   pen.strokeRect(left, top, right - left, bottom - top);
   pen.fillStyle = colour("muted");
-  pen.fillText(most.toPrecision(3), 4, top + 8);
+  pen.fillText(most < 100 ? most.toPrecision(3) : most.toFixed(0), 4, top + 8);
   pen.fillText("0", 4, bottom);
-  pen.fillText(`${start.toFixed(0)} s`, left, height - 5);
+  pen.fillText(`${Math.round(start)} s`, left, height - 5);
   pen.textAlign = "right";
   pen.fillText(`${end.toFixed(0)} s`, right, height - 5);
   pen.textAlign = "left";
@@ -211,7 +215,7 @@ function plot(canvas, label, points, name, windows, now) {
     pen.lineTo(x(now), bottom);
     pen.stroke();
   }
-  canvas.setAttribute("aria-label", `${label}: from ${start.toFixed(0)} s to ${end.toFixed(0)} s, at most ${most.toPrecision(3)}`);
+  canvas.setAttribute("aria-label", `${label}: from ${Math.round(start)} s to ${end.toFixed(0)} s, at most ${most.toPrecision(3)}`);
 }
 
 export function openRuns() {

@@ -228,7 +228,7 @@ export class View {
       const span = this.labels.children[k];
       span.hidden = !at || at[0] < 0 || at[1] < 0 || at[0] > this.canvas.clientWidth || at[1] > this.canvas.clientHeight;
       span.textContent = name;
-      if (at) { span.style.left = `${at[0]}px`; span.style.top = `${at[1]}px`; }
+      if (at) { span.style.left = `${Math.max(at[0], 0.5 * span.offsetWidth + 2)}px`; span.style.top = `${at[1]}px`; }
     });
   }
 
