@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from elastocal.codec import Saturation
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.procedure import commits
@@ -203,6 +204,11 @@ def codec_findings(evidence: Evidence) -> Iterator[Finding]:
         )
     if best is None:
         return
+    yield from _codec_of_others(evidence)
+    yield _saturation(best)
+
+
+def _codec_of_others(evidence: Evidence) -> Iterator[Finding]:
     if evidence.figures is not None and not evidence.has_codec_alike:
         # Or to delete the codec that counts would leave the word to one that does not.
         yield Finding(
@@ -215,9 +221,13 @@ def codec_findings(evidence: Evidence) -> Iterator[Finding]:
                 " springs=…`."
             ),
         )
+
+
+def _saturation(best: Saturation) -> Finding:
+    """Return whether the error had stopped to fall."""
     last = counted(best.last, "training pose")
     if not best.explains:
-        yield Finding(
+        return Finding(
             phrase(
                 "the codec has not saturated: with {last} its springs leave more than half of the"
                 " deflection",
@@ -227,30 +237,29 @@ def codec_findings(evidence: Evidence) -> Iterator[Finding]:
                 "Calibrate with other springs, or look at the readings: more poses do not help."
             ),
         )
-    elif best.n_train == best.last:
-        yield Finding(
+    if best.n_train == best.last:
+        return Finding(
             phrase("the codec has not saturated: the error still falls at {last}", last=last),
             advice=phrase("Measure more poses: the error still falls with every one."),
         )
-    elif not best.settled:
-        yield Finding(
+    if not best.settled:
+        return Finding(
             phrase(
                 "the codec does not show that the error has saturated: its interval reaches {last}",
                 last=last,
             ),
             advice=phrase("Measure some more poses to see that the error no longer falls."),
         )
-    else:
-        yield Finding(
-            phrase(
-                "the error no longer fell from {poses} on (95 % interval {low} to {high}), so there"
-                " were enough poses",
-                poses=counted(best.n_train, "training pose"),
-                low=best.low,
-                high=best.high,
-            ),
-            holds_back=False,
-        )
+    return Finding(
+        phrase(
+            "the error no longer fell from {poses} on (95 % interval {low} to {high}), so there"
+            " were enough poses",
+            poses=counted(best.n_train, "training pose"),
+            low=best.low,
+            high=best.high,
+        ),
+        holds_back=False,
+    )
 
 
 def process_findings(evidence: Evidence) -> Iterator[Finding]:

@@ -40,6 +40,7 @@ from elastocal.procedure import (
     read_summary,
 )
 from elastocal.records import read_json
+from elastocal.results import brief_repr
 from elastocal.verdict._files import (
     CODEC,
     MODEL,
@@ -65,6 +66,7 @@ from elastocal.verdict.evidence import (
 from elastocal.wording import phrase
 
 
+@brief_repr
 @dataclass(frozen=True)
 class EvidenceOptions:
     """Files and limits that a person names."""

@@ -13,6 +13,7 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report import language_of
 from elastocal.report.document import (
+    WrittenReport,
     find_browser,
     require_excel,
     write_pdf,
@@ -22,6 +23,7 @@ from elastocal.report.document import (
 from elastocal.results import Result, brief_repr
 from elastocal.verdict import (
     OF_REPORT,
+    Evidence,
     EvidenceOptions,
     Verdict,
     gather_evidence,
@@ -32,6 +34,7 @@ from elastocal.verdict import (
 from elastocal.workflows._workflow import workflow
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ReportSettings:
     """What to report on, and where to."""
@@ -179,11 +182,17 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     if paper is not None:
         write_pdf(out, paper, browser)
         progress("report", 3, steps)
+    return ReportResult(written.verdict, _figures(written, evidence, paper, tables))
+
+
+def _figures(
+    written: WrittenReport, evidence: Evidence, paper: Path | None, tables: Path | None
+) -> ReportFigures:
     verdict, again, unseen = written.verdict, evidence.reproduction, None
     if again is not None and again.same:
         left = again.unseen
         unseen = UnseenFigures(left.mean, left.p95, left.max, left.poses, len(left.error))
-    figures = ReportFigures(
+    return ReportFigures(
         report=str(written.path),
         pdf=str(paper) if paper else None,
         xlsx=str(tables) if tables else None,
@@ -195,7 +204,6 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
         unseen=unseen,
         missing=tuple(each.name for each in evidence.missing),
     )
-    return ReportResult(verdict, figures)
 
 
 def _check_places(out: Path, beside: tuple[Path | None, ...], force: bool) -> None:

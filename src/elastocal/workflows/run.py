@@ -40,6 +40,7 @@ POSES_MEASURED = "poses measured"
 """The stage that a run reports to its progress."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class RunSettings:
     """Which cell carries out which plan, and who watches."""

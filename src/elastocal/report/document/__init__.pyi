@@ -19,7 +19,10 @@ from .blocks import (
     flattened as flattened,
 )
 from .certificate import (
+    BeforeAfter as BeforeAfter,
     Certificate as Certificate,
+    Mark as Mark,
+    ToleranceBar as ToleranceBar,
     certificate_of_evidence as certificate_of_evidence,
 )
 from .chromium import (

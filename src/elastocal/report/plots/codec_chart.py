@@ -33,6 +33,7 @@ from elastocal.report.plots._box_plots import (
     make_boxes,
 )
 from elastocal.report.plots.style import VariantStyle, variant_styles
+from elastocal.results import brief_repr
 from elastocal.wording import counted, phrase
 
 ERROR_PANELS = {"mean": "Mean error", "max": "Maximum error"}
@@ -97,6 +98,7 @@ def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figu
     return figure
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
     """Mean error at held-out poses of one variant over the number of training poses."""

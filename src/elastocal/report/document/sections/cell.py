@@ -71,6 +71,11 @@ def _instruments(cell: Cell) -> Iterator[tuple[str, str]]:
                 moment=moment,
             ),
         )
+    yield from _surroundings(cell)
+
+
+def _surroundings(cell: Cell) -> Iterator[tuple[str, str]]:
+    file = cell.file
     if file.marker is not None:
         yield phrase("Marker in the tcp frame"), f"{point(file.marker.position)} mm"
     for station in file.trackers:
