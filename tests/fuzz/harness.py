@@ -209,6 +209,7 @@ _PLAIN = {
     "verify": "verify {s}/report.html",
     "krc-config": "krc-config {s}/kuka.yaml --out {o}",
     "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
+    "live": "live {s}/kuka.yaml --model {s}/model.json --duration 1",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
     "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
 }

@@ -35,7 +35,7 @@ from elastocal.records import write_json
 from elastocal.robot import catalogue, xyzabc_from_T
 from elastocal.verdict import OF_RUN, make_key, read_private_key, sign, write_signature
 from elastocal.workflows import Ports
-from support import foreign_logs, kuka_bench, reported, studies
+from support import foreign_logs, kuka_bench, live_bench, reported, studies
 from support.cli import elastocal
 from support.compensated import calibrated
 from support.foreign_bags import write_bag
@@ -147,6 +147,7 @@ KINDS: dict[str, Kind] = {
         0.5,
         0.5,
     ),
+    "live": Kind("live.json", "json", ("check {f}",), (), 0.0, 0.2),
     "ports": Kind("ports.json", "json", ("check {f}",), (), 0.0, 0.2),
     "springs": Kind(
         "springs.yaml",
@@ -448,6 +449,7 @@ def _write_kuka(folder: Path, cell: str) -> None:
     write_json(folder / "commissioning.json", replace(kuka_bench.record(cycle=0.012), robot=robot))
     _done("krc-config", folder / "kuka.yaml", "--out", folder / "krc")
     shutil.copy(folder / "krc" / "elcal_run.xml", folder)
+    write_json(folder / "live.json", live_bench.result())
     write_json(folder / "ports.json", Ports("127.0.0.1", {"net_ft": {"udp": 1, "http": 2}}))
 
 

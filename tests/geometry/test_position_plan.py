@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from functools import cache
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from elastocal.cell import Cell, load_cell, write_example
 from elastocal.geometry import GeometryModel, PositionPlan, plan_positions
-from elastocal.planning import Postures, cell_surface, collision_scene
+from elastocal.planning import Postures, cell_surface, collision_scene, read_plan
 from elastocal.planning.checks import SightCheck
 from elastocal.records import read_json
 from elastocal.robot import Robot, with_joint_origins
@@ -98,3 +99,35 @@ def test_too_few_poses_are_said_to_be_few(cell):
     (found,) = plan_positions(cell, 6, seed=1).findings
     assert "plan" in found
     assert "at least" in found
+
+
+def test_one_campaign_has_presses_and_positions_in_one_program(tmp_path, cell):
+    out = tmp_path / "plan"
+    both = ("plan", cell.path, "--for", "both", "--poses", 4, "--positions", 8, "--compare", "none")
+    figures = json.loads(elastocal(*both, "--out", out, "--json").out)
+    assert (figures["poses"], figures["positions"]) == (4, 8)
+    assert figures["time"]["positions"] > 0.0
+    assert {"plan.json", "positions.json", "positions.csv", "calib.src"} <= set(figures["files"])
+    assert not (out / "positions.src").exists()
+    presses = read_plan(out)
+    positions = read_json(out / "positions.json", PositionPlan)
+    assert positions.cell.fingerprint == presses.cell.fingerprint
+    program = (out / "calib.src").read_text(encoding="ascii", errors="replace")
+    stops = re.findall(r"PTP (XAPP|XPOS)(\d+)", program)
+    assert stops == [("XAPP", str(n)) for n in range(4)] + [("XPOS", str(n)) for n in range(8)]
+    targets = re.findall(r"DECL E6AXIS (\w+)", (out / "calib.dat").read_text(encoding="ascii"))
+    assert len(targets) == len(set(targets))
+    assert program.rstrip().splitlines()[-2].strip().startswith("PTP XHOME")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--positions", 8), "--positions is for --for both"),
+        (("--for", "both", "--dry-run"), "--dry-run shows presses alone"),
+        (("--for", "both", "--search", "cover"), "--search is for --for geometry"),
+    ],
+)
+def test_options_of_one_campaign_that_contradict_are_refused(tmp_path, cell, options, message):
+    assert message in elastocal("plan", cell.path, "--out", tmp_path / "plan", *options).reason
+    assert not (tmp_path / "plan").exists()

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from elastocal import workflows
-from elastocal.cell import AnswerTimes, DeviceSet
+from elastocal.cell import AnswerTimes, DeviceSet, PathLimits, load_cell
 from elastocal.errors import CompensationError, DeviceError, RobotError, UnitError
 from support import live_bench
 from support.cli import elastocal
@@ -107,6 +107,19 @@ def test_settings_are_within_what_the_cell_allows(files, tmp_path, changed, said
         correct(files, compensator=path)
 
 
+def test_the_range_of_the_sensor_is_the_cells_unless_the_settings_say_it(files, tmp_path):
+    cell, limits = load_cell(files[0]), PathLimits(2e-3, 0.02, 0.004, "base")
+    path = tmp_path / "online.yaml"
+    text = "schema: elastocal.compensator/1\nlimits: {correction: 1 mm, rate: 20 mm/s}\n"
+    path.write_text(text)
+    for file in (None, path):
+        found = workflows.settings_within(file, limits, cell).sensor
+        assert found.force == cell.file.sensor.force_range
+        assert found.moment == cell.file.sensor.moment_range
+    path.write_text(f"{text}sensor: {{force: [900 N, 900 N, 900 N]}}\n")
+    assert workflows.settings_within(path, limits, cell).sensor.force == (900.0,) * 3
+
+
 def test_filters_have_the_rate_of_the_cycle_or_of_the_sensor(files, tmp_path):
     path = tmp_path / "online.yaml"
     limits = {"correction": "1 mm", "rate": "20 mm/s"}
@@ -150,9 +163,21 @@ def test_it_ends_by_a_fade_and_its_record_says_what_was(files, tmp_path):
     assert record["line"]["late"] == 2
     assert record["loop"]["cycles"] == result.loop.cycles
     assert {each.name for each in out.iterdir()} == {"live.json", "live.mcap"}
-    assert "record of a live compensation" in " ".join(
-        elastocal("check", out / "live.json").err.split()
-    )
+    assert "record of a live compensation" in checked(out / "live.json")
+    assert f"cycles: {result.logged}" in checked(out / "live.mcap")
+
+
+def checked(path):
+    found = elastocal("check", path)
+    assert found.code == 0, found.err
+    return " ".join(found.err.split())
+
+
+def test_a_log_that_was_cut_off_is_refused(files, tmp_path):
+    correct(files, out=tmp_path / "out")
+    log = tmp_path / "out" / "live.mcap"
+    log.write_bytes(log.read_bytes()[:-100])
+    assert "live.mcap is a damaged MCAP file" in elastocal("check", log).reason
 
 
 def test_it_ends_when_its_time_is_over(files):

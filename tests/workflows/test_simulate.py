@@ -5,8 +5,10 @@ import json
 import pytest
 
 from elastocal import workflows
+from elastocal.cell import load_cell, write_example
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import servers
+from elastocal.sim.wire import servers, suited_servers
+from elastocal.workflows import rig_of
 from support.simulated import example_cell
 
 
@@ -72,3 +74,31 @@ def test_a_device_without_simulator_is_refused_with_the_nearest(made):
 def test_an_impossible_rate_is_refused(made, rate):
     with pytest.raises(DeviceError, match=r"rate is .*: must be above 0"):
         workflows.simulate(example_cell().path, rate=rate)
+
+
+@pytest.mark.parametrize(
+    ("like", "wanted"),
+    [
+        ("afp", {"kuka_rsi", "net_ft", "line_stream"}),
+        ("machining", {"kuka_rsi", "net_ft", "line_stream"}),
+        ("ur20", {"rtde", "line_stream"}),
+    ],
+)
+def test_an_example_on_the_wire_names_devices_that_are_served(tmp_path, like, wanted):
+    cell = load_cell(write_example(tmp_path, like, wire=True)[0])
+    rig = rig_of(cell)
+    assert set(rig.drivers) == wanted
+    assert wanted <= set(suited_servers(cell.robot))
+    ports = [
+        value
+        for kinds in rig.wanted.values()
+        for settings in kinds.values()
+        for key, value in settings
+        if key.endswith("port")
+    ]
+    assert len(set(ports)) == len(ports)
+
+
+def test_an_example_is_simulated_unless_it_is_asked_for(tmp_path):
+    rig = rig_of(load_cell(write_example(tmp_path, "afp")[0]))
+    assert set(rig.drivers) == {"simulated"}

@@ -49,6 +49,7 @@ from .devices import (
     SensorStatus as SensorStatus,
     WrenchBlock as WrenchBlock,
     close_nothing as close_nothing,
+    require_duration as require_duration,
 )
 from .examples import (
     BLOCK_SIZE as BLOCK_SIZE,

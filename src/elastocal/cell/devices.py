@@ -219,6 +219,18 @@ class CommandChecks:
         return array / length
 
 
+def require_duration(seconds: float) -> None:
+    """Refuse a sleep that is negative or not finite.
+
+    Raises
+    ------
+    DeviceError
+        With the time.
+    """
+    if not 0.0 <= seconds < math.inf:
+        raise DeviceError(f"sleep of {seconds!r} s: must be 0 or more, and finite")
+
+
 class Clock(Protocol):
     """Seconds that only go forward. Nothing in the procedure asks any other clock."""
 

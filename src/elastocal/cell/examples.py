@@ -26,6 +26,8 @@ _STL_FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 _CELL_FILE = "cell.yaml"
 PROCESS_FILE = "process.csv"
 """Name of an example's production path."""
+_WIRE = re.compile(r"^# devices: .*\n(?:#   .*\n)+", re.M)
+"""Section ``devices`` of an example, out of use."""
 _WITH_PROCESS = (
     (
         re.compile(r"^  technique: cover\n", re.M),
@@ -145,7 +147,9 @@ def require_example(like: str) -> None:
         )
 
 
-def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, ...]:
+def write_example(
+    folder: Path, like: str, force: bool = False, wire: bool = False
+) -> tuple[Path, ...]:
     """Write an example cell and return the paths of its files, the cell file first.
 
     Parameters
@@ -156,6 +160,8 @@ def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, .
         A key of `EXAMPLES`.
     force : bool
         Whether files that are there may be replaced.
+    wire : bool
+        Whether its devices are on the wire: those that `elastocal simulate` then serves.
 
     Raises
     ------
@@ -177,9 +183,14 @@ def write_example(folder: Path, like: str, force: bool = False) -> tuple[Path, .
     # The cell file comes last: where it is, its meshes are.
     for name, triangles in example.meshes.items():
         write_bytes(folder / name, binary_stl(triangles()))
-    text = importlib.resources.files(__package__).joinpath("templates", example.template)
-    write_text(paths[0], text.read_text(encoding="utf-8"))
+    template = importlib.resources.files(__package__).joinpath("templates", example.template)
+    text = template.read_text(encoding="utf-8")
+    write_text(paths[0], _WIRE.sub(_in_use, text) if wire else text)
     return paths
+
+
+def _in_use(section: re.Match[str]) -> str:
+    return re.sub(r"^# ", "", section[0], flags=re.M)
 
 
 def name_process(text: str) -> str:

@@ -5,7 +5,6 @@ sensor and metrology of different drivers make one rig. What stands under a devi
 is checked by the driver's own settings; which drivers there are is known to `elastocal run`.
 """
 
-import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -28,9 +27,9 @@ from elastocal.cell.devices import (
     RobotArm,
     SensorStatus,
     close_nothing,
+    require_duration,
 )
 from elastocal.cell.line_counts import LineCounts, no_lines
-from elastocal.errors import DeviceError
 from elastocal.records import StrictModel
 from elastocal.results import brief_repr
 
@@ -223,6 +222,5 @@ class WallClock:
         DeviceError
             If the time is negative or not finite.
         """
-        if not 0.0 <= seconds < math.inf:
-            raise DeviceError(f"sleep of {seconds!r} s: must be 0 or more, and finite")
+        require_duration(seconds)
         self._pause(seconds / self.rate)

@@ -8,18 +8,22 @@ of the station in the cell file, a bound on what is kept.
 
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import BeamState, Cell, Clock, LineCounts, PointBlock, Tracker
+from elastocal.cell import BeamState, Cell, Clock, DeviceSet, LineCounts, PointBlock, Tracker
 from elastocal.drivers.device_clock import DeviceClock
 from elastocal.errors import DeviceError, nearest
 from elastocal.units import factor
 
 NEWEST = 500
 """Points that are kept for a caller that does not look; older ones are lost."""
+RECEIVED = 65536
+"""Bytes that are read at once."""
+WAKE = 0.05
+"""How often a thread looks whether it is to end, in s of the wall."""
 _OUTSIDE = 10
 """Points one after another outside the station's range: no blunder, but another unit or frame."""
 _ROUGHLY = 2.0
@@ -224,6 +228,88 @@ class StationsMetrology:
     def lines(self) -> tuple[LineCounts, ...]:
         """Return what was counted of each station."""
         return tuple(feed.counts for feed in self._feeds.values())
+
+
+class StationLink(threading.Thread):
+    """Keeps one connection up until it is closed; what it hears fills the feeds of its stations.
+
+    Parameters
+    ----------
+    name : str
+        Of the thread.
+    feeds : sequence of StationFeed
+        Told when the connection is gone.
+    clock : Clock
+        Of the rig.
+    patience : float
+        How long a connection may be gone before that is a fault, in s.
+    """
+
+    def __init__(
+        self, name: str, feeds: Sequence[StationFeed], clock: Clock, patience: float
+    ) -> None:
+        super().__init__(name=name, daemon=True)
+        self.clock, self.patience = clock, patience
+        self.done = threading.Event()
+        """Set when it is to end."""
+        self._told = feeds
+
+    def hear(self) -> bool:
+        """Connect and take what comes until the connection ends; False: nobody has come yet.
+
+        Raises
+        ------
+        DeviceError
+            If what came ends the run.
+        OSError
+            If the line does not carry.
+        """
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """End the thread."""
+        self.done.set()
+        if self.is_alive():
+            self.join()
+
+    def run(self) -> None:
+        """Connect, hear, connect again."""
+        gone = self.clock.now()
+        while not self.done.is_set():
+            try:
+                if self.hear():
+                    gone = self.clock.now()
+                    self._broken("the connection has ended")
+            except DeviceError as error:
+                self._failed(str(error))
+                return
+            except OSError as error:
+                self._broken(f"no connection: {error.strerror or error}")
+            if not self.clock.now() - gone <= self.patience:
+                self._failed(f"no connection for {self.clock.now() - gone:.0f} s")
+                return
+            self.done.wait(WAKE)
+
+    def _broken(self, why: str) -> None:
+        for feed in self._told:
+            feed.beam_broken(why)
+
+    def _failed(self, why: str) -> None:
+        for feed in self._told:
+            feed.fail(why)
+
+
+def metrology_set(metrology: StationsMetrology, links: Iterable[StationLink]) -> DeviceSet:
+    """Begin to connect; return the stations with what closes their links."""
+    started = tuple(links)
+    for link in started:
+        link.start()
+
+    def close() -> None:
+        for link in started:
+            link.close()
+
+    return DeviceSet(metrology=metrology, close=close, lines=metrology.lines)
 
 
 def require_station(station: str, stations: tuple[str, ...]) -> None:

@@ -28,7 +28,7 @@ from elastocal.results import brief_repr
 
 _SAMPLES, _FRAMES = 800, 160
 """Points of a curve, and postures of the arm, that a page gets of a pose."""
-_AROUND = 1.0
+_AROUND = 0.1
 """Time before the first window of a pose and after the last that is shown, in s."""
 _LISTED = 50
 """Runs that are looked for, at most."""

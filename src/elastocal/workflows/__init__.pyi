@@ -111,6 +111,7 @@ from .live import (
     LiveResult as LiveResult,
     LiveSettings as LiveSettings,
     live as live,
+    settings_within as settings_within,
 )
 from .measure_delay import (
     MeasureDelayResult as MeasureDelayResult,

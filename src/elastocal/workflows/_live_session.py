@@ -22,7 +22,6 @@ from elastocal.cell import (
     RigContext,
     WallClock,
 )
-from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.online import (
     Compensator,
     Design,
@@ -38,7 +37,6 @@ from elastocal.compensation.online import (
 )
 from elastocal.errors import CompensationError, DeviceError
 from elastocal.identification import CalibratedModel
-from elastocal.records import validate
 from elastocal.workflows._operator_and_devices import Rig
 
 _LOOK = 0.05
@@ -59,8 +57,6 @@ _LOADED = 20.0
 """Force below which a cycle says nothing of where a process presses, in N."""
 _SAME_RATE = 0.02
 """Largest difference of the sensor's rate from that of the filters, as a share."""
-_FADE = 0.005
-"""Default speed of the fade, in m/s, where the limits allow it."""
 _MOST_ROWS = 2000
 """Cycles that are kept to say how much of the process was calibrated."""
 
@@ -132,49 +128,6 @@ class LiveEnd:
     logged: int
     dropped: int
     notes: tuple[str, ...]
-
-
-def settings_within(file: Path | None, limits: PathLimits, cell: Cell) -> CompensatorSettings:
-    """Return the settings of a file, within the limits of the cell; or what these make.
-
-    Raises
-    ------
-    CompensationError, SchemaError
-        If they go beyond the limits, or are of another cycle or frame.
-    """
-    if file is None:
-        data: dict[str, object] = {
-            "cycle": f"{limits.cycle!r} s",
-            "frame": limits.frame,
-            "limits": {
-                "correction": f"{limits.correction!r} m",
-                "rate": f"{limits.rate!r} m/s",
-                "fade": f"{min(_FADE, limits.rate)!r} m/s",
-            },
-        }
-        if (sensor := cell.file.sensor) is not None:
-            data["sensor"] = {
-                "force": [f"{value!r} N" for value in sensor.force_range],
-                "moment": [f"{value!r} N*m" for value in sensor.moment_range],
-            }
-        return validate(data, CompensatorSettings, f"{cell.path}: limits of corrections")
-    found = read_settings(file)
-    for what, ours, theirs in (
-        ("cycle", found.cycle, limits.cycle),
-        ("frame", found.frame, limits.frame),
-    ):
-        if ours != theirs:
-            raise CompensationError(f"{file}: {what} is {ours}: must be {theirs}, the arm's")
-    for what, ours, theirs in (
-        ("limits.correction", found.limits.correction, limits.correction),
-        ("limits.rate", found.limits.rate, limits.rate),
-    ):
-        if not ours <= theirs:
-            raise CompensationError(
-                f"{file}: {what} is {1e3 * ours:g} mm{'/s' if what.endswith('rate') else ''}: at"
-                f" most {1e3 * theirs:g}, which the cell file allows"
-            )
-    return found
 
 
 @contextlib.contextmanager

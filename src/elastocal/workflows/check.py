@@ -13,6 +13,7 @@ from elastocal import planning, verdict, workflows
 from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
+from elastocal.compensation.online import LIVE_LOG_SCHEMA, is_live_log, read_live_log_facts
 from elastocal.compensation.process import TABLE
 from elastocal.errors import DatasetError, RobotError, SchemaError, nearest
 from elastocal.planning import PLAN
@@ -28,6 +29,15 @@ from elastocal.workflows._table_kinds import dataset_file, table_file
 from elastocal.workflows._workflow import workflow
 
 _Describe = Callable[[Path], FileDescription]
+
+
+def _recording(path: Path) -> FileDescription:
+    """Describe an MCAP file by the schema that it states: of a run, or of a live compensation."""
+    if not is_live_log(path):
+        return kinds.streams_file(path)
+    found = read_live_log_facts(path)
+    facts = {**vars(found), "joints": list(found.joints)}
+    return "log of a live compensation", {"schema": LIVE_LOG_SCHEMA} | facts
 
 
 def _live_record(path: Path) -> FileDescription:
@@ -272,7 +282,7 @@ _BY_SUFFIX: dict[str, _Describe] = {
     ".json": _json,
     **dict.fromkeys(ROBOT_SUFFIXES, kinds.robot_file),
     ".jsonl": kinds.journal_file,
-    ".mcap": kinds.streams_file,
+    ".mcap": _recording,
     ".yaml": _settings,
     ".yml": _settings,
 }

@@ -25,10 +25,10 @@ from elastocal.workflows._inputs import (
     require_model_of_arm,
     require_same_robot,
 )
-from elastocal.workflows._live_session import settings_within
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._workflow import workflow
 from elastocal.workflows.krc_config import kuka_settings
+from elastocal.workflows.live import settings_within
 
 EXPORT_TARGETS = ("linux",)
 """Machines that a whole program is written for."""

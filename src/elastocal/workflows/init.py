@@ -27,6 +27,8 @@ class InitSettings:
     """``afp``, ``machining`` or ``ur20``."""
     force: bool = False
     """Replace files that are there."""
+    wire: bool = False
+    """Name devices on the wire, as `simulate` serves them on this machine."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -70,7 +72,7 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
     path = Path(settings.out) / PROCESS_FILE
     if path.exists() and not settings.force:
         raise FileAccessError(f"{path} is there already: give --force to replace it")
-    file, *meshes = write_example(Path(settings.out), settings.kind, settings.force)
+    file, *meshes = write_example(Path(settings.out), settings.kind, settings.force, settings.wire)
     if settings.kind not in PROCESSES:
         return InitResult(file, tuple(meshes), None)
     cell = load_cell(file)

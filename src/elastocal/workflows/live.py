@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.cell import Cell, CycleStatistics, PathLimits, load_cell
+from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.online import LiveCounts, design
 from elastocal.errors import CompensationError, DeviceError, UnitError
@@ -16,7 +17,7 @@ from elastocal.files import filling
 from elastocal.identification import CalibratedModel
 from elastocal.procedure.derive import sensor_load
 from elastocal.progress import Progress
-from elastocal.records import record, write_json
+from elastocal.records import record, validate, write_json
 from elastocal.results import Result
 from elastocal.units import parse_number, parse_quantity
 from elastocal.workflows._inputs import (
@@ -30,13 +31,14 @@ from elastocal.workflows._live_session import (
     LiveReport,
     LiveSession,
     Prepared,
-    settings_within,
 )
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._workflow import workflow
 
 LIVE_RECORD, LIVE_LOG = "live.json", "live.mcap"
 """Files of a live compensation, in its folder."""
+_FADE = 0.005
+"""Default speed of the fade, in m/s, where the limits allow it."""
 
 
 @dataclass(frozen=True)
@@ -240,6 +242,61 @@ def _seconds(duration: str | float | None) -> float:
     if not 0.0 < found < float("inf"):
         raise UnitError(f"duration {duration!r} must be a time above 0, such as '60 s'")
     return found
+
+
+def settings_within(file: Path | None, limits: PathLimits, cell: Cell) -> CompensatorSettings:
+    """Return the settings of a file, within the limits of the cell; or what these make.
+
+    Raises
+    ------
+    CompensationError, SchemaError
+        If they go beyond the limits, or are of another cycle or frame.
+    """
+    if file is None:
+        data: dict[str, object] = _range(cell) | {
+            "cycle": f"{limits.cycle!r} s",
+            "frame": limits.frame,
+            "limits": {
+                "correction": f"{limits.correction!r} m",
+                "rate": f"{limits.rate!r} m/s",
+                "fade": f"{min(_FADE, limits.rate)!r} m/s",
+            },
+        }
+        return validate(data, CompensatorSettings, f"{cell.path}: limits of corrections")
+    found = read_settings(file)
+    for what, ours, theirs in (
+        ("cycle", found.cycle, limits.cycle),
+        ("frame", found.frame, limits.frame),
+    ):
+        if ours != theirs:
+            raise CompensationError(f"{file}: {what} is {ours}: must be {theirs}, the arm's")
+    for what, ours, theirs in (
+        ("limits.correction", found.limits.correction, limits.correction),
+        ("limits.rate", found.limits.rate, limits.rate),
+    ):
+        if not ours <= theirs:
+            raise CompensationError(
+                f"{file}: {what} is {1e3 * ours:g} mm{'/s' if what.endswith('rate') else ''}: at"
+                f" most {1e3 * theirs:g}, which the cell file allows"
+            )
+    if "sensor" not in found.model_fields_set:
+        ranges = validate(_range(cell), CompensatorSettings, f"{cell.path}: sensor").sensor
+        found = found.model_copy(update={"sensor": ranges})
+    return found
+
+
+def _range(cell: Cell) -> dict[str, object]:
+    """Return the range of the cell's sensor, as settings have it."""
+    sensor = cell.file.sensor
+    if sensor is None:
+        return {}
+    force, moment = sensor.force_range, sensor.moment_range
+    return {
+        "sensor": {
+            "force": [f"{value!r} N" for value in force],
+            "moment": [f"{value!r} N*m" for value in moment],
+        }
+    }
 
 
 def _notes(settings: LiveSettings, cell: Cell, calibrated: CalibratedModel) -> tuple[str, ...]:

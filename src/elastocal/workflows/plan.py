@@ -47,6 +47,8 @@ __all__ = [
 POSITION_PLAN, POSITION_TABLE = "positions.json", "positions.csv"
 """Files of a plan of positions: the plan, and the table that the tracker's values go into."""
 _PAGE, _FIGURE = "plan.html", "plan.svg"
+_FREE_SEARCH = "i_optimal"
+"""Search technique of the poses in free space."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,9 @@ class PlanSettings:
     """Number of poses in place of the cell's ``search.poses``."""
     language: str | None = None
     """Language of the robot program, or ``none``; by default that of the robot's maker."""
+    free_poses: int | None = None
+    """Number of poses in free space for `geometry`, after the presses and in the same program;
+    none: presses alone."""
 
 
 @record()
@@ -88,6 +93,9 @@ class PlanTimes:
 
     travel: float
     total: float
+    """Of the presses, their ways included."""
+    positions: float | None = None
+    """On the ways through the poses in free space; none where there are none."""
 
 
 @brief_repr
@@ -118,6 +126,8 @@ class PlanFigures:
     """Coverage of production and the error to expect there; none where the cell names none."""
     program: str = ""
     """Language of the robot program, and why it is that one or none."""
+    positions: int | None = None
+    """Poses in free space for `geometry`; none: presses alone."""
 
 
 @workflow(PlanSettings)
@@ -146,6 +156,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     if compare is None:
         compare = "cover" if cell.technique != "cover" else "ioops"
     other = None if compare == "none" else compare
+    _require_free_poses(settings)
     if settings.dry_run:
         return planning.make_plan(cell, other, settings.jobs, progress).plan
     with filling(Path(settings.out), PLAN, settings.force) as folder:
@@ -155,8 +166,23 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
             own = fingerprint(load_cell(Path(settings.cell)))
             record = replace(planned.plan.cell, fingerprint=own)
             planned = replace(planned, plan=replace(planned.plan, cell=record))
-        _write_folder(folder, cell, planned, writer, settings.program)
+        free = None
+        if settings.free_poses is not None:
+            as_written = load_cell(Path(settings.cell))
+            seed = cell.file.search.seed
+            free = choose_positions(as_written, settings.free_poses, _FREE_SEARCH, seed, progress)
+        _write_folder(folder, cell, planned, free, writer, settings.program)
     return planned.plan
+
+
+def _require_free_poses(settings: PlanSettings) -> None:
+    """Refuse a number of poses in free space that is none, or that nobody would see."""
+    if settings.free_poses is None:
+        return
+    if not settings.free_poses >= 1:
+        raise PlanningError(f"--positions {settings.free_poses}: must be at least 1")
+    if settings.dry_run:
+        raise PlanningError("--dry-run shows presses alone: leave the positions out")
 
 
 def _wanted_cell(settings: PlanSettings) -> Cell:
@@ -171,15 +197,33 @@ def _wanted_cell(settings: PlanSettings) -> Cell:
 
 
 def plan_figures(
-    found: PlanResult, folder: Path, program: str, language: str | None = None
+    found: PlanResult,
+    folder: Path,
+    program: str,
+    language: str | None = None,
+    free: PositionPlan | None = None,
 ) -> PlanFigures:
-    """Return the key figures of a plan that was written into a folder."""
+    """Return the key figures of a plan that was written into a folder.
+
+    Parameters
+    ----------
+    found : PlanResult
+        The plan.
+    folder : Path
+        Where it is.
+    program, language : str
+        Name of the robot program, and the language that was asked for.
+    free : PositionPlan, optional
+        Of the poses in free space, where the plan has them.
+    """
     robot = Robot.from_urdf(found.robot.urdf, found.robot.tcp, found.robot.base)
     writer, reason = choose_writer(robot, language)
     programs = () if writer is None else writer.paths(folder, program)
     search, other = found.search, found.comparison
     seeing = Counter(pose.seen_by for pose in found.poses if pose.seen_by is not None)
     names = (PLAN, planning.POOL, PLAN_TABLE, *(each.name for each in programs), _PAGE, _FIGURE)
+    if free is not None:
+        names = (*names, POSITION_PLAN, POSITION_TABLE)
     return PlanFigures(
         folder=str(folder),
         files=tuple(name for name in names if (folder / name).is_file()),
@@ -195,10 +239,13 @@ def plan_figures(
         refused={check.name: check.refused for check in found.pool.checks},
         bottleneck=found.pool.bottleneck,
         stations=dict(sorted(seeing.items())),
-        time=PlanTimes(found.travel_time, found.total_time),
+        time=PlanTimes(
+            found.travel_time, found.total_time, None if free is None else free.travel_time
+        ),
         findings=found.findings,
         production=found.production,
         program=reason,
+        positions=None if free is None else len(free.poses),
     )
 
 
@@ -206,6 +253,7 @@ def _write_folder(
     folder: Path,
     cell: Cell,
     planned: planning.PlanAndPool,
+    free: PositionPlan | None,
     writer: ProgramWriter | None,
     program: str,
 ) -> None:
@@ -214,8 +262,12 @@ def _write_folder(
     planning.write_plan(folder, found)
     planning.write_pool(folder, pool)
     write_plan_table(folder, found)
+    if free is not None:
+        _write_positions(folder, cell.robot, free)
     if writer is not None:
-        write_plan_program(folder, found, writer, program)
+        override = cell.file.motion.override
+        after = None if free is None else _positions_program(free, cell.robot, program, override)
+        write_plan_program(folder, found, writer, program, after)
     write_plan_page(folder / _PAGE, cell, surface, found, pool)
     write_plan_figure(folder / _FIGURE, surface, found, pool)
 
@@ -230,7 +282,7 @@ class PlanPositionsSettings:
     """Folder to write the plan into."""
     poses: int = 60
     """Number of poses."""
-    search: str = "i_optimal"
+    search: str = _FREE_SEARCH
     """Search technique."""
     program: str = "positions"
     """Name of the robot program."""
@@ -268,16 +320,16 @@ def plan_positions(settings: PlanPositionsSettings, progress: Progress) -> Posit
         found = choose_positions(
             cell, settings.poses, settings.search, cell.file.search.seed, progress
         )
-        write_json(folder / POSITION_PLAN, found)
-        _write_positions_table(folder / POSITION_TABLE, cell.robot, found)
+        _write_positions(folder, cell.robot, found)
         if writer is not None:
             override = cell.file.motion.override
             writer.write(folder, _positions_program(found, cell.robot, settings.program, override))
     return found
 
 
-def _write_positions_table(path: Path, robot: Robot, found: PositionPlan) -> None:
-    """Write the table that ``geometry`` reads, its markers left to be filled in."""
+def _write_positions(folder: Path, robot: Robot, found: PositionPlan) -> None:
+    """Write the poses, and the table that ``geometry`` reads, its markers left to be filled in."""
+    write_json(folder / POSITION_PLAN, found)
     joints = [
         f"{name}[{'deg' if turns else 'mm'}]"
         for name, turns in zip(robot.joint_names, robot.revolute, strict=True)
@@ -288,7 +340,7 @@ def _write_positions_table(path: Path, robot: Robot, found: PositionPlan) -> Non
         [each.id, each.station, *(scale * np.array(each.joints)).tolist(), "", "", ""]
         for each in found.poses
     )
-    write_table(path, header, rows)
+    write_table(folder / POSITION_TABLE, header, rows)
 
 
 def _positions_program(
@@ -298,13 +350,13 @@ def _positions_program(
     home = AxisMove("XHOME", np.array(found.robot.home))
     blocks = [Block("", (home,))]
     ways = [
-        tuple(AxisMove(f"XVIA{index}_{n}", np.array(q)) for n, q in enumerate(move.via, start=1))
+        tuple(AxisMove(f"XWAY{index}_{n}", np.array(q)) for n, q in enumerate(move.via, start=1))
         for index, move in enumerate(found.moves)
     ]
     for pose, way in zip(found.poses, ways[:-1], strict=True):
         there = AxisMove(f"XPOS{pose.id}", np.array(pose.joints))
         measure = Stop(f"Measure the marker by {pose.station}, then go on.")
-        title = f"POSE {pose.id} of 0 to {len(found.poses) - 1}"
+        title = f"POSITION {pose.id} of 0 to {len(found.poses) - 1}"
         blocks.append(Block(title, (*way, there, measure)))
     blocks.append(Block("", (*ways[-1], home)))
     percent = max(1, min(PTP_PERCENT, int(100.0 * override + 1e-9)))

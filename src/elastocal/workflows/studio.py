@@ -91,8 +91,7 @@ class StudioResult(Result):
 
     def wait(self) -> None:
         """Wait for Ctrl-C."""
-        with contextlib.suppress(KeyboardInterrupt):
-            threading.Event().wait()
+        threading.Event().wait()
 
 
 @workflow(StudioSettings, outputs=("cell",), marks=("elastocal.cell/",))
@@ -123,7 +122,9 @@ def studio(
     result = StudioResult(figures, session)
     server.start()
     try:
-        settings.while_open(result)
+        # Ctrl-C is how it ends, whatever is being done just then.
+        with contextlib.suppress(KeyboardInterrupt):
+            settings.while_open(result)
     finally:
         session.close()
         server.close()

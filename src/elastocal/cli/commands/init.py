@@ -16,10 +16,14 @@ def _init(
         options.choice("example", "A dome on a rail, a block, or a cobot in force mode."),
     ] = "afp",
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    wire: Annotated[
+        bool,
+        typer.Option("--wire", help="Devices on the wire, as `simulate` serves them."),
+    ] = False,
     as_json: options.Written = False,
 ) -> None:
     """Write a commented example cell with its mesh."""
-    result = workflows.init(folder, kind=like, force=force)
+    result = workflows.init(folder, kind=like, force=force, wire=wire)
     if as_json:
         output.print_json(result)
     else:

@@ -16,6 +16,7 @@ class _Purpose(StrEnum):
 
     ELASTICITY = "elasticity"
     GEOMETRY = "geometry"
+    BOTH = "both"
 
 
 def _plan(  # noqa: PLR0913 - one parameter an option
@@ -34,7 +35,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         typer.Option(
             "--for",
             help="elasticity: presses on the tooling; geometry: positions in free space for"
-            " elastocal geometry.",
+            " elastocal geometry; both: presses, then positions, in one program.",
         ),
     ] = _Purpose.ELASTICITY,
     search: Annotated[
@@ -47,6 +48,12 @@ def _plan(  # noqa: PLR0913 - one parameter an option
             min=1,
             max=100_000,
             help="Number of poses; default: search.poses of the cell file; 60 for geometry.",
+        ),
+    ] = None,
+    free_poses: Annotated[
+        int | None,
+        typer.Option(
+            "--positions", min=1, max=100_000, help="With --for both: number of these; default: 60."
         ),
     ] = None,
     program: Annotated[
@@ -71,8 +78,9 @@ def _plan(  # noqa: PLR0913 - one parameter an option
 ) -> None:
     """Choose calibration poses on the tooling, check them, and put them in order."""
     from elastocal.errors import PlanningError
-    from elastocal.planning.export import pose_lines
 
+    if free_poses is not None and purpose is not _Purpose.BOTH:
+        raise PlanningError("--positions is for --for both")
     if purpose is _Purpose.GEOMETRY:
         if dry_run or compare or jobs:
             raise PlanningError("--dry-run, --compare and --jobs are for presses, not for geometry")
@@ -85,27 +93,56 @@ def _plan(  # noqa: PLR0913 - one parameter an option
             language=language,
             force=force,
         )
-        with output.progress_bars() as progress:
-            positions = workflows.plan_positions(free, progress)
-        if as_json:
-            output.print_json(positions)
-        else:
-            tables.show_position_plan(output.console(), positions, out)
+        _plan_positions(free, out, as_json)
         return
     if search is not None:
         raise PlanningError("--search is for --for geometry: the cell file names its technique")
     program = program or "calib"
     settings = workflows.PlanSettings(
-        cell, out, compare, program, jobs, force, dry_run, poses, language
+        cell,
+        out,
+        compare,
+        program,
+        jobs,
+        force,
+        dry_run,
+        poses,
+        language,
+        (free_poses or 60) if purpose is _Purpose.BOTH else None,
     )
     with output.progress_bars() as progress:
         found = workflows.plan(settings, progress)
-    figures = workflows.plan_figures(found, out, program, language)
-    if dry_run:
+    _show_plan(settings, found, as_json)
+
+
+def _plan_positions(settings: "workflows.PlanPositionsSettings", out: Path, as_json: bool) -> None:
+    with output.progress_bars() as progress:
+        found = workflows.plan_positions(settings, progress)
+    if as_json:
+        output.print_json(found)
+    else:
+        tables.show_position_plan(output.console(), found, out)
+
+
+def _show_plan(
+    settings: "workflows.PlanSettings", found: "workflows.PlanResult", as_json: bool
+) -> None:
+    from elastocal.geometry import PositionPlan
+    from elastocal.planning.export import pose_lines
+    from elastocal.records import read_json
+
+    out = Path(settings.out)
+    free = None
+    if settings.free_poses is not None:
+        free = read_json(out / workflows.POSITION_PLAN, PositionPlan)
+    figures = workflows.plan_figures(found, out, settings.program, settings.language, free)
+    if settings.dry_run:
         figures = replace(figures, files=())
     if as_json:
         output.print_json(figures)
-    else:
-        tables.show_plan(output.console(), found, figures)
-        if dry_run:
-            output.print_lines(pose_lines(found))
+        return
+    tables.show_plan(output.console(), found, figures)
+    if free is not None:
+        tables.show_position_plan(output.console(), free, out)
+    if settings.dry_run:
+        output.print_lines(pose_lines(found))

@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from elastocal import workflows
-from elastocal.cell import LOOPBACK
 from elastocal.cli import output
 
 
@@ -29,7 +28,7 @@ def _studio(
     ] = False,
     host: Annotated[
         str, typer.Option(help="Address to answer on; another lets the network in.")
-    ] = LOOPBACK,
+    ] = "127.0.0.1",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the address in one JSON object.")
     ] = False,
@@ -45,8 +44,10 @@ def _studio(
         output.console().print("Ctrl-C ends it; whoever has the address can use it")
         if not no_browser:
             found.open_page()
-        found.wait()
-        if found.session.is_running:
-            output.console().print("stopping the run: the arm is brought to safety")
+        try:
+            found.wait()
+        finally:
+            if found.session.is_running:
+                output.console().print("stopping the run: the arm is brought to safety")
 
     workflows.studio(cell, model=model, host=host, port=port, arm=arm, while_open=show)

@@ -16,7 +16,13 @@ from .live import (
     every_sample as every_sample,
     newest_sample as newest_sample,
 )
-from .live_log import LIVE_LOG_SCHEMA as LIVE_LOG_SCHEMA, LiveLog as LiveLog
+from .live_log import (
+    LIVE_LOG_SCHEMA as LIVE_LOG_SCHEMA,
+    LiveLog as LiveLog,
+    LiveLogFacts as LiveLogFacts,
+    is_live_log as is_live_log,
+    read_live_log_facts as read_live_log_facts,
+)
 from .state import (
     Correction as Correction,
     Reading as Reading,

@@ -6,16 +6,24 @@ slow or full, cycles are dropped and counted: a hole in the log costs nothing, a
 
 import json
 import math
+import struct
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from elastocal.compensation.online.live import LiveCycle
 from elastocal.compensation.online.state import Status
+from elastocal.errors import FileAccessError, SchemaError
+from elastocal.files import require_file
+from elastocal.records import check_schema
+from elastocal.results import brief_repr
 
 LIVE_LOG_SCHEMA = "elastocal.live-log/1"
 _MOST_WAITING = 5000
@@ -25,6 +33,8 @@ _PAUSE = 0.1
 _AT_ONCE = 25
 """Cycles that it writes before it lets the loop's thread pass."""
 _CHUNK = 256 * 1024
+_HEAD = 4096
+"""Bytes at the beginning of a file that name its schema."""
 _PATIENCE = 30.0
 """For what still waits at the end, in s."""
 _AXES, _NUMBER = ("x", "y", "z"), {"type": "number"}
@@ -109,6 +119,73 @@ class LiveLog:
                 self.written += 1
             ending = self._closed.wait(0.0 if ending or len(self._waiting) > _AT_ONCE else _PAUSE)
         writer.finish()  # type: ignore[no-untyped-call]
+
+
+@brief_repr
+@dataclass(frozen=True)
+class LiveLogFacts:
+    """What a log says of itself, without reading its cycles."""
+
+    cell: str
+    robot: str
+    started: str
+    joints: tuple[str, ...]
+    cycles: int
+    seconds: float
+    """From its first cycle to its last."""
+
+
+def is_live_log(path: Path) -> bool:
+    """Return whether a file begins as a log of a live compensation."""
+    require_file(path)
+    try:
+        with path.open("rb") as file:
+            return LIVE_LOG_SCHEMA.partition("/")[0].encode() in file.read(_HEAD)
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def read_live_log_facts(path: Path) -> LiveLogFacts:
+    """Return what a log says of itself.
+
+    Raises
+    ------
+    SchemaError
+        If it is none of a known version, cut off or damaged.
+    FileAccessError
+        If it cannot be read.
+    """
+    require_file(path)
+    try:
+        with path.open("rb") as file:
+            reader = make_reader(file)
+            found = next((each.metadata for each in reader.iter_metadata()), {})
+            summary = reader.get_summary()
+            joints = json.loads(found.get("joints", "[]"))
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    except (
+        McapError,
+        ValueError,
+        LookupError,
+        OverflowError,
+        RecursionError,
+        struct.error,
+    ) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise SchemaError(f"{path} is a damaged MCAP file: {reason}") from error
+    check_schema(found.get("schema"), LIVE_LOG_SCHEMA, str(path))
+    if summary is None or summary.statistics is None:
+        raise SchemaError(f"{path} is cut off: it has no summary")
+    counts = summary.statistics
+    return LiveLogFacts(
+        cell=found.get("cell", ""),
+        robot=found.get("robot", ""),
+        started=found.get("started", ""),
+        joints=tuple(map(str, joints if isinstance(joints, list) else [])),
+        cycles=counts.message_count,
+        seconds=1e-9 * (counts.message_end_time - counts.message_start_time),
+    )
 
 
 def _message(cycle: LiveCycle, joints: Sequence[str]) -> bytes:

@@ -7,7 +7,7 @@ controller decides.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +37,11 @@ _SAME_TURN = 1e-4
 
 
 def write_plan_program(
-    folder: Path, plan: PlanResult, writer: ProgramWriter, name: str = "calib"
+    folder: Path,
+    plan: PlanResult,
+    writer: ProgramWriter,
+    name: str = "calib",
+    after: RobotProgram | None = None,
 ) -> tuple[Path, ...]:
     """Write a plan as a program into a folder, all of its files or none; return their paths.
 
@@ -51,6 +55,8 @@ def write_plan_program(
         Of the language.
     name : str
         Of the program.
+    after : RobotProgram, optional
+        What the same program does then, from HOME to HOME; its targets have names of their own.
 
     Raises
     ------
@@ -64,7 +70,17 @@ def write_plan_program(
     """
     writer.check_name(name)
     check_plan(plan)
-    return writer.write(folder, plan_program(plan, writer, name))
+    program = plan_program(plan, writer, name)
+    if after is not None:
+        program = replace(
+            program,
+            axis_percent=min(program.axis_percent, after.axis_percent),
+            # The plan ends at HOME, where the other begins.
+            blocks=(*program.blocks, *after.blocks[1:]),
+            facts=(*program.facts, *after.facts),
+            motions=(*program.motions, *(f"Then: {text}" for text in after.motions)),
+        )
+    return writer.write(folder, program)
 
 
 def plan_program(plan: PlanResult, writer: ProgramWriter, name: str = "calib") -> RobotProgram:

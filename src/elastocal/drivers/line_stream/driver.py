@@ -5,7 +5,7 @@ Verified against the simulator (`elastocal.sim.wire`) and clients of a few lines
 
 import socket
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
@@ -35,8 +35,12 @@ from elastocal.drivers.line_stream.lines import (
     columns_of,
 )
 from elastocal.drivers.stations import (
+    RECEIVED,
+    WAKE,
     StationFeed,
+    StationLink,
     StationsMetrology,
+    metrology_set,
     require_station,
     require_trackers,
 )
@@ -44,10 +48,6 @@ from elastocal.errors import DeviceError
 from elastocal.records import StrictModel
 
 _Port = Annotated[int, Field(ge=0, le=65535)]
-_RECEIVED = 65536
-"""Bytes that are read at once."""
-_WAKE = 0.05
-"""How often a thread looks whether it is to end, in s of the wall."""
 
 
 class StationLine(StrictModel):
@@ -110,8 +110,8 @@ class _Address:
     """None: all stations are on it."""
 
 
-class _Line(threading.Thread):
-    """One connection, kept up until it is closed; fills the feeds of its stations."""
+class _Line(StationLink):
+    """One connection; fills the feeds of its stations."""
 
     def __init__(
         self,
@@ -120,9 +120,10 @@ class _Line(threading.Thread):
         feeds: Mapping[str, StationFeed],
         clock: Clock,
     ) -> None:
-        super().__init__(name=f"line_stream {address.host}:{address.port}", daemon=True)
-        self._address, self._settings, self._feeds, self._clock = address, settings, feeds, clock
-        self._done = threading.Event()
+        own = list(feeds.values()) if address.station is None else [feeds[address.station]]
+        name = f"line_stream {address.host}:{address.port}"
+        super().__init__(name, own, clock, settings.patience)
+        self._address, self._settings, self._feeds = address, settings, feeds
         self._frame: str | None = None
         self._looked = next(iter(feeds)) if address.station is None else address.station
         self._to_look = threading.Event()
@@ -145,32 +146,18 @@ class _Line(threading.Thread):
 
     def close(self) -> None:
         """End the thread, and give the port back."""
-        self._done.set()
-        if self.is_alive():
-            self.join()
+        super().close()
         if self._listener is not None:
             self._listener.close()
 
-    def run(self) -> None:
-        """Connect, receive, connect again."""
-        gone = self._clock.now()
-        while not self._done.is_set():
-            try:
-                connection = self._connect()
-                if connection is not None:
-                    with connection:
-                        self._receive(connection)
-                    gone = self._clock.now()
-                    self._broken("the connection has ended")
-            except DeviceError as error:
-                self._failed(str(error))
-                return
-            except OSError as error:
-                self._broken(f"no connection: {error.strerror or error}")
-            if not self._clock.now() - gone <= self._settings.patience:
-                self._failed(f"no connection for {self._clock.now() - gone:.0f} s")
-                return
-            self._done.wait(_WAKE)
+    def hear(self) -> bool:
+        """Connect and receive."""
+        connection = self._connect()
+        if connection is None:
+            return False
+        with connection:
+            self._receive(connection)
+        return True
 
     def _connect(self) -> socket.socket | None:
         """Return a connection; None when nobody has come yet."""
@@ -188,21 +175,21 @@ class _Line(threading.Thread):
 
     def _receive(self, connection: socket.socket) -> None:
         """Take what comes until the connection ends, or says nothing for too long."""
-        connection.settimeout(_WAKE)
+        connection.settimeout(WAKE)
         reader, first = LineReader(self._settings.parsed_columns), True
-        heard = self._clock.now()
+        heard = self.clock.now()
         self._to_look.set()
-        while not self._done.is_set() and self._clock.now() - heard <= self._settings.patience:
+        while not self.done.is_set() and self.clock.now() - heard <= self._settings.patience:
             if self._to_look.is_set():
                 self._to_look.clear()
                 connection.sendall(f"look {self._looked}\n".encode())
             try:
-                data = connection.recv(_RECEIVED)
+                data = connection.recv(RECEIVED)
             except TimeoutError:
                 continue
             if not data:
                 return
-            heard = self._clock.now()
+            heard = self.clock.now()
             if first and reader.columns:
                 # Without a header the first line may be the end of one.
                 data = data.partition(b"\n")[2]
@@ -244,19 +231,6 @@ class _Line(threading.Thread):
         require_station(name, tuple(self._feeds))
         return self._feeds[name]
 
-    @property
-    def _own(self) -> list[StationFeed]:
-        own = self._address.station
-        return list(self._feeds.values()) if own is None else [self._feeds[own]]
-
-    def _broken(self, why: str) -> None:
-        for feed in self._own:
-            feed.beam_broken(why)
-
-    def _failed(self, why: str) -> None:
-        for feed in self._own:
-            feed.fail(why)
-
 
 def _listen(address: _Address) -> socket.socket:
     try:
@@ -266,7 +240,7 @@ def _listen(address: _Address) -> socket.socket:
             f"line_stream: cannot listen at {address.host}:{address.port}:"
             f" {error.strerror or error}"
         ) from error
-    listener.settimeout(_WAKE)
+    listener.settimeout(WAKE)
     return listener
 
 
@@ -339,18 +313,7 @@ class LineStreamDriver:
             for name in names
         }
         lines = [_Line(address, settings, feeds, context.clock) for address in addresses]
-        for line in lines:
-            line.start()
-        metrology = LineMetrology(feeds, settings.rate, lines)
-        return DeviceSet(metrology=metrology, close=_closing(lines), lines=metrology.lines)
-
-
-def _closing(lines: list[_Line]) -> Callable[[], None]:
-    def close() -> None:
-        for line in lines:
-            line.close()
-
-    return close
+        return metrology_set(LineMetrology(feeds, settings.rate, lines), lines)
 
 
 DRIVER = LineStreamDriver()

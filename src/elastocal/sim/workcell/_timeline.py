@@ -10,7 +10,6 @@ in the same process or another, meets the same noise.
 """
 
 import hashlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Motion
+from elastocal.cell import Motion, require_duration
 from elastocal.errors import DeviceError
 from elastocal.sim.arm import RobotSprings
 
@@ -90,8 +89,7 @@ class SimClock:
         DeviceError
             If the time is negative or not finite.
         """
-        if not 0.0 <= seconds < math.inf:
-            raise DeviceError(f"sleep of {seconds!r} s: must be 0 or more, and finite")
+        require_duration(seconds)
         self._now += to_microseconds(seconds)
         for wake in self._woken:
             wake(self._now)

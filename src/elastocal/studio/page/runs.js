@@ -159,7 +159,9 @@ async function openPose(folder, pose, button) {
   play.value = 0;
   play.oninput = () => {
     const k = Number(play.value);
-    play.setAttribute("aria-valuetext", `${streams.time[k].toFixed(1)} s`);
+    const within = streams.windows.find(({ start, end }) => start <= streams.time[k] && streams.time[k] <= end);
+    $("play-text").textContent = `At ${streams.time[k].toFixed(1)} s: ${within ? `${within.name}, ${within.status}` : "between the readings"}`;
+    play.setAttribute("aria-valuetext", $("play-text").textContent);
     shown(streams.time[k]);
     follow(streams.q[k]);
   };
@@ -170,10 +172,14 @@ async function openPose(folder, pose, button) {
 let charted = null;
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charted && chart(...charted));
 
+// Of a run there is no time to choose.
+const ofTheRun = (points) => points === curves?.force;
+
 function chart(title, first, force, second, slip, windows = [], now = null) {
   charted = [title, first, force, second, slip, windows, now];
   $("charts").hidden = false;
   $("charts-title").textContent = title;
+  if (ofTheRun(force)) $("play-label").hidden = true;
   plot($("force-chart"), first, force, "region", windows, now);
   plot($("slip-chart"), second, slip, "arrow", windows, now);
 }
