@@ -124,7 +124,7 @@ def test_equal_runs_give_equal_reports_but_for_times(text, copied, tmp_path):
 
 def test_times_are_marked_as_such(page):
     stamps = [each for each in page.named("time") if each.get("class") == "stamp"]
-    assert len(stamps) == 3
+    assert len(stamps) == 5
     assert MADE in {each["datetime"] for each in stamps}
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import CertificateEntry, Equipment
+from elastocal.report.document.blocks import Stamp
 from elastocal.results import brief_repr
 from elastocal.verdict import (
     Evidence,
@@ -74,7 +75,7 @@ class Certificate:
     """Everything that stands on the first page."""
 
     number: str
-    identity: tuple[tuple[Phrase, tuple[str, ...]], ...]
+    identity: tuple[tuple[Phrase, tuple[str | Stamp, ...]], ...]
     """Rows: what, and its parts; of unknown ones it says so."""
     bar: ToleranceBar | None
     picture: BeforeAfter | None
@@ -91,7 +92,8 @@ class Certificate:
     def is_full(self) -> bool:
         """Whether so much is to be said that it fits on the sheet in small type only."""
         long = [each for each in self.reasons if len(each) > _LONG_REASON]
-        names = [part for _, parts in self.identity for part in parts if len(part) > _LONG_NAME]
+        parts = [part for _, parts in self.identity for part in parts if isinstance(part, str)]
+        names = [part for part in parts if len(part) > _LONG_NAME]
         return len(long) > 1 or len(names) > 1
 
 
@@ -140,7 +142,7 @@ def _short(reason: str) -> str:
 
 def _identity(
     evidence: Evidence, entry: CertificateEntry
-) -> Iterator[tuple[Phrase, tuple[str, ...]]]:
+) -> Iterator[tuple[Phrase, tuple[str | Stamp, ...]]]:
     robot = entry.robot.type or evidence.robot or _NOT_STATED
     yield phrase("Robot"), (robot, _serial(entry.robot))
     yield phrase("Controller"), _equipment(entry.controller)
@@ -160,8 +162,8 @@ def _identity(
         ),
     )
     record = evidence.run_record
-    day = entry.date or (record.started[:10] if record is not None else "")
-    yield phrase("Date of the measurement"), (day or _NOT_STATED,)
+    began = _NOT_STATED if record is None else Stamp(record.started)
+    yield phrase("Date of the measurement"), (entry.date or began,)
     yield phrase("Place"), (entry.place or _NOT_STATED,)
     yield phrase("Temperature"), (entry.temperature or _NOT_STATED,)
     yield phrase("Operator"), (entry.operator or _NOT_STATED,)
