@@ -170,7 +170,7 @@ def python(files: LiveFiles, seconds: float) -> None:
 def in_c(files: LiveFiles, seconds: float) -> None:
     """Measure the C program."""
     folder = files.cell.parent / "c"
-    workflows.export(files.model, out=folder, target="linux", cell=files.cell, tool=files.tool)
+    workflows.export(files.model, out=folder, platform="linux", cell=files.cell, tool=files.tool)
     subprocess.run(["make", "-s", "-C", folder, "check"], check=True)
     process = peers(files, seconds)
     program = subprocess.Popen([folder / "elastocal_live", "--arm"], stdout=subprocess.PIPE)

@@ -46,7 +46,7 @@ class ExportSettings(NewTool):
     """Settings of the compensator (.yaml)."""
     tool: Path | None = None
     """Tool file of `tool`: weight, bias, sensor."""
-    target: str | None = None
+    platform: str | None = None
     """Besides, a program for a real-time Linux: RSI and Net F/T around the compensator."""
     cell: Path | None = None
     """Cell file, whose addresses and limits that program holds."""
@@ -154,13 +154,13 @@ def _around(settings: ExportSettings, model: Robot) -> tuple[LinuxTarget, PathLi
     CompensationError, DeviceError
         If the cell is not one that the program is for.
     """
-    if settings.target is None:
+    if settings.platform is None:
         if settings.cell is not None:
             raise CompensationError("a cell file is for --target linux, which holds its addresses")
         return None
-    if settings.target not in EXPORT_TARGETS:
+    if settings.platform not in EXPORT_TARGETS:
         raise CompensationError(
-            f"target {settings.target!r} is none{nearest(settings.target, EXPORT_TARGETS)}"
+            f"target {settings.platform!r} is none{nearest(settings.platform, EXPORT_TARGETS)}"
             f" (known: {', '.join(EXPORT_TARGETS)})"
         )
     if settings.cell is None or settings.tool is None:

@@ -25,7 +25,7 @@ BIAS = 250.0
 
 def exported(files, folder, **options):
     return workflows.export(
-        files.model, out=folder, target="linux", cell=files.cell, tool=files.tool, **options
+        files.model, out=folder, platform="linux", cell=files.cell, tool=files.tool, **options
     )
 
 
@@ -111,15 +111,15 @@ def wait(holds, seconds=30.0):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"target": "windows"}, r"target 'windows' is none.*known: linux"),
+        ({"platform": "windows"}, r"target 'windows' is none.*known: linux"),
         ({"cell": None}, "needs --cell"),
         ({"tool": None}, "and --tool: a Net F/T gives raw wrenches"),
-        ({"target": None}, "a cell file is for --target linux"),
+        ({"platform": None}, "a cell file is for --target linux"),
     ],
 )
 def test_what_belongs_together_is_asked_for(program, tmp_path, options, said):
     _, files = program
-    usual = {"target": "linux", "cell": files.cell, "tool": files.tool, "out": tmp_path / "c"}
+    usual = {"platform": "linux", "cell": files.cell, "tool": files.tool, "out": tmp_path / "c"}
     with pytest.raises(CompensationError, match=said):
         workflows.export(files.model, **(usual | options))
     assert not (tmp_path / "c").exists()

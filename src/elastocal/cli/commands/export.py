@@ -34,7 +34,7 @@ def _export(  # noqa: PLR0913 - one parameter an option
         out=c,
         compensator=settings,
         tool=options.only_tool(files),
-        target=target,
+        platform=target,
         cell=cell,
         force=force,
         tool_frame=frame,
