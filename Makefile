@@ -43,7 +43,7 @@ slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
 
 # The tables of simulated processes that the site and the README quote: what is not yet written down
-# in docs/hooks/gallery/process_figures.json, or all of it with ANEW=--anew. Up to two hours.
+# in docs/hooks/gallery/process_figures.json, or all of it with ANEW=--anew. Up to an hour.
 process-figures: $(VENV)/installed-dev
 	cd docs/hooks && OMP_NUM_THREADS=1 ../../$(BIN)/python -m gallery.process_figures $(ANEW)
 

@@ -67,6 +67,13 @@ def test_short_campaigns_on_typical_are_no_worse_than_the_papers_way_and_take_8_
         assert short <= 1.1 * mean["cover 30", "bearing"]
 
 
+@pytest.mark.parametrize("kind", ["afp", "machining"])
+def test_campaigns_are_held_against_one_another_on_the_same_seeds(tables, kind):
+    rows = tables.campaigns(kind).splitlines()[2:]
+    assert {row.split("|")[1].strip() for row in rows} >= {"as `init` writes it", "`cover`"}
+    assert len({row.strip("| ").split(" | ")[-1] for row in rows}) == 1
+
+
 @pytest.mark.slow
 def test_a_case_measured_anew_gives_the_figures_that_are_quoted(tables, tmp_path):
     from gallery.process_figures import SHORTER, Case, Measurement

@@ -63,8 +63,13 @@ _INTERVALS = (
 
 
 def campaigns(kind: str) -> str:
-    """Return what shorter campaigns reach on the typical truth."""
+    """Return what shorter campaigns reach on the typical truth, on the seeds that all have."""
     found = _of(quoted(), kind, "typical")
+    seeds_of: dict[str, set[int]] = {}
+    for each in found:
+        seeds_of.setdefault(each["campaign"], set()).add(each["case"]["seed"])
+    common = set.intersection(*seeds_of.values()) if seeds_of else set()
+    found = [each for each in found if each["case"]["seed"] in common]
     rows = []
     for (name, springs), some in groupby(found, lambda each: (each["campaign"], each["springs"])):
         seeds = list(some)

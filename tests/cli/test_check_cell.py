@@ -87,6 +87,10 @@ def process_of(folder, force):
         (lambda folder: process_of(folder, "0,0,0"), "process.file: no row has a force"),
         (lambda _: {"load_cases__friction": 0.01}, "friction is .* N short of holding them"),
         (lambda _: {"sensor__force_range": ["10 N"] * 3}, "need .* times the sensor's range"),
+        (
+            lambda _: {"engagement__disk_radius": "1 m"},
+            "no place of the surface takes the contact disk .*use a smaller disk or edge margin",
+        ),
         (lambda _: {"search": {"pool": 10}}, "search.pool: must be at least the 31 poses"),
         (
             lambda _: {"surface__region": {"box": {"min": ["5 m"] * 3, "max": ["6 m"] * 3}}},
@@ -99,6 +103,31 @@ def test_what_check_refuses_plan_refuses_in_the_same_words(folder, changes, word
     assert re.search(words, reason), reason
     planned = elastocal("plan", folder / "changed.yaml", "--out", folder / "plan")
     assert planned.reason == reason
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        lambda _: {},
+        # Limits of the URDF alone are not judged on an arm without masses.
+        lambda folder: without_masses(folder) | {"limits__torque": {}},
+        lambda _: {"sensor": None},
+        lambda _: {"trackers": [], "marker": None},
+        lambda _: {"load_cases__cases": ["normal"], "search__technique": "i_optimal"},
+        lambda _: {"search__metric": "geodesic", "search__technique": "ioops"},
+        lambda _: {"search__poses": 1, "search__technique": "random"},
+        lambda _: {"search__d_max": "200 mm", "search__poses": None},
+    ],
+)
+def test_what_check_passes_plan_accepts(folder, changes):
+    changes = {"search__pool": 60, "search__poses": 4} | changes(folder)
+    assert check(folder, **changes).code == 0
+    out = folder / "accepted"
+    planned = elastocal(
+        *("plan", folder / "changed.yaml", "--out", out, "--force", "--dry-run", "--jobs", 1),
+        *("--compare", "none"),
+    )
+    assert planned.code == 0, planned.reason
 
 
 def test_a_process_with_a_force_passes(folder):

@@ -4,15 +4,19 @@ import http.client
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
 from elastocal import workflows
 from elastocal.cell import write_example
+from elastocal.procedure import Event, read_journal
 from support.cli import elastocal
+from support.run_cells import planned_cell
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +72,37 @@ def test_a_host_that_is_a_name_and_a_model_that_is_none_are_refused(cell):
         "elastocal: --host 'all': must be an address in numbers\n",
     )
     assert elastocal("studio", cell, "--no-browser", "--model", cell).code == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_run_outlives_no_studio_and_leaves_the_surface_first(tmp_path, number):
+    planned = planned_cell(tmp_path, poses=3)
+    shutil.move(planned.plan, planned.cell.with_name("plan"))
+    words = [sys.executable, "-m", "elastocal", "studio", str(planned.cell), "--no-browser"]
+    journal = planned.cell.with_name("run") / "journal.jsonl"
+
+    def wait_for(text):
+        until = time.monotonic() + 120.0
+        while not (journal.is_file() and text in journal.read_text()):
+            assert time.monotonic() < until, text
+            time.sleep(0.1)
+
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=os.environ) as process:
+        try:
+            _, _, place, token, _ = process.stdout.readline().split("/")
+            asked = http.client.HTTPConnection(place, timeout=60)
+            message = json.dumps({"plan": "plan", "folder": "run", "rate": 2.0})
+            asked.request("POST", f"/{token}/run", message, {"Content-Type": "application/json"})
+            assert asked.getresponse().status == 200
+            asked.close()
+            wait_for('"action":"hold"')
+            process.send_signal(number)
+            wait_for('"event":"finish"')
+            process.wait(60)
+        finally:
+            process.kill()
+    last = read_journal(journal)[-1]
+    assert last.event is Event.FINISH
+    assert last.text.startswith("interrupted, ")
+    assert "AT THE SURFACE" not in last.text

@@ -37,6 +37,7 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     stations: int = 2,
     payloads: tuple[float, ...] = (0.0,),
     compliance: float = 0.0,
+    gears: float = 0.0,
     blunders: int = 0,
 ) -> Measured:
     """Return positions of markers on an arm whose joints stand and turn elsewhere than drawn."""
@@ -49,6 +50,10 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     q = rng.uniform(low, high, (rows, len(low)))
     payload = np.resize(payloads, rows).astype(float)
     yielded = q + compliance * weight_torque(robot, q, payload)
+    for turn, (a, b) in enumerate(
+        gears * np.random.default_rng(seed).normal(size=(2, 2, q.shape[1]))
+    ):
+        yielded = yielded + a * np.sin((turn + 1) * q) + b * np.cos((turn + 1) * q)
     T = truth.forward(yielded)
     points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], MARKERS[:markers])
     station = np.arange(rows) % stations

@@ -1,6 +1,6 @@
 """Table 1 over truths, seeds and campaigns: measured by one command, quoted by the build.
 
-``make process-figures`` runs this file. It takes an hour or two on two cores, so the site and the
+``make process-figures`` runs this file. It takes up to an hour, so the site and the
 README quote ``process_figures.json``, which it writes after every case: a run that is cut goes on
 where it ended. ``docs/hooks/process_tables.py`` makes the tables and the README's sentence of it.
 

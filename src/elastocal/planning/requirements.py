@@ -7,9 +7,18 @@ import numpy as np
 
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
-from elastocal.planning.checks import FrictionCheck, SensorCheck, TorqueCheck
+from elastocal.planning.checks import (
+    EdgeCheck,
+    FlatnessCheck,
+    FrictionCheck,
+    SensorCheck,
+    TorqueCheck,
+)
 from elastocal.planning.search import technique
 from elastocal.planning.surface import Surface, sample_uniform
+
+_POINTS = 200
+"""Points of the surface at which a place for the contact disk is looked for."""
 
 
 def require_possible_search(cell: Cell, compare: str | None = None) -> None:
@@ -62,7 +71,8 @@ def require_loads_possible_anywhere(cell: Cell, surface: Surface) -> None:
     ------
     PlanningError
         If friction, or the sensor's range, refuses the load cases wherever they are applied; if
-        torques are limited and the robot has no masses to tell what gravity takes of them.
+        torques are limited and the robot has no masses to tell what gravity takes of them; if
+        the contact disk lies whole and flat nowhere on the surface.
     SurfaceError
         If the region holds no part of the surface.
     """
@@ -86,4 +96,19 @@ def require_loads_possible_anywhere(cell: Cell, surface: Surface) -> None:
             " masses; give its links masses in the URDF (<inertial>), or leave the torques out"
             " (effort in the URDF, limits.torque.values)"
         )
-    sample_uniform(surface, 1, np.random.default_rng(cell.file.search.seed))
+    _require_place_for_disk(cell, surface)
+
+
+def _require_place_for_disk(cell: Cell, surface: Surface) -> None:
+    """Require that the whole contact disk lies on the surface, and flat, at one of many points."""
+    points = sample_uniform(surface, _POINTS, np.random.default_rng(cell.file.search.seed))
+    radius = 1e3 * cell.file.engagement.disk_radius
+    for check in (EdgeCheck.of(cell, surface, points), FlatnessCheck.of(cell, surface, points)):
+        best = float(check.at_points.max())
+        if not best > 0.0:
+            short = f"{-1e3 * best:.3g} mm" if check.unit == "m" else f"{-np.degrees(best):.3g} deg"
+            raise PlanningError(
+                f"engagement: no place of the surface takes the contact disk (radius {radius:.4g}"
+                f" mm): of {_POINTS} points the best is {short} short of check {check.name!r};"
+                f" {check.advice}"
+            )

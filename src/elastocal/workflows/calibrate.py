@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from elastocal import identification
 from elastocal.cell import ProcessFile, ProductionPath, read_production
 from elastocal.dataset import Dataset, content_sha256, merge, read, without
 from elastocal.elastic import known_springs
-from elastocal.errors import DatasetError
+from elastocal.errors import DatasetError, ElastocalError
 from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
@@ -28,15 +29,17 @@ from elastocal.identification import (
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
-from elastocal.robot import Robot
+from elastocal.robot import Robot, same_joints
 from elastocal.robot.inverse import nearest_zero_posture
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
-_SAME_MARKER = 0.03
-"""Distance of a marker from where readings say, in m, within which it is that one."""
+if TYPE_CHECKING:
+    from elastocal.cell import Cell
 
 __all__ = ["CalibrateResult", "CalibrateSettings", "calibrate"]
+_SAME_MARKER = 0.03
+"""Distance of a marker from where readings say, in m, within which it is that one."""
 
 
 @brief_repr
@@ -61,7 +64,7 @@ class CalibrateSettings(FitSettings):
     """State also what the error at left-out poses is made of."""
     process: Path | None = None
     """Path of production, ``.csv``: ``auto`` chooses for it, and how much of it the readings cover
-    is stated."""
+    is stated. None: that which the cell file of the data's own run names, where there is one."""
     force: bool = False
     """Replace a file that is no former output of this command."""
 
@@ -106,7 +109,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         source = f"{source}, on the arm as built of {settings.geometry}"
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
-    path = None if settings.process is None else _production(settings.process, arm)
+    path, unknown = _production(settings, arm)
     rows = None if path is None else _rows(path)
     choice = choose_model(arm, readings, settings.springs, options, marker, production=rows)
     known = known_springs(arm, settings.springs) or choice.known
@@ -130,6 +133,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         coverage, doubt = _on_production(path, calibration.calibrated)
         warnings = (*figures.warnings, *(doubt.warnings if doubt else ()))
         figures = replace(figures, production=coverage, doubt=doubt, warnings=warnings)
+    figures = replace(figures, warnings=(*figures.warnings, *unknown))
     found_model = replace(calibration.calibrated, on_production=figures.doubt)
     result = replace(CalibrateResult.of(found_model, figures), made_from=made_from)
     if settings.out is not None:
@@ -159,11 +163,42 @@ def _as_built(
     return built, settings
 
 
-def _production(path: Path, robot: Robot) -> ProductionPath:
-    """Return the path of production as the arm runs it."""
-    start = nearest_zero_posture(robot)
-    held = start[None, : robot.external_axes]
-    return read_production(path, ProcessFile(file=path.name), robot, start, held)
+def _production(
+    settings: CalibrateSettings, robot: Robot
+) -> tuple[ProductionPath | None, tuple[str, ...]]:
+    """Return the path of production as the arm runs it, and why it is not known where it should be.
+
+    One that is asked for must fit; one that the cell of a run names is no reason to refuse data.
+    """
+    if settings.process is not None:
+        start = nearest_zero_posture(robot)
+        entry, held = ProcessFile(file=settings.process.name), start[None, : robot.external_axes]
+        return read_production(settings.process, entry, robot, start, held), ()
+    for path in settings.files:
+        try:
+            cell = _cell_of_run(path)
+        except ElastocalError as error:
+            return None, (
+                f"production is not known, though the cell of {path.parent} may name it: {error};"
+                " name its path (--process)",
+            )
+        if cell is not None and cell.process is not None and same_joints(cell.robot, robot):
+            return cell.process, ()
+    return None, ()
+
+
+def _cell_of_run(path: Path) -> "Cell | None":
+    """Return the cell of the run that a file is the dataset of; None where it is of none."""
+    if not (path.parent / "cell").is_dir():
+        return None
+    # These take longer to import than a calibration takes, and most data are of no run.
+    from elastocal.cell import load_cell
+    from elastocal.procedure import RunFolder, read_journal
+
+    run = RunFolder(path.parent)
+    entries = read_journal(run.journal) if run.dataset == path and run.journal.is_file() else ()
+    record = entries[0].run if entries else None
+    return None if record is None else load_cell(run.cell / record.cell_file)
 
 
 def _rows(path: ProductionPath) -> ProductionRows:

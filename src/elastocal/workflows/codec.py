@@ -139,10 +139,12 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
         summary = codec_summary(data, verdicts, analysis.correlations)
         axes = ("x", "y", "z") if settings.per_axis else ()
         result = CodecResult(summary, data, verdicts, analysis, ())
-        return replace(result, files=_write_folder(folder, result, axes))
+        return replace(result, files=_write_folder(folder, result, axes, settings.jobs))
 
 
-def _write_folder(folder: Path, result: CodecResult, axes: tuple[str, ...]) -> tuple[str, ...]:
+def _write_folder(
+    folder: Path, result: CodecResult, axes: tuple[str, ...], jobs: int | None
+) -> tuple[str, ...]:
     """Write everything that a codec leaves behind; return the names of the files."""
     from elastocal.report import write_codec_figures
 
@@ -150,5 +152,5 @@ def _write_folder(folder: Path, result: CodecResult, axes: tuple[str, ...]) -> t
     paths = [write_codec(folder, data), write_codec_summary(folder, result.summary)]
     if analysis.indices:
         paths.append(write_index_table(folder, data, analysis.indices))
-    paths += write_codec_figures(folder, data, result.verdicts, analysis, axes)
+    paths += write_codec_figures(folder, data, result.verdicts, analysis, axes, jobs)
     return tuple(path.name for path in paths)

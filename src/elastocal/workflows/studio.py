@@ -12,6 +12,7 @@ from os import PathLike
 from pathlib import Path
 
 from elastocal.cell import LOOPBACK, SIMULATED, Cell, load_cell
+from elastocal.errors import DeviceError
 from elastocal.planning import read_plan
 from elastocal.procedure import Progress as RunProgress, RunEnd
 from elastocal.procedure.run import PlannedStep
@@ -164,7 +165,10 @@ class _Commands:
         return partial(_run, cell, message)
 
     def is_real(self, cell: Cell) -> bool:
-        return rig_of(cell).real
+        try:
+            return rig_of(cell).real
+        except DeviceError:  # a driver that is not here; what cannot be told may hurt
+            return True
 
 
 def _plan(cell: Path, message: PlanMessage, outbox: Outbox) -> Data:

@@ -146,7 +146,7 @@ def test_all_files_are_written_and_the_same_codec_gives_the_same_bytes(tmp_path,
         *("compliances.svg", "compliances.png", "indices.svg", "indices.png", "codec.html"),
     ]
     assert all(path.stat().st_size > 5000 for path in paths)
-    for path in write_codec_figures(part, known.data, known.verdicts)[:2]:
+    for path in write_codec_figures(part, known.data, known.verdicts, known.insight, "z", 2):
         assert path.read_bytes() == (whole / path.name).read_bytes(), path.name
 
 

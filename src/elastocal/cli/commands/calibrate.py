@@ -57,6 +57,7 @@ def _calibrate(  # noqa: PLR0913 - one parameter an option
         Path | None,
         typer.Option(
             help="Path of production (.csv): springs are chosen for it; how much of it is covered."
+            " By default that of the run's cell."
         ),
     ] = None,
     draws: Annotated[int, typer.Option(max=100_000, help="Bootstrap draws.")] = 200,

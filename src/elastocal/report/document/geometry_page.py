@@ -13,15 +13,13 @@ from elastocal.files import write_text
 from elastocal.geometry import GeometryAccuracy, GeometryModel, LinkNumber
 from elastocal.report.document import blocks
 from elastocal.report.pages import render
-from elastocal.report.plots import error_maps, parameter_figure
+from elastocal.report.plots import MANY_POSITIONS, error_maps, parameter_figure
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
 from elastocal.wording import counted, mm, point
 
 REPORT_TITLE = "Geometry report"
 """How the title of every such page begins."""
-_MANY = 2000
-"""Positions from which maps are drawn as pixels."""
 _MOST_ROWS = 200
 _DEGREES = float(np.degrees(1.0))
 _AXES = {"x": "x of the base", "y": "y of the base", "z": "z of the base", "norm": "distance"}
@@ -136,16 +134,16 @@ def _result(found: GeometryFindings) -> Iterator[blocks.Block]:
 
 def _maps(found: GeometryFindings) -> Iterator[blocks.Block]:
     accuracy = found.accuracy
-    kind = ".png" if len(accuracy.row) > _MANY else ".svg"
+    many = len(accuracy.row) > MANY_POSITIONS
     before, after = (each.mean for each in vars(found.model.held_out).values())
     yield blocks.picture(
         partial(error_maps, accuracy),
         f"Positions in the base of the robot, coloured by their error: {mm(before)} mean before,"
         f" {mm(after)} after",
-        "Every position that was fitted, where its marker was measured, in the base of the robot."
+        ("Means over cells of the map, of all" if many else "All")
+        + " positions that were fitted, where their marker was measured, in the base of the robot."
         " Before and after have one scale, which ends where 98 % of the errors before lie below;"
         " enlarged is what is left, on a scale of its own.",
-        kind,
     )
 
 

@@ -1,5 +1,6 @@
 """The figures of a codec: on paper, and on one HTML page to explore (paper Fig. 7, 9, 10)."""
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,6 +16,7 @@ from elastocal.codec import (
     Verdicts,
 )
 from elastocal.files import write_text
+from elastocal.parallel import map_in_processes, process_count
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import (
     ERROR_PANELS,
@@ -37,6 +39,8 @@ from elastocal.results import counted_alike
 KINDS = (".svg", ".png")
 """In which kinds every figure is written."""
 PAGE = "codec.html"
+_MANY = 30
+"""Springs above which drawing takes longer than processes take to start."""
 
 
 def write_codec_figures(
@@ -45,6 +49,7 @@ def write_codec_figures(
     verdicts: Verdicts,
     insight: CodecAnalysis | None = None,
     axes: Sequence[str] = (),
+    jobs: int | None = None,
 ) -> list[Path]:
     """Write the figures of a codec, each atomically; return their paths.
 
@@ -63,6 +68,8 @@ def write_codec_figures(
         could say which of them are findings; without its indices, none of them.
     axes : sequence of str
         Axes of which a printed figure is wanted beside that of the norm.
+    jobs : int, optional
+        Processes that draw; by default one, but all cores where there are many springs to draw.
 
     Raises
     ------
@@ -80,12 +87,23 @@ def write_codec_figures(
         figures["compliances"] = partial(compliance_chart, data, found.seen)
     if found.indices:
         figures["indices"] = partial(index_chart, data, found.indices, found.correlations)
-    paths: list[Path] = []
-    for name, draw in figures.items():
+    many = bool(found.seen) and max(len(each.names) for each in data.springs) > _MANY
+    processes = process_count(jobs or None, worthwhile=many)
+    # The largest figure first. One process draws it once for all kinds, several once for each.
+    tasks: list[Callable[[], object]] = []
+    for name, draw in reversed(figures.items()):
         kinds = [folder / f"{name}{kind}" for kind in KINDS]
-        paths += write_kinds(kinds, draw, f"{headline(data)} ({name})", description)
-    page = write_codec_page(folder / PAGE, data, verdicts, found.seen, found.correlations)
-    return [*paths, page]
+        shares = [kinds] if processes == 1 else [[each] for each in reversed(kinds)]
+        title = f"{headline(data)} ({name})"
+        tasks += [partial(write_kinds, share, draw, title, description) for share in shares]
+    page = folder / PAGE
+    tasks.append(partial(write_codec_page, page, data, verdicts, found.seen, found.correlations))
+    deque(map_in_processes(_call, tasks, process_count(processes, len(tasks))), maxlen=0)
+    return [*(folder / f"{name}{kind}" for name in figures for kind in KINDS), page]
+
+
+def _call(task: Callable[[], object]) -> None:
+    task()
 
 
 def write_codec_page(

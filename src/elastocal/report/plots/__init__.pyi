@@ -27,6 +27,7 @@ from .codec_chart import (
     write_study_figures as write_study_figures,
 )
 from .geometry_figures import (
+    MANY_POSITIONS as MANY_POSITIONS,
     error_maps as error_maps,
     parameter_figure as parameter_figure,
 )

@@ -17,13 +17,15 @@ from elastocal.geometry import GeometryAccuracy, GeometryParameter
 from elastocal.report.plots import style
 
 _WIDTH = 10.5
-_MAP, _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN = 2.6, 0.6, 0.8, 0.35, 0.5, 0.75
+_MAP, _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN = 2.6, 0.75, 0.8, 0.35, 0.5, 0.75
 """Height of a map, margins, and what is between rows of maps, in inches."""
 _GAPS = (0.4, 1.25)
 """After the maps of before and after, and after their bar, in inches."""
 _ROW, _AXIS = 0.17, 0.62
 """Height of a parameter's line, and of what belongs to a group of them, in inches."""
 _VIEWS = (("y in m", 1, "from above"), ("z in m", 2, "from the side"))
+MANY_POSITIONS = 2000
+"""More positions are drawn as means over cells of the map."""
 _TOP = 98.0
 """Percentile of the errors at which a scale ends."""
 _GROUPS = (
@@ -62,23 +64,33 @@ def error_maps(accuracy: GeometryAccuracy) -> Figure:
                 axes.set_ylabel(label)
         if column:
             bar = figure.add_panel(left + across + 0.1, _FOOT, 0.14, 2 * _MAP + _BETWEEN)
-            figure.colorbar(scale, cax=bar, extend="max").set_label("Error in mm", size=8)
+            figure.colorbar(
+                ScalarMappable(scale, style.SEQUENTIAL), cax=bar, extend="max"
+            ).set_label("Error in mm", size=8)
         left += across + (_GAPS[column] if column < len(_GAPS) else 0.0)
     return figure
 
 
-def _scale(error: FloatArray) -> ScalarMappable:
+def _scale(error: FloatArray) -> Normalize:
     top = max(float(np.percentile(error, _TOP)), 1e-6)
-    return ScalarMappable(Normalize(0.0, top), style.SEQUENTIAL)
+    return Normalize(0.0, top)
 
 
 def _draw_map(
-    axes: Axes, place: FloatArray, error: FloatArray, scale: ScalarMappable, size: float
+    axes: Axes, place: FloatArray, error: FloatArray, scale: Normalize, size: float
 ) -> None:
-    """Draw positions, the worst on top, so that none of them hides."""
+    """Draw positions, the worst on top, so that none of them hides; of many, means of cells."""
+    x, y = place.T
+    if len(error) > MANY_POSITIONS:
+        axes.hexbin(x, y, C=error, gridsize=40, cmap=style.SEQUENTIAL, norm=scale, mincnt=1)
+        axes.set_aspect("equal", adjustable="datalim")
+        style.open_frame(axes, "both")
+        return
     order = np.argsort(error)
-    x, y = place[order].T
-    axes.scatter(x, y, c=scale.to_rgba(error[order]), s=size, lw=0.2, edgecolors=style.MUTED)
+    axes.scatter(
+        x[order], y[order], c=error[order], cmap=style.SEQUENTIAL, norm=scale, s=size, lw=0.2,
+        edgecolors=style.MUTED,
+    )  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")
     style.open_frame(axes, "both")
 

@@ -1,0 +1,26 @@
+"""Let the search find what to do before what was decided, and pages before the reference."""
+
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import Files
+from mkdocs.structure.pages import Page
+
+BOOSTS = {
+    "how-to/": 4.0,
+    "tutorial": 3.0,
+    "explanation/": 1.5,
+    "reference/api/": 0.3,
+    "decisions/": 0.2,
+}
+"""How much more than others a page counts, by the beginning of its path."""
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Weigh a page for the search, unless it says itself how much it counts."""
+    del config, files
+    meta: dict[str, Any] = page.meta
+    for beginning, boost in BOOSTS.items():
+        if page.file.src_uri.startswith(beginning):
+            meta.setdefault("search", {}).setdefault("boost", boost)
+    return markdown
