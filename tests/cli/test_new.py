@@ -77,6 +77,21 @@ def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
     assert (file.robot.model, file.load_cases.fz, file.sensor) == ("UR20", 80.0, None)
 
 
+def test_questions_that_nobody_answers_end_in_a_refusal(tmp_path):
+    with mock.patch.object(sys, "stdin", io.StringIO("")):
+        begun = elastocal("new", "-o", tmp_path / "cell.yaml", "--ask")
+    assert begun.code == 1
+    assert begun.err.splitlines()[-1].startswith("elastocal: nobody answers: standard input has")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_at_a_question_is_an_interruption(tmp_path):
+    keyboard = io.StringIO()
+    keyboard.readline = mock.Mock(side_effect=KeyboardInterrupt)
+    with mock.patch.object(sys, "stdin", keyboard):
+        assert elastocal("new", "-o", tmp_path / "cell.yaml", "--ask").code == 130
+
+
 def test_a_preview_shows_a_cell_and_replaces_only_its_own_page(tmp_path, dome):
     cell, page = tmp_path / "cell.yaml", tmp_path / "look here.html"
     assert elastocal("new", "--robot", "UR20", "--mesh", dome, "-o", cell).code == 0

@@ -28,6 +28,7 @@ import sys
 import tempfile
 import time
 import warnings
+import webbrowser
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -56,6 +57,9 @@ _NOISE = re.compile(
 
 
 _LINKS = re.compile(r"^(whole|broken|not signed|not verifiable) +[^:\n]+: .*\n", re.M)
+"""What verify prints before its reason: a line a link."""
+_QUESTION = re.compile(r"^.*\n(?=elastocal: nobody answers)")
+"""What new prints before its reason, where it asks."""
 
 
 @dataclass(frozen=True)
@@ -211,6 +215,8 @@ _PLAIN = {
     "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
     "live": "live {s}/kuka.yaml --model {s}/model.json --duration 1",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
+    "studio": "studio {s}/cell.yaml --no-browser",
+    "new": "new --out {o}.yaml --mesh {s}/dome.stl --no-browser --no-ask",
     "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
 }
 """Commands that work, to which absurd options are added; an option that stands twice: the last."""
@@ -332,8 +338,7 @@ def _ended(case: Case, seeds: Path, folder: Path, err: Path) -> dict[str, object
     seconds = time.process_time() - started
     text = err.read_bytes().decode("utf-8", "replace")
     memory = _status("VmHWM") - base
-    # What verify prints before its reason is a line a link.
-    judged = _LINKS.sub("", text) if words[0] == "verify" else text
+    judged = _QUESTION.sub("", _LINKS.sub("", text) if words[0] == "verify" else text)
     word = _judged(code, judged, seconds, memory)
     if word == "ok" and code and _listed(folder) != before:
         word, text = "half-written", f"{sorted(set(_listed(folder)) ^ set(before))} {text}"
@@ -353,6 +358,8 @@ def _exit_code(words: list[str]) -> int:
         mock.patch.object(sys, "argv", ["elastocal", *words]),
         mock.patch.object(main, "app", _commands()),
         mock.patch.object(elastocal.workflows.SimulateResult, "wait", return_value=None),
+        mock.patch.object(elastocal.workflows.StudioResult, "wait", return_value=None),
+        mock.patch.object(webbrowser, "open", return_value=True),
     ):
         try:
             main.run()

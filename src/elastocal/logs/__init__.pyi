@@ -52,7 +52,6 @@ from .streams import (
     stream_rows as stream_rows,
 )
 from .table import (
-    LARGEST_LOG as LARGEST_LOG,
     LogTable as LogTable,
     read_text_log as read_text_log,
     read_workbook as read_workbook,

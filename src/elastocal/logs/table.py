@@ -21,13 +21,13 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import FileAccessError, LogError, nearest
-from elastocal.files import require_file
+from elastocal.files import Limit, read_bytes
 from elastocal.logs.bounded import read_bounded
 from elastocal.results import brief_repr
 from elastocal.units import parse_number
 
-LARGEST_LOG = 2 * 1024**3
-"""In bytes: a day of three instruments at 1 kHz."""
+_MOST_TEXT = Limit("ELASTOCAL_MAX_TEXT_LOG_MB", 256, "MB")
+"""Two hours of twelve columns at 250 Hz; to read it takes twelve times as much memory."""
 _COMMENTS = ("#", "//", "%", "!")
 _DELIMITERS = ";\t,|"
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?", re.ASCII)
@@ -172,7 +172,9 @@ def read_text_log(path: Path) -> LogTable:
     LogError
         If it has no rows of equal length, or quotes that do not match.
     FileAccessError
-        If it cannot be read, or is larger than `LARGEST_LOG`.
+        If it cannot be read.
+    SchemaError
+        If it is too large to be read whole.
     """
     lines = [
         line for line in _text(path).splitlines() if line.strip() and not _is_comment(line.strip())
@@ -244,19 +246,7 @@ def _sheet(path: Path, sheet: str | None) -> LogTable:
 
 def _text(path: Path) -> str:
     """Return the text of a file in UTF-8, UTF-16 with its mark, or a code page of Windows."""
-    require_file(path)
-    try:
-        size = Path(path).stat().st_size
-        if size > LARGEST_LOG:
-            raise FileAccessError(
-                f"cannot read {path}: {size / 1024**3:.1f} GiB, at most"
-                f" {LARGEST_LOG // 1024**3} GiB are read: cut it in parts"
-            )
-        data = Path(path).read_bytes()
-    except OSError as error:
-        if isinstance(error, FileAccessError):
-            raise
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    data = read_bytes(path, _MOST_TEXT)
     if b"\0" in data[:4096] and data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
         raise LogError(f"{path} is no text: logs are CSV or text, Excel, MCAP or ROS bags")
     encoding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"

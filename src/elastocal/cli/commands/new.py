@@ -131,11 +131,19 @@ def _needless(settings: "NewSettings", name: str) -> bool:
 
 def _answer(settings: "NewSettings", name: str, question: str) -> str:
     """Return a valid answer to one question; one that is not is refused, and asked again."""
-    from elastocal.errors import ElastocalError
+    from elastocal.errors import ElastocalError, ProcedureError
 
     offered = None if name in ("robot", "mesh") else workflows.offered(settings, name)
     while True:
-        text: str = typer.prompt(question, default=offered, err=True)
+        try:
+            text: str = typer.prompt(question, default=offered, err=True)
+        except typer.Abort as end:
+            output.console().print()  # the question has no end of its line
+            if not isinstance(end.__context__, EOFError):
+                raise KeyboardInterrupt from end
+            raise ProcedureError(
+                "nobody answers: standard input has ended; give options instead"
+            ) from end
         try:
             workflows.parse_answer(name, text.strip())
         except ElastocalError as error:

@@ -106,13 +106,18 @@ def show_compensation(console: Console, result: "CompensateResult", out: Path) -
     console.print(f"  {'tool:':30} {result.tool}", soft_wrap=True)
     for name, length in lengths:
         console.print(
-            f"  {name + ':':30} {readable(length.mean, 'm')} mean,"
-            f" {readable(length.max, 'm')} max ({length.at})"
+            f"  {name + ':':30} {_length_left(length.mean)} mean,"
+            f" {_length_left(length.max)} max ({length.at})"
         )
     if result.program:
         console.print(f"  {'program:':30} {', '.join(result.program)}", soft_wrap=True)
     for note in result.notes:
         console.print(f"Note: {note}")
+
+
+def _length_left(metres: float) -> str:
+    """Return a length; what no tracker sees is not told apart from nothing."""
+    return "below 0.001 mm" if 0.0 < metres < 1e-6 else readable(metres, "m")
 
 
 def show_export(console: Console, result: "ExportResult", with_tool: bool) -> None:
