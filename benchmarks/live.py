@@ -161,6 +161,8 @@ def python(files: LiveFiles, seconds: float) -> None:
         f"Python: {line.late} of {line.answered} answers later than 3.5 ms ({line.late_share:.3%});"
         f" {result.scheduling}; log {result.logged} cycles, {result.dropped} dropped"
     )
+    if result.problem:
+        print(f"Python: {result.problem}")
     print(
         f"Python: stream stopped for 1 s: {loop.held} cycles held, {loop.faded} faded; largest step"
         f" {1e3 * loop.largest_step:.4f} mm of {1e3 * 0.03 * CYCLE:.4f} allowed"

@@ -1,4 +1,4 @@
-"""Quantities and counts as people read them: millimetres, degrees, minutes, plurals."""
+"""Quantities and counts as people read them, and phrases that can be said in other languages."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,6 +12,48 @@ _READABLE = {
 }
 
 
+class Phrase(str):
+    """A text that remembers how it was made, so that it can be said in another language.
+
+    It is its English text; whatever takes a string takes a phrase. Make one with `phrase`.
+    """
+
+    template: str
+    """English, with names of values in braces."""
+    values: Mapping[str, object]
+    """By name; phrases among them are said in the other language too."""
+
+    def __str__(self) -> str:
+        # Or `str` would forget how the text was made.
+        return self
+
+
+def phrase(template: str, **values: object) -> Phrase:
+    """Return a text with values in it.
+
+    >>> phrase("the largest with {error}", error=mm(0.000109))
+    'the largest with 0.109 mm'
+    """
+    made = Phrase(template.format(**values) if values else template)
+    made.template, made.values = template, values
+    return made
+
+
+def phrases(*templates: str) -> tuple[Phrase, ...]:
+    """Return texts without values, such as the heads of a table."""
+    return tuple(map(phrase, templates))
+
+
+def sentences(texts: Sequence[str], between: str = " ") -> Phrase:
+    """Return texts one after the other as one phrase.
+
+    >>> sentences(["One.", "Two."])
+    'One. Two.'
+    """
+    named = {f"_{number}": text for number, text in enumerate(texts)}
+    return phrase(between.join(f"{{{name}}}" for name in named), **named)
+
+
 def readable(value: float, unit: str) -> str:
     """Return an SI value in the unit that people read, with three digits.
 
@@ -21,7 +63,7 @@ def readable(value: float, unit: str) -> str:
     'no limit'
     """
     if math.isinf(value):
-        return "no limit"
+        return phrase("no limit")
     scale, name = _READABLE.get(unit, (1.0, f" {unit}"))
     return f"{_three_digits(value * scale)}{name}"
 
@@ -105,7 +147,7 @@ def lengths_with_interval(
     (('0.120 mm', '0.100 to 0.200'), ('not known', ''))
     """
     if value is None:
-        return "not known", ""
+        return phrase("not known"), ""
     if low is None or high is None:
         return mm(value), ""
     return mm(value), f"{1e3 * low:.3f} to {1e3 * high:.3f}"
@@ -117,7 +159,7 @@ def mm(metres: float, digits: int = 3) -> str:
     >>> mm(0.0001234)
     '0.123 mm'
     """
-    return f"{1e3 * metres:.{digits}f} mm" if math.isfinite(metres) else "not known"
+    return f"{1e3 * metres:.{digits}f} mm" if math.isfinite(metres) else phrase("not known")
 
 
 def um(metres: float) -> str:
@@ -141,12 +183,12 @@ def springs_and_parameters(springs: int, parameters: int) -> str:
 
 
 def counted(number: int, name: str) -> str:
-    """Return a number with its noun.
+    """Return a number with its noun, as a phrase.
 
     >>> counted(1, "pose"), counted(3, "pose")
     ('1 pose', '3 poses')
     """
-    return f"{number} {name}{'' if number == 1 else 's'}"
+    return phrase(f"{{number}} {name}{'' if number == 1 else 's'}", number=number)
 
 
 def listed(names: Sequence[str], most: int = 30) -> str:

@@ -12,7 +12,7 @@ from elastocal.geometry import GeometryModel, GeometryProblem, climb, geometry_m
 from elastocal.identification import CalibrateResult
 from elastocal.progress import silent
 from elastocal.records import write_json
-from elastocal.robot import Robot, with_joint_origins, with_tool
+from elastocal.robot import Robot, of_one_arm, tcp_gap, with_joint_origins, with_tool
 from support.cli import elastocal
 from support.measured_arms import MARKERS, Measured, kuka, measure
 
@@ -144,3 +144,16 @@ def _before(robot: Robot, joint: int, T: np.ndarray) -> np.ndarray:
     """Return what leaves a joint where it was although the link before it has moved by T."""
     place = robot.chain.joints[joint].placement
     return np.linalg.inv(place) @ np.linalg.inv(T) @ place
+
+
+def test_the_arm_as_built_counts_as_the_one_as_drawn():
+    """So that cells and earlier models of the arm go on fitting; without its mark it does not."""
+    measured = measure(kuka(), 60)
+    problem = GeometryProblem(measured.robot, measured.data)
+    model = geometry_model(problem, climb(problem, 40, np.random.default_rng(1), silent), "test")
+    drawn, built = measured.robot, model.as_built(measured.robot)
+    gap = tcp_gap(drawn, built)
+    assert not gap.closed
+    assert of_one_arm(gap, drawn, built)
+    assert not of_one_arm(gap, drawn, drawn)
+    assert not of_one_arm(tcp_gap(_longer(drawn), built), _longer(drawn), built)

@@ -40,7 +40,9 @@ class Seen:
     """As PNG."""
 
 
-def look(browser: str, page: Path, looks: Sequence[Look], height: int = 1400) -> Seen:
+def look(
+    browser: str, page: Path, looks: Sequence[Look], height: int = 1400, before: str = "0"
+) -> Seen:
     """Show a page and return what was seen; a change of width loads it anew.
 
     Parameters
@@ -53,6 +55,8 @@ def look(browser: str, page: Path, looks: Sequence[Look], height: int = 1400) ->
         In their order; where only the scheme changes, the page has to follow.
     height : int
         Of the window, in pixels.
+    before : str
+        Script that is run in the page when it has been loaded.
     """
     frames, screenshots = {}, {}
     with open_tab(browser) as tab:
@@ -63,6 +67,7 @@ def look(browser: str, page: Path, looks: Sequence[Look], height: int = 1400) ->
             emulate(tab, each, height)
             if each.width != width:
                 tab.open(page)
+                tab.evaluate(before)
             width = each.width
             frames[each] = tab.evaluate(PROBE)
             shot = tab.call("Page.captureScreenshot", format="png")

@@ -48,10 +48,15 @@
   // What the view has drawn; read in the turn in which it is drawn, or it is gone.
   function viewed() {
     const view = document.getElementById("view");
-    if (!view?.data) return null;
-    view._fullLayout.scene._scene.glplot.redraw();
-    const canvas = view.querySelector("canvas");
-    return { colours: colours(canvas), traces: view.data.length, width: canvas.width, ground: view.layout.paper_bgcolor };
+    if (!view?.shown) return null;
+    view.shown.drawNow();
+    const [canvas] = view.querySelectorAll("canvas");
+    const pen = new OffscreenCanvas(1, 1).getContext("2d");
+    pen.drawImage(canvas, 2, 2, 1, 1, 0, 0, 1, 1);
+    return {
+      colours: colours(canvas), width: canvas.width, ground: [...pen.getImageData(0, 0, 1, 1).data].slice(0, 3),
+      layers: view.shown.layers(), height: view.shown.eyeHeight(), floor: view.shown.floor,
+    };
   }
 
   async function measured() {

@@ -23,6 +23,16 @@ from .cell import (
     load_cell as load_cell,
     mounted_robot as mounted_robot,
 )
+from .certificate import (
+    ASKED as ASKED,
+    CertificateEntry as CertificateEntry,
+    Equipment as Equipment,
+    SensorIdentity as SensorIdentity,
+    TrackerIdentity as TrackerIdentity,
+    certificate_of as certificate_of,
+    read_statements as read_statements,
+    unstated as unstated,
+)
 from .collision import CollisionWatch as CollisionWatch
 from .devices import (
     ArmState as ArmState,

@@ -12,6 +12,7 @@ from pydantic import Field, field_validator
 
 from elastocal.arrays import FloatArray
 from elastocal.cell._quantities import IDENTITY, OptionalName, Pose
+from elastocal.cell.certificate import CertificateEntry
 from elastocal.cell.hardware import (
     Marker,
     MeshFile,
@@ -89,6 +90,8 @@ class CellFile(StrictModel):
     process: ProcessFile | None = None
     acceptance: Acceptance = Field(default_factory=Acceptance)
     """Tolerances that the result is judged by; neither plan nor run depends on it."""
+    certificate: CertificateEntry = Field(default_factory=CertificateEntry)
+    """Serials, certificates and names for the first page of the report."""
     procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
     devices: DeviceChoices = Field(default_factory=DeviceChoices)
     simulation: Simulation = Field(default_factory=Simulation)

@@ -10,7 +10,7 @@ from elastocal.cell.cell import Cell
 from elastocal.files import read_bytes
 from elastocal.robot import is_relative
 
-RUN_SECTIONS = ("acceptance", "procedure", "devices", "simulation", "faults")
+RUN_SECTIONS = ("acceptance", "certificate", "procedure", "devices", "simulation", "faults")
 """Sections of the cell file that say how a plan is carried out and its result is judged; a plan
 does not depend on them."""
 

@@ -15,6 +15,7 @@ from .options import (
     Payload as Payload,
     PayloadCentre as PayloadCentre,
     RobotName as RobotName,
+    State as State,
     TcpLink as TcpLink,
     ToolCentre as ToolCentre,
     ToolFrame as ToolFrame,

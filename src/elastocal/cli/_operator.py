@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
@@ -21,7 +21,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from elastocal.errors import ProcedureError
+from elastocal.cell import read_statements
+from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure import Progress
 from elastocal.workflows import LiveReport, Supervision
 
@@ -217,10 +218,12 @@ class TerminalOperator:
     ----------
     console : Console
         Where the person looks.
+    asks : bool
+        Whether the person is asked for what the certificate lacks, where there is a terminal.
     """
 
-    def __init__(self, console: Console) -> None:
-        self._console = console
+    def __init__(self, console: Console, asks: bool = False) -> None:
+        self._console, self._asks = console, asks
 
     def warn(self, lines: Sequence[str]) -> None:
         """Print what should be known before anything moves."""
@@ -240,6 +243,26 @@ class TerminalOperator:
         question = "Has somebody looked at the cell, and may the arm move?"
         if not typer.confirm(question, err=True):
             raise ProcedureError("not confirmed: nothing was moved")
+
+    def identify(self, missing: Sequence[str]) -> Mapping[str, str]:
+        """Ask for what the certificate still lacks; an answer that is none is asked for again."""
+        found: dict[str, str] = {}
+        if not (missing and self._asks and sys.stdin.isatty()):
+            return found
+        self._console.print("For the certificate. Enter leaves one out, Ctrl-D all that follow.")
+        waiting = list(missing)
+        while waiting:
+            self._console.print(f"  {waiting[0].replace('.', ', ')}: ", end="")
+            line = sys.stdin.readline()
+            if not line:
+                break
+            try:
+                found |= read_statements((f"{waiting[0]}={line}",)) if line.strip() else {}
+            except SchemaError as error:
+                self._console.print(str(error), soft_wrap=True)
+                continue
+            waiting.pop(0)
+        return found
 
     @contextmanager
     def supervise(self, poses: int) -> Iterator[Supervision]:

@@ -129,6 +129,13 @@ CompensatorFile = Annotated[Path | None, typer.Option(help="Settings of the comp
 Force = Annotated[
     bool, typer.Option("--force", help="Replace a file that this command did not write.")
 ]
+State = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=VALUE",
+        help="For the certificate, e.g. sensor.serial=FT-7; may be repeated.",
+    ),
+]
 Figures = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON object.")]
 KeyFigures = Annotated[
     bool, typer.Option("--json", help="Print the key figures as one JSON object.")

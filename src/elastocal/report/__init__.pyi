@@ -1,3 +1,9 @@
+from .language import (
+    ENGLISH as ENGLISH,
+    LANGUAGES as LANGUAGES,
+    Language as Language,
+    language_of as language_of,
+)
 from .pages import write_codec_figures as write_codec_figures, write_plan_page as write_plan_page
 from .plots import (
     Curve as Curve,

@@ -61,3 +61,9 @@ from .signing import (
     sign as sign,
     write_signature as write_signature,
 )
+from .uncertainty import (
+    COVERAGE_FACTOR as COVERAGE_FACTOR,
+    UncertaintySource as UncertaintySource,
+    UncertaintyStatement as UncertaintyStatement,
+    state_uncertainty as state_uncertainty,
+)

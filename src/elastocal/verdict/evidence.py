@@ -8,12 +8,13 @@ figure; only the origins that the files state tell that it is not the run whose 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.cell import SIMULATED, Cell, fingerprint
+from elastocal.cell import SIMULATED, Cell, CertificateEntry, certificate_of, fingerprint
 from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
@@ -147,6 +148,8 @@ class Evidence:
     missing: tuple[MissingPart, ...] = ()
     chain: "tuple[Link, ...]" = ()
     """Every part held against what it was made from."""
+    stated: Mapping[str, str] = field(default_factory=dict)
+    """What was stated for the certificate when the report was made."""
     doubts: tuple[str, ...] = ()
     """Contradictions between parts that are sound by themselves, broken links among them."""
 
@@ -162,15 +165,20 @@ class Evidence:
     @property
     def simulated(self) -> bool:
         """Whether the devices of the cell are simulated ones."""
-        if self.cell is None:
-            return False
-        choices = self.cell.file.devices.by_kind.values()
+        choices = () if self.cell is None else self.cell.file.devices.by_kind.values()
         return any(choice.driver == SIMULATED for choice in choices)
 
     @property
     def run_record(self) -> RunRecord | None:
         """The begin of the run, by its journal."""
         return self.journal[0].run if self.journal else None
+
+    @property
+    def certificate(self) -> CertificateEntry:
+        """What is stated of the calibration: by the cell file, at the run, for the report."""
+        entry = CertificateEntry() if self.cell is None else self.cell.file.certificate
+        at_run = {} if self.run_record is None else self.run_record.stated
+        return certificate_of(entry, at_run, self.stated)
 
     @property
     def figures(self) -> CalibrationSummary | None:
@@ -182,15 +190,14 @@ class Evidence:
         """Errors at unseen poses; none where the reproduction is not the model file's."""
         return self.reproduction.unseen if self.reproduction and self.reproduction.same else None
 
-    @property
+    @cached_property
     def coverage(self) -> ProductionCoverage | None:
         """How much of the cell's production the calibration covers; none where not known."""
         process = None if self.cell is None else self.cell.process
         if process is None or self.calibrated is None:
             return None
-        return self.calibrated.model.coverage(
-            process.joint_position, process.force, process.moment, process.course
-        )
+        rows = process.joint_position, process.force, process.moment, process.course
+        return self.calibrated.model.coverage(*rows)
 
     @property
     def doubt_on_production(self) -> PredictionDoubt | None:
@@ -217,11 +224,8 @@ class Evidence:
         alike = [pair for pair in found if self._is_like(pair[0])]
         search = None if self.plan is None else self.plan.search.name
         same = [pair for pair in alike if search in (None, pair[0].search)]
-        return min(
-            (saturation for _, saturation in same or alike or found),
-            key=lambda each: each.last_error,
-            default=None,
-        )
+        candidates = [each for _, each in same or alike or found]
+        return min(candidates, key=lambda each: each.last_error, default=None)
 
     @property
     def has_codec_alike(self) -> bool:
@@ -231,11 +235,10 @@ class Evidence:
     def _is_like(self, variant: Variant) -> bool:
         """Return whether a variant has the springs and loads of the calibration."""
         settings = self.figures.settings if self.figures else None
+        ladder = self.figures.ladder if self.figures else ()
         asked = settings.springs if settings else "bearing"
-        taken = (
-            [rung.springs for rung in self.figures.ladder if rung.chosen] if self.figures else []
-        )
-        return variant.load_cases == ALL_LOADS and variant.springs in (asked, *taken)
+        taken = {asked, *(rung.springs for rung in ladder if rung.chosen)}
+        return variant.load_cases == ALL_LOADS and variant.springs in taken
 
 
 _SAME_PLACE = 20e-3

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from elastocal.codec import Saturation
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.procedure import commits
 from elastocal.results import counted_alike
 from elastocal.verdict.chain import LinkState
 from elastocal.verdict.evidence import Evidence
-from elastocal.wording import counted, mm, spans
+from elastocal.wording import Phrase, counted, mm, phrase, sentences, spans
 
 _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
               "calibrated model", "calibration made again", "process")  # fmt: skip
@@ -45,12 +46,15 @@ def reading_findings(evidence: Evidence) -> Iterator[Finding]:
     excluded = figures.settings.exclude if figures.settings else ()
     if excluded:
         yield Finding(
-            f"{', '.join(map(str, excluded))} (pose, or pose:load case) was left out by hand: no"
-            " figure of this report speaks of it",
-            advice="Measure again what was left out, so that nothing has to be.",
+            phrase(
+                "{names} (pose, or pose:load case) was left out by hand: no figure of this report"
+                " speaks of it",
+                names=", ".join(map(str, excluded)),
+            ),
+            advice=phrase("Measure again what was left out, so that nothing has to be."),
         )
     for warning in counted_alike(figures.warnings):
-        yield Finding(f"calibration: {warning}")
+        yield Finding(phrase("calibration: {warning}", warning=warning))
     yield from _outside(evidence)
 
 
@@ -64,8 +68,10 @@ def _outside(evidence: Evidence) -> Iterator[Finding]:
         holds_back=not covered.is_enough,
         advice=""
         if covered.is_enough
-        else "Plan the calibration where production runs, and under its forces: name its path in"
-        " process.file of the cell file.",
+        else phrase(
+            "Plan the calibration where production runs, and under its forces: name its path in"
+            " process.file of the cell file."
+        ),
     )
 
     doubt = evidence.doubt_on_production
@@ -78,11 +84,20 @@ def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
     usable = evidence.dataset.readings(evidence.dataset.joint_names).pose
     missing = sorted({pose.id for pose in evidence.plan.poses} - set(map(int, usable)))
     if missing:
+        planned = counted(len(evidence.plan.poses), "planned pose")
         yield Finding(
-            f"the run is partial: {len(missing)} of"
-            f" {counted(len(evidence.plan.poses), 'planned pose')}"
-            f" {'has' if len(missing) == 1 else 'have'} no usable reading"
-            f" (pose {spans(missing)})",
+            phrase(
+                "the run is partial: 1 of {planned} has no usable reading (pose {poses})",
+                planned=planned,
+                poses=spans(missing),
+            )
+            if len(missing) == 1
+            else phrase(
+                "the run is partial: {missing} of {planned} have no usable reading (pose {poses})",
+                missing=len(missing),
+                planned=planned,
+                poses=spans(missing),
+            ),
             advice=_advice_on_missing(evidence, missing),
         )
 
@@ -109,17 +124,30 @@ def _advice_on_missing(evidence: Evidence, missing: list[int]) -> str:
 
 
 def _suspicious(each: SuspiciousReading) -> Finding:
-    name = f"pose {each.pose} {each.load_case}"
+    name = phrase("pose {pose} {load_case}", pose=each.pose, load_case=each.load_case)
     if each.set_aside:
         return Finding(
-            f"reading {name} was set aside as a blunder ({mm(each.residual)} off)",
+            phrase(
+                "reading {name} was set aside as a blunder ({error} off)",
+                name=name,
+                error=mm(each.residual),
+            ),
             holds_back=False,
-            advice=f"Measure {name} again: its reading cannot be a measurement of this arm.",
+            advice=phrase(
+                "Measure {name} again: its reading cannot be a measurement of this arm.", name=name
+            ),
         )
     return Finding(
-        f"reading {name} looks wrong and was kept in the fit ({mm(each.residual)} off)",
-        advice=f"Look at {name}, and leave it out with `--exclude"
-        f" {each.pose}:{each.load_case}` if it is wrong.",
+        phrase(
+            "reading {name} looks wrong and was kept in the fit ({error} off)",
+            name=name,
+            error=mm(each.residual),
+        ),
+        advice=phrase(
+            "Look at {name}, and leave it out with `--exclude {key}` if it is wrong.",
+            name=name,
+            key=f"{each.pose}:{each.load_case}",
+        ),
     )
 
 
@@ -129,12 +157,12 @@ def instrument_findings(evidence: Evidence) -> Iterator[Finding]:
         return
     for warning in counted_alike(evidence.summary.warnings):
         moved = "moved between" in warning
-        advice = (
+        advice = phrase(
             "Fix the tracker's stand before the next run: a station that moves splits its poses."
         )
-        yield Finding(f"run: {warning}", advice=advice if moved else "")
+        yield Finding(phrase("run: {warning}", warning=warning), advice=advice if moved else "")
     for pose in evidence.summary.attempts.given_up:
-        yield Finding(f"run: pose {pose} was given up after its attempts failed")
+        yield Finding(phrase("run: pose {pose} was given up after its attempts failed", pose=pose))
 
 
 def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -145,15 +173,22 @@ def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
     worse = [rung for rung in ladder if rung.chosen and rung.difference.low > 0.0]
     if worse:
         yield Finding(
-            f"other springs predict left-out poses better than {worse[0].springs}",
-            advice="Calibrate with `--springs auto`: it takes the model that the readings carry.",
+            phrase(
+                "other springs predict left-out poses better than {springs}",
+                springs=worse[0].springs,
+            ),
+            advice=phrase(
+                "Calibrate with `--springs auto`: it takes the model that the readings carry."
+            ),
         )
     springs = evidence.calibrated.model.model.springs
     if not any("." in each.name and not each.name.endswith(".axial") for each in springs):
         yield Finding(
-            "the model has one axial spring a joint and no bearing springs",
+            phrase("the model has one axial spring a joint and no bearing springs"),
             holds_back=False,
-            advice="Calibrate with `--springs bearing` (18 springs on a 6-axis arm) and compare.",
+            advice=phrase(
+                "Calibrate with `--springs bearing` (18 springs on a 6-axis arm) and compare."
+            ),
         )
 
 
@@ -162,42 +197,69 @@ def codec_findings(evidence: Evidence) -> Iterator[Finding]:
     best = evidence.saturation
     if not evidence.codecs:
         yield Finding(
-            "whether there were enough poses was not verified (no codec)",
-            advice="Make a codec with `elastocal codec`: it tells whether more poses would help.",
+            phrase("whether there were enough poses was not verified (no codec)"),
+            advice=phrase(
+                "Make a codec with `elastocal codec`: it tells whether more poses would help."
+            ),
         )
     if best is None:
         return
+    yield from _codec_of_others(evidence)
+    yield _saturation(best)
+
+
+def _codec_of_others(evidence: Evidence) -> Iterator[Finding]:
     if evidence.figures is not None and not evidence.has_codec_alike:
         # Or to delete the codec that counts would leave the word to one that does not.
         yield Finding(
-            "no codec has the springs and the loads of the calibration: whether there were enough"
-            " poses was not verified for it",
-            advice="Make a codec with the calibration's springs: `elastocal codec --compare"
-            " springs=…`.",
+            phrase(
+                "no codec has the springs and the loads of the calibration: whether there were"
+                " enough poses was not verified for it"
+            ),
+            advice=phrase(
+                "Make a codec with the calibration's springs: `elastocal codec --compare"
+                " springs=…`."
+            ),
         )
+
+
+def _saturation(best: Saturation) -> Finding:
+    """Return whether the error had stopped to fall."""
     last = counted(best.last, "training pose")
     if not best.explains:
-        yield Finding(
-            f"the codec has not saturated: with {last} its springs leave more than half of the"
-            " deflection",
-            advice="Calibrate with other springs, or look at the readings: more poses do not help.",
+        return Finding(
+            phrase(
+                "the codec has not saturated: with {last} its springs leave more than half of the"
+                " deflection",
+                last=last,
+            ),
+            advice=phrase(
+                "Calibrate with other springs, or look at the readings: more poses do not help."
+            ),
         )
-    elif best.n_train == best.last:
-        yield Finding(
-            f"the codec has not saturated: the error still falls at {last}",
-            advice="Measure more poses: the error still falls with every one.",
+    if best.n_train == best.last:
+        return Finding(
+            phrase("the codec has not saturated: the error still falls at {last}", last=last),
+            advice=phrase("Measure more poses: the error still falls with every one."),
         )
-    elif not best.settled:
-        yield Finding(
-            f"the codec does not show that the error has saturated: its interval reaches {last}",
-            advice="Measure some more poses to see that the error no longer falls.",
+    if not best.settled:
+        return Finding(
+            phrase(
+                "the codec does not show that the error has saturated: its interval reaches {last}",
+                last=last,
+            ),
+            advice=phrase("Measure some more poses to see that the error no longer falls."),
         )
-    else:
-        yield Finding(
-            f"the error no longer fell from {counted(best.n_train, 'training pose')} on (95 %"
-            f" interval {best.low} to {best.high}), so there were enough poses",
-            holds_back=False,
-        )
+    return Finding(
+        phrase(
+            "the error no longer fell from {poses} on (95 % interval {low} to {high}), so there"
+            " were enough poses",
+            poses=counted(best.n_train, "training pose"),
+            low=best.low,
+            high=best.high,
+        ),
+        holds_back=False,
+    )
 
 
 def process_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -205,12 +267,17 @@ def process_findings(evidence: Evidence) -> Iterator[Finding]:
     if evidence.process is None:
         return
     line, tolerance = evidence.process.table.lines[-1], evidence.limits.tolerance
-    text = (
-        f"on the simulated process path the mean deviation fell by {line.reduction.mean:.1%}, from"
-        f" {mm(line.before.mean)} to {mm(line.after.mean)}; largest left {mm(line.after.max)}"
+    text = phrase(
+        "on the simulated process path the mean deviation fell by {share}, from {before} to"
+        " {after}; largest left {most}",
+        share=f"{line.reduction.mean:.1%}",
+        before=mm(line.before.mean),
+        after=mm(line.after.mean),
+        most=mm(line.after.max),
     )
     if tolerance is not None and not line.after.max <= tolerance:
-        yield Finding(f"{text}, beyond the tolerance of {mm(tolerance)}")
+        beyond = phrase("beyond the tolerance of {tolerance}", tolerance=mm(tolerance))
+        yield Finding(sentences([text, beyond], ", "))
     else:
         yield Finding(text, holds_back=False)
 
@@ -221,15 +288,21 @@ def recertification_findings(evidence: Evidence) -> Iterator[Finding]:
     if found is None:
         return
     if found.verdict is Recertified.PASS:
-        yield Finding(f"against the earlier calibration: {found.reason}", holds_back=False)
+        yield Finding(_against_earlier(found.reason), holds_back=False)
     elif found.verdict is not None:
-        yield Finding(f"against the earlier calibration: {found.reason}")
+        yield Finding(_against_earlier(found.reason))
     elif found.moved:
         yield Finding(
-            f"{counted(len(found.moved), 'spring')} moved since the earlier calibration, and no"
-            " limit was given",
+            phrase(
+                "{springs} moved since the earlier calibration, and no limit was given",
+                springs=counted(len(found.moved), "spring"),
+            ),
             holds_back=False,
         )
+
+
+def _against_earlier(reason: str) -> Phrase:
+    return phrase("against the earlier calibration: {reason}", reason=reason)
 
 
 def missing_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -237,23 +310,34 @@ def missing_findings(evidence: Evidence) -> Iterator[Finding]:
     for each in evidence.missing:
         if each.name in _TOLD_ELSEWHERE and not each.damaged:
             continue
-        word = "cannot be used" if each.damaged else "is missing"
         advice = ""
         if each.name == "tool file" and not each.damaged:
-            advice = (
+            advice = phrase(
                 "Run `elastocal tool`: without it the compensation relies on the cell file's tool."
             )
         holds_back = each.damaged or each.name in _ESSENTIAL
-        yield Finding(f"the {each.name} {word}: {each.reason}", holds_back, advice)
+        text = phrase(
+            "the {name} cannot be used: {reason}"
+            if each.damaged
+            else "the {name} is missing: {reason}",
+            name=each.name,
+            reason=each.reason,
+        )
+        yield Finding(text, holds_back, advice)
     for doubt in evidence.doubts:
         yield Finding(doubt)
     unstated = [link.name for link in evidence.chain if link.state is LinkState.UNSTATED]
     if unstated:
         yield Finding(
-            f"not verifiable by hashes: {', '.join(dict.fromkeys(unstated))} (see Provenance)",
+            phrase(
+                "not verifiable by hashes: {names} (see Provenance)",
+                names=", ".join(dict.fromkeys(unstated)),
+            ),
             holds_back=False,
-            advice="Derive, calibrate and make the codec again: today's files state what they were"
-            " made from.",
+            advice=phrase(
+                "Derive, calibrate and make the codec again: today's files state what they were"
+                " made from."
+            ),
         )
 
 

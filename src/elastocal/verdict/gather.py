@@ -5,8 +5,8 @@ name and cannot be used is left out, and the report says why. Parts that belong 
 or another cell count as unusable.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -40,6 +40,7 @@ from elastocal.procedure import (
     read_summary,
 )
 from elastocal.records import read_json
+from elastocal.results import brief_repr
 from elastocal.verdict._files import (
     CODEC,
     MODEL,
@@ -62,8 +63,10 @@ from elastocal.verdict.evidence import (
     check_tool,
     find_doubts,
 )
+from elastocal.wording import phrase
 
 
+@brief_repr
 @dataclass(frozen=True)
 class EvidenceOptions:
     """Files and limits that a person names."""
@@ -81,6 +84,8 @@ class EvidenceOptions:
     """In m; likewise."""
     signer: str | None = None
     """Public key that must have signed the run, 64 hexadecimal digits."""
+    stated: Mapping[str, str] = field(default_factory=dict)
+    """For the certificate, beside what cell file and run state."""
 
 
 def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
@@ -99,7 +104,7 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
         If there is nothing to report on, or a part that is named cannot be used.
     """
     reader = PartReader(find_folders(options.run))
-    evidence = _with_run(Evidence(made=made), reader)
+    evidence = _with_run(Evidence(made=made, stated=options.stated), reader)
     evidence = _with_model(evidence, reader, options)
     evidence = replace(evidence, limits=_limits(evidence.cell, options))
     evidence = _with_rest(evidence, reader, options)
@@ -279,7 +284,7 @@ def _limits(cell: Cell | None, options: EvidenceOptions) -> AcceptanceLimits:
     stated = cell.file.acceptance if cell is not None else None
     drift = options.drift or (stated.drift if stated else None)
     if options.tolerance is not None:
-        return AcceptanceLimits(options.tolerance, drift, "given with --tolerance")
+        return AcceptanceLimits(options.tolerance, drift, phrase("given with --tolerance"))
     if stated is not None and stated.tolerance is not None:
-        return AcceptanceLimits(stated.tolerance, drift, "of the cell file")
+        return AcceptanceLimits(stated.tolerance, drift, phrase("of the cell file"))
     return AcceptanceLimits(None, drift)

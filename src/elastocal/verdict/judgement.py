@@ -14,7 +14,7 @@ from elastocal.identification import MOST_UNEXPLAINED, UnseenErrors
 from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything
-from elastocal.wording import counted, mm, um
+from elastocal.wording import Phrase, counted, mm, phrase, sentences, um
 
 _LOUD = 0.3
 """Part of the mean error from which on the noise of a reading is worth less of it."""
@@ -71,11 +71,16 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     left = evidence.figures.unexplained if evidence.figures is not None else 0.0
     useless = left > MOST_UNEXPLAINED
     if useless:
-        own = [f"the model leaves {left:.0%} of the deflection unexplained at left-out poses", *own]
+        left_over = phrase(
+            "the model leaves {share} of the deflection unexplained at left-out poses",
+            share=f"{left:.0%}",
+        )
+        own = [left_over, *own]
         light = Light.RED
     if evidence.calibrated is None:
-        light, own = None, ["there is no calibrated model, so there is no accuracy to judge"]
-    word = "Not fit for use" if useless and light else _word(light, bool(own))
+        light = None
+        own = [phrase("there is no calibrated model, so there is no accuracy to judge")]
+    word = phrase("Not fit for use") if useless and light else _word(light, bool(own))
     sentence = _sentence(evidence, unseen, light, useless)
     return Verdict(light, word, sentence, (*own, *held), tuple(notes), tuple(all_advice))
 
@@ -83,9 +88,12 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
 def _word(light: Light | None, by_the_errors: bool) -> str:
     """Return the word that says what the colour says."""
     if light is Light.YELLOW:
-        return "Not proved" if by_the_errors else "Within, with open points"
-    words = {Light.GREEN: "Within the tolerance", Light.RED: "Beyond the tolerance"}
-    return words[light] if light is not None else "Not judged"
+        return phrase("Not proved") if by_the_errors else phrase("Within, with open points")
+    words = {
+        Light.GREEN: phrase("Within the tolerance"),
+        Light.RED: phrase("Beyond the tolerance"),
+    }
+    return words[light] if light is not None else phrase("Not judged")
 
 
 def _light(
@@ -95,70 +103,105 @@ def _light(
     if tolerance is None:
         return None, []
     if unseen is None:
-        own = ["the errors at unseen poses have no interval"]
+        own: list[str] = [phrase("the errors at unseen poses have no interval")]
         stated = evidence.figures.held_out.max if evidence.figures is not None else 0.0
         if stated <= tolerance:
             return Light.YELLOW, own
         # To take the dataset away must not lift a red light.
-        return Light.RED, [f"the model file states errors of up to {mm(stated)}", *own]
+        return Light.RED, [
+            phrase("the model file states errors of up to {error}", error=mm(stated)),
+            *own,
+        ]
     own = list(_against(unseen, tolerance))
     if not unseen.p95.low <= tolerance:
         return Light.RED, own
     return (Light.YELLOW if own or held else Light.GREEN), own
 
 
-def _against(unseen: UnseenErrors, tolerance: float) -> Iterator[str]:
+def _against(unseen: UnseenErrors, tolerance: float) -> Iterator[Phrase]:
     p95 = unseen.p95
-    span = f"{mm(p95.low)} to {mm(p95.high)}"
+    span = phrase("{low} to {high}", low=mm(p95.low), high=mm(p95.high))
     if not p95.low <= tolerance:
-        yield f"the whole interval of the 95 % error ({span}) is beyond {mm(tolerance)}"
+        yield phrase(
+            "the whole interval of the 95 % error ({span}) is beyond {tolerance}",
+            span=span,
+            tolerance=mm(tolerance),
+        )
     elif not p95.high <= tolerance:
-        yield f"the interval of the 95 % error ({span}) reaches beyond {mm(tolerance)}"
+        yield phrase(
+            "the interval of the 95 % error ({span}) reaches beyond {tolerance}",
+            span=span,
+            tolerance=mm(tolerance),
+        )
     beyond = unseen.beyond(tolerance)
     if beyond:
+        readings, most = counted(len(unseen.error), "reading"), mm(unseen.max)
         yield (
-            f"{beyond} of {counted(len(unseen.error), 'reading')} at unseen poses"
-            f" {'is' if beyond == 1 else 'are'} beyond {mm(tolerance)}, the largest with"
-            f" {mm(unseen.max)}"
+            phrase(
+                "1 of {readings} at unseen poses is beyond {tolerance}, the largest with {most}",
+                readings=readings,
+                tolerance=mm(tolerance),
+                most=most,
+            )
+            if beyond == 1
+            else phrase(
+                "{beyond} of {readings} at unseen poses are beyond {tolerance}, the largest with"
+                " {most}",
+                beyond=beyond,
+                readings=readings,
+                tolerance=mm(tolerance),
+                most=most,
+            )
         )
 
 
 def _sentence(
     evidence: Evidence, unseen: UnseenErrors | None, light: Light | None, useless: bool
-) -> str:
+) -> Phrase:
     tolerance = evidence.limits.tolerance
     against = (
-        "No tolerance was given, so this report does not say whether that is enough."
+        phrase("No tolerance was given, so this report does not say whether that is enough.")
         if tolerance is None
-        else f"The tolerance is {mm(tolerance)} ({evidence.limits.source})."
+        else phrase(
+            "The tolerance is {tolerance} ({source}).",
+            tolerance=mm(tolerance),
+            source=evidence.limits.source,
+        )
     )
     if evidence.calibrated is None:
-        return "No calibrated model was found."
+        return phrase("No calibrated model was found.")
     if unseen is None:
-        return f"{_stated(evidence)} {against}"
-    accuracy = (
-        f"At poses that the fit had not seen, the model predicted the deflection to"
-        f" {mm(unseen.mean.value)} on average; 95 % of {counted(len(unseen.error), 'reading')} at"
-        f" {counted(unseen.poses, 'pose')} were within {mm(unseen.p95.value)}, all within"
-        f" {mm(unseen.max)}."
+        return sentences([_stated(evidence), against])
+    accuracy = phrase(
+        "At poses that the fit had not seen, the model predicted the deflection to {mean} on"
+        " average; 95 % of {readings} at {poses} were within {p95}, all within {max}.",
+        mean=mm(unseen.mean.value),
+        readings=counted(len(unseen.error), "reading"),
+        poses=counted(unseen.poses, "pose"),
+        p95=mm(unseen.p95.value),
+        max=mm(unseen.max),
     )
     closing = {
-        Light.GREEN: "The errors are within it, and nothing essential is missing.",
-        Light.YELLOW: "Not everything that a green light needs is there; the reasons follow.",
-        Light.RED: "The errors are beyond it.",
+        Light.GREEN: phrase("The errors are within it, and nothing essential is missing."),
+        Light.YELLOW: phrase(
+            "Not everything that a green light needs is there; the reasons follow."
+        ),
+        Light.RED: phrase("The errors are beyond it."),
     }
     if useless:
-        closing[Light.RED] = "The model explains less than half of what it should predict."
-    return " ".join([accuracy, against, *([closing[light]] if light else [])])
+        closing[Light.RED] = phrase("The model explains less than half of what it should predict.")
+    return sentences([accuracy, against, *([closing[light]] if light else [])])
 
 
-def _stated(evidence: Evidence) -> str:
+def _stated(evidence: Evidence) -> Phrase:
     held_out = evidence.figures.held_out if evidence.figures else None
     if held_out is None:
-        return "The model file tells no error at unseen poses."
-    return (
-        f"The model file states {mm(held_out.mean)} on average and {mm(held_out.max)}"
-        f" at most at poses left out of the fit; this could not be made again here."
+        return phrase("The model file tells no error at unseen poses.")
+    return phrase(
+        "The model file states {mean} on average and {max} at most at poses left out of the fit;"
+        " this could not be made again here.",
+        mean=mm(held_out.mean),
+        max=mm(held_out.max),
     )
 
 
@@ -189,26 +232,39 @@ def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
     noise = scatter if sigma is None else sigma
     if noise is None:
         return
-    compared = f"its readings scatter by {um(noise)}, the errors are {um(unseen.mean.value)}"
-    if noise > _LOUD * unseen.mean.value:
-        yield f"Average longer or bring the tracker nearer: {compared} on average."
-        return
-    stops = ""
-    if sigma is not None and scatter is not None and scatter > sigma:
-        stops = f" Where the arm stops scatters by {um(scatter)} in a coordinate."
-    yield (
-        f"A quieter tracker would not help much: {compared} on average.{stops} Most of the error is"
-        " what springs cannot express, such as play, friction in the gears and links that bend."
+    compared = phrase(
+        "its readings scatter by {noise}, the errors are {error} on average.",
+        noise=um(noise),
+        error=um(unseen.mean.value),
     )
+    if noise > _LOUD * unseen.mean.value:
+        nearer = phrase("Average longer or bring the tracker nearer:")
+        yield sentences([nearer, compared])
+        return
+    said = [phrase("A quieter tracker would not help much:"), compared]
+    if sigma is not None and scatter is not None and scatter > sigma:
+        said.append(
+            phrase(
+                "Where the arm stops scatters by {scatter} in a coordinate.", scatter=um(scatter)
+            )
+        )
+    rest = phrase(
+        "Most of the error is what springs cannot express, such as play, friction in the gears and"
+        " links that bend."
+    )
+    yield sentences([*said, rest])
 
 
 def _largest(unseen: UnseenErrors) -> Iterator[str]:
     """Name the pose at which the model errs most when it stands out."""
     k = int(unseen.error.argmax())
     if unseen.max > 2.0 * unseen.mean.value:
-        yield (
-            f"Look at pose {unseen.pose[k]} {unseen.load_case[k]} first, contact, stand and line of"
-            f" sight: it has the largest error, {mm(unseen.max)}."
+        yield phrase(
+            "Look at pose {pose} {load_case} first, contact, stand and line of sight: it has the"
+            " largest error, {error}.",
+            pose=unseen.pose[k],
+            load_case=unseen.load_case[k],
+            error=mm(unseen.max),
         )
 
 
@@ -219,8 +275,9 @@ def _spare_poses(evidence: Evidence) -> Iterator[str]:
         return
     measured = len(evidence.codecs[0].data.contact)
     if best.settled and best.high is not None and best.high < measured:
-        yield (
-            f"{counted(best.high, 'pose')} would have done here in place of {measured}: the error"
-            " no longer falls from there on. A next robot of this kind may do with about as many;"
-            " its own codec tells."
+        yield phrase(
+            "{poses} would have done here in place of {measured}: the error no longer falls from"
+            " there on. A next robot of this kind may do with about as many; its own codec tells.",
+            poses=counted(best.high, "pose"),
+            measured=measured,
         )

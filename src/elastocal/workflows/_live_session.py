@@ -51,6 +51,8 @@ _SLACK = 2.0
 """Beyond the time that a fade takes, in s, after which a controller that is silent is left."""
 _PRIORITY = 40
 """Of the loop's thread under SCHED_FIFO: below the kernel's own at 50."""
+_LISTENING = 30
+"""Of the threads that hear the sensor."""
 _SWITCH = 1e-4
 """Time after which another thread of Python lets the loop's pass, in s; 5 ms by default."""
 _LOADED = 20.0
@@ -150,14 +152,31 @@ def quiet_interpreter() -> Iterator[None]:
             gc.enable()
 
 
-def ask_priority() -> str:
+def ask_priority(priority: int = _PRIORITY) -> str:
     """Ask that this thread goes before others; return how it is scheduled now, in words."""
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except (AttributeError, OSError) as error:
         reason = getattr(error, "strerror", None) or "not on this system"
         return f"like any program (SCHED_FIFO: {reason})"
-    return f"SCHED_FIFO {_PRIORITY}"
+    return f"SCHED_FIFO {priority}"
+
+
+@contextlib.contextmanager
+def threads_first() -> Iterator[None]:
+    """Let the threads that are made meanwhile go before others: those that hear the sensor.
+
+    A thread has the scheduling of the one that made it; this one has its own again afterwards.
+    """
+    known = hasattr(os, "sched_getscheduler")
+    before = (os.sched_getscheduler(0), os.sched_getparam(0)) if known else None
+    ask_priority(_LISTENING)
+    try:
+        yield
+    finally:
+        if before is not None:
+            with contextlib.suppress(OSError):
+                os.sched_setscheduler(0, *before)
 
 
 class LiveSession:
@@ -199,7 +218,8 @@ class LiveSession:
         clock = WallClock(rate=ready.cell.file.devices.clock_rate)
         context = RigContext(clock, 0, 0.0, None)
         with contextlib.ExitStack() as opened:
-            sensor = ready.rig.connect_sensor(context)
+            with threads_first():
+                sensor = ready.rig.connect_sensor(context)
             opened.callback(sensor.close)
             if log is not None:
                 self._log = LiveLog(log, ready.cell.robot.joint_names, self._facts(started))

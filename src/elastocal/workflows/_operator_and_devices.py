@@ -55,6 +55,9 @@ class Operator(Protocol):
     def confirm(self) -> None:
         """Agree that the cell is clear, or raise `ProcedureError`."""
 
+    def identify(self, missing: Sequence[str]) -> Mapping[str, str]:
+        """State what the certificate still lacks, by key; what is not known is left out."""
+
     def supervise(self, poses: int) -> AbstractContextManager[Supervision]:
         """Watch while the arm moves to this number of poses."""
 
@@ -74,6 +77,10 @@ class Unattended:
             Always.
         """
         raise ProcedureError("a person must confirm that the cell is clear: give --yes")
+
+    def identify(self, missing: Sequence[str]) -> Mapping[str, str]:  # noqa: ARG002 - likewise
+        """State nothing."""
+        return {}
 
     @contextmanager
     def supervise(self, poses: int) -> Iterator[Supervision]:  # noqa: ARG002 - the protocol's form

@@ -1,6 +1,7 @@
 """``report``: the document that stays when the engineer has left."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 from os import PathLike
@@ -10,19 +11,30 @@ from elastocal.errors import FileAccessError
 from elastocal.identification.recertification import Estimate
 from elastocal.progress import Progress
 from elastocal.records import record
-from elastocal.report.document import find_browser, write_pdf, write_report
+from elastocal.report import language_of
+from elastocal.report.document import (
+    WrittenReport,
+    find_browser,
+    require_excel,
+    write_pdf,
+    write_report,
+    write_tables,
+)
 from elastocal.results import Result, brief_repr
 from elastocal.verdict import (
     OF_REPORT,
+    Evidence,
     EvidenceOptions,
     Verdict,
     gather_evidence,
+    public_key,
     read_private_key,
     sign,
 )
 from elastocal.workflows._workflow import workflow
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ReportSettings:
     """What to report on, and where to."""
@@ -51,6 +63,13 @@ class ReportSettings:
     """Replace a report that is there."""
     sign: Path | None = None
     """Private key that signs the report; see `elastocal.verdict.make_key`."""
+    language: str = "en"
+    """Language of the report, see `elastocal.report.LANGUAGES`."""
+    xlsx: bool = False
+    """Also write its tables beside it, as a workbook."""
+    state: Mapping[str, str] = field(default_factory=dict)
+    """For the certificate, beside what cell file and run state; see
+    `elastocal.cell.read_statements`."""
 
 
 @brief_repr
@@ -72,6 +91,7 @@ class ReportFigures:
 
     report: str
     pdf: str | None
+    xlsx: str | None
     light: str | None
     """None where nothing can be judged."""
     verdict: str
@@ -107,7 +127,8 @@ class ReportResult(Result):
     @property
     def files(self) -> str:
         """The files that were written, as a phrase."""
-        return " and ".join(filter(None, (self.figures.report, self.figures.pdf)))
+        found = self.figures
+        return " and ".join(filter(None, (found.report, found.pdf, found.xlsx)))
 
 
 @workflow(ReportSettings)
@@ -130,7 +151,11 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     """
     out = Path(settings.out)
     paper = out.with_suffix(".pdf") if settings.pdf else None
-    _check_places(out, paper, settings.force)
+    tables = out.with_suffix(".xlsx") if settings.xlsx else None
+    _check_places(out, (paper, tables), settings.force)
+    language = language_of(settings.language)
+    if tables is not None:
+        require_excel()
     browser = find_browser() if settings.pdf else ""
     made = datetime.now(UTC).isoformat(timespec="seconds")
     key = None if settings.sign is None else read_private_key(settings.sign)
@@ -143,24 +168,34 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
         settings.old,
         settings.tolerance,
         settings.limit,
+        stated=settings.state,
     )
     steps = 3 if settings.pdf else 2
     progress("report", 0, steps)
     evidence = gather_evidence(options, made)
     progress("report", 1, steps)
     signed = None if key is None else partial(sign, key, OF_REPORT, made=made)
-    written = write_report(out, evidence, signed)
+    written = write_report(out, evidence, signed, language, public_key(key) if key else "")
+    if tables is not None:
+        write_tables(tables, evidence, language)
     progress("report", 2, steps)
     if paper is not None:
         write_pdf(out, paper, browser)
         progress("report", 3, steps)
+    return ReportResult(written.verdict, _figures(written, evidence, paper, tables))
+
+
+def _figures(
+    written: WrittenReport, evidence: Evidence, paper: Path | None, tables: Path | None
+) -> ReportFigures:
     verdict, again, unseen = written.verdict, evidence.reproduction, None
     if again is not None and again.same:
         left = again.unseen
         unseen = UnseenFigures(left.mean, left.p95, left.max, left.poses, len(left.error))
-    figures = ReportFigures(
+    return ReportFigures(
         report=str(written.path),
         pdf=str(paper) if paper else None,
+        xlsx=str(tables) if tables else None,
         light=verdict.light.value if verdict.light else None,
         verdict=verdict.sentence,
         reasons=tuple(verdict.reasons),
@@ -169,16 +204,15 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
         unseen=unseen,
         missing=tuple(each.name for each in evidence.missing),
     )
-    return ReportResult(verdict, figures)
 
 
-def _check_places(out: Path, paper: Path | None, force: bool) -> None:
+def _check_places(out: Path, beside: tuple[Path | None, ...], force: bool) -> None:
     """Refuse places for a report before the work, so that none is done in vain."""
     if out.suffix.lower() not in (".html", ".htm"):
         # Any other name could be that of a model.
         raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")
     if not out.parent.is_dir():
         raise FileAccessError(f"cannot write {out}: there is no folder {out.parent}")
-    for path in (out, paper):
+    for path in (out, *beside):
         if path is not None and path.exists() and not force:
             raise FileAccessError(f"{path} is there already: name another file, or give --force")

@@ -6,7 +6,7 @@ that a person must look at first moves before the operator has agreed.
 
 import contextlib
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal import procedure
-from elastocal.cell import Cell, Devices, LineCounts, load_cell
+from elastocal.cell import Cell, Devices, LineCounts, certificate_of, load_cell, unstated
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan
@@ -40,6 +40,7 @@ POSES_MEASURED = "poses measured"
 """The stage that a run reports to its progress."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class RunSettings:
     """Which cell carries out which plan, and who watches."""
@@ -59,6 +60,8 @@ class RunSettings:
     operator: Operator = field(default_factory=Unattended)
     sign: Path | None = None
     """Private key that signs the journal at the end; see `elastocal.verdict.make_key`."""
+    state: Mapping[str, str] = field(default_factory=dict)
+    """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
 
 
 @brief_repr
@@ -209,7 +212,8 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
             _confirm(job, known, devices, settings)
             session = _session(job, known, devices)
             if known is None:
-                journal.write(devices.clock.now(), Event.START, run=job.record)
+                record = _identified(job, settings.operator)
+                journal.write(devices.clock.now(), Event.START, run=record)
             else:
                 journal.write(devices.clock.now(), Event.RESUME)
             result = _carry_out(session, devices, journal, settings.operator, progress)
@@ -250,7 +254,10 @@ def _prepare(settings: RunSettings) -> _Job:
     text = read_text(folder / PLAN)
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
     copy, signer = procedure.cell_path_in_run(loaded), public_key(key) if key else None
-    stated = procedure.run_record(loaded, read, text, copy, seed, _now(), signer)
+    stated = procedure.run_record(
+        loaded, read, text, copy, seed, _now(), signer, dict(settings.state)
+    )
+    certificate_of(loaded.file.certificate, stated.stated)
     procedure.check_compatible(read, loaded)
     carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
     procedure.rehearse_derivation(loaded, read, place, stated)
@@ -265,6 +272,14 @@ def _prepare(settings: RunSettings) -> _Job:
         procedure.registration_warnings(read),
         key,
     )
+
+
+def _identified(job: _Job, operator: Operator) -> procedure.RunRecord:
+    """Return the record of a run with what the operator states for the certificate."""
+    known = certificate_of(job.cell.file.certificate, job.record.stated)
+    answers = dict(operator.identify(unstated(known)))
+    certificate_of(known, answers)
+    return job.record.model_copy(update={"stated": job.record.stated | answers})
 
 
 def _now() -> str:

@@ -1,22 +1,20 @@
-"""The report in a real browser, without a network: nothing fails, everything is seen.
+"""Report and plan page in a real browser, without a network: nothing fails, everything is seen.
 
 Screenshots go to the folder that the environment names in ``ELASTOCAL_ARTEFACTS``.
 """
 
+import base64
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from elastocal.errors import FileAccessError
-from elastocal.report.document import (
-    find_browser,
-    write_pdf,
-    write_report,
-)
-from elastocal.verdict import (
-    Evidence,
-)
+from elastocal.report import LANGUAGES, language_of, write_plan_page
+from elastocal.report.document import find_browser, open_tab, write_pdf, write_report
+from elastocal.report.pages import templating
+from elastocal.verdict import Evidence
 from support.browser import Look, look
 from support.pages import with_script
 from support.reported import MADE
@@ -40,14 +38,30 @@ def report(parts, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def seen(browser, report):
-    found = look(browser, report, LOOKS)
+def plan(parts, tmp_path_factory):
+    path = tmp_path_factory.mktemp("plan") / "plan.html"
+    return write_plan_page(path, parts.cell, parts.surface, parts.plan, parts.pool)
+
+
+@pytest.fixture(scope="module")
+def pages(browser, report, plan):
+    """What is seen of both pages, the appendix unfolded."""
+    found = {
+        "report": look(browser, report, LOOKS, before="document.getElementById('unfold').click()"),
+        "plan": look(browser, plan, LOOKS),
+    }
     artefacts = os.environ.get("ELASTOCAL_ARTEFACTS")
-    for each, picture in found.screenshots.items():
-        folder = Path(artefacts) if artefacts else report.parent
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / f"report-{each.width}-{each.scheme}.png").write_bytes(picture)
+    for name, seen in found.items():
+        for each, picture in seen.screenshots.items():
+            folder = Path(artefacts) if artefacts else report.parent
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / f"{name}-{each.width}-{each.scheme}.png").write_bytes(picture)
     return found
+
+
+@pytest.fixture(params=("report", "plan"))
+def seen(request, pages):
+    return pages[request.param]
 
 
 @pytest.fixture(params=LOOKS, ids=lambda each: f"{each.width}-{each.scheme}")
@@ -73,22 +87,24 @@ def test_the_page_does_not_scroll_sideways(frame):
 def test_the_view_in_three_dimensions_is_drawn_in_the_colours_of_the_page(frame):
     view = frame["view"]
     assert view["colours"] > 100
-    assert view["traces"] > 5
+    assert view["layers"] > 5
     assert view["width"] > 100
-    assert view["ground"] == ("#1d2023" if frame["dark"] else "#ffffff")
+    assert view["height"] > view["floor"]
+    assert view["ground"] == ([0x1D, 0x20, 0x23] if frame["dark"] else [0xF6, 0xF6, 0xF3])
 
 
-def test_every_picture_shows_something(frame):
-    assert len(frame["images"]) >= 8
-    for image in frame["images"]:
-        assert image["width"] > 300, image
-        assert image["colours"] > 20, image
-        assert len(image["alt"]) > 20
+def test_every_picture_shows_something(pages):
+    for frame in pages["report"].frames.values():
+        assert len(frame["images"]) >= 6
+        for image in frame["images"]:
+            assert image["width"] > 300, image
+            assert image["colours"] > 20, image
+            assert len(image["alt"]) > 20
 
 
 def test_every_text_stands_out_from_its_ground(frame):
     text = frame["text"]
-    assert text["count"] > 300
+    assert text["count"] > 50
     assert text["ratio"] >= LEAST_CONTRAST, text
 
 
@@ -96,6 +112,69 @@ def test_screenshots_show_more_than_one_colour_and_differ(seen):
     pictures = list(seen.screenshots.values())
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
     assert len(set(pictures)) == len(LOOKS)
+
+
+@pytest.fixture(scope="module")
+def keys(browser, report):
+    """What the keyboard does to the report, and how soon its first picture is there."""
+    with open_tab(browser) as tab:
+        tab.open(report)
+        found = {"shown": tab.evaluate(SHOWN), "drawn": tab.evaluate(DRAWN)}
+        tab.evaluate("document.querySelector('nav a[href=\"#poses\"]').focus()")
+        press(tab, "Enter")
+        found["opened"] = tab.evaluate("document.getElementById('poses').open")
+        tab.evaluate("new Promise((done) => setTimeout(done, 300))")
+        tab.evaluate("document.getElementById('view').focus()")
+        for _ in range(40):
+            press(tab, "ArrowDown")
+        found["low"] = tab.evaluate("document.getElementById('view').shown.eyeHeight()")
+        found["floor"] = tab.evaluate("document.getElementById('view').shown.floor")
+        tab.evaluate("document.getElementById('posture').focus()")
+        press(tab, "ArrowRight")
+        found["posture"] = tab.evaluate("document.getElementById('shown').textContent")
+        tab.evaluate("document.querySelector('#findings summary').focus()")
+        press(tab, "Enter")
+        found["unfolded"] = tab.evaluate("document.getElementById('findings').open")
+        found["stays"] = tab.evaluate("document.querySelector('nav').getBoundingClientRect().top")
+    return found
+
+
+DRAWN = "Boolean(document.getElementById('view').shown)"
+SHOWN = "document.querySelector('.tolerance').getBoundingClientRect().width"
+
+
+def press(tab, key):
+    codes = {"Enter": 13, "ArrowDown": 40, "ArrowRight": 39}
+    text = {"text": "\r"} if key == "Enter" else {}
+    for kind in ("keyDown", "keyUp"):
+        tab.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, **text,
+                 windowsVirtualKeyCode=codes[key])  # fmt: skip
+    if key == "Enter":
+        # What a link or a summary does, it does in a turn of its own.
+        tab.evaluate("new Promise((done) => setTimeout(done, 150))")
+
+
+def test_the_keyboard_opens_sections_by_the_contents_and_by_themselves(keys):
+    assert keys["opened"]
+    assert keys["unfolded"]
+
+
+def test_the_contents_stay_in_sight(keys):
+    assert keys["stays"] >= 0
+
+
+def test_the_camera_never_goes_below_the_floor(keys):
+    assert keys["low"] > keys["floor"]
+
+
+def test_the_keyboard_moves_the_robot_from_pose_to_pose(keys):
+    assert keys["posture"].startswith("Pose 1:")
+
+
+def test_the_first_picture_waits_for_no_view(keys):
+    """How soon it is there is measured by benchmarks/report.py."""
+    assert keys["shown"] > 300
+    assert not keys["drawn"]
 
 
 def test_the_probe_sees_what_is_wrong(browser, tmp_path):
@@ -143,9 +222,39 @@ def test_a_script_that_the_page_did_not_come_with_is_not_run(browser, tmp_path):
     assert all("Content Security Policy" in line for line in seen.complaints)
 
 
-def test_it_prints_to_pages_of_a4(browser, report, tmp_path):
+def test_it_prints_to_pages_of_a4_with_its_appendix(browser, report, tmp_path):
     data = write_pdf(report, tmp_path / "report.pdf", browser).read_bytes()
     assert data.startswith(b"%PDF-")
     assert b"/MediaBox [0 0 594.95996 841.91998]" in data
     assert 8 <= data.count(b"/Type /Page\n") <= 40
     assert {path.name for path in tmp_path.iterdir()} == {"report.pdf"}
+
+
+LONG = "a reason that is as long as reasons may be, with names of poses and of load cases, " * 5
+
+
+def test_the_certificate_alone_is_one_sheet_in_every_language_whatever_it_has_to_say(
+    browser, parts, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(templating, "themed_svg", lambda *_: b"")
+    stated = {key: " ".join([key] * 9) for key in ("operator", "robot.serial", "sensor.serial")}
+    wordy = replace(parts, stated=stated, doubts=tuple(f"{k} {LONG}" for k in range(9)))
+    sizes, sheets = {}, {}
+    with open_tab(browser) as tab:
+        tab.call("Emulation.setDeviceMetricsOverride", width=688, height=1017,
+                 deviceScaleFactor=1, mobile=False)  # fmt: skip
+        for code in LANGUAGES:
+            path = tmp_path / f"{code}.html"
+            tab.open(write_report(path, wordy, language=language_of(code)).path)
+            printed = tab.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
+            sheets[code] = base64.b64decode(printed["data"]).count(b"/Type /Page\n")
+            tab.call("Emulation.setEmulatedMedia", media="print")
+            sizes[code] = tab.evaluate(SIZES)
+            tab.call("Emulation.setEmulatedMedia", media="")
+    assert sheets == dict.fromkeys(LANGUAGES, 1)
+    for high, room in sizes.values():
+        assert high <= room + 1, "something of the certificate is cut"
+
+
+SIZES = """(({ scrollHeight, clientHeight }) => [scrollHeight, clientHeight])(
+  document.querySelector(".certificate"))"""

@@ -25,9 +25,10 @@ from elastocal.verdict import (
     reading_findings,
 )
 
-cell, poses, readings, instruments, compliances, codecs, process, _, provenance, not_verified = (
-    SECTIONS
-)
+(
+    in_full, uncertainty, cell, poses, readings, instruments, compliances, codecs, process, _,
+    provenance, not_verified,
+) = SECTIONS  # fmt: skip
 
 
 def words(section, parts):
@@ -81,8 +82,8 @@ def test_poses_stand_with_their_places_and_the_other_technique(parts):
     assert "ioops (not used)" in text
     x = 1e3 * parts.plan.poses[0].tcp_position[0]
     assert f"{x:.1f}" in text
-    data = poses.body(parts).data
-    assert len(data["postures"]) == len(parts.plan.poses) + 1
+    scene = poses.body(parts).scene
+    assert len(scene.view.places) == len(parts.plan.poses) + 1
     assert str(parts.plan.cell.file).rpartition("/")[0] not in text
 
 

@@ -1,9 +1,8 @@
 """The interactive page of a plan."""
 
+import base64
 import json
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -50,13 +49,18 @@ def test_a_fine_mesh_is_drawn_coarser_and_the_page_says_so(
     said = re.search(r"The tooling is drawn with (\d+) faces in place of 320\.", text)
     assert int(said[1]) <= 100
     assert "Parts of the robot with fine meshes are drawn coarser." in text
-    traces = json.loads(Page(text).data)["figure"]["data"]
-    (tooling,) = [trace for trace in traces if trace.get("name") == "tooling"]
-    assert len(tooling["intensity"]["bdata"]) < 4 * 2 * 4 * 100
+    (tooling,) = [
+        each for each in json.loads(Page(text).data)["layers"] if each["label"] == "Tooling"
+    ]
+    assert len(base64.b64decode(tooling["parts"][0]["faces"])) <= 12 * 100
 
 
 def test_a_mesh_that_is_drawn_whole_needs_no_words(written):
     assert "in place of" not in written.read_text(encoding="utf-8")
+
+
+def test_page_is_small(written):
+    assert written.stat().st_size < 1e6
 
 
 def test_page_forbids_itself_the_network(page):
@@ -69,22 +73,18 @@ def test_page_forbids_itself_the_network(page):
 def test_slider_has_a_step_for_home_and_every_pose(page, shown, plan):
     slider = page.one(id="posture")
     assert (slider["type"], slider["min"], slider["max"]) == ("range", "0", str(len(plan.poses)))
-    names = [frame["name"] for frame in shown["figure"]["frames"]]
-    assert names == [str(step) for step in range(len(plan.poses) + 1)]
-    assert len(shown["postures"]) == len(names)
+    assert len(shown["postures"]) == len(plan.poses) + 1
     assert shown["postures"][0] == "HOME"
     assert shown["postures"][1].startswith("Pose 0:")
 
 
 def test_every_pose_is_numbered_in_the_view_and_has_a_row(page, shown, plan):
-    (poses,) = [trace for trace in shown["figure"]["data"] if trace["name"] == "poses"]
-    assert poses["text"] == [str(pose.id) for pose in plan.poses]
+    (poses,) = [each for each in shown["layers"] if each["label"].startswith("Poses")]
+    assert poses["parts"][0]["texts"] == [str(pose.id) for pose in plan.poses]
     assert page.count("tr") == 1 + len(plan.poses)
 
 
-def test_layers_switch_every_trace_once_and_refused_points_are_off(shown, pool):
-    switched = [trace for layer in shown["layers"] for trace in layer["traces"]]
-    assert switched == list(range(len(shown["figure"]["data"])))
+def test_refused_points_are_off(shown, pool):
     off = [layer["label"] for layer in shown["layers"] if not layer["shown"]]
     refused = [layer["label"] for layer in shown["layers"] if layer["label"].startswith("Refused")]
     assert off == refused
@@ -112,7 +112,7 @@ def test_names_are_escaped(tmp_path, cell, block, plan, pool):
     assert "<b>x" not in text
     assert "alert(1)</script>" not in text
     assert "&lt;b&gt;x&lt;/b&gt;" in text
-    assert Page(text).count("script") == 3
+    assert Page(text).count("script") == 2
 
 
 def test_same_plan_gives_the_same_bytes(tmp_path, written, cell, block, plan, pool):
@@ -137,20 +137,3 @@ def test_a_cell_with_another_robot_is_refused(tmp_path, cell, block):
 def test_a_missing_folder_is_named(tmp_path, cell, block, plan, pool):
     with pytest.raises(FileAccessError, match="nowhere"):
         write_plan_page(tmp_path / "nowhere" / "p.html", cell, block, plan, pool)
-
-
-def test_page_draws_in_a_browser_without_an_error(tmp_path, written):
-    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-    if browser is None:
-        pytest.skip("no chromium on the path to draw the page with")
-    run = subprocess.run(
-        [browser, "--headless", "--no-sandbox", "--use-angle=swiftshader",
-         "--enable-unsafe-swiftshader", "--disable-background-networking", "--no-first-run",
-         f"--user-data-dir={tmp_path}", "--virtual-time-budget=6000", "--window-size=400,400",
-         "--enable-logging=stderr", "--dump-dom", written.as_uri()],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-    said = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
-    assert not [line for line in said if re.search("Error|Refused|violates|Uncaught", line)]
-    assert 'data-ready="yes"' in run.stdout
-    assert re.search(r"<tr aria-current[^>]*><td><button[^>]*>0</button>", run.stdout)

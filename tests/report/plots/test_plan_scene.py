@@ -1,4 +1,4 @@
-"""The figure behind the page."""
+"""What the view of a plan shows."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from elastocal.report.plots import (
-    plan_view,
-)
+from elastocal.cell import load_cell
+from elastocal.cell.examples import write_example
+from elastocal.report.plots import Dots, Paint, Strokes, Tags, plan_view
+from elastocal.report.plots._solids import rail_solid
 
 
 @pytest.fixture(scope="module")
@@ -16,76 +17,71 @@ def view(cell, block, plan, pool):
     return plan_view(cell, block, plan, pool)
 
 
-def _points(trace):
-    return np.column_stack([trace.x, trace.y, trace.z])
+def layer(view, start):
+    (found,) = [each for each in view.layers if each.label.startswith(start)]
+    return found
 
 
-def test_every_trace_holds_points(view):
-    for trace in view.figure.data:
-        assert np.isfinite(_points(trace)).any(), trace.name
+def test_every_layer_holds_something(view):
+    for each in view.layers:
+        assert each.parts or each.sight, each.label
+        for part in each.parts:
+            match part:
+                case Paint():
+                    assert len(part.solid.faces)
+                case Strokes():
+                    assert np.isfinite(part.ends).all()
+                case Dots() | Tags():
+                    assert np.isfinite(part.at).all()
 
 
 def test_line_of_sight_joins_marker_and_station(view, cell, plan):
     marker = np.append(cell.file.marker.position_tcp, 1.0)
     stations = {station.name: station.position_base for station in cell.file.trackers}
-    for pose, frame in zip(plan.poses, view.figure.frames[1:], strict=True):
-        start, end, gap = _points(frame.data[1])
-        np.testing.assert_allclose(start, (cell.robot.forward(pose.joints) @ marker)[:3], atol=1e-5)
-        np.testing.assert_allclose(end, stations[pose.seen_by], atol=1e-5)
-        assert np.isnan(gap).all()
+    for pose, (start, end) in zip(plan.poses, view.sight[1:], strict=True):
+        np.testing.assert_allclose(start, (cell.robot.forward(pose.joints) @ marker)[:3], atol=1e-9)
+        np.testing.assert_allclose(end, stations[pose.seen_by], atol=1e-9)
 
 
 def test_home_has_no_line_of_sight(view):
-    assert np.isnan(_points(view.figure.frames[0].data[1])).all()
+    assert np.isnan(view.sight[0]).all()
 
 
-def test_robot_moves_from_frame_to_frame(view):
-    robots = [_points(frame.data[0]) for frame in view.figure.frames]
-    assert view.figure.data[0].name == "robot"
-    np.testing.assert_array_equal(robots[1], _points(view.figure.data[0]))
-    for before, after in pairwise(robots):
-        assert np.abs(after - before).max() > 0.05
+def test_robot_moves_from_posture_to_posture_and_its_foot_stays(view, plan):
+    parts = [each.part for each in layer(view, "Robot").parts]
+    assert parts == list(range(view.places.shape[1]))
+    assert len(view.places) == len(plan.poses) + 1
+    for before, after in pairwise(view.places):
+        np.testing.assert_array_equal(before[0], after[0])
+        assert np.abs(after[-1] - before[-1]).max() > 0.05
 
 
 def test_way_runs_from_home_through_every_approach_pose_and_back(view, cell, plan):
-    (way,) = [_points(trace) for trace in view.figure.data if trace.name == "way"]
+    ends = layer(view, "Way").parts[0].ends
+    np.testing.assert_array_equal(ends[1:, 0], ends[:-1, 1])
     home = cell.robot.forward(plan.robot.home)[:3, 3]
-    np.testing.assert_allclose(way[[0, -1]], [home, home], atol=1e-5)
+    np.testing.assert_allclose([ends[0, 0], ends[-1, 1]], [home, home], atol=1e-9)
     stops = cell.robot.forward([pose.approach_joints for pose in plan.poses])[:, :3, 3]
-    gap = np.linalg.norm(way[:, None] - stops, axis=2).min(axis=0)
-    assert gap.max() < 1e-5
+    assert np.linalg.norm(ends[:, None, 1] - stops, axis=2).min(axis=0).max() < 1e-9
 
 
-def test_a_wide_floor_does_not_widen_the_view(view, cell):
-    scene = view.figure.layout.scene
-    ranges = np.array([scene[f"{axis}axis"].range for axis in "xyz"])
-    assert np.ptp(ranges, axis=1).max() < 9.0
-    for station in cell.file.trackers:
-        assert np.all(
-            (ranges[:, 0] < station.position_base) & (station.position_base < ranges[:, 1])
-        )
+def test_a_wide_floor_does_not_send_the_camera_far_away(view):
+    for camera in view.cameras:
+        assert np.linalg.norm(camera.eye - camera.centre) < 20.0
 
 
-def test_axes_have_one_scale_and_name_their_unit(view):
-    scene = view.figure.layout.scene
-    sides = [np.ptp(scene[f"{axis}axis"].range) for axis in "xyz"]
-    ratio = [scene.aspectratio[axis] for axis in "xyz"]
-    np.testing.assert_allclose(np.divide(ratio, sides), ratio[0] / sides[0])
-    assert [scene[f"{axis}axis"].title.text for axis in "xyz"] == [
-        f"{axis} of base in m" for axis in "xyz"
-    ]
+def test_no_camera_is_below_the_floor_nor_looks_up(view):
+    for camera in view.cameras:
+        assert camera.eye @ view.up > view.floor
+        assert (camera.eye - camera.centre) @ view.up > 0.0
 
 
-@pytest.mark.parametrize("name", ["Robot and tooling", "Tooling", "Whole cell"])
-def test_camera_sees_all_of_the_tooling(view, block, name):
-    scene, camera = view.figure.layout.scene, view.cameras[name]
-    low, high = np.array([scene[f"{axis}axis"].range for axis in "xyz"]).T
-    centre, eye, up = (
-        np.array([camera[part][axis] for axis in "xyz"]) for part in ("center", "eye", "up")
-    )
-    seen = (block.mesh.vertices - 0.5 * (low + high)) / np.cbrt(np.prod(high - low)) - eye
-    ahead = (centre - eye) / np.linalg.norm(centre - eye)
-    right = np.cross(ahead, up) / np.linalg.norm(np.cross(ahead, up))
+@pytest.mark.parametrize("number", range(3))
+def test_camera_sees_all_of_the_tooling(view, block, number):
+    camera = view.cameras[number]
+    seen = block.mesh.vertices - camera.eye
+    ahead = (camera.centre - camera.eye) / np.linalg.norm(camera.centre - camera.eye)
+    right = np.cross(ahead, view.up) / np.linalg.norm(np.cross(ahead, view.up))
     depth = seen @ ahead
     assert depth.min() > 0.0
     assert np.abs(seen @ np.cross(right, ahead) / depth).max() < np.tan(np.radians(22.5))
@@ -95,14 +91,40 @@ def test_camera_sees_all_of_the_tooling(view, block, name):
 def test_a_cell_without_stations_has_no_line_of_sight(cell, block, plan, pool):
     unseen = tuple(replace(pose, seen_by=None) for pose in plan.poses)
     view = plan_view(cell, block, replace(plan, poses=unseen), pool)
-    assert "line of sight" not in {trace.name for trace in view.figure.data}
-    assert all(len(frame.data) == 1 for frame in view.figure.frames)
-    assert all(np.isfinite(_points(trace)).any() for trace in view.figure.data)
+    assert not any(each.sight for each in view.layers)
+    assert np.isnan(view.sight).all()
 
 
-def test_hover_tells_rank_margins_with_units_and_times(view, plan):
-    (poses,) = [trace for trace in view.figure.data if trace.name == "poses"]
-    text = poses.hovertext[2]
-    rank = plan.search.order.index(2)
-    for wanted in ("<b>pose 2</b>", f"search rank {rank}", "wrist: ", "°", "1 min 02 s in contact"):
-        assert wanted in text
+def test_a_hint_tells_margins_with_units_and_times(view):
+    hint = layer(view, "Poses").parts[0].hints[2]
+    for wanted in ("pose 2", "wrist: ", "°", "1 min 02 s in contact"):
+        assert wanted in hint
+    assert "rank" not in hint
+
+
+def test_dots_and_tags_have_a_hint_each(view):
+    for each in view.layers:
+        for part in each.parts:
+            if isinstance(part, Dots | Tags):
+                assert len(part.hints) == len(part.at)
+
+
+class TestRail:
+    @pytest.fixture
+    def on_rail(self, tmp_path_factory):
+        folder = tmp_path_factory.mktemp("afp")
+        write_example(folder, "afp")
+        return load_cell(folder / "cell.yaml")
+
+    def test_it_is_drawn_below_the_foot_along_the_whole_travel(self, on_rail):
+        rail, solid = on_rail.file.robot.rail, rail_solid(on_rail)
+        along = np.array(rail.axis) / np.linalg.norm(rail.axis)
+        at = (solid.vertices - rail.pose.T[:3, 3]) @ along
+        low, high = rail.travel
+        assert at.min() < low
+        assert at.max() > high
+        height = (solid.vertices - rail.pose.T[:3, 3]) @ rail.pose.T[:3, 2]
+        assert height.max() == pytest.approx(0.0, abs=1e-9)
+
+    def test_a_robot_without_a_rail_has_none(self, cell):
+        assert (rail_solid(cell) is None) is (cell.file.robot.rail is None)

@@ -4,7 +4,7 @@ import coal
 import numpy as np
 import pytest
 
-from elastocal.report.plots._solids import Solid, fixture_solids, joined, robot_solids, triangles_of
+from elastocal.report.plots._solids import fixture_solids, joined, robot_solids, triangles_of
 from elastocal.shapes import Mesh, solid_of
 
 TETRAHEDRON = (
@@ -36,19 +36,6 @@ def test_faces_are_wound_outward(name):
     assert np.einsum("fi,fi->", a, np.cross(b, c)) > 0.0
 
 
-def test_faces_towards_the_light_are_bright():
-    solid = triangles_of(solid_of(coal.Box(1.0, 1.0, 1.0)))
-    bright = solid.brightness(np.array([0.0, 0.0, 1.0]))
-    assert sorted(set(bright.round(9))) == [0.0, 0.5, 1.0]
-    top = solid.vertices[solid.faces].mean(axis=1)[:, 2] > 0.49
-    np.testing.assert_allclose(bright[top], 1.0)
-
-
-def test_a_face_without_area_is_neither_lit_nor_dark():
-    flat = Solid(np.zeros((3, 3)), np.array([[0, 1, 2]]))
-    np.testing.assert_array_equal(flat.brightness(np.array([0.0, 0.0, 1.0])), [0.5])
-
-
 def test_joined_solids_keep_their_faces():
     parts = [triangles_of(solid_of(SHAPES[kind])) for kind in ("box", "mesh")]
     both = joined(parts)
@@ -57,32 +44,31 @@ def test_joined_solids_keep_their_faces():
     assert len(joined([]).faces) == 0
 
 
-@pytest.fixture(scope="module")
-def solids(cell, block):
-    return robot_solids(cell, block)
-
-
 class TestRobot:
-    def test_tool_follows_the_tool_centre_point(self, solids, cell, plan):
-        q = np.array([plan.poses[0].joints, plan.poses[3].joints])
-        tool = sum(len(part.vertices) for part in solids.parts[-3:])
+    @pytest.fixture
+    def q(self, plan):
+        return np.array([plan.poses[0].joints, plan.poses[3].joints])
+
+    @pytest.fixture
+    def solids(self, cell, block, q):
+        return robot_solids(cell, block, q)
+
+    def test_tool_follows_the_tool_centre_point(self, solids, cell, q):
+        count = sum(len(part.vertices) for part in solids.parts[solids.tool :])
         own = []
-        for robot, T in zip(solids.at(q), cell.robot.forward(q), strict=True):
-            own.append((robot.vertices[-tool:] - T[:3, 3]) @ T[:3, :3])
+        for posture, T in enumerate(cell.robot.forward(q)):
+            own.append((solids.at(posture).vertices[-count:] - T[:3, 3]) @ T[:3, :3])
         np.testing.assert_allclose(own[0], own[1], atol=1e-9)
 
-    def test_first_link_stays_and_every_shape_is_drawn(self, solids, plan):
-        q = np.array([plan.poses[0].joints, plan.poses[3].joints])
+    def test_first_link_stays_and_every_shape_is_drawn(self, solids):
         first = len(solids.parts[0].vertices)
-        one, other = solids.at(q)
+        one, other = solids.at(0), solids.at(1)
         np.testing.assert_array_equal(one.vertices[:first], other.vertices[:first])
         assert len(solids.parts) > 6 + 3
         assert len(one.vertices) == sum(len(part.vertices) for part in solids.parts)
 
-    def test_parts_are_told_apart(self, solids):
-        tool = sum(len(part.faces) for part in solids.parts[-3:])
-        assert solids.on_tool[-tool:].all()
-        assert not solids.on_tool[:-tool].any()
+    def test_arm_and_tool_are_told_apart(self, solids):
+        assert solids.tool == len(solids.parts) - 3
 
 
 def test_fixtures_are_named_and_placed_and_the_tooling_is_not_among_them(cell, block):

@@ -56,6 +56,11 @@ def _report(  # noqa: PLR0913 - one parameter an option
         Path | None,
         typer.Option(metavar="KEY", help="Private key to sign with; `verify --new-key` makes one."),
     ] = None,
+    language: Annotated[str, typer.Option(help="Language of the report: en, de or fr.")] = "en",
+    xlsx: Annotated[
+        bool, typer.Option("--xlsx", help="Also write its tables beside it, for Excel.")
+    ] = False,
+    state: options.State = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the verdict as one JSON object.")
     ] = False,
@@ -63,9 +68,12 @@ def _report(  # noqa: PLR0913 - one parameter an option
     """Write the report of a calibration: one HTML file that an inspector can sign."""
     accepted = None if tolerance is None else options.parse_limit(tolerance, "--tolerance")
     drift = None if limit is None else options.parse_limit(limit)
+    from elastocal.cell import read_statements
+
     settings = workflows.ReportSettings(
-        run, out, model, tool, codec, process, old, accepted, drift, pdf, force, sign
-    )
+        run, out, model, tool, codec, process, old, accepted, drift, pdf, force, sign,
+        language=language, xlsx=xlsx, state=read_statements(tuple(state or ())),
+    )  # fmt: skip
     result = workflows.report(settings)
     if as_json:
         output.print_json(result.figures)

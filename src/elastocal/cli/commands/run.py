@@ -33,14 +33,18 @@ def _run(  # noqa: PLR0913 - one parameter an option
         Path | None,
         typer.Option(metavar="KEY", help="Private key to sign with; `verify --new-key` makes one."),
     ] = None,
+    state: options.State = None,
     as_json: options.Figures = False,
 ) -> None:
     """Press on the tooling at every pose of a plan and record what happens."""
+    from elastocal.cell import read_statements
     from elastocal.cli._operator import TerminalOperator
     from elastocal.procedure import RunEnd
 
+    operator = TerminalOperator(output.console(), asks=not (yes or as_json))
+    stated = read_statements(tuple(state or ()))
     settings = workflows.RunSettings(
-        cell, plan, out, resume, yes, seed, TerminalOperator(output.console()), sign
+        cell, plan, out, resume, yes, seed, operator, sign, state=stated
     )
     if dry_run:
         rehearsed = workflows.dry_run(settings)

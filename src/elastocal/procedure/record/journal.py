@@ -12,7 +12,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from pydantic import SerializerFunctionWrapHandler, ValidationError, model_serializer
+from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer
 
 from elastocal.cell import Clock, LineCounts
 from elastocal.errors import FileAccessError, SchemaError
@@ -119,6 +119,8 @@ class RunRecord(StrictModel):
     journals before it was written."""
     signer: str | None = None
     """Public key of who signs it; None: nobody does."""
+    stated: dict[str, str] = Field(default_factory=dict)
+    """What was stated for the certificate when the run began, by key: who, where, serials."""
 
     @property
     def origin(self) -> str:

@@ -176,6 +176,7 @@ def run_record(
     seed: int,
     started: str,
     signer: str | None = None,
+    stated: Mapping[str, str] | None = None,
 ) -> RunRecord:
     """Return the record by which a run is known again.
 
@@ -200,6 +201,7 @@ def run_record(
         started=started,
         cell_sha256=sha256(read_text(cell.path)),
         signer=signer,
+        stated=dict(stated or {}),
     )
 
 

@@ -17,7 +17,13 @@ from .blocks import (
     Table as Table,
     Verbatim as Verbatim,
     flattened as flattened,
-    picture as picture,
+)
+from .certificate import (
+    BeforeAfter as BeforeAfter,
+    Certificate as Certificate,
+    Mark as Mark,
+    ToleranceBar as ToleranceBar,
+    certificate_of_evidence as certificate_of_evidence,
 )
 from .chromium import (
     BROWSERS as BROWSERS,
@@ -38,3 +44,4 @@ from .page import (
     verdict_html as verdict_html,
     write_report as write_report,
 )
+from .workbook import require_excel as require_excel, write_tables as write_tables

@@ -1,23 +1,21 @@
 """Blocks: the pieces that every section of the report is made of; ``blocks.html`` shows them.
 
-A section chooses what to show and never writes markup: texts are escaped where they are shown.
+A section chooses what to show and never writes markup: texts are said in the language of the
+report and escaped where they are shown, and figures drawn there.
 """
 
-import base64
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 from matplotlib.figure import Figure
 
+from elastocal.planning import PlanResult, PoolData
 from elastocal.report.pages import render
-from elastocal.report.plots import figure_bytes
+from elastocal.report.plots import PlanView
 from elastocal.results import brief_repr
 from elastocal.verdict import Evidence
-
-_DPI = 130
-"""Resolution of figures with thousands of points, which would be large as SVG."""
-_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
+from elastocal.wording import Phrase, phrase
 
 
 @dataclass(frozen=True)
@@ -94,12 +92,13 @@ class Table:
     """Identifier, where a script looks for the table."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Picture:
     """A printed figure."""
 
-    source: str
-    """The figure itself, as a data URL."""
+    draw: Callable[[], Figure]
+    """Returns it; called with the settings of print."""
     alt: str
     """Words for readers that cannot see it."""
     caption: str
@@ -117,9 +116,9 @@ class Verbatim:
 class PlanScene:
     """The view of a plan in three dimensions."""
 
-    poses: int
-    data: Mapping[str, object]
-    """For the script of the page."""
+    view: PlanView
+    plan: PlanResult
+    pool: PoolData
 
 
 @brief_repr
@@ -143,9 +142,9 @@ class Content:
     blocks: tuple[Block, ...]
 
     @property
-    def data(self) -> Mapping[str, object]:
-        """The data of its scene, for the script of the page; empty without a scene."""
-        return next((each.data for each in self.blocks if isinstance(each, PlanScene)), {})
+    def scene(self) -> PlanScene | None:
+        """Its view in three dimensions, if it has one."""
+        return next((each for each in self.blocks if isinstance(each, PlanScene)), None)
 
     @cached_property
     def html(self) -> str:
@@ -155,11 +154,12 @@ class Content:
 
 @dataclass(frozen=True)
 class Section:
-    """One section: a title, and how it is made from the evidence, whatever is there."""
+    """One section: a title, the question that it answers, and how it is made from the evidence."""
 
     identifier: str
     """Identifier of the heading; also the key of its data."""
-    title: str
+    title: Phrase
+    question: Phrase
     place: int
     """Sections stand in the order of these numbers."""
     blocks: Callable[[Evidence], Iterable[Block]]
@@ -167,24 +167,6 @@ class Section:
     def body(self, evidence: Evidence) -> Content:
         """Return what the section shows."""
         return Content(tuple(self.blocks(evidence)))
-
-
-def picture(draw: Callable[[], Figure], alt: str, caption: str, kind: str = ".svg") -> Picture:
-    """Return a figure with its caption.
-
-    Parameters
-    ----------
-    draw : callable
-        Returns the figure; called with the settings of print.
-    alt : str
-        Words for readers that cannot see it.
-    caption : str
-        For all readers.
-    kind : str
-        ``.svg``, or ``.png`` for figures with many points.
-    """
-    data = base64.b64encode(figure_bytes(draw, kind, _DPI)).decode("ascii")
-    return Picture(f"data:{_TYPES[kind]};base64,{data}", alt, caption)
 
 
 def flattened(value: object, prefix: str = "") -> Iterator[tuple[str, str]]:
@@ -205,7 +187,7 @@ def flattened(value: object, prefix: str = "") -> Iterator[tuple[str, str]]:
 
 def _leaf(value: object) -> str:
     if isinstance(value, list | tuple):
-        return ", ".join(map(_leaf, value)) or "none"
+        return ", ".join(map(_leaf, value)) or phrase("none")
     if isinstance(value, float):
         return f"{value:.10g}"
-    return "none" if value is None else str(value)
+    return phrase("none") if value is None else str(value)

@@ -46,6 +46,8 @@ _READY = """new Promise((done) => {
   const look = () => ready() ? done(true) : setTimeout(look, 20);
   look();
 })"""
+_UNFOLD = "document.querySelectorAll('details.section').forEach((each) => { each.open = true; })"
+"""Before a whole document is printed: what is folded is not."""
 
 Message = Mapping[str, Any]
 """A JSON object of the DevTools protocol."""
@@ -75,7 +77,7 @@ def find_browser() -> str:
 
 
 def write_pdf(page: Path, path: Path, browser: str) -> Path:
-    """Print a page to a PDF file, atomically; return its path.
+    """Print a page to a PDF file, atomically, with all of its appendix; return its path.
 
     Parameters
     ----------
@@ -93,6 +95,7 @@ def write_pdf(page: Path, path: Path, browser: str) -> Path:
     """
     with replacing(path) as temporary, open_tab(browser) as tab:
         tab.open(page)
+        tab.evaluate(_UNFOLD)
         printed = tab.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
         temporary.write_bytes(base64.b64decode(printed["data"]))
     return path

@@ -83,9 +83,8 @@ def write_geometry_page(path: Path, found: GeometryFindings) -> Path:
         title=f"{REPORT_TITLE}: {model.robot.name}",
         subtitle=f"{counted(model.positions, 'position')} of markers, {model.provenance}. Errors"
         " are those at poses that were left out of the fit.",
-        styles=("report.css",),
+        styles=("page.css",),
         scripts=(),
-        interactive=False,
         data={},
         sections=sections,
         version=__version__,
@@ -136,7 +135,7 @@ def _maps(found: GeometryFindings) -> Iterator[blocks.Block]:
     accuracy = found.accuracy
     many = len(accuracy.row) > MANY_POSITIONS
     before, after = (each.mean for each in vars(found.model.held_out).values())
-    yield blocks.picture(
+    yield blocks.Picture(
         partial(error_maps, accuracy),
         f"Positions in the base of the robot, coloured by their error: {mm(before)} mean before,"
         f" {mm(after)} after",
@@ -199,7 +198,7 @@ def _errors(found: GeometryFindings) -> Iterator[blocks.Block]:
     if not model.parameters:
         yield blocks.Paragraph("The nominal arm was kept: the positions speak for no error of it.")
         return
-    yield blocks.picture(
+    yield blocks.Picture(
         partial(parameter_figure, model.parameters),
         f"{counted(len(model.parameters), 'error')} of the arm with 95 % intervals",
         "Filled: known, its 95 % interval is narrower than what one would guess without measuring"

@@ -1,6 +1,6 @@
-"""The whole document: verdict, contents, sections, a place to sign."""
+"""The whole document: a certificate on one sheet, contents, and an appendix of sections."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,10 +8,11 @@ from markupsafe import Markup
 
 from elastocal import __version__
 from elastocal.files import write_text
-from elastocal.identification import UnseenErrors
 from elastocal.report.document import sections as exported
-from elastocal.report.document.blocks import Block, Facts, Paragraph, Section
-from elastocal.report.pages import render
+from elastocal.report.document.blocks import Section
+from elastocal.report.document.certificate import certificate_of_evidence
+from elastocal.report.language import ENGLISH, Language
+from elastocal.report.pages import render, view_data
 from elastocal.verdict import (
     EMPTY_MANIFEST,
     Evidence,
@@ -21,7 +22,7 @@ from elastocal.verdict import (
     judge_evidence,
     manifest_of,
 )
-from elastocal.wording import mm
+from elastocal.wording import phrase
 
 _EXPORTED = (getattr(exported, name) for name in dir(exported))
 SECTIONS: tuple[Section, ...] = tuple(
@@ -39,9 +40,13 @@ class WrittenReport:
 
 
 def write_report(
-    path: Path, evidence: Evidence, sign: Callable[[str], Signature] | None = None
+    path: Path,
+    evidence: Evidence,
+    sign: Callable[[str], Signature] | None = None,
+    language: Language = ENGLISH,
+    signer: str = "",
 ) -> WrittenReport:
-    """Write the report, atomically.
+    """Write the report, atomically: a certificate on one sheet, and an appendix that folds.
 
     Parameters
     ----------
@@ -51,6 +56,10 @@ def write_report(
         Whatever is there.
     sign : callable, optional
         Returns the signature of a hash, here of the manifest; by default there is none.
+    language : Language
+        Of its words; what other parts of the program said stays English.
+    signer : str
+        Public key of who signs it.
 
     Raises
     ------
@@ -59,20 +68,20 @@ def write_report(
     """
     verdict = judge_evidence(evidence)
     sections = [(section, section.body(evidence)) for section in SECTIONS]
-    data = {section.identifier: content.data for section, content in sections if content.data}
+    scene = next((content.scene for _, content in sections if content.scene), None)
+    data = view_data(scene.view, scene.plan, scene.pool, language.say) if scene else {}
     page = render(
         "report.html",
-        title=f"Calibration report: {evidence.name}",
-        styles=("report.css",),
+        language,
+        title=phrase("Calibration certificate: {name}", name=evidence.name),
+        styles=("page.css", "report.css"),
         scripts=("view.js", "report.js"),
-        # Only the view in three dimensions needs the drawing library.
-        interactive="poses" in data,
         data=data,
         evidence=evidence,
+        certificate=certificate_of_evidence(evidence, verdict, signer),
         sections=sections,
         version=__version__,
         verdict=verdict,
-        blocks=tuple(_accuracy(evidence, verdict)),
         empty_manifest=Markup(EMPTY_MANIFEST),
     )
     manifest = manifest_of(page, evidence, verdict, __version__, sign)
@@ -82,33 +91,5 @@ def write_report(
 
 def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
     """Return the verdict as HTML."""
-    return render("verdict.html", verdict=verdict, blocks=tuple(_accuracy(evidence, verdict)))
-
-
-def _accuracy(evidence: Evidence, verdict: Verdict) -> Iterator[Block]:
-    if evidence.simulated:
-        yield Paragraph("A simulated cell: no real robot was measured.", "banner")
-    yield Paragraph(verdict.sentence, "sentence")
-    if evidence.unseen is not None:
-        yield from _unseen(evidence.unseen)
-
-
-def _unseen(unseen: UnseenErrors) -> Iterator[Block]:
-    def span(low: float, high: float) -> str:
-        return f"({mm(low)} to {mm(high)})"
-
-    mean, p95 = unseen.mean, unseen.p95
-    yield Facts(
-        (
-            ("Mean error (95 % interval)", f"{mm(mean.value)} {span(mean.low, mean.high)}"),
-            ("95 % of errors below (95 % interval)", f"{mm(p95.value)} {span(p95.low, p95.high)}"),
-            ("Largest error", mm(unseen.max)),
-            ("Held out", f"{unseen.poses} poses, {len(unseen.error)} readings"),
-        )
-    )
-    yield Paragraph(
-        f"Every pose was left out of the fit once ({unseen.folds} refits) and predicted by the"
-        " others. Intervals: whole poses drawn with replacement. If one more pose were drawn"
-        " like these, the chance that its error is larger than the largest here is at most 1 in"
-        f" {unseen.poses + 1}.", "sub",
-    )  # fmt: skip
+    certificate = certificate_of_evidence(evidence, verdict)
+    return render("verdict.html", verdict=verdict, evidence=evidence, certificate=certificate)

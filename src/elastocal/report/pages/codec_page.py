@@ -148,7 +148,7 @@ def write_codec_page(
     page = render(
         "codec.html",
         title=f"Codec: {data.robot or 'robot'}",
-        styles=("plan.css", "codec.css"),
+        styles=("page.css", "codec.css"),
         scripts=("codec.js",),
         interactive=True,
         data={"variants": variants, "charts": charts},

@@ -1,8 +1,13 @@
 """One HTML page that shows a plan: a view to turn, its key figures and a table of its poses."""
 
-import json
+import base64
+from collections.abc import Callable
+from functools import singledispatch
 from pathlib import Path
 
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.files import write_text
 from elastocal.planning import (
@@ -15,8 +20,16 @@ from elastocal.planning import (
 )
 from elastocal.planning.surface import Surface
 from elastocal.report.pages.templating import render
-from elastocal.report.plots import PlanView, plan_view, weakest_margins
-from elastocal.wording import duration, millimetres, readable, um
+from elastocal.report.plots import (
+    Dots,
+    Paint,
+    PlanView,
+    Strokes,
+    Tags,
+    plan_view,
+    weakest_margins,
+)
+from elastocal.wording import duration, millimetres, phrase, readable, um
 
 
 def write_plan_page(
@@ -49,9 +62,8 @@ def write_plan_page(
     page = render(
         "plan.html",
         title=f"Calibration plan: {plan.cell.name}",
-        styles=("plan.css",),
+        styles=("page.css",),
         scripts=("view.js", "plan.js"),
-        interactive=True,
         data=view_data(view, plan, pool),
         plan=plan,
         figures=key_figures(plan),
@@ -76,28 +88,35 @@ def write_plan_page(
 def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
     """Return the figures at the head of the page, as name and value with its unit."""
     search, pool = plan.search, plan.pool
-    asked = f" (asked: {readable(search.d_max, 'm')})" if search.d_max is not None else ""
+    radius: str = readable(search.covering_radius, "m")
+    if search.d_max is not None:
+        asked = readable(search.d_max, "m")
+        radius = phrase("{radius} (asked: {asked})", radius=radius, asked=asked)
     return (
-        ("Poses", str(len(plan.poses))),
-        ("Covering radius", readable(search.covering_radius, "m") + asked),
-        ("Total time", duration(plan.total_time)),
-        ("of it on the way", duration(plan.travel_time)),
-        ("Points with a posture", f"{pool.valid} of {pool.sampled}"),
-        ("Check that refused most", pool.bottleneck or "none"),
+        (phrase("Poses"), str(len(plan.poses))),
+        (phrase("Covering radius"), radius),
+        (phrase("Total time"), duration(plan.total_time)),
+        (phrase("of it on the way"), duration(plan.travel_time)),
+        (
+            phrase("Points with a posture"),
+            phrase("{rank} of {all}", rank=pool.valid, all=pool.sampled),
+        ),
+        (phrase("Check that refused most"), pool.bottleneck or phrase("none")),
         *(_covered(plan.production) if plan.production is not None else ()),
     )
 
 
 def _covered(production: ProductionRecord) -> tuple[tuple[str, str], ...]:
     found = production.expected_of(production.poses)
-    error = (("Expected error on production", um(found.error)),) if found is not None else ()
-    return (("Production covered", f"{production.coverage.covered:.0%}"), *error)
+    error = (
+        ((phrase("Expected error on production"), um(found.error)),) if found is not None else ()
+    )
+    return ((phrase("Production covered"), f"{production.coverage.covered:.0%}"), *error)
 
 
 def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
     return [
-        str(plan.search.order.index(pose.id)),
         *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
         worst,
         pose.seen_by or "no station",
@@ -106,7 +125,9 @@ def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     ]
 
 
-def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, object]:
+def view_data(
+    view: PlanView, plan: PlanResult, pool: PoolData, say: Callable[[object], str] = str
+) -> dict[str, object]:
     """Return the data from which the script of a page shows a view.
 
     Parameters
@@ -115,24 +136,81 @@ def view_data(view: PlanView, plan: PlanResult, pool: PoolData) -> dict[str, obj
         From `plan_view`.
     plan, pool : PlanResult, PoolData
         That it shows.
+    say : callable
+        Returns a text in the language of the page.
     """
     worst = weakest_margins(pool).label
-    layers, start = [], 0
-    for layer in view.layers:
-        traces = list(range(start, start + len(layer.traces)))
-        start += len(layer.traces)
-        layers.append(
-            {"label": layer.label, "colour": layer.colour, "shown": layer.shown, "traces": traces}
-        )
     poses = [
-        f"Pose {pose.id}: {millimetres(pose.tcp_position)} mm"
-        f" · {f'seen by {pose.seen_by}' if pose.seen_by else 'no line of sight'}"
-        f" · smallest margin: {worst[pose.candidate]}"
+        phrase(
+            "Pose {pose}: {place} mm · {sight} · smallest margin: {margin}",
+            pose=pose.id,
+            place=millimetres(pose.tcp_position),
+            sight=phrase("seen by {station}", station=pose.seen_by)
+            if pose.seen_by
+            else phrase("no line of sight"),
+            margin=worst[pose.candidate],
+        )
         for pose in plan.poses
     ]
     return {
-        "figure": json.loads(view.figure.to_json()),
-        "layers": layers,
-        "cameras": view.cameras,
-        "postures": ["HOME", *poses],
+        "layers": [
+            {
+                "label": say(layer.label),
+                "colour": layer.colour,
+                "shown": layer.shown,
+                "sight": layer.sight,
+                "parts": [_part(each) for each in layer.parts],
+            }
+            for layer in view.layers
+        ],
+        # Column by column, as WebGL takes matrices.
+        "places": _packed(np.swapaxes(view.places, 2, 3)),
+        "sight": _packed(view.sight),
+        "cameras": [
+            {"name": say(each.name), "centre": each.centre.tolist(), "eye": each.eye.tolist()}
+            for each in view.cameras
+        ],
+        "light": view.light.tolist(),
+        "up": view.up.tolist(),
+        "floor": view.floor,
+        "postures": ["HOME", *map(say, poses)],
     }
+
+
+@singledispatch
+def _part(part: object) -> dict[str, object]:
+    raise TypeError(f"no part of a view: {type(part).__name__}")
+
+
+@_part.register
+def _(part: Paint) -> dict[str, object]:
+    return {
+        "kind": "paint", "vertices": _packed(part.solid.vertices),
+        "faces": _packed(part.solid.faces, "<u4"), "colour": part.colour, "part": part.part,
+    }  # fmt: skip
+
+
+@_part.register
+def _(part: Strokes) -> dict[str, object]:
+    ends = _packed(part.ends)
+    return {"kind": "strokes", "ends": ends, "colour": part.colour, "width": part.width}
+
+
+@_part.register
+def _(part: Dots) -> dict[str, object]:
+    colours = _packed(part.colours, "u1")
+    return {"kind": "dots", "at": _packed(part.at), "colours": colours, "hints": list(part.hints)}
+
+
+@_part.register
+def _(part: Tags) -> dict[str, object]:
+    return {
+        "kind": "tags", "at": _packed(part.at), "texts": list(part.texts), "colour": part.colour,
+        "hints": list(part.hints),
+        "normals": None if part.normals is None else _packed(part.normals),
+    }  # fmt: skip
+
+
+def _packed(values: FloatArray | IndexArray, kind: str = "<f4") -> str:
+    """Return numbers as base64; single precision is good to a micrometre within 10 m."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

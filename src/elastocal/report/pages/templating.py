@@ -8,14 +8,20 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cache, partial
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from elastocal.report.language import ENGLISH, Language, language_of
+from elastocal.report.plots import sequential_stops, themed_svg
 from elastocal.templating import templates
+from elastocal.wording import phrase
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
     from markupsafe import Markup
+    from matplotlib.figure import Figure
 
 _POLICY = "default-src 'none'; script-src {scripts}; style-src {styles}; img-src data: blob:"
 """Lets a page load nothing, and run no script and have no style but its own, by their SHA-256."""
@@ -36,20 +42,20 @@ _STYLE_OF_MAPS = re.compile(r"(e\.textContent=)'\.maplibregl(?:[^'\\]|\\.)*'")
 """Its only style that is written out is of maps, which no page of ours has."""
 
 
-def render(template: str, **values: Any) -> str:
+def render(template: str, language: Language = ENGLISH, **values: Any) -> str:
     """Return a template with its values.
 
     Parameters
     ----------
     template : str
         Name of a file in the folder ``templates``.
+    language : Language
+        In which its phrases are said.
     **values
         For the names in it; one that is missing is an error.
     """
-    pages = templates("elastocal.report.pages", markup=True)
-    pages.globals |= {"policy": _policy, "asset": _asset, "plotly": _plotly}
-    pages.filters |= {"embedded": embedded, "pieces": _pieces}
-    return pages.get_template(template).render(values)
+    made = _pages(language.code).get_template(template)
+    return made.render(values | {"language": language.code})
 
 
 def embedded(data: Any) -> "Markup":
@@ -67,6 +73,33 @@ def embedded(data: Any) -> "Markup":
 
     text = json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+@cache
+def _pages(code: str) -> "Environment":
+    """Return the templates of pages, saying their words in a language."""
+    pages, say = templates("elastocal.report.pages", markup=True).overlay(), language_of(code).say
+    # An overlay shares these with what it lies over, and each language has its own.
+    pages.globals = pages.globals | {
+        "policy": _policy,
+        "asset": _asset,
+        "plotly": _plotly,
+        "margin_scale": sequential_stops,
+    }
+    pages.filters = pages.filters | {
+        "embedded": embedded,
+        "pieces": _pieces,
+        "say": say,
+        # Words of the templates themselves.
+        "words": lambda text: say(phrase(text)),
+        "drawn": partial(_data_url, say),
+    }
+    return pages
+
+
+def _data_url(say: Callable[[object], str], draw: "Callable[[], Figure]") -> str:
+    svg = themed_svg(draw, say)
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
 
 
 def _policy(style: str, drawing: str, script: str) -> str:

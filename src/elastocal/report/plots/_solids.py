@@ -1,44 +1,38 @@
-"""Triangle meshes of what stands in a cell, as few as the screen needs, shaded for Plotly.
+"""Triangle meshes of what stands in a cell, as few as the screen needs.
 
 They are the shapes that collisions are checked with: fine meshes of a maker's drawings are not
-needed to see how the robot stands. Shades are computed here, so that the light is the same on
-every machine and in every posture.
+needed to see how the robot stands. A part of the robot is held once, in its own frame, with its
+place in every posture.
 
 Meshes are made coarser by clusters of vertices: J. Rossignac, P. Borrel, "Multi-resolution 3D
 approximations for rendering complex scenes", in Modeling in Computer Graphics, Springer, 1993.
 Vertices in one cell of a grid become their mean; faces and edges that lose a corner go.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-import plotly.graph_objects as go
 
 from elastocal import shapes
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import TOOLING, Cell
-from elastocal.planning import CollisionScene, PlanResult, collision_scene
+from elastocal.planning import collision_scene
 from elastocal.planning.surface import Surface
-from elastocal.report.plots import style
-from elastocal.report.plots.style import tint
 from elastocal.results import brief_repr
 
-MOVING_COLOURS = (style.ARM, style.TOOL)
 _SECTIONS = 24
 """Sides of a drawn cylinder."""
 MOST_OF_TOOLING = 60_000
-"""Faces of the tooling that an interactive page draws; its file would grow by 40 bytes a face."""
+"""Faces of the tooling that an interactive page draws; its file would grow by 24 bytes a face."""
 MOST_OF_FIXTURE = 20_000
 """Faces of one fixture."""
 MOST_OF_LINK = 3_000
-"""Faces of one part of the robot, whose vertices the page holds for every posture."""
+"""Faces of one part of the robot."""
 _COARSER = 1.25
 """By how much the cells grow until there are few enough faces."""
-_DARK = 0.5
-"""Brightness of a face that is turned away from the light."""
-_UNLIT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0, "fresnel": 0.0}
+_BEAM, _BEAM_APART = 0.12, 0.56
+"""Side of a rail's two beams, and from the middle of one to that of the other, in m."""
 
 
 @brief_repr
@@ -55,49 +49,24 @@ class Solid:
         """Return the solid moved by a transform, shape (4, 4)."""
         return Solid(self.vertices @ T[:3, :3].T + T[:3, 3], self.faces)
 
-    def brightness(self, light: FloatArray) -> FloatArray:
-        """Return how much light falls on each face, from 0 (turned away) to 1, shape (face,).
-
-        Parameters
-        ----------
-        light : ndarray, shape (3,)
-            Unit vector towards the light.
-        """
-        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
-        normal = np.cross(b - a, c - a)
-        length = np.linalg.norm(normal, axis=1)
-        cosine = normal @ light / np.where(length > 0.0, length, 1.0)
-        return np.asarray(0.5 + 0.5 * cosine)
-
 
 @dataclass(frozen=True, eq=False)
 class RobotSolids:
-    """Links and tool of a robot; `at` places them."""
+    """Links and tool of a robot, and where they are in some postures."""
 
-    scene: CollisionScene
     parts: tuple[Solid, ...]
     """Links, then tool, each in its own frame, as `CollisionScene.moving` orders them."""
+    tool: int
+    """Number of the first part of the tool."""
+    places: FloatArray
+    """``T_base_part``, shape (posture, part, 4, 4)."""
+    note: str = ""
+    """A remark for readers on how the robot is drawn."""
 
-    @property
-    def on_tool(self) -> IndexArray:
-        """Whether each face of the joined mesh is the tool's: 1 or else 0, shape (face,)."""
-        links = len(self.parts) - len(self.scene.tool)
-        sizes = [len(part.faces) for part in self.parts]
-        return np.repeat((np.arange(len(self.parts)) >= links).astype(np.intp), sizes)
-
-    def at(self, q: FloatArray) -> list[Solid]:
-        """Return links and tool as one mesh in base, one a configuration.
-
-        Parameters
-        ----------
-        q : ndarray, shape (pose, joint)
-            Joint positions in rad or m, in the order of the robot's joints.
-        """
-        places = np.stack([body.T_frame_body for body in self.scene.moving(q)], axis=1)
-        return [
-            joined([part.placed(T) for part, T in zip(self.parts, row, strict=True)])
-            for row in places
-        ]
+    def at(self, posture: int) -> Solid:
+        """Return links and tool as one mesh in base."""
+        places = zip(self.parts, self.places[posture], strict=True)
+        return joined([part.placed(T) for part, T in places])
 
 
 @brief_repr
@@ -130,11 +99,51 @@ class CoarseSolid:
         return f"{what} is drawn with {drawn} faces in place of {self.whole}."
 
 
-def robot_solids(cell: Cell, surface: Surface) -> RobotSolids:
-    """Return the solids of a cell's robot and tool."""
+def robot_solids(cell: Cell, surface: Surface, q: FloatArray) -> RobotSolids:
+    """Return the solids of a cell's robot and tool.
+
+    Parameters
+    ----------
+    cell, surface : Cell, Surface
+        Where it stands.
+    q : ndarray, shape (posture, joint)
+        Joint positions in rad or m, in the order of the robot's joints.
+    """
     scene = collision_scene(cell, surface)
-    nowhere = np.zeros((0, len(cell.robot.joint_names)))
-    return RobotSolids(scene, tuple(triangles_of(body.solid) for body in scene.moving(nowhere)))
+    bodies = scene.moving(q)
+    parts = [coarsened(triangles_of(body.solid), MOST_OF_LINK) for body in bodies]
+    finer = any(part.note("A part") for part in parts)
+    return RobotSolids(
+        tuple(part.solid for part in parts),
+        len(parts) - len(scene.tool),
+        np.stack([body.T_frame_body for body in bodies], axis=1),
+        "Parts of the robot with fine meshes are drawn coarser." if finer else "",
+    )
+
+
+def rail_solid(cell: Cell) -> Solid | None:
+    """Return the two beams of the rail below the robot's foot; None without a rail."""
+    rail = cell.file.robot.rail
+    if rail is None:
+        return None
+    along = np.asarray(rail.axis, dtype=float) / np.linalg.norm(rail.axis)
+    up = rail.pose.T[:3, 2]
+    across = np.cross(up, along)
+    if not np.linalg.norm(across) > 1e-6:  # A lift: its beams stand beside the robot.
+        up, across = rail.pose.T[:3, 0], rail.pose.T[:3, 1]
+    else:
+        across /= np.linalg.norm(across)
+    R = np.stack([along, across, np.cross(along, across)], axis=1)
+    low, high = rail.travel
+    box = shapes.Box(high - low + 2.0 * _BEAM_APART, _BEAM, _BEAM)
+    beams = []
+    for side in (-0.5, 0.5):
+        T = np.eye(4)
+        T[:3, :3] = R
+        middle = rail.pose.T[:3, 3] + 0.5 * (low + high) * along
+        T[:3, 3] = middle + side * _BEAM_APART * across - 0.5 * _BEAM * R[:, 2]
+        beams.append(triangles_of(box).placed(T))
+    return joined(beams)
 
 
 def fixture_solids(cell: Cell, surface: Surface) -> dict[str, Solid]:
@@ -204,118 +213,3 @@ def _proper(faces: IndexArray) -> IndexArray:
     kept = np.flatnonzero((np.diff(corners, axis=1) != 0).all(axis=1))
     _, first = np.unique(corners[kept], axis=0, return_index=True)
     return faces[kept[np.sort(first)]]
-
-
-def solid_trace(
-    solid: Solid, light: FloatArray, name: str, colours: Sequence[str], part: Any = 0
-) -> Any:
-    """Return a Plotly mesh of a solid.
-
-    Parameters
-    ----------
-    solid : Solid
-        In base.
-    light : ndarray, shape (3,)
-        Unit vector towards the light.
-    name : str
-        Of the trace.
-    colours : sequence of str
-        Of the parts, as ``#rrggbb``.
-    part : int or ndarray of int, shape (face,)
-        Which part each face belongs to.
-    """
-    i, j, k = np.asarray(solid.faces, dtype=np.int32).T
-    return go.Mesh3d(
-        **_xyz(solid.vertices), i=i, j=j, k=k, name=name, hoverinfo="skip", showscale=False,
-        intensity=tones(solid, light, part, len(colours)), intensitymode="cell", cmin=0.0, cmax=1.0,
-        colorscale=_scale(colours), lighting=_UNLIT,
-    )  # fmt: skip
-
-
-def tones(solid: Solid, light: FloatArray, part: Any, parts: int) -> Any:
-    """Return where each face lies on the colour scale of `solid_trace`, shape (face,).
-
-    Each part has its own stretch of the scale, from dark to light.
-    """
-    within = 0.01 + 0.98 * solid.brightness(light)
-    return ((part + within) / parts).astype(np.float32)
-
-
-def _scale(colours: Sequence[str]) -> list[tuple[float, str]]:
-    count = len(colours)
-    return [
-        stop
-        for k, colour in enumerate(colours)
-        for stop in ((k / count, tint(colour, _DARK, ground=0)), ((k + 1) / count, colour))
-    ]
-
-
-@dataclass(frozen=True, eq=False)
-class MovingParts:
-    """The robot at HOME and at every pose, with the lines of sight."""
-
-    robot: tuple[Solid, ...]
-    """HOME first."""
-    on_tool: IndexArray
-    """Part that each face of the robot belongs to, shape (face,): 0 the arm, 1 the tool."""
-    light: FloatArray
-    """Unit vector towards the light, shape (3,)."""
-    sight: tuple[FloatArray, ...]
-    """Lines from marker to station and a gap, each of shape (3, 3); NaN where no station sees.
-    Empty in a cell without stations."""
-    note: str = ""
-    """A remark for readers on how the robot is drawn."""
-
-    def frames(self) -> list[Any]:
-        """Return a Plotly frame for every posture: what changes of the first traces."""
-        frames = []
-        for number, robot in enumerate(self.robot):
-            shade = tones(robot, self.light, self.on_tool, len(MOVING_COLOURS))
-            data = [{"type": "mesh3d", **_xyz(robot.vertices), "intensity": shade}]
-            if self.sight:
-                data.append({"type": "scatter3d", **_xyz(self.sight[number])})
-            frames.append(go.Frame(name=str(number), data=data, traces=list(range(len(data)))))
-        return frames
-
-
-def moving_parts(cell: Cell, surface: Surface, plan: PlanResult, light: FloatArray) -> MovingParts:
-    """Return the robot at HOME and in contact at every pose of a plan."""
-    q = np.array([plan.robot.home, *(pose.joints for pose in plan.poses)])
-    whole = robot_solids(cell, surface)
-    drawn = [coarsened(part, MOST_OF_LINK) for part in whole.parts]
-    solids = replace(whole, parts=tuple(part.solid for part in drawn))
-    finer = any(part.note("A part") for part in drawn)
-    note = "Parts of the robot with fine meshes are drawn coarser." if finer else ""
-    seen = [None, *(pose.seen_by for pose in plan.poses)]
-    sight: tuple[FloatArray, ...] = ()
-    if any(seen):
-        tcp = cell.robot.forward(q)
-        sight = tuple(_sight(cell, T, name) for T, name in zip(tcp, seen, strict=True))
-    return MovingParts(tuple(solids.at(q)), solids.on_tool, light, sight, note)
-
-
-def _sight(cell: Cell, T_base_tcp: FloatArray, name: str | None) -> FloatArray:
-    marker = cell.file.marker
-    stations = {station.name: station.position_base for station in cell.file.trackers}
-    if marker is None or name is None or name not in stations:
-        return np.full((3, 3), np.nan)
-    start = T_base_tcp[:3, :3] @ marker.position_tcp + T_base_tcp[:3, 3]
-    return segments([(start, stations[name])])
-
-
-def scatter(
-    points: FloatArray, mode: str, name: str, hoverinfo: str = "skip", **options: object
-) -> Any:
-    """Return a Plotly trace of points or lines, shape (point, 3), in base in m."""
-    return go.Scatter3d(**_xyz(points), mode=mode, name=name, hoverinfo=hoverinfo, **options)
-
-
-def _xyz(points: FloatArray) -> dict[str, object]:
-    """Return coordinates in single precision, which is good to a micrometre within 10 m."""
-    return dict(zip("xyz", np.asarray(points, dtype=np.float32).T, strict=True))
-
-
-def segments(lines: Iterable[Sequence[FloatArray]]) -> FloatArray:
-    """Return separate lines as one array with NaN between them, shape (3 line, 3)."""
-    gap = np.full(3, np.nan)
-    return np.array([row for ends in lines for row in (*ends, gap)]).reshape(-1, 3)

@@ -16,6 +16,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.planning.surface import Surface
 from elastocal.report.plots._solids import fixture_solids
+from elastocal.wording import phrase
 
 ONE_WAY = np.cos(np.radians(72.0))
 """Least cosine between a normal and the viewing direction at which a surface still reads well."""
@@ -32,7 +33,7 @@ _TOUCHING = 0.02
 """Parts whose boxes share more than this part of the smaller one overlap."""
 
 _FIELD_OF_VIEW = np.radians(45.0)
-"""Field of view of Plotly's perspective camera, in rad."""
+"""Field of view of the page's camera, upward, in rad; ``view.js`` has the same."""
 _ASPECT = 1.5
 """Width by height of the picture that cameras are set for; the page steps back if narrower."""
 _ROOM = 1.08
@@ -236,27 +237,32 @@ def _corners(surface: Surface, patch: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Ranges of the axes, each of shape (3,), in m."""
+    """A box that holds what a view shows, in m in base."""
 
     low: FloatArray
+    """Shape (3,)."""
     high: FloatArray
+    """Shape (3,)."""
 
     @property
-    def sides(self) -> dict[str, float]:
-        """Sides of the box in the camera's units: alike in all directions, its volume 1."""
-        return _point((self.high - self.low) / self._unit)
+    def corners(self) -> FloatArray:
+        """Corners, shape (8, 3)."""
+        return np.array(np.meshgrid(*zip(self.low, self.high, strict=True))).reshape(3, -1).T
 
-    def scene(self, point: FloatArray) -> FloatArray:
-        """Return points in the camera's units, from the middle of the box."""
-        return (point - 0.5 * (self.low + self.high)) / self._unit
 
-    @property
-    def _unit(self) -> float:
-        return float(np.cbrt(np.prod(self.high - self.low)))
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """From where a view is seen."""
+
+    name: str
+    centre: FloatArray
+    """What stands in the middle of the picture, shape (3,), in m in base."""
+    eye: FloatArray
+    """Shape (3,), in m in base."""
 
 
 def bounds_of(cell: Cell, surface: Surface, reach: FloatArray) -> Bounds:
-    """Return ranges that hold robot, tooling and stations, whatever the size of the floor.
+    """Return a box that holds robot, tooling and stations, whatever the size of the floor.
 
     Parameters
     ----------
@@ -280,8 +286,8 @@ def bounds_of(cell: Cell, surface: Surface, reach: FloatArray) -> Bounds:
 
 def cameras_of(
     cell: Cell, surface: Surface, robot: FloatArray, bounds: Bounds
-) -> dict[str, dict[str, object]]:
-    """Return Plotly cameras that look at the work, at the tooling and at everything.
+) -> tuple[Camera, ...]:
+    """Return cameras that look at the work, at the tooling and at everything.
 
     Parameters
     ----------
@@ -292,40 +298,36 @@ def cameras_of(
     bounds : Bounds
         Of the view.
     """
-    tooling = surface.mesh.vertices
-    box = np.array(np.meshgrid(*zip(bounds.low, bounds.high, strict=True))).reshape(3, -1).T
-    direction = _viewing_direction(cell, surface)
+    tooling, direction = surface.mesh.vertices, _viewing_direction(cell, surface)
     places = {
-        "Robot and tooling": np.concatenate([tooling, robot]),
-        "Tooling": tooling,
-        "Whole cell": box,
+        phrase("Robot and tooling"): np.concatenate([tooling, robot]),
+        phrase("Tooling"): tooling,
+        phrase("Whole cell"): bounds.corners,
     }
-    return {
-        name: _camera(bounds.scene(points), direction, _up(cell)) for name, points in places.items()
-    }
+    return tuple(_camera(name, points, direction, upward(cell)) for name, points in places.items())
 
 
 def light_over(cell: Cell, surface: Surface) -> FloatArray:
     """Return the unit vector towards the light, shape (3,): over the shoulder of who looks."""
-    return _unit(0.6 * _viewing_direction(cell, surface) + _up(cell))
+    return _unit(0.6 * _viewing_direction(cell, surface) + upward(cell))
 
 
-def _camera(points: FloatArray, direction: FloatArray, up: FloatArray) -> dict[str, object]:
+def _camera(name: str, points: FloatArray, direction: FloatArray, up: FloatArray) -> Camera:
     """Return the camera that has all points in a picture of the aspect `_ASPECT`."""
     right = _unit(np.cross(up, direction))
     axes = np.stack([right, np.cross(direction, right), direction])
     seen = points @ axes.T
     centre = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    across, upward, ahead = (seen - centre).T
+    across, high, ahead = (seen - centre).T
     tangent = np.tan(0.5 * _FIELD_OF_VIEW)
-    distance = ahead + np.maximum(np.abs(upward), np.abs(across) / _ASPECT) / tangent
+    distance = ahead + np.maximum(np.abs(high), np.abs(across) / _ASPECT) / tangent
     middle, back = centre @ axes, _ROOM * float(distance.max())
-    return {"center": _point(middle), "eye": _point(middle + back * direction), "up": _point(up)}
+    return Camera(name, middle, middle + back * direction)
 
 
 def _viewing_direction(cell: Cell, surface: Surface) -> FloatArray:
     """Return where to look from: beside the robot, from above, opposite to the stations."""
-    up, middle = _up(cell), surface.mesh.vertices.mean(axis=0)
+    up, middle = upward(cell), surface.mesh.vertices.mean(axis=0)
     ahead = middle - up * (up @ middle)
     # A tooling right above or below the base leaves the side open: any will do.
     ahead = _unit(ahead if np.linalg.norm(ahead) > 1e-6 else np.roll(up, 1))
@@ -335,7 +337,7 @@ def _viewing_direction(cell: Cell, surface: Surface) -> FloatArray:
     return _unit(0.85 * away * side + 0.3 * ahead + 0.65 * up)
 
 
-def _up(cell: Cell) -> FloatArray:
+def upward(cell: Cell) -> FloatArray:
     """Return the world's vertical in base; a robot may hang from the ceiling."""
     return cell.T_world_base[2, :3]
 
@@ -343,7 +345,3 @@ def _up(cell: Cell) -> FloatArray:
 def _unit(vector: FloatArray) -> FloatArray:
     """Return a vector with length 1, or as it is with length 0."""
     return vector / (np.linalg.norm(vector) or 1.0)
-
-
-def _point(vector: FloatArray) -> dict[str, float]:
-    return {name: float(value) for name, value in zip("xyz", vector, strict=True)}

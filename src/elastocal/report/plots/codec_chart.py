@@ -5,13 +5,16 @@ chart, a strip tells from where on each variant has saturated.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass
+from pathlib import Path, PurePath
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from elastocal.codec import CodecData, Saturation, Verdicts
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.codec import CodecData, Saturation, Variant, Verdicts
 from elastocal.codec.study import (
     SampleResult,
     StudyDesign,
@@ -30,7 +33,8 @@ from elastocal.report.plots._box_plots import (
     make_boxes,
 )
 from elastocal.report.plots.style import VariantStyle, variant_styles
-from elastocal.wording import counted
+from elastocal.results import brief_repr
+from elastocal.wording import counted, phrase
 
 ERROR_PANELS = {"mean": "Mean error", "max": "Maximum error"}
 _MM = 1e3
@@ -92,6 +96,89 @@ def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figu
     draw_legend(figure, styles, _LEFT, _HEADLINE - 0.02, across)
     figure.add_caption(how_to_read(data), _LEFT)
     return figure
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ErrorCurve:
+    """Mean error at held-out poses of one variant over the number of training poses."""
+
+    variant: Variant
+    n_train: IndexArray
+    """Shape (size,)."""
+    median: FloatArray
+    """Over the splits, shape (size,), in m."""
+    low: FloatArray
+    high: FloatArray
+    """Quartiles, likewise."""
+    saturated: int | None
+    """Poses from which on more do not help; None: never."""
+
+
+def error_curves(data: CodecData, saturation: Sequence[Saturation]) -> list[ErrorCurve]:
+    """Return the curve of every variant of a codec that has errors."""
+    curves = []
+    for variant, found in zip(data.variants, saturation, strict=True):
+        errors = data.errors(variant.name, "mean", "norm")
+        known = np.isfinite(errors).any(axis=0)
+        if known.any():
+            low, median, high = np.nanquantile(errors[:, known], (0.25, 0.5, 0.75), axis=0)
+            n = found.n_train if found.explains else None
+            curves.append(ErrorCurve(variant, data.n_train[known], median, low, high, n))
+    return curves
+
+
+def pose_count_figure(curves: Sequence[ErrorCurve], tolerance: float | None) -> Figure:
+    """Return how the error falls with the number of poses, all variants in one panel.
+
+    Parameters
+    ----------
+    curves : sequence of ErrorCurve
+        At least one.
+    tolerance : float, optional
+        In m.
+    """
+    figure = style.new_figure(9.0, 4.4)
+    axes = figure.add_panel(0.75, 0.55, 8.1, 3.2)
+    styles = variant_styles([_name_of(each.variant) for each in curves])
+    for curve, drawn in zip(curves, styles, strict=True):
+        axes.fill_between(
+            curve.n_train, _MM * curve.low, _MM * curve.high, color=drawn.colour, alpha=0.14, lw=0
+        )
+        axes.plot(
+            curve.n_train, _MM * curve.median, color=drawn.colour, marker=drawn.marker, ms=3.2,
+            lw=1.4, label=style.literal(drawn.name),
+        )  # fmt: skip
+        if curve.saturated is not None and curve.saturated in curve.n_train:
+            at = int(np.flatnonzero(curve.n_train == curve.saturated)[0])
+            axes.plot(
+                [curve.saturated], [_MM * curve.median[at]], "D", ms=8, mfc="none",
+                mec=drawn.colour, mew=1.6,
+            )  # fmt: skip
+    if tolerance is not None:
+        axes.axhline(_MM * tolerance, color=style.INK, lw=1.0, ls=(0, (5, 4)))
+        axes.annotate(
+            phrase("tolerance"), (1.0, _MM * tolerance), (0, 3), ha="right", size=8.0,
+            xycoords=("axes fraction", "data"), textcoords="offset points",
+        )  # fmt: skip
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel(phrase("training poses"))
+    axes.set_ylabel(phrase("mean error at held-out poses in mm"))
+    style.open_frame(axes, grid="both")
+    figure.legend(
+        loc="upper left", bbox_to_anchor=(0.075, 0.995), ncols=2, frameon=False, fontsize=8.5
+    )
+    return figure
+
+
+def _name_of(variant: Variant) -> str:
+    springs = PurePath(variant.springs).name
+    return phrase(
+        "{search}, {springs}, loads {load_cases}", search=variant.search, springs=springs,
+        load_cases=variant.load_cases,
+    )  # fmt: skip
 
 
 def error_boxes(data: CodecData, which: str, axis: str) -> list[Boxes]:

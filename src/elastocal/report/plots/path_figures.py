@@ -22,6 +22,7 @@ from elastocal.compensation import PathStations, PostureSurvey
 from elastocal.compensation.process import CourseDeviation
 from elastocal.report.plots import style
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 _WIDTH, _MAP, _CURVES = 6.6, 2.3, 2.3
 """Width of the figure of stiffness, heights of a map and of the curves, in inches."""
@@ -206,8 +207,8 @@ def process_maps(traces: Sequence[CourseDeviation]) -> Figure:
     """
     place = _best_plane(np.concatenate([trace.position for trace in traces]))
     sides = {
-        "Without correction": _MM * np.abs(np.concatenate([t.before for t in traces])),
-        "With correction": _MM * np.abs(np.concatenate([t.after for t in traces])),
+        phrase("Without correction"): _MM * np.abs(np.concatenate([t.before for t in traces])),
+        phrase("With correction"): _MM * np.abs(np.concatenate([t.after for t in traces])),
     }
     low, high = place.min(axis=0), place.max(axis=0)
     across = 0.5 * (_PROCESS_WIDTH - 1.5)
@@ -232,7 +233,7 @@ def process_maps(traces: Sequence[CourseDeviation]) -> Figure:
     figure.colorbar(
         ScalarMappable(Normalize(0.0, largest), style.SEQUENTIAL), cax=bar, orientation="horizontal"
     )
-    bar.set_xlabel("absolute deviation in mm", fontsize=8)
+    bar.set_xlabel(phrase("absolute deviation in mm"), fontsize=8)
     bar.tick_params(labelsize=7, length=2)
     return figure
 
@@ -250,15 +251,23 @@ def course_figure(trace: CourseDeviation, tolerance: float | None) -> Figure:
     figure = style.new_figure(_PROCESS_WIDTH, 2.8)
     axes = figure.subplots()
     axes.plot(trace.time, _MM * trace.before, color=style.VERMILLION, lw=1.2, ls="--",
-              label="without correction")  # fmt: skip
-    axes.plot(trace.time, _MM * trace.after, color=style.BLUE, lw=1.2, label="with correction")
+              label=phrase("without correction"))  # fmt: skip
+    axes.plot(
+        trace.time, _MM * trace.after, color=style.BLUE, lw=1.2, label=phrase("with correction")
+    )
     if tolerance is not None:
         for sign in (-1.0, 1.0):
             axes.axhline(sign * _MM * tolerance, color=style.INK, lw=0.8, ls=":")
-        axes.text(float(trace.time[0]), _MM * tolerance, " tolerance", va="bottom", fontsize=7.5)
+        axes.text(
+            float(trace.time[0]), _MM * tolerance, phrase("tolerance"), va="bottom", fontsize=7.5
+        )
     axes.axhline(0.0, color=style.FAINT, lw=0.6, zorder=0)
-    axes.set(xlabel="time in s", ylabel="deviation in mm")
-    axes.set_title(style.literal(f"{trace.course}, seed {trace.seed}"), loc="left", fontsize=9)
+    axes.set(xlabel=phrase("time in s"), ylabel=phrase("deviation in mm"))
+    axes.set_title(
+        style.literal(phrase("{course}, seed {seed}", course=trace.course, seed=trace.seed)),
+        loc="left",
+        fontsize=9,
+    )
     axes.legend(loc="upper right", bbox_to_anchor=(1.0, 1.16), ncols=2, frameon=False)
     style.open_frame(axes)
     figure.subplots_adjust(left=0.07, right=0.99, bottom=0.17, top=0.88)

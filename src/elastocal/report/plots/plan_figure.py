@@ -19,7 +19,7 @@ from elastocal.planning import PlanResult, PoolData, SpreadRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.report.plots._views import FlatMap, flat_map
-from elastocal.wording import readable
+from elastocal.wording import phrase, readable
 
 _HEAD, _FOOT, _SIDE = 0.7, 1.95, 0.25
 """Room above, below and beside the panels, in inches."""
@@ -111,16 +111,20 @@ def _choices(plan: PlanResult, pool: PoolData) -> list[_Choice]:
     candidate = {pose.id: pose.candidate for pose in plan.poses}
     search, other = plan.search, plan.comparison
     ids = [str(pose) for pose in search.order]
-    found = [(search.name, "this plan", [candidate[i] for i in search.order], ids, search.spread)]
+    found = [
+        (search.name, phrase("this plan"), [candidate[i] for i in search.order], ids, search.spread)
+    ]
     if other is not None:
         unnamed = [""] * len(other.candidates)
-        found.append((other.name, "for comparison", list(other.candidates), unnamed, other.spread))
+        found.append(
+            (other.name, phrase("for comparison"), list(other.candidates), unnamed, other.spread)
+        )
     choices = []
     for (name, role, order, names, spread), colour, marker in zip(
         found, style.CHOSEN, "os", strict=False
     ):
         distance = np.asarray(cKDTree(pool.contact[order]).query(pool.contact)[0])
-        title = f"{name.upper()} ({role})"
+        title = phrase("{name} ({role})", name=name.upper(), role=role)
         choices.append(
             _Choice(title, colour, marker, order, names, distance, spread, search.metric)
         )
@@ -145,18 +149,24 @@ def _extent(surface: Surface, flat: FlatMap) -> tuple[FloatArray, FloatArray]:
 def _draw_frame(figure: style.Page, plan: PlanResult, flat: FlatMap, dots: PathCollection) -> None:
     """Draw what belongs to all panels: title, colour bar, how to read it."""
     width, height = figure.get_size_inches()
-    title = f"{plan.cell.name}: {len(plan.poses)} of {plan.pool.valid} candidate poses"
+    title = phrase(
+        "{cell}: {poses} of {valid} candidate poses",
+        cell=plan.cell.name,
+        poses=len(plan.poses),
+        valid=plan.pool.valid,
+    )
     figure.text(0.5, 1.0 - 0.12 / height, style.literal(title), ha="center", va="top", fontsize=12)
     bar = figure.add_axes((0.5 - 1.7 / width, 0.72 / height, 3.4 / width, 0.11 / height))
     figure.colorbar(dots, cax=bar, orientation="horizontal")
     bar.set_title(
-        "Straight distance of each candidate from its nearest chosen pose in mm", fontsize=8, pad=3
+        phrase("Straight distance of each candidate from its nearest chosen pose in mm"),
+        fontsize=8,
+        pad=3,
     )
     bar.tick_params(labelsize=8, length=2)
     figure.text(
         0.5, 0.1 / height,
-        f"Surface {flat.kind}.\n"
-        "Poses are numbered in the order in which they were chosen.",
+        phrase("Surface {kind}.\nPoses are numbered in visiting order.", kind=flat.kind),
         ha="center", va="bottom", fontsize=8, color=style.MUTED,
     )  # fmt: skip
 
@@ -273,10 +283,13 @@ def _draw_numbers(axes: Axes, choice: _Choice) -> None:
     """Write the figures that show clustering under the panel."""
     numbers = choice.spread
     lines = [
-        (f"Covering radius ({choice.metric})", readable(numbers.covering_radius, "m")),
-        ("Mean distance from the edge", _length(numbers.boundary_distance)),
-        ("Mean distance to the nearest other pose", _length(numbers.nearest_neighbour)),
-        ("Observability index O1 (no unit)", f"{numbers.o1:.3g}"),
+        (
+            phrase("Covering radius ({metric})", metric=choice.metric),
+            readable(numbers.covering_radius, "m"),
+        ),
+        (phrase("Mean distance from the edge"), _length(numbers.boundary_distance)),
+        (phrase("Mean distance to the nearest other pose"), _length(numbers.nearest_neighbour)),
+        (phrase("Observability index O1 (no unit)"), f"{numbers.o1:.3g}"),
     ]
     for row, (name, value) in enumerate(lines):
         down = (0, -8 - 14 * row)
@@ -290,4 +303,4 @@ def _draw_numbers(axes: Axes, choice: _Choice) -> None:
 
 
 def _length(value: float | None) -> str:
-    return "none" if value is None else readable(value, "m")
+    return phrase("none") if value is None else readable(value, "m")

@@ -1,16 +1,14 @@
-"""The interactive view of a plan: a Plotly figure whose frames are the postures of the robot.
+"""The view of a plan in three dimensions: layers of solids, lines, dots and tags, and postures.
 
-It holds what moves (robot, line of sight), the layers that stay, and cameras that look at the
-work, at the tooling and at the whole cell. Traces of one layer go on and off together.
+Nothing here draws: ``view.js`` shows what this module describes. What moves is the robot, whose
+parts are placed anew for every posture, and the line of sight.
 """
 
 from dataclasses import dataclass
-from html import escape
 from itertools import pairwise
-from typing import Any
 
+import matplotlib
 import numpy as np
-import plotly.graph_objects as go
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
@@ -20,27 +18,23 @@ from elastocal.report.plots import style
 from elastocal.report.plots._solids import (
     MOST_OF_FIXTURE,
     MOST_OF_TOOLING,
-    MOVING_COLOURS,
-    MovingParts,
+    RobotSolids,
     Solid,
     coarsened,
     fixture_solids,
     joined,
-    moving_parts,
-    scatter,
-    segments,
-    solid_trace,
+    rail_solid,
+    robot_solids,
 )
-from elastocal.report.plots._views import Bounds, bounds_of, cameras_of, light_over
+from elastocal.report.plots._views import Camera, bounds_of, cameras_of, light_over, upward
 from elastocal.results import brief_repr
-from elastocal.wording import duration, millimetres, readable
+from elastocal.wording import duration, millimetres, phrase, readable
 
-_LABEL = {"textposition": "top center", "textfont": {"size": 13, "color": style.INK}}
-_Json = dict[str, object]
-"""A part of a figure as plotly.js reads it."""
 _OFF_SURFACE = 0.004
 """Dots are drawn this far off the surface, as part of its size, so that it does not swallow half
 of each."""
+_QUIET, _TOOLING, _FIXTURE, _RAIL = "--muted", "--tooling", "--fixture", "--strong"
+"""Colours that follow the scheme of the page: names of its style sheet."""
 
 
 @brief_repr
@@ -58,31 +52,91 @@ class WeakestMargins:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
+class Paint:
+    """A solid and its colour."""
+
+    solid: Solid
+    """In base; of a part of the robot in its own frame."""
+    colour: str
+    """``#rrggbb``, or a name of the page's style sheet."""
+    part: int = -1
+    """Number of the robot's part that it is; -1 for what stays."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Straight lines, each by itself."""
+
+    ends: FloatArray
+    """Shape (line, 2, 3), in m in base."""
+    colour: str
+    width: float
+    """In pixels."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Dots:
+    """Small discs."""
+
+    at: FloatArray
+    """Shape (dot, 3), in m in base."""
+    colours: IndexArray
+    """Red, green and blue from 0 to 255, shape (dot, 3)."""
+    hints: tuple[str, ...] = ()
+    """Texts that a reader who points at one sees; empty for none."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class Tags:
+    """Short texts at places."""
+
+    at: FloatArray
+    """Shape (tag, 3), in m in base."""
+    texts: tuple[str, ...]
+    colour: str
+    hints: tuple[str, ...]
+    normals: FloatArray | None = None
+    """Of poses: out of the surface, shape (tag, 3); a tag on the far side is drawn pale."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
 class Layer:
-    """Traces with one switch."""
+    """What has one switch."""
 
     label: str
     colour: str
     """Colour of the switch's swatch."""
-    traces: tuple[Any, ...]
-    """Plotly traces, at least one."""
+    parts: tuple[Paint | Strokes | Dots | Tags, ...]
     shown: bool = True
     """Whether the layer is on when the page opens."""
     note: str = ""
     """A remark for readers on how it is drawn."""
+    sight: bool = False
+    """Whether it holds the line of sight, which moves."""
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class PlanView:
-    """A figure, its layers and its camera places."""
+    """Layers, postures and cameras."""
 
-    figure: Any
-    """Plotly figure; frame 0 is HOME, frame i + 1 is pose i."""
     layers: tuple[Layer, ...]
-    """Traces of the figure that go on and off together, in its order."""
-    cameras: dict[str, _Json]
-    """Plotly cameras by name; the first is the initial one."""
+    places: FloatArray
+    """``T_base_part``, shape (posture, part, 4, 4); posture 0 is HOME, i + 1 is pose i."""
+    sight: FloatArray
+    """Marker and station of each posture, shape (posture, 2, 3), in m; NaN where none sees."""
+    cameras: tuple[Camera, ...]
+    """The first is the initial one."""
+    light: FloatArray
+    """Unit vector towards the light, shape (3,)."""
+    up: FloatArray
+    """The world's vertical in base, shape (3,)."""
+    floor: float
+    """Height above which the camera stays, along `up`, in m."""
 
 
 def plan_view(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) -> PlanView:
@@ -93,92 +147,74 @@ def plan_view(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) ->
     cell, surface, plan, pool
         Which belong together; the plan has at least one pose.
     """
-    moving = moving_parts(cell, surface, plan, light_over(cell, surface))
-    layers = (*_moving_layers(moving), *_still_layers(cell, surface, plan, pool, moving.light))
-    traces = [trace.update(visible=layer.shown) for layer in layers for trace in layer.traces]
-    reach = [*(robot.vertices for robot in moving.robot), _tool_path(cell, plan)]
-    bounds = bounds_of(cell, surface, np.concatenate(reach))
-    cameras = cameras_of(cell, surface, moving.robot[1].vertices, bounds)
-    layout = _layout(bounds, next(iter(cameras.values())))
-    return PlanView(go.Figure(traces, layout, moving.frames()), layers, cameras)
+    q = np.array([plan.robot.home, *(pose.joints for pose in plan.poses)])
+    robot = robot_solids(cell, surface, q)
+    postures = [robot.at(posture).vertices for posture in range(len(q))]
+    sight = _sights(cell, cell.robot.forward(q), plan)
+    bounds = bounds_of(cell, surface, np.concatenate([*postures, _tool_path(cell, plan)]))
+    up = upward(cell)
+    standing = np.concatenate([surface.mesh.vertices, postures[0]])
+    return PlanView(
+        (*_moving_layers(robot, sight), *_still_layers(cell, surface, plan, pool)),
+        robot.places,
+        sight,
+        cameras_of(cell, surface, postures[1], bounds),
+        light_over(cell, surface),
+        up,
+        float((standing @ up).min()),
+    )
 
 
-def _layout(bounds: Bounds, camera: _Json) -> _Json:
-    axes = {
-        f"{name}axis": {
-            "title": {"text": f"{name} of base in m"}, "range": [float(low), float(high)],
-            "backgroundcolor": "#f7f7f5", "gridcolor": "#dcdcdc", "showbackground": True,
-            "zeroline": False, "showspikes": False, "dtick": 1.0,
-        }
-        for name, low, high in zip("xyz", bounds.low, bounds.high, strict=True)
-    }  # fmt: skip
-    # Plotly's aspect mode "data" would follow the whole floor; this is the same, of what is shown.
-    scene = {"aspectmode": "manual", "aspectratio": bounds.sides, "camera": camera, **axes}
-    return {
-        "scene": scene,
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 62},
-        "showlegend": False,
-        "paper_bgcolor": style.PAPER,
-        "font": {"family": "system-ui, sans-serif", "color": style.INK},
-        "hoverlabel": {"align": "left", "bgcolor": style.PAPER, "font": {"color": style.INK}},
-        "template": "none",
-    }
-
-
-def _moving_layers(moving: MovingParts) -> list[Layer]:
-    """Return the layers that differ between postures, as they are at the first pose."""
-    robot = solid_trace(moving.robot[1], moving.light, "robot", MOVING_COLOURS, moving.on_tool)
-    layers = [Layer("Robot and tool", style.ARM, (robot,), note=moving.note)]
-    if moving.sight:
-        line = scatter(
-            moving.sight[1], "lines+markers", "line of sight",
-            line={"color": style.SIGHT, "width": 5}, marker={"color": style.SIGHT, "size": 4},
-        )  # fmt: skip
-        layers.append(Layer("Line of sight to the marker", style.SIGHT, (line,)))
+def _moving_layers(robot: RobotSolids, sight: FloatArray) -> list[Layer]:
+    """Return the layers that differ between postures."""
+    parts = tuple(
+        Paint(part, style.ARM if number < robot.tool else style.TOOL, number)
+        for number, part in enumerate(robot.parts)
+    )
+    layers = [Layer(phrase("Robot and tool"), style.ARM, parts, note=robot.note)]
+    if np.isfinite(sight).any():
+        layers.append(Layer(phrase("Line of sight to the marker"), style.SIGHT, (), sight=True))
     return layers
 
 
-def _still_layers(
-    cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData, towards_light: FloatArray
-) -> list[Layer]:
-    """Return the layers that stay as they are whatever posture is shown.
+def _sights(cell: Cell, T_base_tcp: FloatArray, plan: PlanResult) -> FloatArray:
+    marker, found = cell.file.marker, np.full((len(T_base_tcp), 2, 3), np.nan)
+    stations = {station.name: station.position_base for station in cell.file.trackers}
+    for number, pose in enumerate(plan.poses, start=1):
+        if marker is not None and pose.seen_by in stations:
+            T = T_base_tcp[number]
+            found[number] = T[:3, :3] @ marker.position_tcp + T[:3, 3], stations[pose.seen_by]
+    return found
 
-    Parameters
-    ----------
-    cell, surface, plan, pool
-        Which belong together.
-    towards_light : ndarray, shape (3,)
-        Unit vector.
-    """
+
+def _still_layers(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) -> list[Layer]:
+    """Return the layers that stay as they are whatever posture is shown."""
     lift = _OFF_SURFACE * float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
     return [
-        _tooling(surface, towards_light),
-        *_fixtures(cell, surface, towards_light),
+        _tooling(surface),
+        *_fixtures(cell, surface),
+        *_rail(cell),
         _candidates(pool, lift),
-        Layer("Poses, in visiting order", style.BLUE, (_poses(plan, 5.0 * lift),)),
-        Layer("Approach, along the normal", style.MUTED, (_approaches(plan),)),
-        Layer("Way of the tool from HOME to HOME", style.TOUR, _tour(cell, plan)),
+        Layer(phrase("Poses, in visiting order"), style.BLUE, (_poses(plan, 5.0 * lift),)),
+        Layer(phrase("Approach, along the normal"), _QUIET, (_approaches(plan),)),
+        Layer(phrase("Way of the tool from HOME to HOME"), style.TOUR, _tour(cell, plan)),
         *_trackers(cell),
         *_refused(pool),
     ]
 
 
-def _tooling(surface: Surface, towards_light: FloatArray) -> Layer:
+def _tooling(surface: Surface) -> Layer:
     """Return the surface and the lines at which its smooth patches end."""
     mesh = surface.mesh
     drawn = coarsened(Solid(mesh.vertices, mesh.faces), MOST_OF_TOOLING)
     face, corner = np.divmod(surface.border_half_edges, 3)
     ends = np.stack([mesh.faces[face, (corner + step) % 3] for step in (0, 1)], axis=1)
-    lines = drawn.solid.vertices[drawn.edges(ends)]
-    edges = scatter(
-        segments(lines), "lines", "edges", line={"color": style.MUTED, "width": 2}
-    )  # fmt: skip
-    tooling = solid_trace(drawn.solid, towards_light, "tooling", (style.TOOLING,))
-    traces = (tooling, edges) if len(lines) else (tooling,)
-    return Layer("Tooling", style.TOOLING, traces, note=drawn.note("The tooling"))
+    edges = Strokes(drawn.solid.vertices[drawn.edges(ends)], _QUIET, 1.5)
+    paint = Paint(drawn.solid, _TOOLING)
+    return Layer(phrase("Tooling"), _TOOLING, (paint, edges), note=drawn.note("The tooling"))
 
 
-def _fixtures(cell: Cell, surface: Surface, towards_light: FloatArray) -> list[Layer]:
+def _fixtures(cell: Cell, surface: Surface) -> list[Layer]:
     """Return the layer of the fixtures, if there are any."""
     drawn = {
         name: coarsened(solid, MOST_OF_FIXTURE)
@@ -187,84 +223,75 @@ def _fixtures(cell: Cell, surface: Surface, towards_light: FloatArray) -> list[L
     if not drawn:
         return []
     together = joined([fixture.solid for fixture in drawn.values()])
-    trace = solid_trace(together, towards_light, "fixtures", (style.FIXTURE,))
     notes = (fixture.note(f"Fixture {name}") for name, fixture in drawn.items())
-    return [Layer("Fixtures", style.FIXTURE, (trace,), note=" ".join(filter(None, notes)))]
+    note = " ".join(filter(None, notes))
+    return [Layer(phrase("Fixtures"), _FIXTURE, (Paint(together, _FIXTURE),), note=note)]
+
+
+def _rail(cell: Cell) -> list[Layer]:
+    """Return the layer of the rail below the robot, if there is one."""
+    solid = rail_solid(cell)
+    return [] if solid is None else [Layer(phrase("Rail"), _RAIL, (Paint(solid, _RAIL),))]
 
 
 def _candidates(pool: PoolData, lift: float) -> Layer:
     found = weakest_margins(pool)
     edge = [readable(float(distance), "m") for distance in pool.boundary_distance]
-    text = [
-        f"candidate {number}<br>nearest to refusal: {escape(label)}"
-        f" ({share:.0%} of the pool's median)<br>distance to the edge: {far}"
+    hints = tuple(
+        f"candidate {number}\\nnearest to refusal: {label} ({share:.0%} of the pool's median)\\n"
+        f"distance to the edge: {far}"
         for number, (label, share, far) in enumerate(
             zip(found.label, found.share, edge, strict=True)
         )
-    ]
-    bar = {
-        "title": {"text": "Smallest margin, part of the pool's median", "side": "top"},
-        "orientation": "h", "thickness": 9, "lenmode": "pixels", "len": 280, "tickformat": ".0%",
-        "x": 0.5, "xanchor": "center", "y": -0.01, "yanchor": "top", "dtick": 0.25, "ypad": 4,
-    }  # fmt: skip
-    marker = {
-        "size": 2.6, "color": found.share.astype(np.float32), "cmin": 0.0, "cmax": 1.0,
-        "colorscale": style.SEQUENTIAL, "colorbar": bar,
-    }  # fmt: skip
-    trace = scatter(
-        pool.contact + lift * pool.normal, "markers", "candidates", "text", marker=marker,
-        hovertext=text,
-    )  # fmt: skip
-    return Layer(f"Candidates ({len(pool.contact)})", "#7b7b78", (trace,))
+    )
+    colours = matplotlib.colormaps[style.SEQUENTIAL](np.clip(found.share, 0.0, 1.0))[:, :3]
+    dots = Dots(pool.contact + lift * pool.normal, np.rint(255 * colours).astype(np.intp), hints)
+    return Layer(phrase("Candidates ({count})", count=len(pool.contact)), "#7b7b78", (dots,))
 
 
 def _refused(pool: PoolData) -> list[Layer]:
     """Return the points without a posture, a layer a reason, most frequent first."""
     layers = []
     counts = [int(np.sum(pool.refused_by == k)) for k in range(len(pool.refusal_names))]
+    grey = [int(style.REFUSED[k : k + 2], 16) for k in (1, 3, 5)]
     for number in sorted(np.flatnonzero(counts), key=lambda k: -counts[k]):
-        name, count = pool.refusal_names[number], counts[number]
-        trace = scatter(
-            pool.sampled[pool.refused_by == number], "markers", f"refused: {escape(name)}", "name",
-            marker={"size": 2.6, "symbol": "x", "color": style.REFUSED},
-        )  # fmt: skip
-        layers.append(Layer(f"Refused by {name} ({count})", style.REFUSED, (trace,), shown=False))
+        name, at = pool.refusal_names[number], pool.sampled[pool.refused_by == number]
+        dots = Dots(at, np.tile(grey, (len(at), 1)), (f"refused: {name}",) * len(at))
+        label = phrase("Refused by {check} ({count})", check=name, count=counts[number])
+        layers.append(Layer(label, style.REFUSED, (dots,), shown=False))
     return layers
 
 
-def _poses(plan: PlanResult, lift: float) -> Any:
-    rank = {pose: number for number, pose in enumerate(plan.search.order)}
-    return scatter(
-        np.array([_above(pose, lift) for pose in plan.poses]), "markers+text", "poses", "text",
-        text=[str(pose.id) for pose in plan.poses], textposition="middle center",
-        textfont={"size": 10, "color": style.INK},
-        marker={"size": 15, "color": style.PAPER, "line": {"color": style.BLUE, "width": 2}},
-        customdata=[pose.id for pose in plan.poses],
-        hovertext=[_hover(plan, pose, rank.get(pose.id)) for pose in plan.poses],
-    )  # fmt: skip
+def _poses(plan: PlanResult, lift: float) -> Tags:
+    return Tags(
+        np.array([_above(pose, lift) for pose in plan.poses]),
+        tuple(str(pose.id) for pose in plan.poses),
+        style.BLUE,
+        tuple(_hint(plan, pose) for pose in plan.poses),
+        np.array([pose.normal for pose in plan.poses]),
+    )
 
 
-def _hover(plan: PlanResult, pose: PoseRecord, rank: int | None) -> str:
+def _hint(plan: PlanResult, pose: PoseRecord) -> str:
     unit = {check.name: check.unit or "" for check in plan.pool.checks}
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
-    seen = f"seen by {escape(pose.seen_by)}" if pose.seen_by else "not seen by a station"
+    seen = f"seen by {pose.seen_by}" if pose.seen_by else "not seen by a station"
     lines = [
-        f"<b>pose {pose.id}</b>, search rank {rank}",
+        f"pose {pose.id}",
         f"x, y, z: {millimetres(pose.tcp_position)} mm",
         seen,
         f"{duration(way)} on the way, {duration(pose.contact_time)} in contact",
-        "<b>margins</b>",
-        *(f"{escape(n)}: {readable(m, unit.get(n, ''))}" for n, m in pose.margins.items()),
+        "margins:",
+        *(f"{n}: {readable(m, unit.get(n, ''))}" for n, m in pose.margins.items()),
     ]
-    return "<br>".join(lines)
+    return "\\n".join(lines)
 
 
-def _approaches(plan: PlanResult) -> Any:
+def _approaches(plan: PlanResult) -> Strokes:
     """Return the last part of the way to each pose; near the surface it would cross the number."""
     far = plan.contact.approach_distance
     ends = [(_above(pose, 0.4 * far), _above(pose, 1.0 * far)) for pose in plan.poses]
-    line = {"color": style.MUTED, "width": 2}
-    return scatter(segments(ends), "lines", "approaches", line=line)
+    return Strokes(np.array(ends), _QUIET, 1.5)
 
 
 def _above(pose: PoseRecord, distance: float) -> FloatArray:
@@ -272,14 +299,10 @@ def _above(pose: PoseRecord, distance: float) -> FloatArray:
     return np.array(pose.tcp_position) + distance * np.array(pose.normal)
 
 
-def _tour(cell: Cell, plan: PlanResult) -> tuple[Any, Any]:
+def _tour(cell: Cell, plan: PlanResult) -> tuple[Strokes, Tags]:
     path = _tool_path(cell, plan)
-    way = scatter(path, "lines", "way", line={"color": style.TOUR, "width": 3})
-    home = scatter(
-        path[:1], "markers+text", "HOME", "name", text=["HOME"], **_LABEL,
-        marker={"size": 6, "symbol": "square", "color": style.TOUR},
-    )  # fmt: skip
-    return way, home
+    way = Strokes(np.stack([path[:-1], path[1:]], axis=1), style.TOUR, 2.0)
+    return way, Tags(path[:1], ("HOME",), style.TOUR, ("HOME: where the robot starts and ends",))
 
 
 def _trackers(cell: Cell) -> list[Layer]:
@@ -287,17 +310,17 @@ def _trackers(cell: Cell) -> list[Layer]:
     stations = cell.file.trackers
     if not stations:
         return []
-    trace = scatter(
-        np.array([station.position_base for station in stations]), "markers+text", "trackers",
-        "text", text=[station.name for station in stations], **_LABEL,
-        marker={"size": 8, "symbol": "diamond", "color": style.SIGHT},
-        hovertext=[
-            f"<b>{escape(station.name)}</b><br>x, y, z: {millimetres(station.position)} mm<br>"
+    tags = Tags(
+        np.array([station.position_base for station in stations]),
+        tuple(station.name for station in stations),
+        style.SIGHT,
+        tuple(
+            f"{station.name}\\nx, y, z: {millimetres(station.position)} mm\\n"
             f"range {station.range[0]:g} m to {station.range[1]:g} m"
             for station in stations
-        ],
-    )  # fmt: skip
-    return [Layer("Tracker stations", style.SIGHT, (trace,))]
+        ),
+    )
+    return [Layer(phrase("Tracker stations"), style.SIGHT, (tags,))]
 
 
 def _tool_path(cell: Cell, plan: PlanResult, steps: int = 12) -> FloatArray:

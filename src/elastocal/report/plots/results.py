@@ -26,6 +26,7 @@ from elastocal.report.plots.spring_figures import recertification_figure, spring
 from elastocal.report.plots.style import literal, new_figure, open_frame, variant_styles
 from elastocal.report.plots.timeline_figure import timeline_figure
 from elastocal.results import brief_repr
+from elastocal.wording import counted, phrase
 
 _P = ParamSpec("_P")
 _MM = 1e3
@@ -67,12 +68,13 @@ def displacement_figure(
     figure = new_figure(_READINGS_WIDTH, 4.0)
     main, side = figure.subplots(1, 2, width_ratios=(6, 1), sharey=True)
     x = np.arange(len(pose))
-    for number in np.unique(pose)[1::2]:
-        of = np.flatnonzero(pose == number)
+    labels = list(dict.fromkeys(pose.tolist()))
+    places = [np.flatnonzero(pose == label) for label in labels]
+    for of in places[1::2]:
         main.axvspan(of[0] - 0.5, of[-1] + 0.5, color=style.BAND, lw=0, zorder=0)
     series = (
-        ("commanded displacement of the tcp", commanded, style.VERMILLION, "^"),
-        ("residual of the fit", residual, style.BLUE, "o"),
+        (phrase("commanded displacement of the tcp"), commanded, style.VERMILLION, "^"),
+        (phrase("residual of the fit"), residual, style.BLUE, "o"),
     )
     edges = np.linspace(0.0, _MM * float(max(commanded.max(), residual.max())), 40)
     for name, values, colour, marker in series:
@@ -83,13 +85,15 @@ def displacement_figure(
     if not np.all(used):
         main.scatter(
             x[~used], _MM * residual[~used], s=60, facecolors="none", edgecolors=style.INK,
-            marker="s", label="set aside as a blunder", zorder=3,
+            marker="s", label=phrase("set aside as a blunder"), zorder=3,
         )  # fmt: skip
     main.set_ylim(bottom=0.0)
     main.set_xlim(-1, len(pose))
-    main.set(xlabel="reading, pose by pose", ylabel="norm in mm")
+    step = max(1, -(-len(labels) // 30))
+    main.set_xticks([of.mean() for of in places[::step]], [str(each) for each in labels[::step]])
+    main.set(xlabel=phrase("readings of each pose"), ylabel=phrase("norm in mm"))
     main.legend(loc="upper center", bbox_to_anchor=(0.5, 1.13), ncols=3, frameon=False)
-    side.set_xlabel("readings")
+    side.set_xlabel(phrase("readings"))
     side.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=3))
     for axes in (main, side):
         open_frame(axes, grid="y")
@@ -120,7 +124,7 @@ def pose_grid(
         axes = figure.add_panel(_LEFT, bottom, across, _CELL * len(cases))
         _draw_shades(axes, title, values, poses, cases)
         if number == len(panels) - 1:
-            axes.set_xlabel("pose; a cross: no usable reading")
+            axes.set_xlabel(phrase("pose; a cross: no usable reading"))
     return figure
 
 
@@ -139,7 +143,7 @@ def _draw_shades(
         if not np.isfinite(value):
             axes.text(pose, case, "×", ha="center", va="center", color=style.VERMILLION)
         elif len(poses) <= _MANY:
-            ink = style.INK if value > 0.55 * top else style.PAPER
+            ink = style.ON_BRIGHT if value > 0.55 * top else style.ON_DARK
             # In little room: 1.23, .041.
             text = f"{value:.2f}" if value >= 1.0 else f"{value:.3f}".lstrip("0")
             axes.text(pose, case, text, ha="center", va="center", color=ink, fontsize=6.0)
@@ -155,14 +159,17 @@ def station_figure(stations: Sequence[StationResiduals]) -> Figure:
     """
     figure = new_figure(_READINGS_WIDTH, 2.6)
     axes = figure.subplots()
-    names = [f"{each.station}, {len(each.poses)} poses" for each in stations]
+    names = [
+        phrase("{station}, {poses}", station=each.station, poses=counted(len(each.poses), "pose"))
+        for each in stations
+    ]
     for each, drawn in zip(stations, variant_styles(names), strict=True):
         size = 1e6 * np.linalg.norm(each.residual, axis=1)
         axes.vlines(each.poses, 0.0, size, color=drawn.colour, lw=1.0)
         axes.scatter(
             each.poses, size, s=18, c=drawn.colour, marker=drawn.marker, label=literal(drawn.name)
         )
-    axes.set(xlabel="pose", ylabel="residual in µm")
+    axes.set(xlabel=phrase("pose"), ylabel=phrase("residual in µm"))
     axes.set_ylim(bottom=0.0)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.22), ncols=4, frameon=False)
     open_frame(axes, grid="y")

@@ -22,6 +22,7 @@ from elastocal.identification.recertification import (
 )
 from elastocal.report.plots import style
 from elastocal.report.plots.style import literal, wrapped
+from elastocal.wording import phrase
 
 _BAR, _BAR_FOOT = 0.23, 0.75
 """Heights of a spring and of what stands below its panel, in inches."""
@@ -114,13 +115,14 @@ def _draw_bars(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
             left = bar.value > bottom + 0.75 * span
             axes.text(
                 bar.value + (-0.015 if left else 0.015) * span, k,
-                f"not by itself, group {bar.group}", ha="right" if left else "left",
+                phrase("not by itself, group {group}", group=bar.group),
+                ha="right" if left else "left",
                 va="center", fontsize=7.5, color=style.MUTED, style="italic",
             )  # fmt: skip
     axes.set_yticks(range(len(bars)), [literal(bar.name) for bar in bars], fontsize=8)
     axes.set_ylim(len(bars) - 0.4, -0.6)
     axes.set_xlim(bottom - 0.02 * span, bottom + 1.05 * span)
-    axes.set_xlabel(f"compliance in {unit}; band: 95 % interval")
+    axes.set_xlabel(phrase("compliance in {unit}; band: 95 % interval", unit=unit))
     style.open_frame(axes, grid="both", colour="#e6e6e2")
     axes.tick_params(length=0)
 

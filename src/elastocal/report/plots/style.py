@@ -15,9 +15,13 @@ from typing import Any, Literal
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import Collection, PathCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import FileAccessError
@@ -57,6 +61,26 @@ _FILL = 0.35
 """Part of the colour in a box; the rest is paper."""
 _DPI = 200
 _SCREEN_DPI = 100
+_IMAGE_DPI = 100
+_MOST_PARTS = 400
+"""Parts of one artist beyond which SVG would be larger than an image."""
+ON_BRIGHT, ON_DARK = "#1b1b1a", "#fffffe"
+"""Ink on the colours of a map, which are the same in every scheme."""
+_THEMED = {
+    INK: "ink", MUTED: "muted", PAPER: "ground", GRID: "grid", "#e6e6e2": "grid", FAINT: "faint",
+    BAND: "band", BLUE: "after", VERMILLION: "before", REFUSED: "refused",
+}  # fmt: skip
+_DARK = {
+    "ink": "#e8e8e4", "muted": "#b4b4ae", "ground": "#14171a", "grid": "#363b40",
+    "faint": "#5c6268", "band": "#1d2125", "after": "#56b4e9", "before": "#ff9a5c",
+    "refused": "#a5a59f",
+}  # fmt: skip
+"""As the style sheet of pages has them."""
+_SCHEMES = (
+    f":root{{{';'.join(f'--{name}:{colour}' for colour, name in _THEMED.items())}}}"
+    "@media screen and (prefers-color-scheme:dark){"
+    f":root{{{';'.join(f'--{name}:{colour}' for name, colour in _DARK.items())}}}}}"
+)
 _UNDATED: dict[str, dict[str, str | None]] = {
     ".svg": {"Date": None, "Creator": "elastocal"},
     ".pdf": {"CreationDate": None, "Creator": "elastocal"},
@@ -189,7 +213,7 @@ def literal(text: str) -> str:
     >>> literal("a$b")
     'a\\$b'
     """
-    return text.replace("$", r"\$")
+    return text.replace("$", r"\$") if "$" in text else text
 
 
 def wrapped(text: str, width: int) -> list[str]:
@@ -291,6 +315,45 @@ def figure_bytes(draw: Callable[[], Figure], suffix: str, dpi: int) -> bytes:
     with matplotlib.rc_context(print_settings()):
         draw().savefig(buffer, format=suffix[1:], dpi=dpi, metadata=_metadata(suffix))
     return buffer.getvalue()
+
+
+def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] = str) -> bytes:
+    """Return a figure as SVG whose greys follow the colour scheme of the page that shows it.
+
+    What has very many parts is held as an image in it, without a ground.
+
+    Parameters
+    ----------
+    draw : callable
+        Returns the figure; called with the settings of print.
+    say : callable
+        Returns a text in the language of the page.
+    """
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(print_settings() | {"savefig.transparent": True}):
+        figure = draw()
+        for text in figure.findobj(Text):
+            text.set_text(say(text.get_text()))
+        for many in figure.findobj(_has_many_parts):
+            many.set_rasterized(True)
+        figure.savefig(buffer, format="svg", dpi=_IMAGE_DPI, metadata=_metadata(".svg"))
+    svg = buffer.getvalue().decode("utf-8")
+    for colour, name in _THEMED.items():
+        svg = svg.replace(colour, f"var(--{name})")
+    opened = svg.index(">", svg.index("<svg")) + 1
+    return f"{svg[:opened]}<style>{_SCHEMES}</style>{svg[opened:]}".encode()
+
+
+def sequential_stops(count: int = 9) -> list[tuple[float, str]]:
+    """Return colours of `SEQUENTIAL` from 0 to 1, as part and ``#rrggbb``."""
+    parts = np.linspace(0.0, 1.0, count)
+    return [(float(part), to_hex(matplotlib.colormaps[SEQUENTIAL](part))) for part in parts]
+
+
+def _has_many_parts(artist: Artist) -> bool:
+    if isinstance(artist, PathCollection):
+        return len(np.asarray(artist.get_offsets())) > _MOST_PARTS
+    return isinstance(artist, Collection) and len(artist.get_paths()) > _MOST_PARTS
 
 
 def _metadata(suffix: str, title: str = "", description: str = "") -> dict[str, str | None]:

@@ -2,81 +2,102 @@
 
 from collections.abc import Iterator
 from functools import partial
+from pathlib import PurePath
 
-from elastocal.codec import CodecData
-from elastocal.errors import CodecError
+from elastocal.codec import Saturation, Variant
 from elastocal.report.document import blocks
-from elastocal.report.plots import codec_chart, headline, how_to_read
+from elastocal.report.plots import ErrorCurve, error_curves, pose_count_figure
 from elastocal.verdict import CodecEvidence, Evidence
-from elastocal.wording import mm
-
-_FIGURES = {
-    "search": ("Search", "Fig. 7"),
-    "springs": ("Springs", "Fig. 9"),
-    "load_cases": ("Load cases", "Fig. 10"),
-}
-"""Comparisons of the paper, in its order: title and figure of each."""
+from elastocal.wording import Phrase, counted, mm, phrase, phrases
 
 
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     if not evidence.codecs:
-        text = "There is no codec, so it is not known whether there were enough poses."
-        yield blocks.Paragraph(text)
+        yield blocks.Paragraph(
+            phrase("There is no codec, so it is not known whether there were enough poses.")
+        )
         return
     data = evidence.codecs[0].data
     sets, size = data.verification.shape
+    last = phrase("1 to {last}", last=int(data.n_train[-1]))
     yield blocks.Facts(
         (
-            ("Poses", len(data.contact)),
-            ("Splits", sets),
-            ("Held-out poses in each", size),
-            ("Training poses", f"1 to {data.n_train[-1]}"),
+            (phrase("Poses"), len(data.contact)),
+            (phrase("Splits"), sets),
+            (phrase("Held-out poses in each"), size),
+            (phrase("Training poses"), last),
         )
     )
-    for codec in sorted(evidence.codecs, key=_order):
-        yield from _codec(codec)
-
-
-def _codec(codec: CodecEvidence) -> Iterator[blocks.Block]:
-    data, verdicts = codec.data, codec.verdicts
-    yield blocks.Heading(_title(data))
-    yield blocks.Bullets(tuple(map(_micro, (*verdicts.springs, *verdicts.sentences))))
-    try:
-        yield blocks.picture(
-            partial(codec_chart, data, verdicts),
-            f"{headline(data)}: box plots of mean and maximum error at held-out poses over the"
-            f" number of training poses. {_micro(' '.join(verdicts.sentences))}",
-            f"After the paper's {_like(data)}. {how_to_read(data)}",
-            ".png",
+    curves = _curves(evidence)
+    if curves:
+        yield blocks.Picture(
+            partial(pose_count_figure, curves, evidence.limits.tolerance),
+            _alt(curves),
+            phrase(
+                "Median over the splits of the mean error at held-out poses; the band holds the"
+                " middle half of the splits. Diamonds: more poses no longer help from there on."
+                " All comparisons in one picture; the paper shows them apart (Fig. 7, 9 and 10)."
+            ),
         )
-    except CodecError as error:
-        yield blocks.Paragraph(f"No chart: {error}.")
-    yield _saturation(codec)
+    else:
+        yield blocks.Paragraph(phrase("No variant has an error that could be drawn."))
+    yield _saturation(evidence)
+    for codec in evidence.codecs:
+        yield from _words(codec)
 
 
-def _title(data: CodecData) -> str:
-    names = " against ".join(each.name for each in data.variants)
-    key = _compared(data)
-    return f"{_FIGURES[key][0]}: {names}" if key else names
+def _curves(evidence: Evidence) -> list[ErrorCurve]:
+    """Return each variant once, whichever comparisons it is in."""
+    found: dict[tuple[str, ...], ErrorCurve] = {}
+    for codec in evidence.codecs:
+        for curve in error_curves(codec.data, codec.verdicts.saturation):
+            found.setdefault(_key(curve.variant), curve)
+    return list(found.values())
 
 
-def _like(data: CodecData) -> str:
-    """Return the figure of the paper that compares the same."""
-    key = _compared(data)
-    return _FIGURES[key][1] if key else "codecs (Fig. 7, 9 and 10)"
+def _key(variant: Variant) -> tuple[str, ...]:
+    return variant.search, variant.springs, variant.load_cases, str(variant.solver)
 
 
-def _compared(data: CodecData) -> str | None:
-    """Return the key in which the variants differ, as far as the paper compares it."""
-    for key in _FIGURES:
-        if len({getattr(each, key) for each in data.variants}) > 1:
-            return key
-    return None
+def _alt(curves: list[ErrorCurve]) -> Phrase:
+    return phrase(
+        "Error at held-out poses over the number of training poses, of {variants}",
+        variants=counted(len(curves), "variant"),
+    )
 
 
-def _order(codec: CodecEvidence) -> int:
-    key = _compared(codec.data)
-    return list(_FIGURES).index(key) if key else len(_FIGURES)
+def _saturation(evidence: Evidence) -> blocks.Block:
+    rows: dict[tuple[str, ...], blocks.Row] = {}
+    for codec in evidence.codecs:
+        pairs = zip(codec.data.variants, codec.verdicts.saturation, strict=True)
+        for variant, found in pairs:
+            rows.setdefault(_key(variant), _row(variant, found))
+    heads = phrases("Search", "Springs", "Load cases", "Saturated from", "95 % interval",
+                    "Error there", "Error with all", "Settled?")  # fmt: skip
+    caption = phrase("Saturation: training poses from which on more do not help")
+    return blocks.Table(caption, heads, tuple(rows.values()), texts=3)
+
+
+def _row(variant: Variant, found: Saturation) -> blocks.Row:
+    return (
+        variant.search,
+        PurePath(variant.springs).name,
+        variant.load_cases,
+        str(found.n_train) if found.explains else phrase("never"),
+        phrase("not known")
+        if found.low is None
+        else phrase("{low} to {high}", low=found.low, high=found.high),
+        mm(found.error),
+        mm(found.last_error),
+        phrase("yes") if found.settled else phrase("not sure"),
+    )
+
+
+def _words(codec: CodecEvidence) -> Iterator[blocks.Block]:
+    """Yield what the comparison found, in its own words."""
+    lines = tuple(map(_micro, (*codec.verdicts.springs, *codec.verdicts.sentences)))
+    names = ", ".join(each.name for each in codec.data.variants)
+    yield blocks.Details(phrase("In words: {variants}", variants=names), (blocks.Bullets(lines),))
 
 
 def _micro(sentence: str) -> str:
@@ -84,21 +105,6 @@ def _micro(sentence: str) -> str:
     return sentence.replace(" um", " µm")
 
 
-def _saturation(codec: CodecEvidence) -> blocks.Block:
-    rows = tuple(
-        (
-            each.variant,
-            str(each.n_train) if each.explains else "never",
-            "not known" if each.low is None else f"{each.low} to {each.high}",
-            mm(each.error),
-            mm(each.last_error),
-            "yes" if each.settled else "not sure",
-        )
-        for each in codec.verdicts.saturation
-    )
-    heads = ("Variant", "Saturated from", "95 % interval", "Error there", "Error with all",
-             "Settled?")  # fmt: skip
-    return blocks.Table("Saturation: training poses from which on more do not help", heads, rows)
-
-
-CODECS = blocks.Section("codecs", "Number of poses: codecs", 60, _body)
+CODECS = blocks.Section(
+    "codecs", phrase("Number of poses"), phrase("Were there enough poses?"), 60, _body
+)

@@ -5,16 +5,16 @@ from functools import partial
 
 from elastocal.planning import PlanResult, ProductionRecord
 from elastocal.report.document import blocks
-from elastocal.report.pages import key_figures, view_data
+from elastocal.report.pages import key_figures
 from elastocal.report.plots import plan_figure, plan_view
 from elastocal.verdict import Evidence
-from elastocal.wording import counted, mm, um
+from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences, um
 
 
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     plan = evidence.plan
     if plan is None:
-        text = "The plan is not known, so nothing is said of how the poses were chosen."
+        text = phrase("The plan is not known, so nothing is said of how the poses were chosen.")
         yield blocks.Paragraph(text)
         return
     yield blocks.Facts(key_figures(plan))
@@ -22,7 +22,9 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     if plan.production is not None:
         yield _expected(plan, plan.production)
     pictures = tuple(_pictures(evidence, plan))
-    yield from pictures or (blocks.Paragraph("Without cell, mesh and pool there is no picture."),)
+    yield from pictures or (
+        blocks.Paragraph(phrase("Without cell, mesh and pool there is no picture.")),
+    )
     yield from _notes(plan)
     yield _poses(plan, buttons=bool(pictures))
 
@@ -31,15 +33,15 @@ def _pictures(evidence: Evidence, plan: PlanResult) -> Iterator[blocks.Block]:
     cell, surface, pool = evidence.cell, evidence.surface, evidence.pool
     if pool is None or surface is None or cell is None:
         return
-    data = view_data(plan_view(cell, surface, plan, pool), plan, pool)
-    yield blocks.PlanScene(len(plan.poses), data)
-    yield blocks.picture(
+    yield blocks.Picture(
         partial(plan_figure, surface, plan, pool),
         _alt(plan),
-        "After the paper's Fig. 3: the surface unrolled; colour is the distance of each candidate"
-        " from its nearest chosen pose.",
-        ".png",
+        phrase(
+            "The surface laid flat, as in the paper's Fig. 3; colour is the distance of each"
+            " candidate from its nearest chosen pose."
+        ),
     )
+    yield blocks.PlanScene(plan_view(cell, surface, plan, pool), plan, pool)
 
 
 def _poses(plan: PlanResult, buttons: bool) -> blocks.Block:
@@ -47,30 +49,37 @@ def _poses(plan: PlanResult, buttons: bool) -> blocks.Block:
     rows = tuple(
         (
             blocks.PoseButton(pose.id) if buttons else str(pose.id),
-            str(plan.search.order.index(pose.id)),
             *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
-            pose.seen_by or "no station",
+            pose.seen_by or phrase("no station"),
         )
         for pose in plan.poses
     )
-    heads = ("Pose", "Search rank", "x in mm", "y in mm", "z in mm", "Seen by")
-    caption = "Poses in visiting order, contact point in base"
+    heads = phrases("Pose", "x in mm", "y in mm", "z in mm", "Seen by")
+    caption = phrase("Poses in visiting order, contact point in base")
     table = blocks.Table(caption, heads, rows, name="pose-table")
-    return blocks.Details(f"The {counted(len(plan.poses), 'pose')} in visiting order", (table,))
+    return blocks.Details(
+        phrase("The {poses} in visiting order", poses=counted(len(plan.poses), "pose")), (table,)
+    )
 
 
 def _spreads(plan: PlanResult) -> blocks.Block:
     search, other = plan.search, plan.comparison
     rows = [(search.name, search.spread)] + ([(other.name, other.spread)] if other else [])
     return blocks.Table(
-        "How the poses lie in the pool",
-        ("Technique", "Covering radius", "To the edge, mean", "To the next pose, mean", "O1"),
+        phrase("How the poses lie in the pool"),
+        phrases(
+            "Technique", "Covering radius", "To the edge, mean", "To the next pose, mean", "O1"
+        ),
         tuple(
             (
-                f"{name}{'' if name == search.name else ' (not used)'}",
+                name if name == search.name else phrase("{name} (not used)", name=name),
                 mm(spread.covering_radius, 1),
-                "no edge" if spread.boundary_distance is None else mm(spread.boundary_distance, 1),
-                "one pose" if spread.nearest_neighbour is None else mm(spread.nearest_neighbour, 1),
+                phrase("no edge")
+                if spread.boundary_distance is None
+                else mm(spread.boundary_distance, 1),
+                phrase("one pose")
+                if spread.nearest_neighbour is None
+                else mm(spread.nearest_neighbour, 1),
                 f"{spread.o1:.4f}",
             )
             for name, spread in rows
@@ -82,13 +91,15 @@ def _expected(plan: PlanResult, production: ProductionRecord) -> blocks.Block:
     """Return the error to expect from some numbers of poses, and what they take."""
     floor = production.floor
     return blocks.Table(
-        f"Error to expect on production, planned with sigma {um(production.sigma)}",
-        ("Poses", "From noise", "With the model's own", "In the cell"),
+        phrase(
+            "Error to expect on production, planned with sigma {sigma}", sigma=um(production.sigma)
+        ),
+        phrases("Poses", "From noise", "With the model's own", "In the cell"),
         tuple(
             (
                 str(each.poses),
                 um(each.noise),
-                "not known" if floor is None else um(each.error),
+                phrase("not known") if floor is None else um(each.error),
                 f"{plan.time_of(each.poses) / 60.0:.0f} min",
             )
             for each in production.some_expected()
@@ -96,11 +107,13 @@ def _expected(plan: PlanResult, production: ProductionRecord) -> blocks.Block:
     )
 
 
-def _alt(plan: PlanResult) -> str:
+def _alt(plan: PlanResult) -> Phrase:
     names = [plan.search.name] + ([plan.comparison.name] if plan.comparison else [])
-    return (
-        f"Flat map of the surface with {len(plan.poses)} poses chosen by {' and by '.join(names)};"
-        f" covering radius {mm(plan.search.covering_radius, 1)}"
+    return phrase(
+        "Flat map of the surface with {poses} chosen by {technique}; covering radius {radius}",
+        poses=counted(len(plan.poses), "pose"),
+        technique=sentences(names, ", "),
+        radius=mm(plan.search.covering_radius, 1),
     )
 
 
@@ -110,7 +123,9 @@ def _notes(plan: PlanResult) -> Iterator[blocks.Block]:
     # Where the folder lies is no part of a report.
     folder = plan.cell.file.rpartition("/")[0]
     notes = tuple(text.replace(f"{folder}/", "") if folder else text for text in plan.findings)
-    yield blocks.Details("Notes of the planner", (blocks.Bullets(notes),))
+    yield blocks.Details(phrase("Notes of the planner"), (blocks.Bullets(notes),))
 
 
-POSES = blocks.Section("poses", "Surface, pool and poses", 20, _body)
+POSES = blocks.Section(
+    "poses", phrase("Surface and poses"), phrase("Where was measured?"), 20, _body
+)

@@ -18,7 +18,7 @@ from elastocal.compensation.process import (
 from elastocal.report.document import blocks
 from elastocal.report.plots import course_figure, process_maps
 from elastocal.verdict import Evidence
-from elastocal.wording import counted, mm
+from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class PublishedCase:
     before: tuple[float, float, float]
     after: tuple[float, float, float]
     reduction: tuple[float, float, float]
-    measures: str
+    measures: Phrase
     """What its figures hold, in a sentence."""
 
 
@@ -37,124 +37,165 @@ PAPER = {
     "afp": PublishedCase(
         "Robotized AFP processing of a 3D thermoplastic aerostructure",
         (0.570, 0.956, 0.100), (0.061, 0.285, 0.046), (0.8930, 0.7019, 0.5400),
-        "The paper measures the side deviation of the head by a 6D probe on the real machine: what"
-        " is left there holds backlash, dynamics and servo errors beside what the model misses.",
+        phrase(
+            "The paper measures the side deviation of the head by a 6D probe on the real machine:"
+            " what is left there holds backlash, dynamics and servo errors beside what the model"
+            " misses."
+        ),
     ),
     "machining": PublishedCase(
         "Robotized roughing of an Al-7075 aerospace part",
         (0.597, 2.050, 0.725), (0.101, 0.520, 0.342), (0.8308, 0.7463, 0.5283),
-        "The paper scans the part: before and after hold geometry, cutter, fixture and dynamics"
-        " beside the elastic deviation, which is all that is simulated here.",
+        phrase(
+            "The paper scans the part: before and after hold geometry, cutter, fixture and dynamics"
+            " beside the elastic deviation, which is all that is simulated here."
+        ),
     ),
 }  # fmt: skip
 """Table 1 of Monsarrat et al., RCIM 2024: mean, maximum and standard deviation."""
 _DEVIATIONS = {
-    "afp": "Absolute value of lateral deviation",
-    "machining": "Absolute value of the error normal to the part",
+    "afp": phrase("Absolute value of lateral deviation"),
+    "machining": phrase("Absolute value of the error normal to the part"),
 }
-_SIDE_BY_SIDE = (
+_SIDE_BY_SIDE = phrase(
     "The paper's figures are of its real cell, those above them of the simulated one, which counts"
     " the path under force against the same path in the air: elastic deviation and what friction,"
     " delay and sensor leave of it. They stand side by side for their size, not as a repetition;"
     " that a seed's deviation without correction is near the paper's is chance."
 )
-_HEADS = ("", "Mean", "Max", "St. dev.")
+_HEADS = ("", *phrases("Mean", "Max", "St. dev."))
 
 
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     record = evidence.process
     if record is None:
-        text = "No process path was run, so the effect of the correction was not verified."
+        text = phrase("No process path was run, so the effect of the correction was not verified.")
         yield blocks.Paragraph(text)
         return
     yield blocks.Paragraph(
-        "Simulated: the simulated robot followed the path under process forces, once as programmed"
-        " and once with the online compensator of a calibrated model.", "banner",
-    )  # fmt: skip
+        phrase(
+            "Simulated: the simulated robot followed the path under process forces, once as"
+            " programmed and once with the online compensator of a calibrated model."
+        ),
+        "banner",
+    )
     yield from _table_1(record)
     seed = record.courses[0].seed
     yield from _pictures(
         [trace for trace in record.courses if trace.seed == seed], evidence.limits.tolerance
     )
     if record.table.budget:
-        yield blocks.Details("Error budget", (_budget(record.table.budget),))
-    settings = blocks.Table("Settings, SI units", ("Key", "Value"),
-                     tuple(blocks.flattened(record.table.settings)), 2)  # fmt: skip
-    yield blocks.Details("Settings of the compensator", (settings,))
+        yield blocks.Details(phrase("Error budget"), (_budget(record.table.budget),))
+    rows = tuple(blocks.flattened(record.table.settings))
+    settings = blocks.Table(phrase("Settings, SI units"), phrases("Key", "Value"), rows, 2)
+    yield blocks.Details(phrase("Settings of the compensator"), (settings,))
 
 
 def _table_1(record: SimulatedProcess) -> Iterator[blocks.Block]:
     table, rows = record.table, list[blocks.Row]()
-    deviation = _DEVIATIONS.get(table.process, f"Absolute deviation, {table.direction}")
-    named = [(f"{deviation}, {line.name}", line) for line in table.lines]
-    named += [(f"3-D deviation, {line.name}", line) for line in table.spatial[-1:]]
+    deviation = _DEVIATIONS.get(
+        table.process, phrase("Absolute deviation, {direction}", direction=table.direction)
+    )
+    spatial = phrase("3-D deviation")
+    named = [(deviation, line.name, line) for line in table.lines]
+    named += [(spatial, line.name, line) for line in table.spatial[-1:]]
     for each in table.loads:
-        text = f"at {each.load:g} of the load, {each.lines[-1].name}"
-        named += [(f"{deviation} {text}", each.lines[-1])]
-        named += [(f"3-D deviation {text}", each.spatial[-1])]
+        text = phrase(
+            "at {load} of the load, {name}", load=f"{each.load:g}", name=each.lines[-1].name
+        )
+        named += [(deviation, text, each.lines[-1]), (spatial, text, each.spatial[-1])]
     if table.posture is not None:
-        text = "in the programmed posture"
-        named += [(f"{deviation} {text}", table.posture.lines[-1])]
-        named += [(f"3-D deviation {text}", table.posture.spatial[-1])]
-    for name, line in named:
+        text = phrase("in the programmed posture")
+        named += [(deviation, text, table.posture.lines[-1])]
+        named += [(spatial, text, table.posture.spatial[-1])]
+    for what, name, line in named:
+        title = phrase(
+            "{what}, {name} ({points} points), without correction in mm",
+            what=what,
+            name=name,
+            points=line.points,
+        )
         rows += [
-            (f"{name} ({line.points} points), without correction in mm", *_mm(line.before)),
-            ("With correction in mm", *_mm(line.after)),
-            ("Reduction", *(f"{share:.2%}" for share in _three(line.reduction))),
+            (title, *_mm(line.before)),
+            (phrase("With correction in mm"), *_mm(line.after)),
+            (phrase("Reduction"), *(f"{share:.2%}" for share in _three(line.reduction))),
         ]
     paper = PAPER.get(table.process)
     if paper is not None:
         rows += [
-            ("Paper, without correction in mm", *(f"{value:.3f}" for value in paper.before)),
-            ("Paper, with correction in mm", *(f"{value:.3f}" for value in paper.after)),
-            ("Paper, reduction", *(f"{share:.2%}" for share in paper.reduction)),
+            (
+                phrase("Paper, without correction in mm"),
+                *(f"{value:.3f}" for value in paper.before),
+            ),
+            (phrase("Paper, with correction in mm"), *(f"{value:.3f}" for value in paper.after)),
+            (phrase("Paper, reduction"), *(f"{share:.2%}" for share in paper.reduction)),
         ]
-    yield blocks.Table("In the form of the paper's Table 1", _HEADS, tuple(rows))
+    yield blocks.Table(phrase("In the form of the paper's Table 1"), _HEADS, tuple(rows))
     if len(table.runs) > 1 and table.means:
         yield _means(table.means)
     if paper is not None:
-        yield blocks.Paragraph(f"{_SIDE_BY_SIDE} {paper.measures}", "sub")
+        yield blocks.Paragraph(sentences([_SIDE_BY_SIDE, paper.measures]), "sub")
     if table.posture is not None:
-        yield blocks.Paragraph(f"Posture (paper 4.3.1): {table.posture.sentence}.", "sub")
+        yield blocks.Paragraph(
+            phrase("Posture (paper 4.3.1): {sentence}.", sentence=table.posture.sentence), "sub"
+        )
     for note in (*_truth(table), *table.notes):
         yield blocks.Paragraph(note, "sub")
 
 
 def _means(means: tuple[SeedMeans, ...]) -> blocks.Block:
-    heads = ("", "Mean, before to after in mm", "Reduction", "Max, before to after in mm",
-             "Reduction")  # fmt: skip
+    heads = ("", *phrases("Mean, before to after in mm", "Reduction", "Max, before to after in mm",
+                          "Reduction"))  # fmt: skip
     rows = tuple(
         (
             each.title,
-            f"{1e3 * each.mean_before.mean:.3f} to {1e3 * each.mean_after.mean:.3f}",
+            _change(each.mean_before.mean, each.mean_after.mean),
             _with_interval(each.mean_reduction),
-            f"{1e3 * each.max_before.mean:.3f} to {1e3 * each.max_after.mean:.3f}",
+            _change(each.max_before.mean, each.max_after.mean),
             _with_interval(each.max_reduction),
         )
         for each in means
     )
-    caption = f"Means over {means[0].seeds} seeds, 95 % interval (Student's t over the seeds)"
+    caption = phrase(
+        "Means over {seeds} seeds, 95 % interval (Student's t over the seeds)",
+        seeds=means[0].seeds,
+    )
     return blocks.Table(caption, heads, rows)
+
+
+def _change(before: float, after: float) -> Phrase:
+    return phrase("{low} to {high}", low=f"{1e3 * before:.3f}", high=f"{1e3 * after:.3f}")
 
 
 def _with_interval(figure: SeedMean) -> str:
     if figure.low is None or figure.high is None:
         return f"{figure.mean:.1%}"
-    return f"{figure.mean:.1%} ({figure.low:.1%} to {figure.high:.1%})"
+    return phrase(
+        "{value} ({low} to {high})",
+        value=f"{figure.mean:.1%}",
+        low=f"{figure.low:.1%}",
+        high=f"{figure.high:.1%}",
+    )
 
 
-def _truth(table: SimulateProcessResult) -> Iterator[str]:
+def _truth(table: SimulateProcessResult) -> Iterator[Phrase]:
     """Yield how hard the truth was, where the file says it."""
     if not table.preset:
         return
     reacts = table.process_stiffness
     forces = (
-        "process forces react to the tool's shift along the surface's normal, by"
-        f" {1e-3 * reacts:g} N/mm"
+        phrase(
+            "process forces react to the tool's shift along the surface's normal, by {rate}",
+            rate=f"{1e-3 * reacts:g} N/mm",
+        )
         if reacts
-        else "process forces are given, they do not react to the tool's shift"
+        else phrase("process forces are given, they do not react to the tool's shift")
     )
-    yield f"Truth of the simulated cell: preset {table.preset}; {forces}."
+    yield phrase(
+        "Truth of the simulated cell: preset {preset}; {forces}.",
+        preset=table.preset,
+        forces=forces,
+    )
 
 
 def _budget(lines: tuple[DeviationComparison, ...]) -> blocks.Block:
@@ -162,7 +203,7 @@ def _budget(lines: tuple[DeviationComparison, ...]) -> blocks.Block:
         (
             line.name,
             *(
-                f"{1e3 * b:.3f} to {1e3 * a:.3f} ({r:.1%})"
+                phrase("{change} ({share})", change=_change(b, a), share=f"{r:.1%}")
                 for b, a, r in zip(
                     _three(line.before), _three(line.after), _three(line.reduction), strict=True
                 )
@@ -170,7 +211,7 @@ def _budget(lines: tuple[DeviationComparison, ...]) -> blocks.Block:
         )
         for line in lines
     )
-    caption = "Error budget of the first seed, before to after in mm (reduction)"
+    caption = phrase("Error budget of the first seed, before to after in mm (reduction)")
     return blocks.Table(caption, _HEADS, rows)
 
 
@@ -179,20 +220,26 @@ def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterato
     before, after = (
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
     )
-    text = (
-        f"mean {mm(float(np.abs(before).mean()))} without and {mm(float(np.abs(after).mean()))}"
-        f" with correction, over {counted(len(traces), 'course')}"
+    text = phrase(
+        "Absolute deviation, mean {before} without and {after} with correction, over {courses}, as"
+        " in the paper's Fig. 11e, 11f and 13b, 13c.",
+        before=mm(float(np.abs(before).mean())),
+        after=mm(float(np.abs(after).mean())),
+        courses=counted(len(traces), "course"),
     )
-    yield blocks.picture(
-        partial(process_maps, traces),
-        f"Two maps of the path, coloured by absolute deviation: {text}",
-        f"After the paper's Fig. 11e, 11f and 13b, 13c, in the plane that fits the path best:"
-        f" {text}.", ".png",
-    )  # fmt: skip
-    yield blocks.picture(
+    yield blocks.Picture(
+        partial(process_maps, traces), phrase("Two maps of the path. {text}", text=text), text
+    )
+    yield blocks.Picture(
         partial(course_figure, worst, tolerance),
-        f"Deviation over time of course {worst.course}, without and with correction",
-        f"After the paper's Fig. 11g: the course with the largest deviation, {worst.course}.",
+        phrase(
+            "Deviation over time of course {course}, without and with correction",
+            course=worst.course,
+        ),
+        phrase(
+            "The course with the largest deviation, {course}, as in the paper's Fig. 11g.",
+            course=worst.course,
+        ),
     )
 
 
@@ -204,4 +251,10 @@ def _mm(values: DeviationStatistics) -> tuple[str, ...]:
     return tuple(f"{1e3 * value:.3f}" for value in _three(values))
 
 
-PROCESS = blocks.Section("process", "The process path, before and after", 70, _body)
+PROCESS = blocks.Section(
+    "process",
+    phrase("The process path"),
+    phrase("What does the correction bring?"),
+    70,
+    _body,
+)

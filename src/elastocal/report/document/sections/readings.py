@@ -13,7 +13,7 @@ from elastocal.procedure.derive import RunSummary
 from elastocal.report.document import blocks
 from elastocal.report.plots import displacement_figure, pose_grid
 from elastocal.verdict import Evidence
-from elastocal.wording import counted, mm
+from elastocal.wording import Phrase, counted, mm, phrase, phrases
 
 _PoseValues = dict[tuple[int, str], float]
 """Values in m by pose and load case."""
@@ -22,7 +22,7 @@ _PoseValues = dict[tuple[int, str], float]
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     dataset, reproduction = evidence.dataset, evidence.reproduction
     if dataset is None:
-        yield blocks.Paragraph("The dataset is not known, so no reading is shown.")
+        yield blocks.Paragraph(phrase("The dataset is not known, so no reading is shown."))
         yield from _suspicious(evidence)
         return
     yield from _counts(dataset, evidence.summary)
@@ -40,25 +40,29 @@ def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Blo
     size = np.linalg.norm(readings.deflection, axis=1)
     yield blocks.Facts(
         (
-            ("Poses", len(dataset.poses)),
-            ("Load cases", ", ".join(dataset.load_cases)),
-            ("Usable readings", len(readings)),
-            ("Deflection, mean", mm(float(size.mean()))),
-            ("Deflection, largest", mm(float(size.max()))),
+            (phrase("Poses"), len(dataset.poses)),
+            (phrase("Load cases"), ", ".join(dataset.load_cases)),
+            (phrase("Usable readings"), len(readings)),
+            (phrase("Deflection, mean"), mm(float(size.mean()))),
+            (phrase("Deflection, largest"), mm(float(size.max()))),
         )
     )
     if summary is None:
         return
     counts = tuple(summary.readings.counts.items())
-    yield blocks.Table("Readings by status", ("Status", "Readings"), counts)
+    yield blocks.Table(phrase("Readings by status"), phrases("Status", "Readings"), counts)
     yield from _lines(summary.lines)
     lost = tuple(
-        f"pose {each.pose} {each.load_case}: {each.status}"
-        + (f" ({each.note})" if each.note else "")
+        phrase(
+            "pose {pose} {load_case}: {status}",
+            pose=each.pose,
+            load_case=each.load_case,
+            status=f"{each.status} ({each.note})" if each.note else str(each.status),
+        )
         for each in summary.readings.not_ok
     )
     if lost:
-        yield blocks.Heading("Readings that are not ok")
+        yield blocks.Heading(phrase("Readings that are not ok"))
         yield blocks.Bullets(lost)
 
 
@@ -77,47 +81,56 @@ def _lines(lines: tuple[LineCounts, ...]) -> Iterator[blocks.Block]:
         for each in lines
     )
     names = (name.capitalize() for _, name in COUNTED)
-    heads = ("Device", "Received", *names, "Status", "Answer, ms: median / 99 % / longest")
-    yield blocks.Table("What was counted on the lines of the devices", heads, rows)
+    heads = (
+        *phrases("Device", "Received"),
+        *names,
+        *phrases("Status", "Answer, ms: median / 99 % / longest"),
+    )
+    yield blocks.Table(phrase("What was counted on the lines of the devices"), heads, rows)
 
 
 def _residuals(calibration: Calibration) -> blocks.Block:
     readings, used = calibration.readings, calibration.used
     commanded = np.linalg.norm(readings.controller_displacement, axis=1)
     residual = np.linalg.norm(calibration.residual, axis=1)
-    text = (
-        f"Commanded displacement {mm(float(commanded.mean()))} on average,"
-        f" {mm(float(commanded.max()))} at most; residual of the fit"
-        f" {mm(float(residual[used].mean()))} on average, {mm(float(residual[used].max()))} at most"
-        f" ({counted(int(used.sum()), 'reading')} that were fitted, so not held out)"
+    text = phrase(
+        "Commanded displacement {commanded} on average, {most} at most; residual of the fit {mean}"
+        " on average, {max} at most ({readings} that were fitted, so not held out), as in the"
+        " paper's Fig. 8g and 12b.",
+        commanded=mm(float(commanded.mean())),
+        most=mm(float(commanded.max())),
+        mean=mm(float(residual[used].mean())),
+        max=mm(float(residual[used].max())),
+        readings=counted(int(used.sum()), "reading"),
     )
-    return blocks.picture(
+    return blocks.Picture(
         partial(displacement_figure, readings.pose, commanded, residual, used),
-        f"Norms of commanded displacements and of residuals of each reading. {text}",
-        f"After the paper's Fig. 8g and 12b. {text}.",
+        phrase("Commanded displacement and residual of each reading. {text}", text=text),
+        text,
     )
 
 
 def _grids(dataset: Dataset, reproduction: Reproduction | None) -> Iterator[blocks.Block]:
-    panels = [("Measured deflection, norm in mm", _grid(dataset, _deflection(dataset)))]
+    panels = [(phrase("Measured deflection, norm in mm"), _grid(dataset, _deflection(dataset)))]
     if reproduction is not None:
         error = _grid(dataset, _errors(reproduction.unseen))
-        panels.append(("Error where the pose was left out of the fit, norm in mm", error))
-    yield blocks.picture(
+        title = phrase("Error where the pose was left out of the fit, norm in mm")
+        panels.append((title, error))
+    yield blocks.Picture(
         partial(pose_grid, panels, dataset.poses, dataset.load_cases),
-        "Shaded table of poses and load cases: " + "; ".join(title for title, _ in panels),
-        "Each pose under each load case. Bright is large; the two scales differ.",
+        phrase("Shaded table of poses and load cases: measured deflection and error"),
+        phrase("Each pose under each load case. Bright is large; the two scales differ."),
     )
     tables = tuple(_number_table(dataset, title, values) for title, values in panels)
-    yield blocks.Details("The same numbers as a table", tables)
+    yield blocks.Details(phrase("The same numbers as a table"), tables)
 
 
 def _number_table(dataset: Dataset, title: str, values: FloatArray) -> blocks.Table:
     rows = tuple(
-        (str(label), *("none" if np.isnan(v) else f"{v:.3f}" for v in row))
+        (str(label), *(phrase("none") if np.isnan(v) else f"{v:.3f}" for v in row))
         for label, row in zip(dataset.poses, values, strict=True)
     )
-    return blocks.Table(title, ("Pose", *dataset.load_cases), rows)
+    return blocks.Table(title, (phrase("Pose"), *dataset.load_cases), rows)
 
 
 def _deflection(dataset: Dataset) -> _PoseValues:
@@ -151,30 +164,36 @@ def _suspicious(evidence: Evidence) -> Iterator[blocks.Block]:
         return
     figures: CalibrationSummary | None = evidence.figures
     if figures is None or not figures.suspicious:
-        yield blocks.Heading("Suspicious readings")
-        yield blocks.Paragraph("No reading looks wrong.")
+        yield blocks.Heading(phrase("Suspicious readings"))
+        yield blocks.Paragraph(phrase("No reading looks wrong."))
         return
     rows = tuple(
         (
-            f"pose {each.pose} {each.load_case}",
+            _reading(each.pose, each.load_case),
             mm(each.residual),
             f"{each.score:.1f}",
             f"{each.leverage:.2f}",
-            "set aside as a blunder" if each.set_aside else "kept in the fit",
+            phrase("set aside as a blunder") if each.set_aside else phrase("kept in the fit"),
         )
         for each in figures.suspicious
     )
-    heads = ("Reading", "Off by", "Robust score", "Leverage", "What was done")
-    yield blocks.Table("Readings that look wrong", heads, rows)
+    heads = phrases("Reading", "Off by", "Robust score", "Leverage", "What was done")
+    yield blocks.Table(phrase("Readings that look wrong"), heads, rows)
 
 
 def _worst(unseen: UnseenErrors) -> blocks.Block:
     """Return where the model errs most."""
     order = np.argsort(-unseen.error, kind="stable")[:5]
     rows = tuple(
-        (f"pose {unseen.pose[k]} {unseen.load_case[k]}", mm(float(unseen.error[k]))) for k in order
+        (_reading(int(unseen.pose[k]), unseen.load_case[k]), mm(float(unseen.error[k])))
+        for k in order
     )
-    return blocks.Table("Largest errors, each at a left-out pose", ("Reading", "Error"), rows)
+    caption = phrase("Largest errors, each at a left-out pose")
+    return blocks.Table(caption, phrases("Reading", "Error"), rows)
+
+
+def _reading(pose: int, load_case: str) -> Phrase:
+    return phrase("pose {pose} {load_case}", pose=pose, load_case=load_case)
 
 
 def _load_check(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
@@ -183,8 +202,8 @@ def _load_check(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
     if check is None:
         return
     yield blocks.Table(
-        "Check at a load level that was kept out of the fit",
-        (
+        phrase("Check at a load level that was kept out of the fit"),
+        phrases(
             "Load case",
             "Readings",
             "Deflection",
@@ -202,11 +221,17 @@ def _load_check(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
                 mm(check.mean),
                 mm(check.p95),
                 mm(check.max),
-                "not known" if check.noise is None else mm(check.noise),
+                phrase("not known") if check.noise is None else mm(check.noise),
                 check.source,
             ),
         ),
     )
 
 
-READINGS = blocks.Section("readings", "What was measured", 30, _body)
+READINGS = blocks.Section(
+    "readings",
+    phrase("Readings"),
+    phrase("What was measured, and how well does it fit?"),
+    30,
+    _body,
+)

@@ -1,4 +1,7 @@
-{
-  const data = JSON.parse(document.getElementById("data").textContent);
-  showView(data, document.querySelectorAll("tbody tr")).then(() => { document.documentElement.dataset.ready = "yes"; });
-}
+// The page is painted first: drawing the view takes a second where there is no graphics card.
+requestAnimationFrame(() => setTimeout(() => {
+  const view = showView(JSON.parse(document.getElementById("data").textContent), document.querySelectorAll("#pose-table tbody tr"));
+  addEventListener("beforeprint", () => view.still(document.getElementById("still")));
+  document.getElementById("view").shown = view;
+  document.documentElement.dataset.ready = "yes";
+}));

@@ -1,53 +1,48 @@
 {
   const data = JSON.parse(document.getElementById("data").textContent);
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  const ready = () => { document.documentElement.dataset.ready = "yes"; };
+  const sections = [...document.querySelectorAll("details.section")];
+  const links = new Map([...document.querySelectorAll("nav a")].map((each) => [each.hash.slice(1), each]));
+  let view = null;
 
-  // Details that a reader folded are still part of the document on paper, but for long ones.
-  addEventListener("beforeprint", () => document.querySelectorAll("details:not(.long)").forEach((each) => {
-    each.dataset.was = each.open;
-    each.open = true;
-  }));
+  // The view costs a second where there is no graphics card: it is made when it is first seen.
+  function showScene() {
+    if (view || !data.layers) return;
+    view = showView(data, document.querySelectorAll("#pose-table tbody tr"));
+    document.getElementById("view").shown = view;
+  }
+  const seen = (section) => section.open && section.querySelector("#view");
+
+  function goTo(id) {
+    const target = id ? document.getElementById(id) : null;
+    if (target instanceof HTMLDetailsElement) target.open = true;
+    target?.scrollIntoView();
+    target?.focus({ preventScroll: true });
+  }
+  addEventListener("hashchange", () => goTo(location.hash.slice(1)));
+  links.forEach((link, id) => link.addEventListener("click", () => { if (location.hash === link.hash) goTo(id); }));
+  sections.forEach((section) => section.addEventListener("toggle", () => { if (seen(section)) showScene(); }));
+  document.getElementById("unfold").addEventListener("click", () => sections.forEach((each) => { each.open = true; }));
+  document.getElementById("fold").addEventListener("click", () => sections.forEach((each) => { each.open = false; }));
+  addEventListener("beforeprint", () => {
+    // Details in a section that is printed are printed too, but for long ones.
+    document.querySelectorAll("details.section[open] details:not(.long)").forEach((each) => {
+      each.dataset.was = each.open;
+      each.open = true;
+    });
+    if (!sections.some(seen)) return;
+    showScene();
+    view?.still(document.getElementById("still"));
+  });
   addEventListener("afterprint", () => document.querySelectorAll("details[data-was]").forEach((each) => {
     each.open = each.dataset.was === "true";
+    delete each.dataset.was;
   }));
 
-  function palette() {
-    const { ink, card, wall, line } = dark.matches
-      ? { ink: "#e8e8e4", card: "#1d2023", wall: "#25292d", line: "#4a5056" }
-      : { ink: "#1b1b1b", card: "#ffffff", wall: "#f7f7f5", line: "#dcdcdc" };
-    const axis = (name) => ({ [`scene.${name}axis.backgroundcolor`]: wall, [`scene.${name}axis.gridcolor`]: line, [`scene.${name}axis.color`]: ink });
-    return { paper_bgcolor: card, "font.color": ink, "hoverlabel.bgcolor": card, "hoverlabel.font.color": ink, ...axis("x"), ...axis("y"), ...axis("z") };
-  }
-
-  function put(target, [key, ...rest], value) {
-    if (!rest.length) target[key] = value;
-    else put(target[key] ??= {}, rest, value);
-  }
-
-  // Paper has no depth to turn: it gets a picture, always in the light colours.
-  function keepStill(figure) {
-    const still = document.getElementById("still");
-    const plain = { data: figure.data, layout: figure.layout, config: {} };
-    return Plotly.toImage(plain, { format: "png", width: 1100, height: 620 }).then((source) => {
-      still.src = source;
-      still.hidden = false;
-    });
-  }
-
-  if (data.poses) {
-    const view = document.getElementById("view");
-    const figure = structuredClone(data.poses.figure);
-    const first = figure.frames[1] ?? figure.frames[0];
-    (first.traces ?? []).forEach((place, k) => Object.assign(figure.data[place], first.data[k]));
-    const rows = document.querySelectorAll("#pose-table tbody tr");
-    // In its colours from the start: drawing it twice takes a second where there is no graphics card.
-    Object.entries(palette()).forEach(([path, value]) => put(data.poses.figure.layout, path.split("."), value));
-    showView(data.poses, rows)
-      .then(() => { dark.addEventListener("change", () => Plotly.relayout(view, palette())); })
-      .then(() => keepStill(figure))
-      .then(ready);
-  } else {
-    ready();
-  }
+  // The contents show where the reader is.
+  const places = new IntersectionObserver((entries) => entries.forEach(({ target, isIntersecting }) => {
+    links.get(target.id || "verdict")?.toggleAttribute("aria-current", isIntersecting);
+  }), { rootMargin: "0px 0px -60% 0px" });
+  [document.querySelector(".certificate"), ...sections].forEach((each) => places.observe(each));
+  goTo(location.hash.slice(1));
+  document.documentElement.dataset.ready = "yes";
 }

@@ -1,0 +1,216 @@
+"""What the verdict rests on: its reasons, the uncertainty, and what was not verified."""
+
+from collections.abc import Iterator
+
+from elastocal.identification import UnseenErrors
+from elastocal.report.document import blocks
+from elastocal.verdict import (
+    COVERAGE_FACTOR,
+    Evidence,
+    UncertaintySource,
+    judge_evidence,
+    state_uncertainty,
+)
+from elastocal.wording import Phrase, mm, phrase, phrases, um
+
+
+def _findings(evidence: Evidence) -> Iterator[blocks.Block]:
+    verdict = judge_evidence(evidence)
+    if evidence.unseen is not None:
+        yield from _unseen(evidence.unseen)
+    if verdict.reasons:
+        judged = verdict.light is not None
+        yield blocks.Heading(
+            phrase("Why it is not green") if judged else phrase("What has to be known")
+        )
+        yield blocks.Bullets(verdict.reasons, "reasons", code=True)
+    if verdict.notes:
+        yield blocks.Heading(phrase("Good to know"))
+        yield blocks.Bullets(verdict.notes, code=True)
+    yield blocks.Heading(phrase("What would improve the result"))
+    nothing = blocks.Paragraph(phrase("Nothing in these data asks for a change."))
+    yield blocks.Bullets(verdict.advice, code=True) if verdict.advice else nothing
+
+
+def _unseen(unseen: UnseenErrors) -> Iterator[blocks.Block]:
+    def span(value: float, low: float, high: float) -> Phrase:
+        return phrase("{value} ({low} to {high})", value=mm(value), low=mm(low), high=mm(high))
+
+    mean, p95 = unseen.mean, unseen.p95
+    yield blocks.Facts(
+        (
+            (phrase("Mean error (95 % interval)"), span(mean.value, mean.low, mean.high)),
+            (phrase("95 % of errors below (95 % interval)"), span(p95.value, p95.low, p95.high)),
+            (phrase("Largest error"), mm(unseen.max)),
+            (
+                phrase("Held out"),
+                phrase(
+                    "{poses} poses, {readings} readings",
+                    poses=unseen.poses,
+                    readings=len(unseen.error),
+                ),
+            ),
+        )
+    )
+    yield blocks.Paragraph(
+        phrase(
+            "Every pose was left out of the fit once ({folds} refits) and predicted by the others."
+            " Intervals: whole poses drawn with replacement. If one more pose were drawn like"
+            " these, the chance that its error is larger than the largest here is at most 1 in"
+            " {more}.",
+            folds=unseen.folds,
+            more=unseen.poses + 1,
+        ),
+        "sub",
+    )
+
+
+FINDINGS = blocks.Section(
+    "findings", phrase("The verdict in full"), phrase("Why, and what next?"), 1, _findings
+)
+
+
+def _uncertainty(evidence: Evidence) -> Iterator[blocks.Block]:
+    statement = state_uncertainty(evidence)
+    if statement is None:
+        yield blocks.Paragraph(
+            phrase("Not stated: no error at poses left out of the fit is known.")
+        )
+    else:
+        yield blocks.Facts(
+            (
+                (phrase("Combined standard uncertainty"), um(statement.standard)),
+                (phrase("Coverage factor"), f"k = {COVERAGE_FACTOR:g}"),
+                (phrase("Expanded uncertainty U, about 95 %"), um(statement.expanded)),
+                (phrase("Degrees of freedom"), statement.degrees_of_freedom),
+            )
+        )
+        heads = phrases("Source", "Type", "How it was found", "Standard uncertainty")
+        rows = tuple(map(_source, statement.sources))
+        yield blocks.Table(phrase("Sources of uncertainty"), heads, rows, texts=3)
+    yield blocks.Heading(phrase("Method"))
+    yield blocks.Paragraph(_METHOD)
+    yield blocks.Heading(phrase("Traceability"))
+    yield from _traceability(evidence)
+    yield blocks.Heading(phrase("Decision rule"))
+    yield blocks.Paragraph(_RULE)
+    yield blocks.Paragraph(_NOT_ACCREDITED, "banner")
+
+
+def _source(source: UncertaintySource) -> blocks.Row:
+    value = phrase("not known") if source.standard is None else um(source.standard)
+    return source.name, source.kind, source.origin, value
+
+
+_METHOD = phrase(
+    "The quantity is the deflection of the tool centre point under a force, along any one"
+    " direction, at poses and under forces like those of the run. Type A: every pose was left out"
+    " of the fit once and predicted by the others, so that what the springs cannot express, the"
+    " repeatability of the arm, the noise of sensor and tracker and the registration are in it."
+    " Type B: what the calibration certificates of the instruments state. Both are added in"
+    " quadrature (JCGM 100:2008, GUM) and multiplied by the coverage factor."
+)
+_RULE = phrase(
+    "Within the tolerance: the upper end of the 95 % confidence interval of the 95 % error lies"
+    " within it, no reading at an unseen pose lies beyond it, and nothing essential is missing"
+    " (guarded acceptance). Beyond it: the lower end lies beyond. Otherwise the result is not"
+    " proved, with the reasons. The rule takes the errors as they were measured and assumes no"
+    " normal distribution; the uncertainty of the instruments' own calibrations is stated, and not"
+    " added to the errors."
+)
+_NOT_ACCREDITED = phrase(
+    "This is a statement in the manner of ISO/IEC 17025, 7.8.4, made by a program from what it was"
+    " given. It is not an accredited certificate, and no accreditation body stands behind it."
+)
+
+
+def _traceability(evidence: Evidence) -> Iterator[blocks.Block]:
+    entry = evidence.certificate
+    instruments = (
+        (phrase("Tracker"), entry.tracker.certificate),
+        (phrase("Force sensor"), entry.sensor.certificate),
+    )
+    yield blocks.Bullets(
+        tuple(
+            phrase("{instrument}: certificate {number}", instrument=name, number=number)
+            if number
+            else phrase("{instrument}: no certificate is stated", instrument=name)
+            for name, number in instruments
+        )
+    )
+    yield blocks.Paragraph(
+        phrase("As stated by whoever made the measurement; the program has seen no certificate.")
+        if all(number for _, number in instruments)
+        else phrase(
+            "Without the certificates of both instruments the result cannot be called traceable to"
+            " the SI."
+        )
+    )
+
+
+UNCERTAINTY = blocks.Section(
+    "uncertainty",
+    phrase("Uncertainty"),
+    phrase("How sure is a predicted deflection?"),
+    5,
+    _uncertainty,
+)
+
+
+_ALWAYS = phrases(
+    "Geometric calibration and the sag under the arm's own weight: only deflection under a force"
+    " is modelled, and both must be corrected before it.",
+    "Absolute accuracy: deflections are differences to the unloaded reading at the same pose.",
+    "Temperature: nothing corrects for a warm arm.",
+    "Payloads and tools other than the one of this run.",
+    "Poses outside the region of the pool, and forces beyond those that were applied.",
+    "Dynamic effects: readings were taken while the arm stood still.",
+    "The controller that will apply the correction, and its delay.",
+    "Safety: a calibrated model is not a safety function.",
+)
+
+
+def _not_verified(evidence: Evidence) -> Iterator[blocks.Block]:
+    yield blocks.Paragraph(phrase("Whatever the light says, this was not verified:"))
+    yield blocks.Bullets(tuple(_always(evidence)))
+    yield blocks.Heading(phrase("Missing in this report"))
+    missing = tuple(
+        phrase(
+            "{name} (cannot be used): {reason}" if each.damaged else "{name}: {reason}",
+            name=f"{each.name[0].upper()}{each.name[1:]}",
+            reason=each.reason,
+        )
+        for each in evidence.missing
+    )
+    none = blocks.Paragraph(phrase("No part of the report is missing."))
+    yield blocks.Bullets(missing, code=True) if missing else none
+    if evidence.doubts:
+        yield blocks.Heading(phrase("What does not fit together"))
+        yield blocks.Bullets(evidence.doubts)
+
+
+def _always(evidence: Evidence) -> Iterator[Phrase]:
+    if evidence.simulated:
+        yield phrase("A real robot: all devices of this run are simulated.")
+    yield from _ALWAYS
+    calibrated = evidence.calibrated
+    if calibrated is not None and calibrated.model.observability.unobservable:
+        yield phrase(
+            "Single springs that no reading tells apart (see Compliances): their numbers are not"
+            " findings."
+        )
+    if evidence.plan is not None:
+        yield phrase(
+            "Places on the surface farther than {radius} from every pose; that is how far the worst"
+            " covered candidate is from one.",
+            radius=mm(evidence.plan.search.covering_radius, 1),
+        )
+
+
+NOT_VERIFIED = blocks.Section(
+    "not-verified",
+    phrase("What was not verified"),
+    phrase("What does this report not say?"),
+    100,
+    _not_verified,
+)

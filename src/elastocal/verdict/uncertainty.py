@@ -1,0 +1,106 @@
+"""The uncertainty of a predicted deflection, stated in the manner of ISO/IEC 17025.
+
+The evaluation follows the GUM (JCGM 100:2008): standard uncertainties of type A from readings at
+poses that were left out of the fit, of type B from what calibration certificates state, added in
+quadrature; the expanded uncertainty has the coverage factor k = 2 (about 95 %). It is of the
+deflection along any one direction, at poses and under forces like those of the run.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.results import brief_repr
+from elastocal.verdict.evidence import Evidence
+from elastocal.wording import Phrase, counted, phrase
+
+COVERAGE_FACTOR = 2.0
+
+
+@dataclass(frozen=True)
+class UncertaintySource:
+    """One contribution."""
+
+    name: Phrase
+    kind: str
+    """``A``: from readings of this run; ``B``: from elsewhere."""
+    standard: float | None
+    """Standard uncertainty of a deflection along one direction, in m; None: not known."""
+    origin: Phrase
+    """How it was found."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class UncertaintyStatement:
+    """Contributions and what they come to."""
+
+    sources: tuple[UncertaintySource, ...]
+    degrees_of_freedom: int
+    """Of the type A evaluation: poses that were left out, less one."""
+
+    @property
+    def standard(self) -> float:
+        """Combined standard uncertainty in m, of what is known."""
+        known = [each.standard for each in self.sources if each.standard is not None]
+        return float(np.sqrt(np.sum(np.square(known))))
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty in m, k = `COVERAGE_FACTOR`."""
+        return COVERAGE_FACTOR * self.standard
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every contribution is known."""
+        return all(each.standard is not None for each in self.sources)
+
+
+def state_uncertainty(evidence: Evidence) -> UncertaintyStatement | None:
+    """Return the uncertainty of a predicted deflection; None where no error is known."""
+    unseen = evidence.unseen
+    if unseen is None:
+        return None
+    # The norm holds three directions.
+    spread = float(np.sqrt(np.mean(unseen.error**2) / 3.0))
+    sources = [
+        UncertaintySource(
+            phrase("Error at poses left out of the fit: model, repeatability, noise, set-up"),
+            "A",
+            spread,
+            phrase(
+                "root mean square of {readings} at {poses}, along one direction",
+                readings=counted(len(unseen.error), "reading"),
+                poses=counted(unseen.poses, "pose"),
+            ),
+        ),
+        _tracker(evidence),
+        _sensor(evidence),
+    ]
+    return UncertaintyStatement(tuple(sources), unseen.poses - 1)
+
+
+def _tracker(evidence: Evidence) -> UncertaintySource:
+    name, stated = phrase("Calibration of the tracker"), evidence.certificate.tracker.uncertainty
+    if stated is None:
+        return UncertaintySource(name, "B", None, _NOT_STATED)
+    return UncertaintySource(name, "B", stated / COVERAGE_FACTOR, _FROM_CERTIFICATE)
+
+
+def _sensor(evidence: Evidence) -> UncertaintySource:
+    """Return what the sensor's calibration adds: forces scale the deflections."""
+    name, stated = (
+        phrase("Calibration of the force sensor"),
+        evidence.certificate.sensor.uncertainty,
+    )
+    if stated is None or evidence.dataset is None:
+        return UncertaintySource(name, "B", None, _NOT_STATED)
+    readings = evidence.dataset.readings(evidence.dataset.joint_names)
+    force = float(np.sqrt(np.mean(np.sum(readings.force**2, axis=1))))
+    deflection = float(np.sqrt(np.mean(np.sum(readings.deflection**2, axis=1)) / 3.0))
+    standard = stated / COVERAGE_FACTOR / force * deflection
+    return UncertaintySource(name, "B", standard, _FROM_CERTIFICATE)
+
+
+_NOT_STATED = phrase("not stated: the cell file gives no uncertainty for it")
+_FROM_CERTIFICATE = phrase("as stated by its certificate, halved (k = 2)")
