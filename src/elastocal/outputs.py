@@ -10,6 +10,7 @@ as a program's ``.src`` and ``.dat``, stand for one another.
 """
 
 import contextlib
+import errno
 import os
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
@@ -145,7 +146,9 @@ def _keys(path: Path) -> tuple[_Key, ...]:
     twin = place.with_suffix(_TWINS.get(suffix, suffix)) if suffix else place
     try:
         found = place.stat()
-    except (OSError, ValueError):
+    except (OSError, ValueError) as error:
+        if isinstance(error, OSError) and error.errno == errno.ELOOP:
+            raise FileAccessError(f"cannot use {path}: {error.strerror}") from error
         return str(place).casefold(), str(twin).casefold()
     return str(place).casefold(), str(twin).casefold(), (found.st_dev, found.st_ino)
 

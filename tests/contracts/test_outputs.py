@@ -237,3 +237,9 @@ def test_a_place_where_no_file_can_be_is_refused_before_the_work(tmp_path, name,
     shown = elastocal(*words, out.option, tmp_path / place)
     assert shown.code == 1
     assert f"cannot write {tmp_path / place}: " in shown.reason
+
+
+def test_links_that_lead_in_a_circle_are_refused_in_a_line(tmp_path):
+    (tmp_path / "model.json").symlink_to("model.json")
+    shown = elastocal("compare", tmp_path / "model.json", tmp_path / "model.json")
+    assert "model.json: Too many levels of symbolic links" in shown.reason
