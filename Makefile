@@ -33,7 +33,7 @@ docs-strict: $(VENV)/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 # Every parser of what devices send, under Atheris; `make fuzz-lines UNTIL=-runs=1000000` is longer.
-UNTIL ?= -max_total_time=20
+UNTIL ?= -max_total_time=10
 fuzz-lines: $(VENV)/installed-fuzz
 	cd tests && ../$(BIN)/python -m fuzz.lines $(UNTIL) -max_len=4096 -verbosity=0 -print_final_stats=1
 

@@ -9,6 +9,8 @@ from support import bare
 bare.forbid()
 
 TESTS = Path(__file__).parent
+# A program of its own, which ends where Atheris is not installed.
+collect_ignore = ["fuzz/lines.py"]
 END_TO_END = (
     "cli",
     "fuzz",

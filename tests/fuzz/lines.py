@@ -1,6 +1,6 @@
 """The parsers of everything that devices send, under Atheris: coverage chooses the next damage.
 
-``make fuzz-lines`` runs it for 20 s, or as `UNTIL` says; it ends with what fell, or with the number
+``make fuzz-lines`` runs it for 10 s, or as `UNTIL` says; it ends with what fell, or with the number
 of inputs. Whatever comes is read, or refused by an error of ours in one line. The Hypothesis and
 the random versions are in ``tests/drivers``.
 """
