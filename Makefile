@@ -7,12 +7,16 @@ BIN := $(VENV)/bin
 # Neighbours stay together, so that what a file prepares is seldom prepared twice.
 SHARED_OUT := -n auto --dist worksteal
 
-.PHONY: demo test lint units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation docs docs-version bench house fuzz clean
+.PHONY: demo test checks lint units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation docs docs-version bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
 
-test: lint units end-to-end browser docs-strict fuzz-lines
+test: checks units end-to-end browser fuzz-lines
+
+# Type checker and site keep one processor busy each.
+checks: $(VENV)/installed-dev
+	$(MAKE) --no-print-directory -j2 lint docs-strict
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

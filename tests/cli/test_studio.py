@@ -15,7 +15,7 @@ import pytest
 from elastocal import workflows
 from elastocal.cell import write_example
 from elastocal.procedure import Event, read_journal
-from support.cli import elastocal
+from support.cli import default_signals, elastocal
 from support.run_cells import planned_cell
 
 
@@ -27,8 +27,9 @@ def cell(tmp_path_factory):
 def test_the_first_line_is_the_address_and_ctrl_c_ends_it(cell):
     words = [sys.executable, "-m", "elastocal", "studio", str(cell), "--no-browser"]
     with subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
-    ) as process:
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ,
+        preexec_fn=default_signals,
+    ) as process:  # fmt: skip
         try:
             line = process.stdout.readline()
             found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)(/[\w-]{32,}/)\n", line)
@@ -88,7 +89,9 @@ def test_a_run_outlives_no_studio_and_leaves_the_surface_first(tmp_path, number)
             assert time.monotonic() < until, text
             time.sleep(0.1)
 
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=os.environ) as process:
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, text=True, env=os.environ, preexec_fn=default_signals
+    ) as process:
         try:
             _, _, place, token, _ = process.stdout.readline().split("/")
             asked = http.client.HTTPConnection(place, timeout=60)

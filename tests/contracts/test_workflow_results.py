@@ -32,6 +32,7 @@ WITHOUT = {
     "NewResult",
     "ReportResult",
     "SimulateResult",
+    "StudioResult",
     "ToolResult",
     "VerifyResult",
 }
@@ -83,6 +84,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.simulate(cell, meanwhile=lambda _: None),
         workflows.stiffness(model, path=path, spins=4, external_positions=3, stations=5),
         workflows.StudyResult(study_summary(design, samples, None), design, samples, ()),
+        workflows.studio(cell, while_open=lambda _: None),
         workflows.tool(run),
         workflows.verify(run),
     )

@@ -86,7 +86,9 @@ def test_a_plain_robot_that_counts_by_one_loses_nothing(linked):
             assert f"<IPOC>{ipoc}</IPOC>" in answer
             corrected = np.array([float(v) for v in re.findall(r' [XYZ]="([-\d.]+)"', answer)])
     np.testing.assert_allclose(corrected, 1e3 * WANTED, atol=1e-4)
-    counts = link.statistics()
+    patience = time.monotonic() + 5.0
+    while (counts := link.statistics()).answered < 60 and time.monotonic() < patience:
+        time.sleep(0.01)  # an answer is counted when it has been sent
     assert (counts.answered, counts.lost, counts.jumps, counts.malformed) == (60, 0, 0, 0)
     np.testing.assert_allclose(source.heard[-1].actual[:3], [1621.4, -0.2, 1910.0], atol=1e-3)
 

@@ -15,7 +15,7 @@ from elastocal.planning.checks import (
     TorqueCheck,
 )
 from elastocal.planning.search import technique
-from elastocal.planning.surface import Surface, sample_uniform
+from elastocal.planning.surface import Surface, arm_reach, sample_uniform, tiny_finding
 
 _POINTS = 200
 """Points of the surface at which a place for the contact disk is looked for."""
@@ -107,8 +107,10 @@ def _require_place_for_disk(cell: Cell, surface: Surface) -> None:
         best = float(check.at_points.max())
         if not best > 0.0:
             short = f"{-1e3 * best:.3g} mm" if check.unit == "m" else f"{-np.degrees(best):.3g} deg"
+            doubts = tiny_finding(surface, arm_reach(cell.robot))
+            advice = doubts[0].message if doubts else check.advice
             raise PlanningError(
                 f"engagement: no place of the surface takes the contact disk (radius {radius:.4g}"
                 f" mm): of {_POINTS} points the best is {short} short of check {check.name!r};"
-                f" {check.advice}"
+                f" {advice}"
             )

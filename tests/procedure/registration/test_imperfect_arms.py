@@ -127,6 +127,7 @@ def test_a_move_that_is_not_seen_turns_a_displacement_by_a_third_of_a_micrometre
     assert max(np.linalg.norm(turn, 2) for turn in turns) < 0.3e-3
 
 
+@pytest.mark.slow
 def test_memory_grows_with_the_poses_not_with_their_square():
     import tracemalloc
 

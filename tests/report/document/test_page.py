@@ -26,7 +26,7 @@ from support.reported import MADE
 
 LATER = "2027-08-09T10:11:12+00:00"
 MANIFEST = re.compile(r'id="manifest">.*?<')
-STAMP = re.compile(r"\d{4}-\d\d-\d\dT[\d:]+\+00:00")
+STAMP = re.compile(r'<time class="stamp" datetime="[^"]*">[^<]*</time>')
 
 
 class Page(HTMLParser):

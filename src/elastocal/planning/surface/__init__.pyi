@@ -18,6 +18,7 @@ from .findings import (
     mesh_findings as mesh_findings,
     placement_findings as placement_findings,
     size_findings as size_findings,
+    tiny_finding as tiny_finding,
     unit_findings as unit_findings,
 )
 from .mesh import (

@@ -114,12 +114,25 @@ def placement_findings(
             f" the mesh in {_misread(size, reach)} (surface.unit)?"
         )
         return (Finding("huge", text, fatal=True),)
+    return tiny_finding(surface, reach) + inverted_finding(surface, reachable, rng)
+
+
+def tiny_finding(surface: Surface, reach: float) -> tuple[Finding, ...]:
+    """Return a finding when a surface is so small that its unit is doubtful.
+
+    Parameters
+    ----------
+    surface : Surface
+        The surface.
+    reach : float
+        Of the arm with its tool, in m.
+    """
+    size = float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
     text = (
-        f"{name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
+        f"{surface.name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
         f" {reach:.3g} m: is the mesh in {_misread(size, reach)} (surface.unit)?"
     )
-    tiny = (Finding("tiny", text),) if size < _TINY * reach else ()
-    return tiny + inverted_finding(surface, reachable, rng)
+    return (Finding("tiny", text),) if size < _TINY * reach else ()
 
 
 def _misread(size: float, reach: float) -> str:
