@@ -26,7 +26,7 @@ from support.reported import MADE
 
 LATER = "2027-08-09T10:11:12+00:00"
 MANIFEST = re.compile(r'id="manifest">.*?<')
-STAMP = re.compile(r'<time class="stamp" datetime="[^"]*">[^<]*</time>')
+STAMP = re.compile(r"\d{4}-\d\d-\d\d(T[\d:]+\+00:00| [\d:]+ UTC)")
 
 
 class Page(HTMLParser):
