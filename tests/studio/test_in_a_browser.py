@@ -183,9 +183,9 @@ def plan_it(page, cell, told):
 def run_it(page, cell, told):
     page.click("#tab-run")
     page.wait("document.getElementById('run-plan').options.length > 0")
-    page.get("document.getElementById('run-form').elements.rate.value = '0'")
+    page.get("document.getElementById('run-form').elements.rate.value = '20'")
     page.click("#run-form button")
-    page.wait("document.getElementById('live-figures').textContent.includes('settle')")
+    page.wait("/settle|average/.test(document.getElementById('live-figures').textContent)")
     told["live"] = page.text("live-figures")
     page.keep("run")
     stopped = time.monotonic()
