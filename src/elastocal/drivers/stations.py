@@ -7,6 +7,7 @@ of the station in the cell file, a bound on what is kept.
 """
 
 import threading
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -230,7 +231,7 @@ class StationsMetrology:
         return tuple(feed.counts for feed in self._feeds.values())
 
 
-class StationLink(threading.Thread):
+class StationLink(threading.Thread, ABC):
     """Keeps one connection up until it is closed; what it hears fills the feeds of its stations.
 
     Parameters
@@ -254,6 +255,7 @@ class StationLink(threading.Thread):
         """Set when it is to end."""
         self._told = feeds
 
+    @abstractmethod
     def hear(self) -> bool:
         """Connect and take what comes until the connection ends; False: nobody has come yet.
 
@@ -264,7 +266,6 @@ class StationLink(threading.Thread):
         OSError
             If the line does not carry.
         """
-        raise NotImplementedError
 
     def close(self) -> None:
         """End the thread."""

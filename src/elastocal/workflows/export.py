@@ -117,8 +117,9 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     calibrated = settings.read_model(model)
     require_model_of_arm(calibrated, model)
     around = _around(settings, calibrated.model.robot)
-    chosen = None if settings.compensator is None else read_settings(settings.compensator)
-    if around is not None:
+    if around is None:
+        chosen = None if settings.compensator is None else read_settings(settings.compensator)
+    else:
         chosen = settings_within(settings.compensator, *around[1:])
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     try:

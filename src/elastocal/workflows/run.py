@@ -255,7 +255,14 @@ def _prepare(settings: RunSettings) -> _Job:
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
     copy, signer = procedure.cell_path_in_run(loaded), public_key(key) if key else None
     stated = procedure.run_record(
-        loaded, read, text, copy, seed, _now(), signer, dict(settings.state)
+        loaded,
+        read,
+        plan_text=text,
+        cell_file=copy,
+        seed=seed,
+        started=_now(),
+        signer=signer,
+        stated=dict(settings.state),
     )
     certificate_of(loaded.file.certificate, stated.stated)
     procedure.check_compatible(read, loaded)

@@ -171,6 +171,7 @@ def last_known(entries: tuple[Entry, ...]) -> LastKnown:
 def run_record(
     cell: Cell,
     plan: PlanResult,
+    *,
     plan_text: str,
     cell_file: str,
     seed: int,

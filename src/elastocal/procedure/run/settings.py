@@ -102,14 +102,15 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
         )
     loads = tuple((name, np.array(force)) for name, force in plan.contact.load_cases.items())
     _check_contact_force(cell, loads)
+    tolerance = _force_tolerance(cell, loads)
     motion = cell.file.motion
     return RunSettings(
         procedure=cell.file.procedure,
         override=motion.override,
         axes=AxisMotion(cell.axis_speeds, motion.acceleration_time),
         R_tcp_sensor=T_sensor_tcp[:3, :3].T,
-        force_limit=_force_limit(cell, loads, T_sensor_tcp[:3, :3]),
-        force_tolerance=_force_tolerance(cell, loads),
+        force_limit=_force_limit(cell, loads, T_sensor_tcp[:3, :3], tolerance),
+        force_tolerance=tolerance,
         weight_base=cell.file.tool.mass * cell.gravity_base,
         near_contact=plan.contact.near_contact,
         approach_distance=plan.contact.approach_distance,
@@ -137,7 +138,10 @@ def _force_tolerance(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> f
 
 
 def _force_limit(
-    cell: Cell, loads: tuple[tuple[str, FloatArray], ...], R_sensor_tcp: FloatArray
+    cell: Cell,
+    loads: tuple[tuple[str, FloatArray], ...],
+    R_sensor_tcp: FloatArray,
+    tolerance: float,
 ) -> float:
     """Return the force limit; it stays within the sensor's range in the direction of each load."""
     sensor, asked = cell.file.sensor, cell.file.procedure.force_limit
@@ -149,7 +153,7 @@ def _force_limit(
         for norm, (_, force) in zip(norms, loads, strict=True)
     )
     limit = min(_LIMIT_PER_LOAD * largest, within) if asked is None else asked
-    room = largest + _force_tolerance(cell, loads)
+    room = largest + tolerance
     if not room < limit <= within:
         raise ProcedureError(
             f"{cell.path}: procedure.force_limit must be above {room:g} N (largest load case and"
