@@ -7,6 +7,8 @@ import re
 from collections.abc import Collection, Iterable
 from typing import Any, TypeVar
 
+from elastocal.wording import phrase
+
 MOST_LINES = 20
 """Longest representation in a console."""
 MOST_CHARACTERS = 1500
@@ -139,7 +141,15 @@ def counted_alike(texts: Iterable[str], most: int = 3) -> list[str]:
     shown: list[str] = []
     for alike in kinds.values():
         few = len(alike) <= most
-        shown += alike if few else [f"{alike[0]} (and {len(alike) - 1} more of this kind)"]
+        shown += (
+            alike
+            if few
+            else [
+                phrase(
+                    "{first} (and {more} more of this kind)", first=alike[0], more=len(alike) - 1
+                )
+            ]
+        )
     return shown
 
 

@@ -198,7 +198,8 @@ def listed(names: Sequence[str], most: int = 30) -> str:
     ('a, b', 'a, b and 2 more')
     """
     left = len(names) - most
-    return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
+    shown = ", ".join(names[:most])
+    return phrase("{names} and {left} more", names=shown, left=left) if left > 0 else shown
 
 
 def point(values: Sequence[float | None], scale: float = 1e3, digits: int = 1) -> str:

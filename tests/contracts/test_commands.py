@@ -19,6 +19,7 @@ from elastocal.elastic import LAYOUTS
 from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
 from elastocal.planning.search import TECHNIQUES
+from elastocal.report import LANGUAGES
 from elastocal.robot import catalogue
 from elastocal.workflows import EXPORT_TARGETS, SimulateResult, StudioResult
 from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
@@ -131,6 +132,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "free frame": _FREE_FRAMES,
         "posture": (PROGRAMMED, STIFFEST),
         "target": EXPORT_TARGETS,
+        "page language": tuple(LANGUAGES),
     } == options.CHOICES
 
 

@@ -9,6 +9,8 @@ import pytest
 
 import elastocal
 from elastocal.errors import ReportError
+from elastocal.planning import UNREACHABLE, checks
+from elastocal.procedure.record import ReadingStatus
 from elastocal.report import LANGUAGES, language_of
 from elastocal.wording import counted, mm, phrase, sentences
 
@@ -17,6 +19,11 @@ CATALOGUES = {
     code: json.loads((SOURCE / "report" / "words" / f"{code}.json").read_text(encoding="utf-8"))
     for code in LANGUAGES
     if code != "en"
+}
+TREES = {
+    path: ast.parse(path.read_text(encoding="utf-8"))
+    for path in SOURCE.rglob("*.py")
+    if "phrase" in path.read_text(encoding="utf-8")
 }
 PLACE = re.compile(r"\{(\w+)\}")
 
@@ -32,8 +39,8 @@ def constants(node):
 
 def phrases_of_the_program():
     found = set()
-    for path in SOURCE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for tree in TREES.values():
+        for node in ast.walk(tree):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args):
                 continue
             if node.func.id == "phrase":
@@ -52,26 +59,37 @@ def phrases_of_the_program():
     return {each for each in found if re.search("[A-Za-z]", PLACE.sub("", each))}
 
 
-def counts_of_the_report():
-    """Return the templates of numbers with a noun, of which the report counts some."""
+def counts_of_the_pages():
+    """Return the templates of numbers with a noun, where a phrase may hold them."""
     nouns = set()
-    for package in ("report/document", "verdict"):
-        for path in (SOURCE / package).rglob("*.py"):
-            if path.name == "geometry_page.py":
-                # The page of another command, which speaks English alone.
-                continue
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if (
-                    isinstance(node, ast.Call)
-                    and isinstance(node.func, ast.Name)
-                    and node.func.id == "counted"
-                ):
-                    nouns |= set(constants(node.args[1]))
+    for path, tree in TREES.items():
+        calls = [
+            node
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        ]
+        shown = path.is_relative_to(SOURCE / "verdict") or any(
+            node.func.id == "phrase" for node in calls
+        )
+        if shown and path.name != "wording.py":
+            nouns |= {
+                noun
+                for node in calls
+                if node.func.id == "counted"
+                for noun in constants(node.args[1])
+            }
     return {f"{{number}} {noun}{end}" for noun in nouns for end in ("", "s")}
 
 
 LIGHTS = {f"{colour} light" for colour in ("green", "yellow", "red")}
-ALL = phrases_of_the_program() | counts_of_the_report() | LIGHTS
+CHECKS = {UNREACHABLE} | {
+    kind.name
+    for kind in (getattr(checks, name) for name in dir(checks) if name.endswith("Check"))
+    if isinstance(getattr(kind, "name", None), str)
+}
+"""What may refuse a candidate: names in files, words on a page."""
+STATUSES = {status.value for status in ReadingStatus}
+ALL = phrases_of_the_program() | counts_of_the_pages() | LIGHTS | CHECKS | STATUSES
 
 
 @pytest.mark.parametrize("code", CATALOGUES)

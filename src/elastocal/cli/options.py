@@ -23,6 +23,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "process": ("afp", "machining"),
     "example": ("afp", "machining", "ur20"),
     "language": ("krl", "rapid", "fanuc", "urscript", "none"),
+    "page language": ("en", "de", "fr"),
     "loss": ("linear", "huber", "cauchy"),
     "weights": ("none", "sigma"),
     "free frame": ("none", "load_case", "campaign"),
@@ -108,6 +109,7 @@ Language = Annotated[
     str | None,
     choice("language", "Language of the robot program. Default: that of the robot's maker."),
 ]
+PageLanguage = Annotated[str, choice("page language", "Language of the page.")]
 Geometry = Annotated[
     Path | None,
     typer.Option(help="Model file from geometry: the arm as built, its errors and its sag."),

@@ -40,6 +40,7 @@ from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import Candidates, growing_choices, technique
 from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
+from elastocal.wording import phrase
 
 _STAGE = "splits"
 _WORTH_PROCESSES = 4.0
@@ -167,8 +168,13 @@ def _draw_findings(measured: Readings, drawn: Readings, options: CodecOptions) -
     if poses == of:
         return []
     return [
-        f"made on {poses} of the {of} poses, drawn with seed {options.seed}: work and memory grow"
-        " with the cube of their number (--poses takes more)"
+        phrase(
+            "made on {poses} of the {of} poses, drawn with seed {seed}: work and memory grow with"
+            " the cube of their number (--poses takes more)",
+            poses=poses,
+            of=of,
+            seed=options.seed,
+        )
     ]
 
 

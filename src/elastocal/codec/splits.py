@@ -27,6 +27,7 @@ from elastocal.identification import (
 from elastocal.planning.search import Candidates, Cover
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
+from elastocal.wording import phrase
 
 _RATIO = 70.0 / 30.0
 """Training to verification poses, the paper's ``r``."""
@@ -165,7 +166,10 @@ def _group_by_pose(robot: Robot, readings: Readings, findings: list[str]) -> Cam
     """Return readings by physical pose."""
     pose = pose_blocks(readings)
     repeated = [
-        f"poses {', '.join(map(str, group))} are one configuration: kept on one side of each split"
+        phrase(
+            "poses {poses} are one configuration: kept on one side of each split",
+            poses=", ".join(map(str, group)),
+        )
         for group in same_configuration(readings, pose)
     ]
     position = robot.forward(readings.joint_position)[:, :3, 3]
@@ -176,8 +180,11 @@ def _group_by_pose(robot: Robot, readings: Readings, findings: list[str]) -> Cam
     )
     company = poses_in_company(robot, readings.joint_position, pose)
     lone = [
-        f"pose {', '.join(map(str, labels[number]))} is far from all others: it trains, and"
-        " verifies nothing, as it is left out of the ladder"
+        phrase(
+            "pose {pose} is far from all others: it trains, and verifies nothing, as it is left"
+            " out of the ladder",
+            pose=", ".join(map(str, labels[number])),
+        )
         for number in np.flatnonzero(~company).tolist()
     ]
     return Campaign(readings, pose, contact, company, labels, (*findings, *repeated, *lone))

@@ -11,7 +11,7 @@ from elastocal.errors import GeometryError
 from elastocal.geometry.problem import GeometryProblem, State
 from elastocal.geometry.solve import GeometryFit, register
 from elastocal.robot import JointReading, Robot, other_joint_readings
-from elastocal.wording import counted
+from elastocal.wording import counted, phrase
 
 _ODD = 0.02
 """Median distance of markers from a nominal arm, in m, that is no arm's own error."""
@@ -80,11 +80,14 @@ def _single_signs(robot: Robot) -> list[JointReading]:
 
 def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[str, ...]:
     """Return what a person should know of positions, a sentence each."""
-    notes = []
+    notes: list[str] = []
     if not problem.robot.has_masses:
         notes.append(
-            f"the description of {problem.robot.name} has no masses: what the arm yields to its own"
-            " weight is not told from its geometry"
+            phrase(
+                "the description of {name} has no masses: what the arm yields to its own weight is"
+                " not told from its geometry",
+                name=problem.robot.name,
+            )
         )
     return (*notes, *_swapped_markers(problem, fit), *_moved_stations(problem, fit))
 
@@ -98,7 +101,7 @@ def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
     in_base = np.einsum("nji,nj->ni", R, problem.measured - t)
     measured[problem.row, problem.marker] = in_base
     expected[problem.row, problem.marker] = in_base - fit.residual
-    notes = []
+    notes: list[str] = []
     for a, b in combinations(range(seen.shape[1]), 2):
         apart = [
             np.linalg.norm(measured[:, one] - expected[:, other], axis=1)
@@ -108,8 +111,14 @@ def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
         rows = np.flatnonzero(swapped & (apart[2] > _SIGMAS * sigma))
         if len(rows):
             notes.append(
-                f"marker {a + 1} and marker {b + 1} are swapped in {counted(len(rows), 'row')}"
-                f" (counted from 0: {_named(rows)}); they were left out"
+                phrase(
+                    "marker {a} and marker {b} are swapped in {rows} (counted from 0: {numbers});"
+                    " they were left out",
+                    a=a + 1,
+                    b=b + 1,
+                    rows=counted(len(rows), "row"),
+                    numbers=_named(rows),
+                )
             )
     return notes
 
@@ -121,7 +130,7 @@ def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
     best split between them; F says by how much better two are (E. S. Page, "A test for a change in
     a parameter occurring at an unknown point", Biometrika 42, 1955).
     """
-    notes = []
+    notes: list[str] = []
     for index, name in enumerate(problem.data.stations):
         own = (problem.station == index) & (np.linalg.norm(fit.residual, axis=1) < _NEAR)
         points = np.flatnonzero(own)
@@ -131,9 +140,14 @@ def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
         if F > _STRONG and shift > _SHIFT * fit.sigma:
             row = int(problem.row[points[split]])
             notes.append(
-                f"station {name!r} seems to have moved by {1e3 * shift:.2g} mm before row {row}"
-                " (counted from 0): give the rows from there on a name of their own in the column"
-                " 'station'"
+                phrase(
+                    "station {name} seems to have moved by {shift} mm before row {row} (counted"
+                    " from 0): give the rows from there on a name of their own in the column"
+                    " 'station'",
+                    name=repr(name),
+                    shift=f"{1e3 * shift:.2g}",
+                    row=row,
+                )
             )
     return notes
 

@@ -40,6 +40,7 @@ from elastocal.planning.search import Candidates, SearchTechnique, technique
 from elastocal.progress import Progress, silent
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 _SCHEMA = "elastocal.position-plan/1"
 _RUNG = "weight"
@@ -315,6 +316,12 @@ def _findings(count: int, errors: int) -> tuple[str, ...]:
     if count >= least:
         return ()
     return (
-        f"{count} poses give {3 * count} coordinates for {errors} errors of the arm: plan {least}"
-        " at least",
+        phrase(
+            "{poses} poses give {coordinates} coordinates for {errors} errors of the arm: plan"
+            " {least} at least",
+            poses=count,
+            coordinates=3 * count,
+            errors=errors,
+            least=least,
+        ),
     )

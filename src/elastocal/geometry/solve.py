@@ -11,6 +11,7 @@ from elastocal.geometry.arm import ArmErrors
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
 from elastocal.results import brief_repr
 from elastocal.robot import nearest_rotation
+from elastocal.wording import phrase
 
 _DEPENDENT = 1e-7
 """Part of a weighed column that is new beside those before it, below which nothing is."""
@@ -111,7 +112,7 @@ def told_apart(
             basis = np.column_stack([basis, rest / new])
         else:
             why = (
-                "moves no marker"
+                phrase("moves no marker")
                 if length <= _DEPENDENT * scale
                 else _why(problem, R, order, kept, column)
             )
@@ -130,7 +131,10 @@ def _why(
     names = [
         problem.unknowns[kept[i]].name for i in big if abs(share[i]) > 0.05 * abs(share[big[0]])
     ]
-    return "as " + " with ".join(names[:4]) + (" and others" if len(names) > 4 else "")
+    alike = names[0]
+    for name in names[1:4]:
+        alike = phrase("{first} with {second}", first=alike, second=name)
+    return phrase("as {names} and others" if len(names) > 4 else "as {names}", names=alike)
 
 
 @brief_repr

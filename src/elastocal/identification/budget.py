@@ -36,16 +36,12 @@ from elastocal.identification.uncertainty import CONFIDENCE, HeldOut, leave_pose
 from elastocal.parallel import one_blas_thread
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.wording import phrase, phrases
 
 TermName = Literal["bearings", "gears", "friction", "sag", "registration"]
 _TERMS: tuple[TermName, ...] = get_args(TermName)
-_LABELS: dict[TermName, str] = {
-    "bearings": "bearings",
-    "gears": "stiffening gears",
-    "friction": "friction memory",
-    "sag": "gravity sag",
-    "registration": "registration",
-}
+_WORDS = phrases("bearings", "stiffening gears", "friction memory", "gravity sag", "registration")
+_LABELS: dict[TermName, str] = dict(zip(_TERMS, _WORDS, strict=True))
 _FEWEST_REPEATS = 9
 """Components of repeated readings from which their scatter is known within a factor of two."""
 _TURN = 1e-2
@@ -126,10 +122,10 @@ class ErrorBudget:
     def parts(self) -> tuple[tuple[str, ErrorPart], ...]:
         """The error and its parts, as people read them."""
         return (
-            ("all, at left-out poses", self.total),
-            ("noise of a reading", self.noise),
-            ("the fit, by its poses", self.fit),
-            ("the rest", self.rest),
+            (phrase("all, at left-out poses"), self.total),
+            (phrase("noise of a reading"), self.noise),
+            (phrase("the fit, by its poses"), self.fit),
+            (phrase("the rest"), self.rest),
         )
 
 
@@ -171,7 +167,8 @@ def error_budget(
     chosen = problem.reweighted(weight)
     held_out, compliance = leave_poses_out(chosen), solve(chosen).compliance
     squares = _mean_squares(chosen, held_out)
-    total = _part(*_with_interval(squares), f"{len(squares)} poses, each left out")
+    source = phrase("{poses} poses, each left out", poses=len(squares))
+    total = _part(*_with_interval(squares), source)
     noise = _noise(model, readings, chosen, compliance)
     fit = _fit(chosen, held_out, compliance)
     ablation = _Ablation(model, readings, options, marker_offset, weight, squares)
@@ -235,11 +232,11 @@ class _Ablation:
         if term in ("bearings", "gears", "friction") and not any(
             map(self._is_axial, self.model.springs)
         ):
-            return "not among these springs"
+            return phrase("not among these springs")
         if term == "friction" and not has_levels(self.readings):
-            return "no load case of low load"
+            return phrase("no load case of low load")
         if term == "sag" and not self.model.robot.has_masses:
-            return "no masses in the URDF"
+            return phrase("no masses in the URDF")
         return None
 
     def _other(self, term: TermName) -> Problem:
@@ -339,7 +336,7 @@ def _fit(problem: Problem, held_out: HeldOut, compliance: FloatArray) -> ErrorPa
     folds = held_out.folds
     changes = problem.O @ (held_out.compliance - compliance).T
     square = (folds - 1) / folds * float(np.sum(np.square(changes))) / len(problem)
-    return _part(square, None, None, f"{folds} refits, jackknife")
+    return _part(square, None, None, phrase("{folds} refits, jackknife", folds=folds))
 
 
 def _noise(
@@ -356,9 +353,10 @@ def _noise(
         scatter = float(np.sum(np.square(residual - (sums / count[:, None])[group])))
         tail = 0.5 * (1.0 - CONFIDENCE)
         low, high = (3.0 * scatter / float(chdtri(freedom, p)) for p in (tail, 1.0 - tail))
-        return _part(3.0 * scatter / freedom, low, high, f"{freedom // 3} repeated readings")
+        source = phrase("{count} repeated readings", count=freedom // 3)
+        return _part(3.0 * scatter / freedom, low, high, source)
     if readings.marker_sigma is None:
-        return ErrorPart(None, None, None, "no repeated reading, no stated deviation")
+        return ErrorPart(None, None, None, phrase("no repeated reading, no stated deviation"))
     return stated_noise(model, readings, compliance[: len(model.parameters)])
 
 
@@ -375,14 +373,14 @@ def stated_noise(model: ElasticModel, readings: Readings, compliance: FloatArray
         Of the springs.
     """
     if readings.marker_sigma is None:
-        return ErrorPart(None, None, None, "no stated deviation")
-    square, source = np.sum(np.square(readings.marker_sigma), axis=1), "metrology"
+        return ErrorPart(None, None, None, phrase("no stated deviation"))
+    square, source = np.sum(np.square(readings.marker_sigma), axis=1), phrase("stated: metrology")
     if readings.force_sigma is not None:
         place = (readings.joint_position, readings.force, readings.moment)
         C = model.cartesian_compliance(compliance, *place).translation
         square = square + np.sum(np.square(C * readings.force_sigma[:, None, :]), axis=(1, 2))
-        source = "metrology and force sensor"
-    return _part(float(square.mean()), None, None, f"stated: {source}")
+        source = phrase("stated: metrology and force sensor")
+    return _part(float(square.mean()), None, None, source)
 
 
 def _rest(total: ErrorPart, noise: ErrorPart, fit: ErrorPart) -> ErrorPart:
@@ -396,5 +394,6 @@ def _rest(total: ErrorPart, noise: ErrorPart, fit: ErrorPart) -> ErrorPart:
             (total.high, noise.error if noise.low is None else noise.low),
         )
     )
-    source = "what noise and fit leave" if noise.error is not None else "noise is in it"
+    is_apart = noise.error is not None
+    source = phrase("what noise and fit leave" if is_apart else "noise is in it")
     return _part(square, low, high, source)

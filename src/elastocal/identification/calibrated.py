@@ -30,6 +30,7 @@ from elastocal.robot import (
     xyzabc_from_T,
 )
 from elastocal.units import impossible
+from elastocal.wording import phrase
 
 _LINK = "tool_tcp"
 """Name of the link at another tool's tcp; with a number where it is taken."""
@@ -251,7 +252,7 @@ class CalibratedModel:
     def tool_name(self) -> str:
         """The tool that the model is for, in words."""
         if self.tool is None:
-            return f"{self.model.robot.tip}, as calibrated"
+            return phrase("{frame}, as calibrated", frame=self.model.robot.tip)
         return self.tool.sentence
 
     def with_tool(

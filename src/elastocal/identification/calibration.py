@@ -44,6 +44,7 @@ from elastocal.identification.uncertainty import (
 )
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
+from elastocal.wording import phrase, sentences
 
 
 @brief_repr
@@ -206,22 +207,33 @@ def _data_warnings(
 ) -> list[str]:
     """Return what is odd about the data before they are fitted, or refuse them."""
     warnings = list(check_joints(model.robot, readings)) + [
-        f"poses {', '.join(map(str, group))} are one configuration: resampled and left out together"
+        phrase(
+            "poses {poses} are one configuration: resampled and left out together",
+            poses=", ".join(map(str, group)),
+        )
         for group in same_configuration(readings, problem.block)
     ]
     if gap := model.robot.chain.weight_gap:
         warnings.append(
-            f"robot {model.robot.name}: {gap}: the arm's own weight bends it otherwise at the"
-            " reference than under load, and here that passes as deflection"
+            phrase(
+                "robot {name}: {gap}: the arm's own weight bends it otherwise at the reference"
+                " than under load, and here that passes as deflection",
+                name=model.robot.name,
+                gap=gap,
+            )
         )
     try:
         left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
-        return [*warnings, f"fitted in spite of this: {error}"]
+        return [*warnings, phrase("fitted in spite of this: {error}", error=error)]
     if left > POOR_FIT:
-        warnings.append(f"the springs leave {left:.0%} of the median deflection unexplained")
+        warnings.append(
+            phrase(
+                "the springs leave {left} of the median deflection unexplained", left=f"{left:.0%}"
+            )
+        )
     return warnings
 
 
@@ -233,20 +245,30 @@ def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> 
         raise IdentificationError(
             "every spring ends at a bound: the bounds, not the data, would make the model"
         )
-    warnings = []
+    warnings: list[str] = []
     missing = reach - calibrated.observability.rank
     if missing > 0:
         warnings.append(
-            f"poses and load cases determine {calibrated.observability.rank} of the {reach}"
-            " directions that more of them would: predictions elsewhere are not covered"
+            phrase(
+                "poses and load cases determine {rank} of the {reach} directions that more of them"
+                " would: predictions elsewhere are not covered",
+                rank=calibrated.observability.rank,
+                reach=reach,
+            )
         )
     left = calibrated.unexplained
     if left > MOST_UNEXPLAINED:
-        none = "; it predicts no better than none at all" if left >= 1.0 else ""
         warnings.append(
-            f"at left-out poses the model leaves {left:.0%} of the deflection unexplained, more"
-            f" than half: it is not fit for use, and is not exported{none}"
+            phrase(
+                "at left-out poses the model leaves {left} of the deflection unexplained, more than"
+                " half: it is not fit for use, and is not exported",
+                left=f"{left:.0%}",
+            )
         )
+        if left >= 1.0:
+            warnings[-1] = sentences(
+                (warnings[-1], phrase("it predicts no better than none at all")), "; "
+            )
     return warnings
 
 
@@ -255,6 +277,9 @@ def _unsettled(solution: Solution, loss: str) -> list[str]:
     if solution.settled:
         return []
     return [
-        f"the {loss} loss had not settled when reweighting ended: its weights, and so the springs,"
-        " depend on where it stopped"
+        phrase(
+            "the {loss} loss had not settled when reweighting ended: its weights, and so the"
+            " springs, depend on where it stopped",
+            loss=loss,
+        )
     ]

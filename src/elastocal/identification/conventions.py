@@ -25,6 +25,7 @@ from elastocal.identification.options import FitOptions, FreeFrame
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
 from elastocal.robot import JointReading, Robot, other_joint_readings
+from elastocal.wording import phrase
 
 POOR_FIT = 0.35
 """Part of the median deflection that may stay unexplained without a warning."""
@@ -205,16 +206,25 @@ def _limits(robot: Robot, readings: Readings) -> list[str]:
     clearly = [message for joint, message in found.items() if worst[joint] < -_OUTSIDE]
     if clearly and not assumed:
         raise DatasetError(f"{'; '.join(clearly)}: degrees, another joint order, or another robot?")
-    note = " (limits assumed, no source)" if assumed else ""
-    return [message + note for message in found.values()]
+    if not assumed:
+        return list(found.values())
+    return [
+        phrase("{message} (limits assumed, no source)", message=message)
+        for message in found.values()
+    ]
 
 
 def _outside(robot: Robot, readings: Readings, reading: int, joint: int) -> str:
     limits, unit = robot.limits, _unit(robot, joint)
-    return (
-        f"{robot.joint_names[joint]} at pose {readings.pose[reading]} is"
-        f" {readings.joint_position[reading, joint]:.4g} {unit}, outside the robot's"
-        f" {limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} {unit}"
+    return phrase(
+        "{joint} at pose {pose} is {position} {unit}, outside the robot's {lower}"
+        " to {upper} {unit}",
+        joint=robot.joint_names[joint],
+        pose=readings.pose[reading],
+        position=f"{readings.joint_position[reading, joint]:.4g}",
+        unit=unit,
+        lower=f"{limits.lower[joint]:.4g}",
+        upper=f"{limits.upper[joint]:.4g}",
     )
 
 
@@ -229,9 +239,12 @@ def _positions(robot: Robot, readings: Readings) -> list[str]:
     recorded = readings.tcp_position + readings.controller_displacement
     distance = np.linalg.norm(computed - recorded, axis=1)
     median = float(np.median(distance))
-    message = (
-        f"recorded tcp_position is {1e3 * median:.1f} mm (median) from that of the joints of"
-        f" {robot.name} at {robot.tip!r}"
+    message = phrase(
+        "recorded tcp_position is {distance} mm (median) from that of the joints of {name} at"
+        " {tip}",
+        distance=f"{1e3 * median:.1f}",
+        name=robot.name,
+        tip=repr(robot.tip),
     )
     if median > _TCP_WRONG:
         raise DatasetError(f"{message}: another tcp, joint signs, joint order or base frame?")

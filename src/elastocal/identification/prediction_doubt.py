@@ -26,6 +26,7 @@ from elastocal.identification.solve import solve
 from elastocal.identification.uncertainty import CONFIDENCE, leave_poses_out
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 DOUBT_ROWS = 100
 """Rows by which predictions along a path are judged."""
@@ -102,9 +103,10 @@ class PredictionDoubt:
     @property
     def figures(self) -> str:
         """Both lengths, in words."""
-        return (
-            f"{1e3 * self.deflection:.3g} mm on average with a 95 % interval of"
-            f" ± {1e3 * self.half_width:.3g} mm"
+        return phrase(
+            "{deflection} mm on average with a 95 % interval of ± {half_width} mm",
+            deflection=f"{1e3 * self.deflection:.3g}",
+            half_width=f"{1e3 * self.half_width:.3g}",
         )
 
     @property
@@ -113,9 +115,12 @@ class PredictionDoubt:
         if self.is_small:
             return ()
         return (
-            f"on production the model predicts {self.figures}: it does not know what it"
-            " predicts, a correction may do harm; press in the directions of production, or take"
-            " fewer springs (--springs bearing)",
+            phrase(
+                "on production the model predicts {figures}: it does not know what it predicts, a"
+                " correction may do harm; press in the directions of production, or take fewer"
+                " springs (--springs bearing)",
+                figures=self.figures,
+            ),
         )
 
 

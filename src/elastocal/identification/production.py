@@ -9,7 +9,7 @@ and its load is within what was pressed there (`CalibratedLoads`). Every command
 model holds says it by this.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -20,7 +20,7 @@ from elastocal.identification.domain import LEVEL_REACH, CalibratedLoads, force_
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.wording import counted
+from elastocal.wording import Phrase, counted, phrase, sentences
 
 JOINT_REACH = float(np.radians(30.0))
 """Largest distance of a covered row from a calibrated posture in a turning joint, in rad."""
@@ -29,6 +29,7 @@ RAIL_REACH = 0.4
 _MOST_ALONE = 0.25
 """Part of the poses that may stand alone without counting; where more do, none has neighbours to
 speak of, and all count."""
+_OF_PRODUCTION = phrase("of production")
 ENOUGH = 0.95
 """Share of production that a calibration has to cover."""
 _ARM = 6
@@ -98,7 +99,7 @@ class ProductionCoverage:
         """Whether the share that is covered is `ENOUGH`."""
         return self.covered >= ENOUGH
 
-    def sentence(self, of: str = "of production") -> str:
+    def sentence(self, of: str = _OF_PRODUCTION) -> str:
         """Return the figures in a line, with what lies outside by name.
 
         Parameters
@@ -106,34 +107,67 @@ class ProductionCoverage:
         of : str
             Which rows they are.
         """
+        rows: str = sentences((counted(self.rows, "row"), of))
+        if of == _OF_PRODUCTION:
+            rows = phrase(
+                "{number} row of production" if self.rows == 1 else "{number} rows of production",
+                number=self.rows,
+            )
+        values = {
+            "share": f"{self.covered:.0%}",
+            "rows": rows,
+            "angle": f"{np.degrees(JOINT_REACH):.0f}",
+        }
         within = (
-            f"{self.covered:.0%} of {counted(self.rows, 'row')} {of} lie within"
-            f" {np.degrees(JOINT_REACH):.0f} deg in each joint,"
-            f"{'' if self.rail is None else f' {RAIL_REACH:g} m of rail'} and the loads of a"
-            " calibrated posture"
+            phrase(
+                "{share} of {rows} lie within {angle} deg in each joint, and the loads of a"
+                " calibrated posture",
+                **values,
+            )
+            if self.rail is None
+            else phrase(
+                "{share} of {rows} lie within {angle} deg in each joint, {rail} m of rail and"
+                " the loads of a calibrated posture",
+                **values,
+                rail=f"{RAIL_REACH:g}",
+            )
         )
-        outside = [
-            f"{self.farthest_joint} up to {np.degrees(self.farthest):.0f} deg away"
-            f" ({1.0 - self.joints:.0%} of rows)"
-            if self.joints < 1.0
-            else "",
-            f"rail up to {self.farthest_rail:.2f} m away ({1.0 - self.rail:.0%} of rows)"
-            if self.rail is not None and self.rail < 1.0
-            else "",
-            f"load {self._level} ({1.0 - self.load:.0%} of rows)" if self.load < 1.0 else "",
-        ]
-        parts = [each for each in outside if each]
-        if not parts:
+        outside = tuple(self._outside())
+        if not outside:
             return within
-        named = f"; in {', '.join(self.courses)}" if self.courses else ""
-        named += f"; first: {self.first}" if self.first else ""
-        return f"{within}; outside: {', '.join(parts)}{named}"
+        parts = [within, phrase("outside: {what}", what=sentences(outside, ", "))]
+        if self.courses:
+            parts.append(phrase("in {courses}", courses=", ".join(self.courses)))
+        if self.first:
+            parts.append(phrase("first: {row}", row=self.first))
+        return sentences(parts, "; ")
 
-    @property
-    def _level(self) -> str:
-        if self.level is None:
-            return "to a side to which nothing was pressed"
-        return f"up to {self.level:.2f} times that calibrated"
+    def _outside(self) -> Iterator[Phrase]:
+        """Yield what lies outside, and how far."""
+        if self.joints < 1.0:
+            yield phrase(
+                "{joint} up to {angle} deg away ({share} of rows)",
+                joint=self.farthest_joint,
+                angle=f"{np.degrees(self.farthest):.0f}",
+                share=f"{1.0 - self.joints:.0%}",
+            )
+        if self.rail is not None and self.rail < 1.0:
+            yield phrase(
+                "rail up to {distance} m away ({share} of rows)",
+                distance=f"{self.farthest_rail:.2f}",
+                share=f"{1.0 - self.rail:.0%}",
+            )
+        if self.load < 1.0:
+            share = f"{1.0 - self.load:.0%}"
+            yield (
+                phrase("load to a side to which nothing was pressed ({share} of rows)", share=share)
+                if self.level is None
+                else phrase(
+                    "load up to {level} times that calibrated ({share} of rows)",
+                    level=f"{self.level:.2f}",
+                    share=share,
+                )
+            )
 
 
 @brief_repr

@@ -27,6 +27,7 @@ from elastocal.identification._least_squares import RANK_TOLERANCE, rank
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import Solution, normalised_residuals, solve
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 _FALSE_ALARM = 0.01
 """Probability that a data set with normal noise and no blunder names any reading."""
@@ -128,10 +129,19 @@ class ForceOffset:
     def message(self) -> str:
         """Return the offset as a warning."""
         x, y, z = self.force
-        kind = "tool weight left in?" if self.frame == "base" else "zeroed at the wrong moment?"
-        return (
-            f"the forces seem to contain a constant of ({x:.0f}, {y:.0f}, {z:.0f}) N in the"
-            f" {self.frame} frame: {kind}"
+        kind = (
+            phrase("tool weight left in?")
+            if self.frame == "base"
+            else phrase("zeroed at the wrong moment?")
+        )
+        return phrase(
+            "the forces seem to contain a constant of ({x}, {y}, {z}) N in the {frame} frame:"
+            " {kind}",
+            x=f"{x:.0f}",
+            y=f"{y:.0f}",
+            z=f"{z:.0f}",
+            frame=self.frame,
+            kind=kind,
         )
 
 

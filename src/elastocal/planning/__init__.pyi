@@ -77,6 +77,7 @@ from .production import (
 from .requirements import (
     require_loads_possible_anywhere as require_loads_possible_anywhere,
     require_possible_search as require_possible_search,
+    unjudged_limits as unjudged_limits,
 )
 from .scene import (
     CollisionScene as CollisionScene,

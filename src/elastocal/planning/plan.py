@@ -47,6 +47,7 @@ from elastocal.planning.production import production_findings
 from elastocal.planning.requirements import (
     require_loads_possible_anywhere,
     require_possible_search,
+    unjudged_limits,
 )
 from elastocal.planning.scene import (
     cell_surface,
@@ -57,7 +58,7 @@ from elastocal.planning.search import Cover, CoverSelection, Selection, techniqu
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import Finding, Surface
 from elastocal.progress import Progress, silent
-from elastocal.robot import has_wrist
+from elastocal.wording import phrase, sentences
 
 _SURFACE, _SEARCH = "surface", "search"
 """Stages under which progress is reported, beside `CANDIDATES` and `VISITING`."""
@@ -220,42 +221,43 @@ def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[str, ...]:
     wanted = cell.file.search.pool
     if len(pool.postures) < wanted:
         notes.append(
-            f"only {len(pool.postures)} of {wanted} candidates were found among"
-            f" {pool.sampled} points; most of the others were refused by"
-            f" {' and '.join(pool.commonest_refusals[:2])}; {pool.advice}"
+            phrase(
+                "only {found} of {wanted} candidates were found among {sampled} points; most of"
+                " the others were refused by {checks}; {advice}",
+                found=len(pool.postures),
+                wanted=wanted,
+                sampled=pool.sampled,
+                checks=" and ".join(pool.commonest_refusals[:2]),
+                advice=pool.advice,
+            )
         )
     if search.d_max is not None and not search.covered:
         notes.append(
-            f"d_max of {1e3 * search.d_max:.4g} mm was not reached: the worst-covered candidate is"
-            f" {1e3 * search.covering_radius:.4g} mm from the nearest of {len(search.order)} poses"
+            phrase(
+                "d_max of {d_max} mm was not reached: the worst-covered candidate is {radius} mm"
+                " from the nearest of {poses} poses",
+                d_max=f"{1e3 * search.d_max:.4g}",
+                radius=f"{1e3 * search.covering_radius:.4g}",
+                poses=len(search.order),
+            )
         )
     if search.d_max is not None and not isinstance(technique(search.name), Cover):
-        notes.append(f"{search.name} knows no d_max: it chose as many poses as cover needs for it")
-    notes.extend(f"assumed, {text}" for text in _assumptions(cell))
-    notes.extend(_unjudged(cell))
-    return tuple(notes)
-
-
-def _unjudged(cell: Cell) -> list[str]:
-    """Return what a limit of the cell file asks for and no check can judge on this robot."""
-    notes: list[str] = []
-    known = zip(cell.robot.joint_names, np.isfinite(cell.torque_limits), strict=True)
-    unknown = [name for name, is_known in known if not is_known]
-    if unknown:
-        notes.append(f"torques of {', '.join(unknown)} are not known and not judged")
-    if not has_wrist(cell.robot):
         notes.append(
-            f"limits.wrist_angle is not judged: {cell.robot.name} has no six joints of which the"
-            " fourth and the sixth turn"
+            phrase(
+                "{name} knows no d_max: it chose as many poses as cover needs for it",
+                name=search.name,
+            )
         )
-    return notes
+    notes.extend(f"assumed, {text}" for text in _assumptions(cell))
+    notes.extend(unjudged_limits(cell))
+    return tuple(notes)
 
 
 def _shortages(poses: tuple[PoseRecord, ...]) -> Iterator[str]:
     """Yield each station that no choice of stations gives enough poses to be registered."""
     for station, few in registration_shortages([pose.seen_by for pose in poses]).items():
-        advice = "no station sees enough poses beside: move or add one, or plan more poses"
-        yield f"{shortage_text(station, few)}; {advice}"
+        advice = phrase("no station sees enough poses beside: move or add one, or plan more poses")
+        yield sentences((shortage_text(station, few), advice), "; ")
 
 
 def _assumptions(cell: Cell) -> list[str]:

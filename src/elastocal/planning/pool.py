@@ -24,10 +24,11 @@ from elastocal.planning.postures import Postures
 from elastocal.planning.surface import contact_frames
 from elastocal.results import brief_repr
 from elastocal.robot.inverse import InverseKinematics
+from elastocal.wording import phrase, sentences
 
 UNREACHABLE = "reach"
 """Name under which points that no configuration reaches are counted."""
-REACH_ADVICE = (
+REACH_ADVICE = phrase(
     "bring the tooling within the robot's reach, turn it towards the robot, or let the external"
     " axes be searched"
 )
@@ -107,7 +108,9 @@ class Pool:
         several checks refuse counts for one of them alone.
         """
         texts = dict(zip(self.refusals, (REACH_ADVICE, *self.margins.advice), strict=True))
-        return "; ".join(f"{name}: {texts[name]}" for name in self.commonest_refusals[:2])
+        return sentences(
+            [sentences((name, texts[name]), ": ") for name in self.commonest_refusals[:2]], "; "
+        )
 
     def first(self, count: int) -> "Pool":
         """Return the pool without the postures beyond the first ``count`` ones.

@@ -28,7 +28,7 @@ from elastocal.identification import (
 from elastocal.planning.search import CRITERIA, Information
 from elastocal.records import record
 from elastocal.results import brief_repr
-from elastocal.wording import mm, um
+from elastocal.wording import mm, phrase, um
 
 SIGMA = 25e-6
 """Standard deviation of a measured coordinate of a deflection, in m, where the cell file says none:
@@ -96,14 +96,22 @@ class ProductionRecord:
         """Return coverage and the error to expect, in a few words."""
         found = self.expected_of(self.poses)
         if found is None:
-            return (("production", self.coverage.sentence()),)
+            return ((phrase("production"), self.coverage.sentence()),)
         floor = (
-            "the model's own error is not known and comes on top"
+            phrase("the model's own error is not known and comes on top")
             if self.floor is None
-            else f"with the model's own error of {um(self.floor)}"
+            else phrase("with the model's own error of {floor}", floor=um(self.floor))
         )
-        text = f"{um(found.error)} for sigma {um(self.sigma)}; {floor}"
-        return (("production", self.coverage.sentence()), ("expected error", text))
+        text = phrase(
+            "{error} for sigma {sigma}; {floor}",
+            error=um(found.error),
+            sigma=um(self.sigma),
+            floor=floor,
+        )
+        return (
+            (phrase("production"), self.coverage.sentence()),
+            (phrase("expected error"), text),
+        )
 
 
 def plan_coverage(cell: Cell, q: FloatArray) -> ProductionCoverage | None:
@@ -236,29 +244,41 @@ def _load_findings(cell: Cell) -> Iterator[str]:
     pushed = np.stack([x, -x, y, -y]).max(axis=1)
     for case, (side, key) in _SIDES.items():
         if pushed[side] > _NOTHING and not pressed.largest[0, side] > 0.0:
-            yield (
-                f"load case {case} is missing: production pushes the robot with {pushed[side]:.0f}"
-                f' N to that side; add it to load_cases.cases, with {key}: "{_up(pushed[side])} N"'
+            yield phrase(
+                "load case {case} is missing: production pushes the robot with {force} N to"
+                ' that side; add it to load_cases.cases, with {key}: "{amplitude} N"',
+                case=case,
+                force=f"{pushed[side]:.0f}",
+                key=key,
+                amplitude=_up(pushed[side]),
             )
     lateral = float(np.hypot(x, y).max())
     known = float(pressed.largest[0, :4].max())
     press = float((-z).max())
     if known > 0.0 and lateral > LEVEL_REACH * known:
         held = _up(lateral * loads.safety / loads.friction)
-        yield (
-            f"production pushes aside with {lateral:.0f} N, the load cases with {known:.0f} N: ask"
-            f' for load_cases.fx and fy of "{_up(lateral)} N", which friction holds from fz of'
-            f' "{max(held, _up(loads.fz))} N" on'
+        yield phrase(
+            "production pushes aside with {lateral} N, the load cases with {known} N: ask for"
+            ' load_cases.fx and fy of "{amplitude} N", which friction holds from fz of "{held}'
+            ' N" on',
+            lateral=f"{lateral:.0f}",
+            known=f"{known:.0f}",
+            amplitude=_up(lateral),
+            held=max(held, _up(loads.fz)),
         )
     if press > LEVEL_REACH * loads.fz:
-        yield (
-            f"production presses with {press:.0f} N, the load cases with {loads.fz:.0f} N: ask for"
-            f' load_cases.fz of "{_up(press)} N"'
+        yield phrase(
+            "production presses with {press} N, the load cases with {fz} N: ask for"
+            ' load_cases.fz of "{amplitude} N"',
+            press=f"{press:.0f}",
+            fz=f"{loads.fz:.0f}",
+            amplitude=_up(press),
         )
     if float(z.max()) > (LEVEL_REACH - 1.0) * loads.fz:
-        yield (
-            f"production pulls the tool with {z.max():.0f} N, which no press on a surface does: the"
-            " calibration does not cover it"
+        yield phrase(
+            "production pulls the tool with {force} N, which no press on a surface does: the"
+            " calibration does not cover it",
+            force=f"{z.max():.0f}",
         )
 
 
@@ -272,13 +292,17 @@ def production_findings(cell: Cell, record: ProductionRecord | None) -> Iterator
     if record is None:
         return
     if not record.coverage.is_enough:
-        yield (
-            f"production is not covered: {record.coverage.sentence()}; let the external axes be"
-            " searched, widen surface.region towards it, or ask for more poses (search.poses)"
+        yield phrase(
+            "production is not covered: {found}; let the external axes be searched, widen"
+            " surface.region towards it, or ask for more poses (search.poses)",
+            found=record.coverage.sentence(),
         )
     wanted, found = record.accuracy, record.expected_of(record.poses)
     if wanted is not None and found is not None and found.error > wanted:
-        yield (
-            f"an error of {mm(wanted)} (search.accuracy) is not expected from {record.poses} poses:"
-            f" {mm(found.error)} is; raise search.poses, or press harder"
+        yield phrase(
+            "an error of {wanted} (search.accuracy) is not expected from {poses} poses:"
+            " {error} is; raise search.poses, or press harder",
+            wanted=mm(wanted),
+            poses=record.poses,
+            error=mm(found.error),
         )

@@ -16,6 +16,8 @@ from elastocal.planning.checks import (
 )
 from elastocal.planning.search import technique
 from elastocal.planning.surface import Surface, arm_reach, sample_uniform, tiny_finding
+from elastocal.robot import has_wrist
+from elastocal.wording import phrase
 
 _POINTS = 200
 """Points of the surface at which a place for the contact disk is looked for."""
@@ -114,3 +116,23 @@ def _require_place_for_disk(cell: Cell, surface: Surface) -> None:
                 f" mm): of {_POINTS} points the best is {short} short of check {check.name!r};"
                 f" {advice}"
             )
+
+
+def unjudged_limits(cell: Cell) -> list[str]:
+    """Return what a limit of the cell file asks for and no check can judge on this robot."""
+    notes: list[str] = []
+    known = zip(cell.robot.joint_names, np.isfinite(cell.torque_limits), strict=True)
+    unknown = [name for name, is_known in known if not is_known]
+    if unknown:
+        notes.append(
+            phrase("torques of {joints} are not known and not judged", joints=", ".join(unknown))
+        )
+    if not has_wrist(cell.robot):
+        notes.append(
+            phrase(
+                "limits.wrist_angle is not judged: {name} has no six joints of which the fourth"
+                " and the sixth turn",
+                name=cell.robot.name,
+            )
+        )
+    return notes

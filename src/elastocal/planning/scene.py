@@ -40,10 +40,8 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot, collision_model
 from elastocal.robot.inverse import inverse_for
 from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere, solid_of
+from elastocal.wording import phrase
 
-_NO_MASSES = (
-    "torques are not judged: the links of robot {name!r} have no masses (<inertial> in its URDF)"
-)
 _NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
 
@@ -252,7 +250,16 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
         if key != "surface":
             found += size_findings(path, mesh.metres, key, arm_reach(cell.robot))
     if not cell.robot.has_masses and np.isfinite(cell.torque_limits).any():
-        found.append(Finding("masses", _NO_MASSES.format(name=cell.robot.name)))
+        found.append(
+            Finding(
+                "masses",
+                phrase(
+                    "torques are not judged: the links of robot {name} have no masses (<inertial>"
+                    " in its URDF)",
+                    name=repr(cell.robot.name),
+                ),
+            )
+        )
     found += mesh_findings(surface) + placement_findings(
         surface,
         first_joint_positions(cell.robot, external),

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-import numpy as np
-
 from elastocal.cell import SENSOR_CORRECTED, SensorLoad
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.dataset import Dataset, content_sha256, read_made_from
@@ -29,15 +27,10 @@ from elastocal.procedure import (
 from elastocal.procedure.record import check_stream
 from elastocal.records import record, to_data
 from elastocal.results import counted_alike
+from elastocal.verdict._differences import changed_place, difference_of, other_texts
 from elastocal.verdict.evidence import Evidence, Seal
 from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
-from elastocal.wording import counted
-
-_SAME = 1e-4
-"""Difference, by the largest number of its kind, below which two derivations are one: versions and
-machines round differently, and what is smaller changes no verdict."""
-_OLD = "made before files stated it"
-_ADVICE = "; `elastocal derive` makes it again"
+from elastocal.wording import Phrase, counted, phrase, sentences
 
 
 class LinkState(Enum):
@@ -123,8 +116,12 @@ def _is_old(evidence: Evidence) -> bool:
 def _unstated(evidence: Evidence, name: str, text: str) -> Link:
     """Return a link without a statement, which only files from before hashes may lack."""
     if _is_old(evidence):
-        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD})")
-    return _broken(name, f"{text}, although other parts state theirs: make it again")
+        return Link(
+            name, LinkState.UNSTATED, phrase("{text} (made before files stated it)", text=text)
+        )
+    return _broken(
+        name, phrase("{text}, although other parts state theirs: make it again", text=text)
+    )
 
 
 def _seals(evidence: Evidence) -> Iterator[Link]:
@@ -133,13 +130,22 @@ def _seals(evidence: Evidence) -> Iterator[Link]:
         if file.seal is Seal.BROKEN:
             yield _broken(
                 file.name,
-                f"{file.name} was changed after it was written: its content does not have the"
-                " SHA-256 that it states",
+                phrase(
+                    "{name} was changed after it was written: its content does not have the"
+                    " SHA-256 that it states",
+                    name=file.name,
+                ),
             )
     if silent := [file.name for file in evidence.files if file.seal is Seal.ABSENT]:
-        more = f" and {counted(len(silent) - 1, 'other file')}" if silent[1:] else ""
-        verb = "do" if more else "does"
-        text = f"{silent[0]}{more} {verb} not state the SHA-256 of their content"
+        text = (
+            phrase(
+                "{name} and {others} do not state the SHA-256 of their content",
+                name=silent[0],
+                others=counted(len(silent) - 1, "other file"),
+            )
+            if silent[1:]
+            else phrase("{name} does not state the SHA-256 of their content", name=silent[0])
+        )
         yield _unstated(evidence, "content", text)
 
 
@@ -148,15 +154,17 @@ def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
     place, trusted = run.signature, files.signer or record.signer
     if not place.exists():
         if trusted is None:
-            text = "the run is not signed: whoever edits its record can renew the hashes"
+            text = phrase("the run is not signed: whoever edits its record can renew the hashes")
             return Link("signature", LinkState.UNSIGNED, text)
-        return _broken("signature", f"the run should be signed, and there is no {place.name}")
+        return _broken(
+            "signature", phrase("the run should be signed, and there is no {name}", name=place.name)
+        )
     try:
         found = read_signature(place)
         check_signature(found, OF_RUN, file_sha256(run.journal), trusted)
     except ElastocalError as error:
         return _broken("signature", files.plain(error))
-    return _whole("signature", f"the journal is signed by key {found.signer}")
+    return _whole("signature", phrase("the journal is signed by key {signer}", signer=found.signer))
 
 
 def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
@@ -169,9 +177,11 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         cell, _ = read_copies(run, record)
         # The fingerprint leaves out the tolerance, by which the light is given.
         if record.cell_sha256 in (None, sha256(read_text(cell.path))):
-            yield _whole("cell and plan", "cell and plan are those that the run began with")
+            yield _whole("cell and plan", phrase("cell and plan are those that the run began with"))
         else:
-            text = f"cell/{record.cell_file} was changed after the run began"
+            text = phrase(
+                "cell/{cell_file} was changed after the run began", cell_file=record.cell_file
+            )
             yield _broken("cell and plan", text)
     except ElastocalError as error:
         yield _broken("cell and plan", files.plain(error))
@@ -186,17 +196,23 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         yield from (_broken("streams", text) for text in counted_alike(wrong))
     else:
         found = counted(len(known), "recording")
-        yield _whole("streams", f"{found}: those that the journal names, by their SHA-256")
+        yield _whole(
+            "streams",
+            phrase("{found}: those that the journal names, by their SHA-256", found=found),
+        )
     stated = _made_from(evidence).get(JOURNAL)
     if evidence.dataset is None:
         return
     if stated is None:
-        text = "the dataset does not state which journal it was derived from"
+        text = phrase("the dataset does not state which journal it was derived from")
         yield _unstated(evidence, "journal", text)
     elif stated == file_sha256(run.journal):
-        yield _whole("journal", "the journal is the one that the dataset was derived from")
+        yield _whole("journal", phrase("the journal is the one that the dataset was derived from"))
     else:
-        yield _broken("journal", f"{JOURNAL} was changed after the dataset was derived from it")
+        yield _broken(
+            "journal",
+            phrase("{journal} was changed after the dataset was derived from it", journal=JOURNAL),
+        )
 
 
 def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> Iterator[Link]:
@@ -208,31 +224,50 @@ def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> It
     try:
         again = _derive(evidence, dataset, files)
     except ElastocalError as error:
-        text, reason = "the dataset cannot be made again from the streams", files.plain(error)
-        again_told = Link("dataset", LinkState.UNSTATED, f"{text}, see above")
-        yield again_told if reason in told else _broken("dataset", f"{text}: {reason}")
+        text, reason = (
+            phrase("the dataset cannot be made again from the streams"),
+            files.plain(error),
+        )
+        again_told = Link("dataset", LinkState.UNSTATED, phrase("{text}, see above", text=text))
+        yield again_told if reason in told else _broken("dataset", sentences((text, reason), ": "))
         return
-    text = "the dataset is not what the streams give"
-    if difference := _difference(dataset, again.dataset, old):
-        yield _broken("dataset", f"{text}: {difference}{_ADVICE}")
-    elif difference := _other_texts(dataset, again.dataset):
-        yield _unlike(old, "dataset", f"{text}: {difference}")
+    text = phrase("the dataset is not what the streams give")
+    if difference := difference_of(dataset, again.dataset, old):
+        yield _broken("dataset", _with_advice(sentences((text, difference), ": ")))
+    elif difference := other_texts(dataset, again.dataset):
+        yield _unlike(old, "dataset", sentences((text, difference), ": "))
     else:
-        yield _whole("dataset", "the dataset is what the streams give, made again from them")
+        yield _whole(
+            "dataset", phrase("the dataset is what the streams give, made again from them")
+        )
     if summary is None:
         return
-    if place := _changed_place(to_data(summary), to_data(again.summary)):
-        text = f"the summary of the run is not what the streams give: {place} differs"
+    if place := changed_place(to_data(summary), to_data(again.summary)):
+        text = phrase(
+            "the summary of the run is not what the streams give: {place} differs", place=place
+        )
         yield _unlike(old, "summary", text)
     else:
-        yield _whole("summary", "the summary of the run is what the streams give")
+        yield _whole("summary", phrase("the summary of the run is what the streams give"))
 
 
 def _unlike(old: bool, name: str, text: str) -> Link:
     """Return what differs beside the readings: an earlier version said other things about them."""
     if old:
-        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD}, by another version){_ADVICE}")
-    return _broken(name, f"{text}{_ADVICE}")
+        return Link(
+            name,
+            LinkState.UNSTATED,
+            phrase(
+                "{text} (made before files stated it, by another version); `elastocal derive`"
+                " makes it again",
+                text=text,
+            ),
+        )
+    return _broken(name, _with_advice(text))
+
+
+def _with_advice(text: str) -> Phrase:
+    return phrase("{text}; `elastocal derive` makes it again", text=text)
 
 
 def _derive(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> DerivedRun:
@@ -253,81 +288,18 @@ def _sensor(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> SensorLo
     return read_sensor_load(files.tool, evidence.cell.robot)
 
 
-def _other_texts(stated: Dataset, found: Dataset) -> str:
-    """Return which text of a dataset is not that of the one made again; empty where none is."""
-    told = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
-    for name in told:
-        if stated.attributes.get(name) != found.attributes.get(name):
-            return f"its attribute {name} is another"
-    return ""
-
-
-def _difference(stated: Dataset, found: Dataset, old: bool) -> str:
-    """Return how readings differ from those made again; empty where they do not.
-
-    What a dataset of before does not have at all is no difference.
-    """
-    if content_sha256(stated) == content_sha256(found):
-        return ""
-    for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
-        if getattr(stated, name) != getattr(found, name):
-            return f"its {name.replace('_', ' ')} are others"
-    mine, again = stated.to_labelled(), found.to_labelled()
-    for name, array in again.variables.items():
-        if array.values.dtype.kind not in "iuf" or (name not in mine and old):
-            continue
-        if name not in mine:
-            return f"it has no {name}"
-        unit = str(array.attributes.get("units", ""))
-        if text := _largest_difference(stated, mine[name].values, array.values, unit):
-            return f"{name} {text}"
-    added = sorted(mine.variables.keys() - again.variables.keys())
-    return f"it has {added[0]}, which the streams do not give" if added else ""
-
-
-def _largest_difference(dataset: Dataset, stated: np.ndarray, found: np.ndarray, unit: str) -> str:
-    """Return the place where two arrays differ most, with both numbers; empty where they agree."""
-    a, b = np.asarray(stated, dtype=float), np.asarray(found, dtype=float)
-    size = float(np.nanmax(np.abs(b), initial=0.0))
-    gap = np.where(np.isnan(a) & np.isnan(b), 0.0, np.abs(a - b))
-    gap = np.where(np.isnan(gap), np.inf, gap)
-    if not np.any(gap > _SAME * size):
-        return ""
-    place = np.unravel_index(int(np.argmax(gap)), gap.shape)
-    pose = f"of pose {dataset.poses[place[0]]}" if place else ""
-    case = f" {dataset.load_cases[place[1]]}" if dataset.status.shape == gap.shape[:2] else ""
-    return f"{pose}{case} is {a[place]:.6g} {unit}, the streams give {b[place]:.6g} {unit}"
-
-
-def _changed_place(stated: object, found: object, place: str = "") -> str:
-    """Return the path of the first entry in which two JSON-ready records differ."""
-    if isinstance(stated, dict) and isinstance(found, dict) and stated.keys() == found.keys():
-        inner = [(f"{place}.{key}".lstrip("."), stated[key], found[key]) for key in stated]
-        # Which version derived it is no finding.
-        pairs = [each for each in inner if each[0] != "elastocal"]
-    elif isinstance(stated, list) and isinstance(found, list) and len(stated) == len(found):
-        pairs = [(f"{place}.{n}", a, b) for n, (a, b) in enumerate(zip(stated, found, strict=True))]
-    else:
-        return "" if stated == found or _is_close(stated, found) else place
-    return next((text for key, a, b in pairs if (text := _changed_place(a, b, key))), "")
-
-
-def _is_close(a: object, b: object) -> bool:
-    if not (isinstance(a, int | float) and isinstance(b, int | float)):
-        return False
-    # A thousandth: standard deviations of what is hardly determined round most.
-    return abs(a - b) <= max(10.0 * _SAME * abs(b), 1e-12)
-
-
 def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:
     if evidence.calibrated is None:
         return
     stated = evidence.calibrated.made_from
     if len(stated) > 1 and dataset in stated.values():
-        others = f"the model was made from {len(stated)} datasets, of which only one is here"
+        others = phrase(
+            "the model was made from {stated} datasets, of which only one is here",
+            stated=len(stated),
+        )
         yield Link("model", LinkState.UNSTATED, others)
     else:
-        yield _made_of(evidence, dataset, "model", "the model", stated)
+        yield _made_of(evidence, dataset, "model", phrase("the model"), stated)
 
 
 def _codecs(evidence: Evidence, dataset: str) -> Iterator[Link]:
@@ -340,11 +312,17 @@ def _made_of(
 ) -> Link:
     """Return whether a part was made from the dataset of this hash."""
     if not stated:
-        return _unstated(evidence, name, f"{what} does not state which dataset it is made from")
+        return _unstated(
+            evidence, name, phrase("{what} does not state which dataset it is made from", what=what)
+        )
     if dataset not in stated.values():
-        text = f"{what} was made from another dataset ({', '.join(stated)}) than this one"
+        text = phrase(
+            "{what} was made from another dataset ({stated}) than this one",
+            what=what,
+            stated=", ".join(stated),
+        )
         return _broken(name, text)
-    return _whole(name, f"{what} was made from this dataset")
+    return _whole(name, phrase("{what} was made from this dataset", what=what))
 
 
 def _process(evidence: Evidence) -> Iterator[Link]:
@@ -354,19 +332,23 @@ def _process(evidence: Evidence) -> Iterator[Link]:
     own = [run for run in runs if run.model_sha256 == evidence.calibrated.sha256]
     tools = {run.tool_sha256 for run in own}
     if not own:
-        text = "the process was run with another model than the one of this report"
+        text = phrase("the process was run with another model than the one of this report")
         yield _broken("process", text)
     elif tools - {None} and evidence.tool_sha256 is None:
-        yield _broken("process", "the process was run with a tool file that is not here")
+        yield _broken("process", phrase("the process was run with a tool file that is not here"))
     elif evidence.tool_sha256 not in tools:
-        text = "the process was run with another tool file than the one of this report"
+        text = phrase("the process was run with another tool file than the one of this report")
         yield _broken("process", text)
     else:
-        yield _whole("process", "the process was run with this model and this tool file")
+        yield _whole("process", phrase("the process was run with this model and this tool file"))
     record = evidence.run_record
     if own and evidence.simulated and record and record.seed not in {run.seed for run in own}:
         yield _broken(
             "process",
-            f"the process was run on the simulated cell of seed {own[0].seed}, the run on that of"
-            f" seed {record.seed}",
+            phrase(
+                "the process was run on the simulated cell of seed {seed}, the run on that of seed"
+                " {other}",
+                seed=own[0].seed,
+                other=record.seed,
+            ),
         )

@@ -105,22 +105,30 @@ def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
 def _advice_on_missing(evidence: Evidence, missing: list[int]) -> str:
     """Return what to do about poses without a usable reading: not all of it can be resumed."""
     if not evidence.journal:
-        return "Measure them in another run, and calibrate with both datasets."
+        return phrase("Measure them in another run, and calibrate with both datasets.")
     committed = {log.pose for log in commits(evidence.journal)}
     left, spoiled = set(missing) - committed, set(missing) & committed
     texts = []
     if left:
         texts.append(
-            f"Finish the run: `elastocal run --resume` measures pose {spans(sorted(left))}, with"
-            " the cell file and the plan that it was begun with."
+            phrase(
+                "Finish the run: `elastocal run --resume` measures pose {poses}, with the cell"
+                " file and the plan that it was begun with.",
+                poses=spans(sorted(left)),
+            )
         )
     if spoiled:
         texts.append(
-            f"Pose {spans(sorted(spoiled))} {'is' if len(spoiled) == 1 else 'are'} committed and"
-            " --resume does not repeat them: mend what spoiled the readings, and measure in a new"
-            " run; calibrate takes both datasets."
+            phrase(
+                "Pose {poses} is committed and --resume does not repeat them: mend what spoiled"
+                " the readings, and measure in a new run; calibrate takes both datasets."
+                if len(spoiled) == 1
+                else "Pose {poses} are committed and --resume does not repeat them: mend what"
+                " spoiled the readings, and measure in a new run; calibrate takes both datasets.",
+                poses=spans(sorted(spoiled)),
+            )
         )
-    return " ".join(texts)
+    return sentences(texts)
 
 
 def _suspicious(each: SuspiciousReading) -> Finding:

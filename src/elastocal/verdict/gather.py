@@ -10,16 +10,18 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from elastocal import dataset as datasets
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
-from elastocal.codec import ARRAYS, VERDICTS, judge, read_codec
+from elastocal.codec import ARRAYS, VERDICTS, CodecData, judge, read_codec
 from elastocal.compensation.conditioning import ToolResult, read_tool
 from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
 from elastocal.dataset import Dataset
-from elastocal.errors import CodecError, ElastocalError
+from elastocal.errors import CodecError, CompensationError, ElastocalError, IdentificationError
 from elastocal.files import read_text
-from elastocal.identification import CalibrateResult, reproduce_calibration
+from elastocal.identification import CalibratedModel, CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
 from elastocal.planning import (
     PLAN,
@@ -41,6 +43,7 @@ from elastocal.procedure import (
 )
 from elastocal.records import read_json
 from elastocal.results import brief_repr
+from elastocal.robot import parse_urdf
 from elastocal.verdict._files import (
     CODEC,
     MODEL,
@@ -57,10 +60,6 @@ from elastocal.verdict.evidence import (
     CodecEvidence,
     Evidence,
     ModelEvidence,
-    check_codec,
-    check_model,
-    check_process,
-    check_tool,
     find_doubts,
 )
 from elastocal.wording import phrase
@@ -125,21 +124,25 @@ def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
     """Return the evidence with the parts that a run folder holds."""
     run = reader.folders.run
     if run is None:
-        reason = "no folder of a run was given: nothing is known of how the readings came about"
-        reader.note_missing("run", reason)
+        reason = phrase(
+            "no folder of a run was given: nothing is known of how the readings came about"
+        )
+        reader.note_missing(phrase("run"), reason)
         return evidence
-    journal = reader.read("journal", run.journal, lambda: read_journal(run.journal))
+    journal = reader.read(phrase("journal"), run.journal, lambda: read_journal(run.journal))
     evidence = replace(evidence, journal=journal)
     record = evidence.run_record
     path = run.cell / (record.cell_file if record else "cell.yaml")
-    cell = reader.read("cell", path, lambda: load_cell(path))
+    cell = reader.read(phrase("cell"), path, lambda: load_cell(path))
     evidence = replace(evidence, cell=cell)
     if cell is not None:
-        surface = reader.read("surface", cell.path, lambda: cell_surface(cell))
+        surface = reader.read(phrase("surface"), cell.path, lambda: cell_surface(cell))
         evidence = replace(evidence, surface=surface, cell_text=read_text(cell.path))
     evidence = _with_plan(evidence, reader, run)
-    summary = _derived(reader, "summary of the run", run.summary, read_summary)
-    evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
+    summary = _derived(reader, phrase("summary of the run"), run.summary, read_summary)
+    evidence = replace(
+        evidence, dataset=_derived(reader, phrase("dataset"), run.dataset, datasets.read)
+    )
     for file in run_files(run):
         reader.use(file)
     return replace(evidence, summary=summary)
@@ -156,7 +159,7 @@ def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Eviden
             check_plan_robot(plan, cell)
         return plan
 
-    plan = reader.read("plan", run.plan / PLAN, plan_of_cell)
+    plan = reader.read(phrase("plan"), run.plan / PLAN, plan_of_cell)
     if plan is None:
         return evidence
 
@@ -166,9 +169,11 @@ def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Eviden
         return pool
 
     if not (run.plan / POOL).exists():
-        reader.note_missing("pool", f"there is no {reader.folders.shown(run.plan / POOL)}")
+        reader.note_missing(
+            phrase("pool"), phrase("there is no {path}", path=reader.folders.shown(run.plan / POOL))
+        )
         return replace(evidence, plan=plan)
-    pool = reader.read("pool", run.plan / POOL, pool_of_plan)
+    pool = reader.read(phrase("pool"), run.plan / POOL, pool_of_plan)
     return replace(evidence, plan=plan, pool=pool)
 
 
@@ -176,7 +181,9 @@ def _derived(
     reader: PartReader, name: str, path: Path, read: Callable[[Path], Part]
 ) -> Part | None:
     if not path.is_file():
-        reason = f"there is no {reader.folders.shown(path)}; `elastocal derive` makes it"
+        reason = phrase(
+            "there is no {path}; `elastocal derive` makes it", path=reader.folders.shown(path)
+        )
         reader.note_missing(name, reason)
         return None
     return reader.read(name, path, lambda: read(path))
@@ -185,8 +192,8 @@ def _derived(
 def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
     given = options.model or reader.folders.model
     calibrated = reader.find(
-        "calibrated model", given, MODEL, lambda path: _calibrated(path, evidence.dataset),
-        "`elastocal calibrate` makes one",
+        phrase("calibrated model"), given, MODEL, lambda path: _calibrated(path, evidence.dataset),
+        phrase("`elastocal calibrate` makes one"),
     )  # fmt: skip
     evidence = replace(evidence, calibrated=calibrated)
     if calibrated is None or evidence.dataset is None:
@@ -195,7 +202,7 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
         reproduction = reproduce_calibration(calibrated.model, calibrated.figures, evidence.dataset)
     except ElastocalError as error:
         reason = " ".join(str(error).split())
-        reader.note_missing("calibration made again", reason, damaged=True)
+        reader.note_missing(phrase("calibration made again"), reason, damaged=True)
         return evidence
     return replace(evidence, reproduction=reproduction)
 
@@ -216,15 +223,17 @@ def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions)
         return check_process(read_process(folder), evidence, folder / TABLE)
 
     place = options.tool or reader.folders.default(TOOL)
-    found = reader.find("tool file", options.tool, TOOL, tool, "`elastocal tool` makes one")
+    found = reader.find(
+        phrase("tool file"), options.tool, TOOL, tool, phrase("`elastocal tool` makes one")
+    )
     return replace(
         evidence,
         tool=found,
         tool_sha256=file_sha256(place) if found is not None and place is not None else None,
         codecs=_codecs(evidence, reader, options.codec),
         process=reader.find(
-            "process", options.process, PROCESS, process,
-            "`elastocal simulate-process` makes one for a simulated cell",
+            phrase("process"), options.process, PROCESS, process,
+            phrase("`elastocal simulate-process` makes one for a simulated cell"),
         ),
     )  # fmt: skip
 
@@ -243,11 +252,12 @@ def _codecs(
     root = given or reader.folders.default(CODEC)
     inner = sorted(path.parent for path in root.glob(f"*/{ARRAYS}")) if root else []
     if root is None or not inner or (root / ARRAYS).exists():
-        hint = "`elastocal codec` makes one"
-        found = reader.find("codec", given, CODEC, codec, hint)
+        hint = phrase("`elastocal codec` makes one")
+        found = reader.find(phrase("codec"), given, CODEC, codec, hint)
         return () if found is None else (found,)
     read = (
-        reader.read("codec", path, partial(codec, path), named=given is not None) for path in inner
+        reader.read(phrase("codec"), path, partial(codec, path), named=given is not None)
+        for path in inner
     )
     return tuple(each for each in read if each is not None)
 
@@ -257,12 +267,14 @@ def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) 
     old = options.old
     new = options.model or reader.folders.model or reader.folders.default(MODEL)
     if old is None:
-        reason = "no earlier calibration was given (--old), so nothing is known of any change"
-        reader.note_missing("earlier calibration", reason)
+        reason = phrase(
+            "no earlier calibration was given (--old), so nothing is known of any change"
+        )
+        reader.note_missing(phrase("earlier calibration"), reason)
         return evidence
     if new is None or evidence.calibrated is None:
-        reason = "there is no calibrated model to compare it with"
-        reader.note_missing("comparison with the earlier calibration", reason)
+        reason = phrase("there is no calibrated model to compare it with")
+        reader.note_missing(phrase("comparison with the earlier calibration"), reason)
         return evidence
     q, force = _rows_that_matter(evidence)
     found = recertify_files(old, new, q, force, limit=evidence.limits.drift)
@@ -288,3 +300,87 @@ def _limits(cell: Cell | None, options: EvidenceOptions) -> AcceptanceLimits:
     if stated is not None and stated.tolerance is not None:
         return AcceptanceLimits(stated.tolerance, drift, phrase("of the cell file"))
     return AcceptanceLimits(None, drift)
+
+
+_SAME_PLACE = 20e-3
+"""Largest distance of contact points, loaded and unloaded, that are one pose, in m."""
+
+
+def check_model(model: CalibratedModel, dataset: Dataset | None, path: Path) -> None:
+    """Refuse a model whose robot has other joints than the dataset.
+
+    Raises
+    ------
+    IdentificationError
+        By the names of the joints.
+    """
+    names = model.model.robot.joint_names
+    if dataset is not None and sorted(names) != sorted(dataset.joint_names):
+        raise IdentificationError(
+            f"{path} is a model of {model.model.robot.name} with joints {', '.join(names)}; the"
+            f" dataset has {', '.join(dataset.joint_names)}"
+        )
+
+
+def check_tool(record: ToolResult, evidence: Evidence, path: Path) -> ToolResult:
+    """Return a tool file, or refuse one whose flange the robot does not have.
+
+    Raises
+    ------
+    CompensationError
+        By the name of the link.
+    """
+    if evidence.cell is not None:
+        robot = evidence.cell.robot
+        links = [str(link.get("name")) for link in parse_urdf(robot.urdf).findall("link")]
+        if record.flange not in links:
+            raise CompensationError(
+                f"{path}: flange {record.flange!r} is no link of {robot.name}: it is the tool of"
+                " another robot"
+            )
+    return record
+
+
+def check_codec(data: CodecData, evidence: Evidence, path: Path) -> CodecData:
+    """Return a codec, or refuse one of another robot or of other poses.
+
+    Raises
+    ------
+    CodecError
+        By the robot or the number of poses.
+    """
+    if evidence.robot and data.robot and data.robot != evidence.robot:
+        raise CodecError(f"{path} is a codec of {data.robot}, not of {evidence.robot}")
+    if evidence.dataset is None:
+        return data
+    known = set(evidence.dataset.poses)
+    foreign = [label for group in data.pose_labels for label in group if label not in known]
+    if foreign:
+        raise CodecError(f"{path} has pose {foreign[0]}, which the dataset does not have")
+    if not _same_places(data, evidence.dataset):
+        raise CodecError(f"{path} has its poses at other places than the dataset")
+    return data
+
+
+def _same_places(data: CodecData, dataset: Dataset) -> bool:
+    if dataset.tcp_position is None:
+        return True
+    place = dict(zip(dataset.poses, dataset.tcp_position, strict=True))
+    found = np.array([place[group[0]] for group in data.pose_labels])
+    gap = np.linalg.norm(found - data.contact, axis=1)
+    return bool(np.all(~(gap > _SAME_PLACE)))
+
+
+def check_process(record: SimulatedProcess, evidence: Evidence, path: Path) -> SimulatedProcess:
+    """Return a process, or refuse one of another cell.
+
+    Raises
+    ------
+    CompensationError
+        By the names of the cells.
+    """
+    if evidence.cell is not None and record.table.cell != evidence.cell.name:
+        raise CompensationError(
+            f"{path} is of cell {record.table.cell!r}, the run of cell {evidence.cell.name!r}"
+        )
+    return record

@@ -21,7 +21,7 @@ from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.records import read_arrays, read_json, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
-from elastocal.wording import plainly
+from elastocal.wording import phrase, plainly
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
 from elastocal.workflows._inputs import ROBOT_SUFFIXES
@@ -110,6 +110,8 @@ _UNITS = {
 
 _FEW_POSES, _FEW_CANDIDATES = 6, 150
 """Of a preview: seconds, not minutes."""
+_PLAN_PAGE = '<meta name="generator" content="elastocal plan">'
+"""Stands in the page of a plan, whatever its language."""
 _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
     ((PLAN,), lambda folder: kinds.plan_file(folder / PLAN)),
     ((JOURNAL,), kinds.run_folder),
@@ -132,6 +134,8 @@ class CheckSettings:
     """Page (.html) to write of a cell: a view in three dimensions of a first few poses."""
     force: bool = False
     """Replace a file that is there by the page."""
+    language: str = "en"
+    """Language of that page, see `elastocal.report.LANGUAGES`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,7 +165,7 @@ def _label(name: str) -> str:
     return name.removesuffix("_m").replace("_", " ")
 
 
-@workflow(CheckSettings, marks=("<title>Calibration plan:",), outputs=("preview",))
+@workflow(CheckSettings, marks=("<title>Calibration plan:", _PLAN_PAGE), outputs=("preview",))
 def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: ARG001 - an instant
     """Validate a file and say what it holds.
 
@@ -190,24 +194,30 @@ def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: 
     if settings.preview is not None:
         if kind != "cell file":
             raise SchemaError(f"{path} is a {kind}: a preview is of a cell file")
-        _write_preview(Path(settings.preview), load_cell(path))
+        _write_preview(Path(settings.preview), load_cell(path), settings.language)
     return CheckResult(str(settings.file), kind, holds)
 
 
-def _write_preview(page: Path, cell: Cell) -> None:
+def _write_preview(page: Path, cell: Cell, code: str) -> None:
     """Write the page of a plan of few poses from few candidates.
 
     It shows where the arm comes to, and what refuses the other points.
     """
-    from elastocal.report import write_plan_page  # takes longer to import than most files to check
+    from elastocal.report import (  # takes longer to import than most files to check
+        language_of,
+        write_plan_page,
+    )
 
+    language = language_of(code)
     few = {"technique": "cover", "poses": _FEW_POSES, "d_max": None, "accuracy": None}
     search = cell.file.search.model_copy(update={**few, "pool": _FEW_CANDIDATES})
     file = cell.file.model_copy(update={"search": search, "process": None})
     planned = planning.make_plan(replace(cell, file=file, process=None))
-    named = replace(planned.plan.cell, name=f"{cell.name}, a first look with few poses")
+    named = replace(
+        planned.plan.cell, name=phrase("{name}, a first look with few poses", name=cell.name)
+    )
     plan = replace(planned.plan, cell=named)
-    write_plan_page(page, cell, planned.surface, plan, planned.pool)
+    write_plan_page(page, cell, planned.surface, plan, planned.pool, language)
 
 
 def describe_file(path: Path) -> FileDescription:

@@ -21,6 +21,7 @@ from elastocal.geometry import (
 )
 from elastocal.progress import Progress
 from elastocal.records import write_json
+from elastocal.report import language_of
 from elastocal.report.document import REPORT_TITLE, GeometryFindings, write_geometry_page
 from elastocal.results import Result, brief_repr
 from elastocal.robot import BUILT_MARK
@@ -31,6 +32,8 @@ from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
 _MM, _DEGREES = 1e3, float(np.degrees(1.0))
+_PAGE = '<meta name="generator" content="elastocal geometry">'
+"""Stands in the report, whatever its language."""
 _TABLE = ("joint", "number", "unit", "nominal", "calibrated", "difference", "low", "high")
 
 
@@ -62,6 +65,8 @@ class GeometrySettings:
     """Of these draws."""
     force: bool = False
     """Replace a file that this command did not write."""
+    language: str = "en"
+    """Language of the report, see `elastocal.report.LANGUAGES`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,7 +95,7 @@ class GeometryResult(Result):
 @workflow(
     GeometrySettings,
     outputs=("out", "urdf", "report_file", "table"),
-    marks=("elastocal.geometry/", BUILT_MARK, f"<title>{REPORT_TITLE}", ",".join(_TABLE)),
+    marks=("elastocal.geometry/", BUILT_MARK, f"<title>{REPORT_TITLE}", _PAGE, ",".join(_TABLE)),
 )
 def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     """Find the geometric errors of an arm, and what it yields under its weight and payloads.
@@ -110,8 +115,11 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
         If there is no such robot or link.
     FileAccessError
         If a file cannot be read or written, or its name says another kind.
+    ReportError
+        If the report knows no such language.
     """
     _check_suffixes(settings)
+    language = language_of(settings.language)
     path = Path(settings.positions)
     robot = find_robot(settings.robot, settings.tcp, None)
     problem = GeometryProblem(robot, read_positions(path, robot))
@@ -130,7 +138,9 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
         if settings.table is not None:
             write_table(settings.table, _TABLE, map(_cells, links))
         if settings.report_file is not None:
-            write_geometry_page(settings.report_file, GeometryFindings(model, accuracy, links))
+            write_geometry_page(
+                settings.report_file, GeometryFindings(model, accuracy, links), language
+            )
     return GeometryResult(model, accuracy)
 
 

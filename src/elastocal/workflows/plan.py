@@ -26,7 +26,7 @@ from elastocal.planning import PLAN, PlanResult, ProductionRecord, SpreadRecord
 from elastocal.planning.export import PLAN_TABLE, write_table as write_plan_table
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
-from elastocal.report import write_plan_figure, write_plan_page
+from elastocal.report import Language, language_of, write_plan_figure, write_plan_page
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.tables import write_table
@@ -77,6 +77,8 @@ class PlanSettings:
     free_poses: int | None = None
     """Number of poses in free space for `geometry`, after the presses and in the same program;
     none: presses alone."""
+    page_language: str = "en"
+    """Language of ``plan.html``, see `elastocal.report.LANGUAGES`."""
 
 
 @record()
@@ -157,6 +159,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
         compare = "cover" if cell.technique != "cover" else "ioops"
     other = None if compare == "none" else compare
     _require_free_poses(settings)
+    language = language_of(settings.page_language, "--page-language")
     if settings.dry_run:
         return planning.make_plan(cell, other, settings.jobs, progress).plan
     with filling(Path(settings.out), PLAN, settings.force) as folder:
@@ -171,7 +174,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
             as_written = load_cell(Path(settings.cell))
             seed = cell.file.search.seed
             free = choose_positions(as_written, settings.free_poses, _FREE_SEARCH, seed, progress)
-        _write_folder(folder, cell, planned, free, writer, settings.program)
+        _write_folder(folder, cell, planned, free, writer, settings.program, language)
     return planned.plan
 
 
@@ -256,6 +259,7 @@ def _write_folder(
     free: PositionPlan | None,
     writer: ProgramWriter | None,
     program: str,
+    language: Language,
 ) -> None:
     """Write every file of a plan; no robot program where the robot has no language of ours."""
     found, pool, surface = planned.plan, planned.pool, planned.surface
@@ -268,7 +272,7 @@ def _write_folder(
         override = cell.file.motion.override
         after = None if free is None else _positions_program(free, cell.robot, program, override)
         write_plan_program(folder, found, writer, program, after)
-    write_plan_page(folder / _PAGE, cell, surface, found, pool)
+    write_plan_page(folder / _PAGE, cell, surface, found, pool, language)
     write_plan_figure(folder / _FIGURE, surface, found, pool)
 
 

@@ -22,6 +22,7 @@ from elastocal.files import filling, read_text, sha256
 from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 from elastocal.workflows.process_trial import ProcessTrial, TrialRuns, run_budget, run_loads
@@ -333,9 +334,11 @@ def _notes(
     seeds: int,
     covered: ProductionCoverage | None,
 ) -> tuple[str, ...]:
-    notes = []
+    notes: list[str] = []
     if seeds == 1:
-        notes.append("a single seed: the figures have no interval, and another seed has others")
+        notes.append(
+            phrase("a single seed: the figures have no interval, and another seed has others")
+        )
     if settings.path is not None:
         sizes = [np.linalg.norm(course.force, axis=1) for course in courses]
         sudden = [
@@ -345,14 +348,19 @@ def _notes(
         ]
         if sudden:
             notes.append(
-                f"{', '.join(sudden)}: the force is there from the first row or until the last; no"
-                " correction can be there at once. Let it rise and fall in the path as it does in"
-                " the cell"
+                phrase(
+                    "{courses}: the force is there from the first row or until the last; no"
+                    " correction can be there at once. Let it rise and fall in the path as it does"
+                    " in the cell",
+                    courses=", ".join(sudden),
+                )
             )
     if any(load < 0.0 for load in settings.loads):
         notes.append(
-            "a load below 0 is the force aside and along the feed turned round; along the tool's"
-            " axis it keeps its sign, since what presses cannot pull"
+            phrase(
+                "a load below 0 is the force aside and along the feed turned round; along the"
+                " tool's axis it keeps its sign, since what presses cannot pull"
+            )
         )
     if covered is not None:
         notes.append(covered.sentence())

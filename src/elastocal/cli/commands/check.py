@@ -29,13 +29,14 @@ def _check(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Show that page in a browser.")
     ] = False,
+    language: options.PageLanguage = "en",
     force: options.Force = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the findings as one JSON object.")
     ] = False,
 ) -> None:
     """Validate a file and say what it holds."""
-    result = workflows.check(file, tcp=tcp, preview=preview, force=force)
+    result = workflows.check(file, tcp=tcp, preview=preview, force=force, language=language)
     if preview is not None and browser:
         webbrowser.open(preview.resolve().as_uri())
     if as_json:

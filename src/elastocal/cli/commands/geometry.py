@@ -36,6 +36,7 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
     draws: Annotated[int, typer.Option(min=40, max=100_000, help="Draws of the bootstrap.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Of these draws.")] = 0,
     force: options.Force = False,
+    language: options.PageLanguage = "en",
     as_json: options.Figures = False,
 ) -> None:
     """Find the geometric errors of an arm and its sag from absolute positions of markers."""
@@ -53,6 +54,7 @@ def _geometry(  # noqa: PLR0913 (a command has as many options as it has)
         draws=draws,
         seed=seed,
         force=force,
+        language=language,
     )
     with output.progress_bars() as progress:
         result = workflows.geometry(given, progress)

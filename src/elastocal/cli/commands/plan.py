@@ -61,6 +61,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         typer.Option(help="Name of the robot program; default: calib, or positions."),
     ] = None,
     language: options.Language = None,
+    page_language: options.PageLanguage = "en",
     jobs: Annotated[
         int | None,
         typer.Option(min=1, max=1024, help="Processes for large pools; default: all cores."),
@@ -109,6 +110,7 @@ def _plan(  # noqa: PLR0913 - one parameter an option
         poses,
         language,
         (free_poses or 60) if purpose is _Purpose.BOTH else None,
+        page_language,
     )
     with output.progress_bars() as progress:
         found = workflows.plan(settings, progress)

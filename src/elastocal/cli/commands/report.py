@@ -56,7 +56,7 @@ def _report(  # noqa: PLR0913 - one parameter an option
         Path | None,
         typer.Option(metavar="KEY", help="Private key to sign with; `verify --new-key` makes one."),
     ] = None,
-    language: Annotated[str, typer.Option(help="Language of the report: en, de or fr.")] = "en",
+    language: options.PageLanguage = "en",
     xlsx: Annotated[
         bool, typer.Option("--xlsx", help="Also write its tables beside it, for Excel.")
     ] = False,

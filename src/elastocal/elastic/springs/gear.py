@@ -19,6 +19,7 @@ from elastocal.elastic.springs.spring import (
 from elastocal.errors import SpringError
 from elastocal.records import record
 from elastocal.units import impossible
+from elastocal.wording import phrase
 
 LOST_MOTION = Unit("rad", "arcmin", 10_800.0 / np.pi)
 """Unit of the angle between a torque and its opposite that friction leaves."""
@@ -97,7 +98,9 @@ class Gear(OneAxisSpring):
         usual = float(np.exp(np.median(np.log(self.knees))))
         found = [
             Characteristic(
-                self.name if torque == 0.0 else f"{self.name} at {torque:.0f} N·m",
+                self.name
+                if torque == 0.0
+                else phrase("{spring} at {torque} N·m", spring=self.name, torque=f"{torque:.0f}"),
                 (1.0, *(1.0 / (1.0 + (torque / T) ** 2) for T in self.knees), *sliding),
                 TORSIONAL,
             )
@@ -108,7 +111,11 @@ class Gear(OneAxisSpring):
             soft = (2.0 * T * float(np.arctan2(held, T)) for T in self.knees)
             both_ways = (2.0 * r for r in self.slips)
             found.append(
-                Characteristic(f"{self.name} lost motion", (0.0, *soft, *both_ways), LOST_MOTION)
+                Characteristic(
+                    phrase("{spring} lost motion", spring=self.name),
+                    (0.0, *soft, *both_ways),
+                    LOST_MOTION,
+                )
             )
         return tuple(found)
 

@@ -12,6 +12,7 @@ from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures, retreat_joints
 from elastocal.planning.scene import CollisionScene, collision_scene
 from elastocal.planning.surface import Surface
+from elastocal.wording import phrase
 
 _DISTANCES_BEYOND = (1e-3, 1e-2, 3e-2, 1e-1)
 """Distances in m beyond the clearance asked for that are tried. Whether bodies keep a distance
@@ -39,7 +40,7 @@ class CollisionCheck(PostureCheck):
     """Distance from the surface at which the tool stops before contact, in m."""
     name: str = "collision"
     unit: str = "m"
-    advice: str = "move fixtures away, slim the tool's collision shape, or turn the tooling"
+    advice: str = phrase("move fixtures away, slim the tool's collision shape, or turn the tooling")
     order: ClassVar[int] = 90
     slow: ClassVar[bool] = True
 

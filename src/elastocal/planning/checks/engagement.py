@@ -19,6 +19,7 @@ from elastocal.planning.surface import (
     fit_disk,
 )
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 
 @brief_repr
@@ -34,7 +35,9 @@ class EdgeCheck(PointCheck):
     """Least distance between disk and edge, in m."""
     name: str = "edge"
     unit: str = "m"
-    advice: str = "use a smaller disk or edge margin: so many points are too near to an edge"
+    advice: str = phrase(
+        "use a smaller disk or edge margin: so many points are too near to an edge"
+    )
     order: ClassVar[int] = 10
 
     @classmethod
@@ -60,7 +63,7 @@ class FlatnessCheck(PointCheck):
     """Largest angle between the normal at the centre and under the disk, in rad."""
     name: str = "flatness"
     unit: str = "rad"
-    advice: str = "use a smaller disk, or allow a larger angle: the surface is too curved"
+    advice: str = phrase("use a smaller disk, or allow a larger angle: the surface is too curved")
     order: ClassVar[int] = 20
 
     @classmethod

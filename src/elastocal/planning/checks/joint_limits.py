@@ -16,6 +16,7 @@ from elastocal.planning.postures import Postures
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
+from elastocal.wording import phrase
 
 
 @brief_repr
@@ -28,7 +29,9 @@ class JointLimitsCheck(PostureCheck):
     """Least distance to the limits, a number in `unit`, or shape (joint,), in rad or m."""
     name: str = "joint_limits"
     unit: str = "rad"
-    advice: str = "move the tooling towards the middle of the robot's reach, or mount the tool anew"
+    advice: str = phrase(
+        "move the tooling towards the middle of the robot's reach, or mount the tool anew"
+    )
     order: ClassVar[int] = 10
     _turning: ClassVar[bool] = True
 
@@ -53,6 +56,8 @@ class TravelLimitsCheck(JointLimitsCheck):
 
     name: str = "travel_limits"
     unit: str = "m"
-    advice: str = "choose positions of the rail farther from its ends, or a smaller rail_margin"
+    advice: str = phrase(
+        "choose positions of the rail farther from its ends, or a smaller rail_margin"
+    )
     order: ClassVar[int] = 20
     _turning: ClassVar[bool] = False

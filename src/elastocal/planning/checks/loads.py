@@ -16,6 +16,7 @@ from elastocal.planning.postures import Postures
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot
+from elastocal.wording import phrase
 
 
 @brief_repr
@@ -31,7 +32,9 @@ class FrictionCheck(PostureCheck):
     """Factor by which the friction must exceed the lateral force, at least 1."""
     name: str = "friction"
     unit: str = "N"
-    advice: str = "press harder, ask for less lateral force, or use a disk with more friction"
+    advice: str = phrase(
+        "press harder, ask for less lateral force, or use a disk with more friction"
+    )
     order: ClassVar[int] = 50
 
     @classmethod
@@ -80,7 +83,9 @@ class TorqueCheck(PostureCheck):
     """In base, in m/s²."""
     name: str = "torque"
     unit: str = "1"
-    advice: str = "lower the forces, bring the tooling nearer, or give the true continuous torques"
+    advice: str = phrase(
+        "lower the forces, bring the tooling nearer, or give the true continuous torques"
+    )
     order: ClassVar[int] = 60
 
     @classmethod
@@ -159,7 +164,7 @@ class SensorCheck(PostureCheck):
     """Distance of that weight from the sensor, in m."""
     name: str = "sensor"
     unit: str = "1"
-    advice: str = "lower the forces, shorten the tool, or use a sensor with a larger range"
+    advice: str = phrase("lower the forces, shorten the tool, or use a sensor with a larger range")
     order: ClassVar[int] = 70
 
     @classmethod

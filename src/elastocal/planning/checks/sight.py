@@ -24,7 +24,7 @@ from elastocal.planning.scene import CollisionScene, fixture_bodies, tool_bodies
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.shapes import Beams, Body, Mesh, SightSolid
-from elastocal.wording import counted
+from elastocal.wording import counted, phrase
 
 MARKER_SEAT_LENGTH = 5e-3
 """Distance from the marker, in m, from which on arm and tool count: a marker sits on something."""
@@ -130,7 +130,7 @@ class SightCheck(PostureCheck):
     """Links and tool, which may be in the way too."""
     name: str = "sight"
     unit: str = "rad"
-    advice: str = "move or add a tracker station, or turn the marker clear of arm and tool"
+    advice: str = phrase("move or add a tracker station, or turn the marker clear of arm and tool")
     order: ClassVar[int] = 80
 
     @classmethod
@@ -256,9 +256,13 @@ def registration_shortages(seen_by: Sequence[str | None]) -> dict[str, tuple[int
 
 def shortage_text(station: str, poses: tuple[int, ...]) -> str:
     """Return what becomes of the poses of a station that cannot be registered."""
-    return (
-        f"station {station} sees {len(poses)} of the {REGISTRATION_POSES} poses that it needs to be"
-        f" registered: the readings at pose {', '.join(map(str, poses))} will be missing"
+    return phrase(
+        "station {station} sees {seen} of the {needed} poses that it needs to be"
+        " registered: the readings at pose {poses} will be missing",
+        station=station,
+        seen=len(poses),
+        needed=REGISTRATION_POSES,
+        poses=", ".join(map(str, poses)),
     )
 
 
@@ -277,8 +281,11 @@ def unseen_bumps(seen_by: Sequence[str | None]) -> tuple[str, ...]:
     if count > _FEW or not any(seen_by):
         return ()
     return (
-        f"{counted(count, 'pose')} cannot show that a tracker station was bumped by less than about"
-        " 2 mm (some thirty show 0.3 mm): see that nobody touches its stand",
+        phrase(
+            "{poses} cannot show that a tracker station was bumped by less than about 2 mm (some"
+            " thirty show 0.3 mm): see that nobody touches its stand",
+            poses=counted(count, "pose"),
+        ),
     )
 
 

@@ -11,6 +11,7 @@ from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import Surface
 from elastocal.robot import Robot, has_wrist, smallest_singular_value, wrist_angle
+from elastocal.wording import phrase
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class SingularityCheck(PostureCheck):
     """Least singular value, dimensionless; see `robot.singularity`."""
     name: str = "singularity"
     unit: str = "1"
-    advice: str = "bring the tooling nearer: a stretched arm is singular"
+    advice: str = phrase("bring the tooling nearer: a stretched arm is singular")
     order: ClassVar[int] = 30
 
     @classmethod
@@ -45,7 +46,7 @@ class WristCheck(PostureCheck):
     """Least angle in rad, below pi / 2: the angle between two lines is never more."""
     name: str = "wrist"
     unit: str = "rad"
-    advice: str = "tilt the tooling or the tool: axes 4 and 6 line up"
+    advice: str = phrase("tilt the tooling or the tool: axes 4 and 6 line up")
     order: ClassVar[int] = 40
 
     @classmethod

@@ -16,6 +16,7 @@ from elastocal.planning.surface.surface import Surface, SurfacePoints
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, arm_base
+from elastocal.wording import phrase
 
 _FAR = 5.0
 """A surface whose nearest point is more than this many reaches away is in the wrong unit."""
@@ -25,8 +26,8 @@ _TINY = 0.02
 """So is one whose bounding box is smaller than this part of the reach."""
 _LARGEST_TOOL, _LARGEST_FIXTURE, _SMALLEST_SOLID = 1.5, 20.0, 1e-3
 """Sizes of solids over the reach, beyond which they are suspected; fixtures may be a hall."""
-_TOO_LARGE = {"mm and read as m": 1e-3, "inches and read as m": 0.0254}
-_TOO_SMALL = {"m and read as mm": 1e3, "inches and read as mm": 25.4}
+_TOO_LARGE = {phrase("mm and read as m"): 1e-3, phrase("inches and read as m"): 0.0254}
+_TOO_SMALL = {phrase("m and read as mm"): 1e3, phrase("inches and read as mm"): 25.4}
 """Mistakes about a unit, and by what the size is to be multiplied to mend them."""
 _POINTS = 200
 _SPINS = 4
@@ -57,27 +58,50 @@ def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
     surface : Surface
         The surface.
     """
-    odd = (
-        ("degenerate", surface.mesh.degenerate, ": {} faces without area were left out"),
-        ("duplicate", surface.mesh.duplicate, ": {} faces stood twice and were left out once"),
-        (
-            "winding",
+    mesh, name = surface.mesh, surface.name
+    odd = {
+        "degenerate": (
+            mesh.degenerate,
+            phrase(
+                "{name}: {count} faces without area were left out", name=name, count=mesh.degenerate
+            ),
+        ),
+        "duplicate": (
+            mesh.duplicate,
+            phrase(
+                "{name}: {count} faces stood twice and were left out once",
+                name=name,
+                count=mesh.duplicate,
+            ),
+        ),
+        "winding": (
             surface.turned,
-            ": {} faces were wound against their neighbours and were turned",
+            phrase(
+                "{name}: {count} faces were wound against their neighbours and were turned",
+                name=name,
+                count=surface.turned,
+            ),
         ),
-        (
-            "non-manifold",
+        "non-manifold": (
             surface.non_manifold_edges,
-            " is not a manifold: {} edges have three faces or more, or none that agree; the contact"
-            " disk keeps away from them",
+            phrase(
+                "{name} is not a manifold: {count} edges have three faces or more, or none that"
+                " agree; the contact disk keeps away from them",
+                name=name,
+                count=surface.non_manifold_edges,
+            ),
         ),
-        (
-            "open",
+        "open": (
             surface.open_edges,
-            " is an open mesh with {} edges at its border; the contact disk keeps away from them",
+            phrase(
+                "{name} is an open mesh with {count} edges at its border; the contact disk keeps"
+                " away from them",
+                name=name,
+                count=surface.open_edges,
+            ),
         ),
-    )
-    return tuple(Finding(kind, surface.name + text.format(n)) for kind, n, text in odd if n)
+    }
+    return tuple(Finding(kind, text) for kind, (count, text) in odd.items() if count)
 
 
 def placement_findings(
@@ -102,16 +126,23 @@ def placement_findings(
     gap = np.linalg.norm(vertices[:, None] - first_joints[None], axis=2).min()
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     if not gap <= _FAR * reach:
-        text = (
-            f"{name}: its nearest point is {gap:.3g} m from the robot, whose reach is"
-            f" {reach:.3g} m: is the mesh in {_misread(size, reach)} (surface.unit), or its pose"
-            " wrong?"
+        text = phrase(
+            "{name}: its nearest point is {gap} m from the robot, whose reach is {reach} m: is the"
+            " mesh in {unit} (surface.unit), or its pose wrong?",
+            name=name,
+            gap=f"{gap:.3g}",
+            reach=f"{reach:.3g}",
+            unit=_misread(size, reach),
         )
         return (Finding("far", text, fatal=True),)
     if not size <= _HUGE * reach:
-        text = (
-            f"{name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is"
-            f" the mesh in {_misread(size, reach)} (surface.unit)?"
+        text = phrase(
+            "{name} is {size} m across; the reach of the robot is {reach} m: is the mesh in {unit}"
+            " (surface.unit)?",
+            name=name,
+            size=f"{size:.3g}",
+            reach=f"{reach:.3g}",
+            unit=_misread(size, reach),
         )
         return (Finding("huge", text, fatal=True),)
     return tiny_finding(surface, reach) + inverted_finding(surface, reachable, rng)
@@ -128,9 +159,13 @@ def tiny_finding(surface: Surface, reach: float) -> tuple[Finding, ...]:
         Of the arm with its tool, in m.
     """
     size = float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
-    text = (
-        f"{surface.name} is only {1e3 * size:.3g} mm across; the reach of the robot is"
-        f" {reach:.3g} m: is the mesh in {_misread(size, reach)} (surface.unit)?"
+    text = phrase(
+        "{name} is only {size} mm across; the reach of the robot is {reach} m: is the mesh in"
+        " {unit} (surface.unit)?",
+        name=surface.name,
+        size=f"{1e3 * size:.3g}",
+        reach=f"{reach:.3g}",
+        unit=_misread(size, reach),
     )
     return (Finding("tiny", text),) if size < _TINY * reach else ()
 
@@ -160,7 +195,12 @@ def unit_findings(path: Path, unit: str, key: str) -> tuple[Finding, ...]:
     """
     if unit == "in" or not says_inches(path):
         return ()
-    text = f"{path.name} speaks of inches and is read in {unit}: write {key}.unit: in, if it is so"
+    text = phrase(
+        "{name} speaks of inches and is read in {unit}: write {key}.unit: in, if it is so",
+        name=path.name,
+        unit=unit,
+        key=key,
+    )
     return (Finding("inches", text),)
 
 
@@ -188,9 +228,14 @@ def size_findings(path: Path, unit: float, key: str, reach: float) -> tuple[Find
     largest = _LARGEST_TOOL if key.startswith("tool") else _LARGEST_FIXTURE
     if not size > 0.0 or _SMALLEST_SOLID * reach <= size <= largest * reach:
         return ()
-    text = (
-        f"{path.name} is {size:.3g} m across; the reach of the robot is {reach:.3g} m: is the mesh"
-        f" in {_misread(size, reach)} ({key}.unit)?"
+    text = phrase(
+        "{name} is {size} m across; the reach of the robot is {reach} m: is the mesh in {unit}"
+        " ({key}.unit)?",
+        name=path.name,
+        size=f"{size:.3g}",
+        reach=f"{reach:.3g}",
+        unit=_misread(size, reach),
+        key=key,
     )
     return (Finding("tiny" if size < reach else "huge", text),)
 
@@ -213,19 +258,25 @@ def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> 
     """
     if not surface.orientable:
         return ()
-    offer = "; set surface.flip_normals: true to turn them"
     if surface.closed:
         if surface.signed_volume >= 0.0:
             return ()
-        text = f"{surface.name} is closed and inside out: its normals point inwards{offer}"
+        text = phrase(
+            "{name} is closed and inside out: its normals point inwards; set surface.flip_normals:"
+            " true to turn them",
+            name=surface.name,
+        )
         return (Finding("inverted", text),)
     points = sample_uniform(surface, _POINTS, rng)
     front, back = (_reached(points, sign, reachable) for sign in (1.0, -1.0))
     if not back - front > _CLEARLY:
         return ()
-    text = (
-        f"{surface.name}: the normals point away from the robot's side: it reaches"
-        f" {front:.0%} of the points along them and {back:.0%} against them{offer}"
+    text = phrase(
+        "{name}: the normals point away from the robot's side: it reaches {front} of the points"
+        " along them and {back} against them; set surface.flip_normals: true to turn them",
+        name=surface.name,
+        front=f"{front:.0%}",
+        back=f"{back:.0%}",
     )
     return (Finding("inverted", text),)
 

@@ -18,6 +18,7 @@ from elastocal.procedure.derive.tool import Interval, ToolEstimate
 from elastocal.procedure.record import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 _SIGMAS = ("force_sigma", "marker_sigma")
 _MASS_SHARE = 0.1
@@ -265,37 +266,59 @@ def _about_readings(rows: Sequence[LoadRow], load_cases: Sequence[str]) -> Itera
     had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
     for case in load_cases:
         if case not in had:
-            yield f"load case {case!r} has no usable reading at any pose: the dataset leaves it out"
+            yield phrase(
+                "load case {case} has no usable reading at any pose: the dataset leaves it out",
+                case=repr(case),
+            )
     if lost := len(_not_ok(rows)):
-        yield f"{lost} of {len(rows)} readings are not ok; the list says why"
+        yield phrase(
+            "{lost} of {rows} readings are not ok; the list says why", lost=lost, rows=len(rows)
+        )
     for name in _SIGMAS:
         if any(not np.all(getattr(numbers, name) > 0) for numbers in _good(rows)):
-            yield f"{name} is left out: some readings show no scatter and no maker's value"
+            yield phrase(
+                "{name} is left out: some readings show no scatter and no maker's value", name=name
+            )
 
 
 def _about_stations(registration: Registration) -> Iterator[str]:
     for station, reason in registration.unregistered.items():
-        yield f"station {station} is not registered, its readings are missing: {reason}"
+        yield phrase(
+            "station {station} is not registered, its readings are missing: {reason}",
+            station=station,
+            reason=reason,
+        )
     for move in registration.moves:
         jump, half = 1e3 * move.distance, 1e3 * _HALF * move.distance_sigma
         runs = _power_of_ten(-move.improbability)
-        yield (
-            f"station {move.station} moved between poses {move.before} and {move.pose}: the marker"
-            f" seemed to jump by {jump:.2f} ± {half:.2f} mm, the station turned by"
-            f" {1e3 * move.angle:.2f} mrad; scatter and errors of the arm look like this in one run"
-            f" of {runs}; both stretches are registered by themselves"
+        yield phrase(
+            "station {station} moved between poses {before} and {pose}: the marker seemed to"
+            " jump by {jump} ± {half} mm, the station turned by {angle} mrad; scatter and"
+            " errors of the arm look like this in one run of {runs}; both stretches are"
+            " registered by themselves",
+            station=move.station,
+            before=move.before,
+            pose=move.pose,
+            jump=f"{jump:.2f}",
+            half=f"{half:.2f}",
+            angle=f"{1e3 * move.angle:.2f}",
+            runs=runs,
         )
     for blunder in registration.blunders:
-        yield (
-            f"pose {blunder.pose}: the unloaded marker reading of station {blunder.station} is"
-            f" {1e3 * blunder.distance:.2f} mm off: its displacements are doubtful"
+        yield phrase(
+            "pose {pose}: the unloaded marker reading of station {station} is {distance} mm"
+            " off: its displacements are doubtful",
+            pose=blunder.pose,
+            station=blunder.station,
+            distance=f"{1e3 * blunder.distance:.2f}",
         )
     for fit in registration.stations:
         if not fit.rotation_sigma <= _LARGE_ROTATION:
-            yield (
-                f"station {fit.station}: its rotation is known to"
-                f" {1e3 * fit.rotation_sigma:.1f} mrad only, an error of"
-                f" {1e3 * fit.rotation_sigma:.1f} µm for each mm of displacement"
+            yield phrase(
+                "station {station}: its rotation is known to {angle} mrad only, an error of"
+                " {angle} µm for each mm of displacement",
+                station=fit.station,
+                angle=f"{1e3 * fit.rotation_sigma:.1f}",
             )
 
 
@@ -306,45 +329,56 @@ def _power_of_ten(exponent: float) -> str:
 
 def _about_lever(registration: Registration) -> Iterator[str]:
     if registration.undetermined_lever:
-        yield (
+        yield phrase(
             "the orientations of the poses are too similar to tell the lever arm of the marker"
-            f" along {', '.join(registration.undetermined_lever)} of the tcp: there it is the cell"
-            " file's"
+            " along {axes} of the tcp: there it is the cell file's",
+            axes=", ".join(registration.undetermined_lever),
         )
     away = float(np.linalg.norm(registration.lever_arm - registration.lever_prior))
     if not away <= _LEVER:
-        yield (
-            f"the marker is {1e3 * away:.1f} mm from where the cell file has it"
-            f" ({_millimetres(registration.lever_arm)} in the tcp frame)"
+        yield phrase(
+            "the marker is {away} mm from where the cell file has it ({place} in the tcp frame)",
+            away=f"{1e3 * away:.1f}",
+            place=_millimetres(registration.lever_arm),
         )
 
 
 def _about_tool(tool: SensorLoad, estimate: ToolEstimate, weighed: Sequence[int]) -> Iterator[str]:
     if estimate.change is not None:
-        yield (
-            f"the tool weight changed near pose {weighed[estimate.change.reading]}, by about"
-            f" {estimate.change.mass:+.1f} kg (or the sensor's zero by as much): no one mass fits"
-            " the run"
+        yield phrase(
+            "the tool weight changed near pose {pose}, by about {mass} kg (or the sensor's"
+            " zero by as much): no one mass fits the run",
+            pose=weighed[estimate.change.reading],
+            mass=f"{estimate.change.mass:+.1f}",
         )
         return
     mass, half = float(estimate.mass.value), float(estimate.mass.half_width)
     if mass + half < _ZEROED * tool.mass:
-        yield (
-            f"the sensor shows {mass:.1f} ± {half:.1f} kg of the tool's {tool.mass:.1f} kg: it"
-            " seems to take the tool weight away itself"
+        yield phrase(
+            "the sensor shows {mass} ± {half} kg of the tool's {stated} kg: it seems to take"
+            " the tool weight away itself",
+            mass=f"{mass:.1f}",
+            half=f"{half:.1f}",
+            stated=f"{tool.mass:.1f}",
         )
     elif abs(mass - tool.mass) > max(half, _MASS_SHARE * tool.mass):
-        yield (
-            f"the tool weighs {mass:.1f} ± {half:.1f} kg by {estimate.count} unloaded references,"
-            f" {tool.mass:.1f} kg by the cell file"
+        yield phrase(
+            "the tool weighs {mass} ± {half} kg by {count} unloaded references, {stated} kg by"
+            " the cell file",
+            mass=f"{mass:.1f}",
+            half=f"{half:.1f}",
+            count=estimate.count,
+            stated=f"{tool.mass:.1f}",
         )
     away = np.abs(estimate.centre.value - tool.centre)
     far = away > np.maximum(estimate.centre.half_width, _CENTRE)
     if np.any(far):
         axis = int(np.argmax(np.where(far, away, 0.0)))
-        yield (
-            f"the tool's centre of mass is {1e3 * away[axis]:.0f} mm along {'xyz'[axis]} of the"
-            " sensor from where the cell file has it"
+        yield phrase(
+            "the tool's centre of mass is {away} mm along {axis} of the sensor from where the"
+            " cell file has it",
+            away=f"{1e3 * away[axis]:.0f}",
+            axis="xyz"[axis],
         )
 
 

@@ -188,6 +188,8 @@ def flattened(value: object, prefix: str = "") -> Iterator[tuple[str, str]]:
 def _leaf(value: object) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(_leaf, value)) or phrase("none")
+    if isinstance(value, bool):
+        return phrase("yes") if value else phrase("no")
     if isinstance(value, float):
         return f"{value:.10g}"
     return phrase("none") if value is None else str(value)

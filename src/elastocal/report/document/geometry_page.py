@@ -12,17 +12,24 @@ from elastocal.arrays import FloatArray
 from elastocal.files import write_text
 from elastocal.geometry import GeometryAccuracy, GeometryModel, LinkNumber
 from elastocal.report.document import blocks
+from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages import render
 from elastocal.report.plots import MANY_POSITIONS, error_maps, parameter_figure
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
-from elastocal.wording import counted, mm, point
+from elastocal.wording import counted, mm, phrase, phrases, point
 
 REPORT_TITLE = "Geometry report"
-"""How the title of every such page begins."""
+"""How the title of every such page in English begins."""
 _MOST_ROWS = 200
 _DEGREES = float(np.degrees(1.0))
-_AXES = {"x": "x of the base", "y": "y of the base", "z": "z of the base", "norm": "distance"}
+_AXES = dict(
+    zip(
+        ("x", "y", "z", "norm"),
+        phrases("x of the base", "y of the base", "z of the base", "distance"),
+        strict=True,
+    )
+)
 _SHOWN = {
     "m": (1e3, "mm", 3),
     "rad": (1e3, "mrad", 3),
@@ -31,7 +38,7 @@ _SHOWN = {
     "1": (1e6, "ppm", 0),
 }
 """Factor, unit and digits in which numbers are shown."""
-_LINKS = (
+_LINKS = phrase(
     "A link goes from its joint's axis to the next by Rz(theta + q) Tz(d) Tx(a) Rx(alpha) (Denavit"
     " and Hartenberg, distal frames). Where both axes are parallel as drawn, Ry(beta) follows and d"
     " stays as drawn (Hayati): it goes together with the d of other links. z is the joint's axis in"
@@ -50,7 +57,7 @@ class GeometryFindings:
     links: tuple[LinkNumber, ...]
 
 
-def write_geometry_page(path: Path, found: GeometryFindings) -> Path:
+def write_geometry_page(path: Path, found: GeometryFindings, language: Language = ENGLISH) -> Path:
     """Write the page, atomically; return its path.
 
     Parameters
@@ -59,6 +66,8 @@ def write_geometry_page(path: Path, found: GeometryFindings) -> Path:
         An HTML file.
     found : GeometryFindings
         What it shows.
+    language : Language
+        Of its words.
 
     Raises
     ------
@@ -69,20 +78,25 @@ def write_geometry_page(path: Path, found: GeometryFindings) -> Path:
     sections = [
         (identifier, title, tuple(show(found)))
         for identifier, title, show in (
-            ("result", "Before and after", _result),
-            ("maps", "Where in the workspace", _maps),
-            ("iso", "Pose accuracy and repeatability (ISO 9283)", _iso),
-            ("errors", "Which errors are known, and how well", _errors),
-            ("links", "Denavit-Hartenberg table", _links),
-            ("blunders", "Positions left out", _blunders),
-            ("frames", "Stations, markers, provenance", _frames),
+            ("result", phrase("Before and after"), _result),
+            ("maps", phrase("Where in the workspace"), _maps),
+            ("iso", phrase("Pose accuracy and repeatability (ISO 9283)"), _iso),
+            ("errors", phrase("Which errors are known, and how well"), _errors),
+            ("links", phrase("Denavit-Hartenberg table"), _links),
+            ("blunders", phrase("Positions left out"), _blunders),
+            ("frames", phrase("Stations, markers, provenance"), _frames),
         )
     ]
     page = render(
         "geometry.html",
-        title=f"{REPORT_TITLE}: {model.robot.name}",
-        subtitle=f"{counted(model.positions, 'position')} of markers, {model.provenance}. Errors"
-        " are those at poses that were left out of the fit.",
+        language,
+        title=phrase("Geometry report: {robot}", robot=model.robot.name),
+        subtitle=phrase(
+            "{positions} of markers, {provenance}. Errors are those at poses that were left out of"
+            " the fit.",
+            positions=counted(model.positions, "position"),
+            provenance=model.provenance,
+        ),
         styles=("page.css",),
         scripts=(),
         data={},
@@ -99,32 +113,44 @@ def _result(found: GeometryFindings) -> Iterator[blocks.Block]:
     known = sum(each.known for each in model.parameters)
     yield blocks.Facts(
         (
-            ("Nominal arm, mean error", mm(before.mean)),
-            ("Calibrated, mean error", mm(after.mean)),
-            ("Calibrated, 95 % of errors below", mm(after.p95)),
-            ("Calibrated, largest error", mm(after.max)),
-            ("Model", next(each.rung for each in model.ladder if each.chosen)),
-            ("Errors of the arm known", f"{known} of {len(model.parameters)}"),
+            (phrase("Nominal arm, mean error"), mm(before.mean)),
+            (phrase("Calibrated, mean error"), mm(after.mean)),
+            (phrase("Calibrated, 95 % of errors below"), mm(after.p95)),
+            (phrase("Calibrated, largest error"), mm(after.max)),
+            (phrase("Model"), next(each.rung for each in model.ladder if each.chosen)),
+            (
+                phrase("Errors of the arm known"),
+                phrase("{known} of {all}", known=known, all=len(model.parameters)),
+            ),
         )
     )
     yield blocks.Bullets(model.findings, "reasons")
     rows: list[blocks.Row] = []
     for each in accuracy.axes:
-        for when, figures in (("before", each.registration), ("after", each.chosen)):
+        for when, figures in (
+            (phrase("before"), each.registration),
+            (phrase("after"), each.chosen),
+        ):
             bias = "" if each.axis == "norm" else f"{1e3 * figures.bias:+.3f}"
             values = (figures.mean, figures.rms, figures.p95, figures.max)
             rows.append((_AXES[each.axis], when, bias, *(f"{1e3 * v:.3f}" for v in values)))
-    heads = ("Along", "", "Bias", "Mean size", "Root mean square", "95 % below", "Largest")
-    yield blocks.Table("Errors by axis in mm, of poses left out", heads, tuple(rows), texts=2)
+    heads = (
+        phrase("Along"),
+        "",
+        *phrases("Bias", "Mean size", "Root mean square", "95 % below", "Largest"),
+    )
     yield blocks.Table(
-        "Models at the same left-out poses, mm",
-        ("Model", "Unknowns", "Mean", "95 % below", "Largest", ""),
+        phrase("Errors by axis in mm, of poses left out"), heads, tuple(rows), texts=2
+    )
+    yield blocks.Table(
+        phrase("Models at the same left-out poses, mm"),
+        (*phrases("Model", "Unknowns", "Mean", "95 % below", "Largest"), ""),
         tuple(
             (
                 each.rung,
                 each.unknowns,
                 *(f"{1e3 * value:.3f}" for value in vars(each.held_out).values()),
-                "taken" if each.chosen else "",
+                phrase("taken") if each.chosen else "",
             )
             for each in model.ladder
         ),
@@ -134,15 +160,24 @@ def _result(found: GeometryFindings) -> Iterator[blocks.Block]:
 def _maps(found: GeometryFindings) -> Iterator[blocks.Block]:
     accuracy = found.accuracy
     many = len(accuracy.row) > MANY_POSITIONS
+    count = counted(len(accuracy.row), "position")
     before, after = (each.mean for each in vars(found.model.held_out).values())
     yield blocks.Picture(
         partial(error_maps, accuracy),
-        f"Positions in the base of the robot, coloured by their error: {mm(before)} mean before,"
-        f" {mm(after)} after",
-        ("Means over cells of the map, of all" if many else "All")
-        + " positions that were fitted, where their marker was measured, in the base of the robot."
-        " Before and after have one scale, which ends where 98 % of the errors before lie below;"
-        " enlarged is what is left, on a scale of its own.",
+        phrase(
+            "Positions in the base of the robot, coloured by their error: {before} mean before,"
+            " {after} after",
+            before=mm(before),
+            after=mm(after),
+        ),
+        phrase(
+            "{which} that were fitted, each at poses left out and where its marker was measured, in"
+            " the base of the robot. Before and after have one scale, which ends where 98 % of the"
+            " errors before lie below; enlarged is what is left, on a scale of its own.",
+            which=phrase("Means over cells of the map, of all {positions}", positions=count)
+            if many
+            else phrase("All {positions}", positions=count),
+        ),
     )
 
 
@@ -151,36 +186,44 @@ def _iso(found: GeometryFindings) -> Iterator[blocks.Block]:
     if not poses:
         norm = found.accuracy.axes[-1]
         yield blocks.Paragraph(
-            "No repeated visits: no pose was visited twice by one station under one load, so"
-            " repeatability (RP) is not known. Pose accuracy (AP) of single visits is the distance"
-            f" above: {mm(norm.registration.mean)} mean and {mm(norm.registration.max)} at most"
-            f" before, {mm(norm.chosen.mean)} and {mm(norm.chosen.max)} after."
+            phrase(
+                "No repeated visits: no pose was visited twice by one station under one load, so"
+                " repeatability (RP) is not known. Pose accuracy (AP) of single visits is the"
+                " distance above: {mean} mean and {max} at most before, {mean_after} and"
+                " {max_after} after.",
+                mean=mm(norm.registration.mean),
+                max=mm(norm.registration.max),
+                mean_after=mm(norm.chosen.mean),
+                max_after=mm(norm.chosen.max),
+            )
         )
         return
     worst = max(poses, key=lambda each: each.repeatability)
     yield blocks.Facts(
         (
-            ("AP before, mean", mm(sum(each.registration for each in poses) / len(poses))),
-            ("AP before, largest", mm(max(each.registration for each in poses))),
-            ("AP after, mean", mm(sum(each.chosen for each in poses) / len(poses))),
-            ("AP after, largest", mm(max(each.chosen for each in poses))),
-            ("RP, mean", mm(sum(each.repeatability for each in poses) / len(poses))),
-            ("RP, largest", mm(worst.repeatability)),
+            (phrase("AP before, mean"), mm(sum(each.registration for each in poses) / len(poses))),
+            (phrase("AP before, largest"), mm(max(each.registration for each in poses))),
+            (phrase("AP after, mean"), mm(sum(each.chosen for each in poses) / len(poses))),
+            (phrase("AP after, largest"), mm(max(each.chosen for each in poses))),
+            (phrase("RP, mean"), mm(sum(each.repeatability for each in poses) / len(poses))),
+            (phrase("RP, largest"), mm(worst.repeatability)),
         )
     )
     fewest = min(each.visits for each in poses)
     yield blocks.Paragraph(
-        "After ISO 9283:1998, 7.2, from the visits of one commanded pose under one load: AP is the"
-        " distance of their barycentre from where the pose was expected, RP the mean distance from"
-        " the barycentre plus three standard deviations."
-        f" {counted(len(poses), 'pose')} with at least {counted(fewest, 'visit')}; the standard"
-        " asks for 30 visits of five poses at stated speed and load, which the table does not say."
-        " Where joints are those measured at the time, and not commanded, the scatter of the drives"
-        " is not in RP.", "sub",
+        phrase(
+            "After ISO 9283:1998, 7.2, from the visits of one commanded pose under one load: AP is"
+            " the distance of their barycentre from where the pose was expected, RP the mean"
+            " distance from the barycentre plus three standard deviations. {poses} with at least"
+            " {fewest}; the standard asks for 30 visits of five poses at stated speed and load,"
+            " which the table does not say. Where joints are those measured at the time, and not"
+            " commanded, the scatter of the drives is not in RP.",
+poses=counted(len(poses), 'pose'),
+fewest=counted(fewest, 'visit')), "sub",
     )  # fmt: skip
     rows: tuple[blocks.Row, ...] = tuple(
         (
-            f"row {each.row}",
+            phrase("row {row}", row=each.row),
             each.station,
             each.marker,
             each.visits,
@@ -188,38 +231,58 @@ def _iso(found: GeometryFindings) -> Iterator[blocks.Block]:
         )
         for each in sorted(poses, key=lambda each: -each.repeatability)[:_MOST_ROWS]
     )
-    heads = ("Pose first at", "Station", "Marker", "Visits", "AP before", "AP after", "RP")
-    table = blocks.Table("By pose in mm, the least repeatable first", heads, rows, texts=2)
+    heads = (
+        *phrases("Pose first at", "Station", "Marker", "Visits", "AP before", "AP after"),
+        "RP",
+    )
+    table = blocks.Table(phrase("By pose in mm, the least repeatable first"), heads, rows, texts=2)
     yield blocks.Details(f"All poses ({len(rows)})", (table,), "long")
 
 
 def _errors(found: GeometryFindings) -> Iterator[blocks.Block]:
     model = found.model
     if not model.parameters:
-        yield blocks.Paragraph("The nominal arm was kept: the positions speak for no error of it.")
+        yield blocks.Paragraph(
+            phrase("The nominal arm was kept: the positions speak for no error of it.")
+        )
         return
     yield blocks.Picture(
         partial(parameter_figure, model.parameters),
-        f"{counted(len(model.parameters), 'error')} of the arm with 95 % intervals",
-        "Filled: known, its 95 % interval is narrower than what one would guess without measuring"
-        " (1 mm, 1 mrad). Hollow: not known. Intervals: blocks of poses drawn with replacement.",
+        phrase(
+            "{parameters} of the arm with 95 % intervals",
+            parameters=counted(len(model.parameters), "error"),
+        ),
+        phrase(
+            "Filled: known, its 95 % interval is narrower than what one would guess without"
+            " measuring (1 mm, 1 mrad). Hollow: not known. Intervals: blocks of poses drawn with"
+            " replacement."
+        ),
     )
     rows = tuple(
-        (each.name, "known" if each.known else "not known", *_number(each.value, each.unit),
+        (each.name, phrase(
+            "known") if each.known else phrase(
+            "not known"), *_number(each.value, each.unit),
          _span(each.low, each.high, each.unit))
         for each in model.parameters
     )  # fmt: skip
-    heads = ("Error", "", "Value", "Unit", "95 % interval")
-    table = blocks.Table("Errors of the arm", heads, rows, texts=2)
-    yield blocks.Details(f"All errors in numbers ({len(rows)})", (table,))
+    heads = (phrase("Error"), "", *phrases("Value", "Unit", "95 % interval"))
+    table = blocks.Table(phrase("Errors of the arm"), heads, rows, texts=2)
+    yield blocks.Details(phrase("All errors in numbers ({rows})", rows=len(rows)), (table,))
     fixed = tuple((each.name, each.why) for each in model.fixed)
     if fixed:
         yield blocks.Paragraph(
-            f"{counted(len(fixed), 'error')} cannot be told from others by these positions: they"
-            " count as 0, and what they do is in the others. Predictions do not need them."
+            phrase(
+                "{fixed} cannot be told from others by these positions: they count as 0, and what"
+                " they do is in the others. Predictions do not need them.",
+                fixed=counted(len(fixed), "error"),
+            )
         )
-        table = blocks.Table("Errors that are not told apart", ("Error", "Why"), fixed, texts=2)
-        yield blocks.Details(f"What they go together with ({len(fixed)})", (table,))
+        table = blocks.Table(
+            phrase("Errors that are not told apart"), phrases("Error", "Why"), fixed, texts=2
+        )
+        yield blocks.Details(
+            phrase("What they go together with ({fixed})", fixed=len(fixed)), (table,)
+        )
 
 
 def _links(found: GeometryFindings) -> Iterator[blocks.Block]:
@@ -231,14 +294,18 @@ def _links(found: GeometryFindings) -> Iterator[blocks.Block]:
         ends = (
             ""
             if each.low is None or each.high is None
-            else f"{scale * each.low - nominal:+.{digits}f} to"
-            f" {scale * each.high - nominal:+.{digits}f}"
+            else phrase(
+                "{low} to {high}",
+                low=f"{scale * each.low - nominal:+.{digits}f}",
+                high=f"{scale * each.high - nominal:+.{digits}f}",
+            )
         )
         shown = [f"{round(v, digits) + 0.0:.{digits}f}" for v in (nominal, calibrated)]
         change = f"{calibrated - nominal:+.{digits}f}" if ends else ""
         rows.append((each.joint, each.number, unit, *shown, change, ends))
-    heads = ("Link of", "Number", "Unit", "Nominal", "Calibrated", "Change", "95 % of the change")
-    yield blocks.Table("Links as drawn and as built", heads, tuple(rows), texts=3)
+    heads = phrases("Link of", "Number", "Unit", "Nominal", "Calibrated", "Change",
+                    "95 % of the change")  # fmt: skip
+    yield blocks.Table(phrase("Links as drawn and as built"), heads, tuple(rows), texts=3)
 
 
 def _drawn_unit(row: LinkNumber) -> tuple[float, str, int]:
@@ -248,35 +315,52 @@ def _drawn_unit(row: LinkNumber) -> tuple[float, str, int]:
 def _blunders(found: GeometryFindings) -> Iterator[blocks.Block]:
     blunders = found.accuracy.blunders
     if not blunders:
-        yield blocks.Paragraph("None: no position is farther off than its neighbours allow.")
+        yield blocks.Paragraph(
+            phrase("None: no position is farther off than its neighbours allow.")
+        )
         return
     named = sorted(blunders, key=lambda each: each.row)
     rows = tuple(
-        (f"row {each.row}", each.station, each.marker, f"{1e3 * each.distance:.2f}")
+        (phrase("row {row}", row=each.row), each.station, each.marker, f"{1e3 * each.distance:.2f}")
         for each in named[:_MOST_ROWS]
     )
     yield blocks.Paragraph(
-        f"{counted(len(blunders), 'position')} of {found.model.positions} more than seven standard"
-        " deviations from where the calibrated arm has them. Rows are counted from 0."
+        phrase(
+            "{blunders} of {positions} more than seven standard deviations from where the"
+            " calibrated arm has them. Rows are counted from 0.",
+            blunders=counted(len(blunders), "position"),
+            positions=found.model.positions,
+        )
     )
-    heads = ("Row", "Station", "Marker", "Distance in mm")
-    more = f", the first {_MOST_ROWS}" if len(blunders) > _MOST_ROWS else ""
-    yield blocks.Table(f"Blunders{more}", heads, rows, texts=2)
+    heads = phrases("Row", "Station", "Marker", "Distance in mm")
+    caption = (
+        phrase("Blunders, the first {count}", count=_MOST_ROWS)
+        if len(blunders) > _MOST_ROWS
+        else phrase("Blunders")
+    )
+    yield blocks.Table(caption, heads, rows, texts=2)
 
 
 def _frames(found: GeometryFindings) -> Iterator[blocks.Block]:
     model = found.model
-    heads = ("Frame", "x", "y", "z", "A", "B", "C")
+    heads = (phrase("Frame"), "x", "y", "z", "A", "B", "C")
     stations = tuple((name, *_pose(T)) for name, T in model.stations.items())
-    title = "Base in the frame of each station, mm and ° (Z-Y'-X'')"
+    title = phrase("Base in the frame of each station, mm and ° (Z-Y'-X'')")
     yield blocks.Table(title, heads, stations)
-    rows = tuple((f"marker {n}", point(each)) for n, each in enumerate(model.markers.tolist(), 1))
-    yield blocks.Table("Markers in the tcp, mm", ("Marker", "x, y, z"), rows)
+    rows = tuple(
+        (phrase("marker {number}", number=n), point(each))
+        for n, each in enumerate(model.markers.tolist(), 1)
+    )
+    yield blocks.Table(phrase("Markers in the tcp, mm"), (phrase("Marker"), "x, y, z"), rows)
     if model.T_tcp_built is not None:
-        built = (("tcp as built", *_pose(model.T_tcp_built)),)
-        yield blocks.Table("Tcp as built in the tcp as described, mm and °", heads, built)
+        built = ((phrase("tcp as built"), *_pose(model.T_tcp_built)),)
+        yield blocks.Table(phrase("Tcp as built in the tcp as described, mm and °"), heads, built)
     yield blocks.Facts(
-        (("Robot", model.robot.name), ("Tcp", model.tcp), ("Made from", model.provenance))
+        (
+            (phrase("Robot"), model.robot.name),
+            (phrase("Tcp"), model.tcp),
+            (phrase("Made from"), model.provenance),
+        )
     )
 
 
@@ -293,4 +377,8 @@ def _number(value: float, unit: str) -> tuple[str, str]:
 
 def _span(low: float, high: float, unit: str) -> str:
     scale, _, digits = _SHOWN[unit]
-    return f"{scale * low:+.{digits}f} to {scale * high:+.{digits}f}"
+    return phrase(
+        "{low} to {high}",
+        low=f"{scale * low:+.{digits}f}",
+        high=f"{scale * high:+.{digits}f}",
+    )

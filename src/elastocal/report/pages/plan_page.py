@@ -2,6 +2,7 @@
 
 import base64
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import singledispatch
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from elastocal.planning import (
     check_pool_of,
 )
 from elastocal.planning.surface import Surface
+from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import (
     Dots,
@@ -29,11 +31,16 @@ from elastocal.report.plots import (
     plan_view,
     weakest_margins,
 )
-from elastocal.wording import duration, millimetres, phrase, readable, um
+from elastocal.wording import counted, duration, millimetres, phrase, phrases, readable, um
 
 
 def write_plan_page(
-    path: Path, cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData
+    path: Path,
+    cell: Cell,
+    surface: Surface,
+    plan: PlanResult,
+    pool: PoolData,
+    language: Language = ENGLISH,
 ) -> Path:
     """Write the interactive page of a plan, atomically; return its path.
 
@@ -45,6 +52,8 @@ def write_plan_page(
         That the plan was made for.
     plan, pool : PlanResult, PoolData
         Of one run.
+    language : Language
+        Of the page's words.
 
     Raises
     ------
@@ -61,28 +70,83 @@ def write_plan_page(
     worst = weakest_margins(pool).label
     page = render(
         "plan.html",
-        title=f"Calibration plan: {plan.cell.name}",
+        language,
+        title=phrase("Calibration plan: {name}", name=plan.cell.name),
         styles=("page.css",),
         scripts=("view.js", "plan.js"),
-        data=view_data(view, plan, pool),
+        data=view_data(view, plan, pool, language.say),
         plan=plan,
         figures=key_figures(plan),
         rows=[(pose.id, _cells(plan, pose, worst[pose.candidate])) for pose in plan.poses],
-        expected=[
-            (
-                each.poses,
-                um(each.noise),
-                "not known" if production.floor is None else um(each.error),
-                f"{plan.time_of(each.poses) / 60.0:.0f} min",
-            )
-            for production in [plan.production]
-            if production is not None
-            for each in production.some_expected()
-        ],
+        heads=phrases(
+            "Pose",
+            "x in mm",
+            "y in mm",
+            "z in mm",
+            "Smallest margin",
+            "Seen by",
+            "Way to it",
+            "In contact",
+        ),
+        expected=None if plan.production is None else expected_table(plan, plan.production),
+        subtitle=phrase(
+            "{poses} chosen by {technique} for {robot}. Lengths in the base frame of the robot.",
+            poses=counted(len(plan.poses), "pose"),
+            technique=plan.search.name,
+            robot=plan.robot.name,
+        ),
+        made=phrase(
+            "Made by elastocal {version} from {file} (fingerprint {fingerprint}).",
+            version=plan.elastocal,
+            file=plan.cell.file,
+            fingerprint=plan.cell.fingerprint[:12],
+        ),
         notes=[layer.note for layer in view.layers if layer.note],
     )
     write_text(path, page)
     return Path(path)
+
+
+@dataclass(frozen=True)
+class ExpectedTable:
+    """The error to expect on production from some numbers of poses, and what they take."""
+
+    caption: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def expected_table(plan: PlanResult, production: ProductionRecord) -> ExpectedTable:
+    """Return the error to expect from some numbers of poses, as texts of a table."""
+    sigma, is_known = um(production.sigma), production.floor is not None
+    return ExpectedTable(
+        phrase(
+            "Error to expect on production, root mean square of the deviation, from readings that"
+            " scatter by {sigma}",
+            sigma=sigma,
+        )
+        if is_known
+        else phrase(
+            "Error to expect on production, root mean square of the deviation, from readings that"
+            " scatter by {sigma}; the model's own error comes on top and is not known before a"
+            " calibration",
+            sigma=sigma,
+        ),
+        (
+            *phrases("Poses", "Error from noise"),
+            *(phrases("With the model's own error") if is_known else ()),
+            phrase("In the cell"),
+        ),
+        tuple(
+            (
+                str(each.poses),
+                um(each.noise),
+                *((um(each.error),) if is_known else ()),
+                f"{plan.time_of(each.poses) / 60.0:.0f} min",
+            )
+            for each in production.some_expected()
+        ),
+    )
 
 
 def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
@@ -101,7 +165,7 @@ def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
             phrase("Points with a posture"),
             phrase("{rank} of {all}", rank=pool.valid, all=pool.sampled),
         ),
-        (phrase("Check that refused most"), pool.bottleneck or phrase("none")),
+        (phrase("Check that refused most"), phrase(pool.bottleneck or "none")),
         *(_covered(plan.production) if plan.production is not None else ()),
     )
 
@@ -119,7 +183,7 @@ def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     return [
         *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
         worst,
-        pose.seen_by or "no station",
+        pose.seen_by or phrase("no station"),
         duration(way),
         duration(pose.contact_time),
     ]
@@ -159,7 +223,7 @@ def view_data(
                 "colour": layer.colour,
                 "shown": layer.shown,
                 "sight": layer.sight,
-                "parts": [_part(each) for each in layer.parts],
+                "parts": [_said(_part(each), say) for each in layer.parts],
             }
             for layer in view.layers
         ],
@@ -199,7 +263,12 @@ def _(part: Strokes) -> dict[str, object]:
 @_part.register
 def _(part: Dots) -> dict[str, object]:
     colours = _packed(part.colours, "u1")
-    return {"kind": "dots", "at": _packed(part.at), "colours": colours, "hints": list(part.hints)}
+    return {
+        "kind": "dots",
+        "at": _packed(part.at),
+        "colours": colours,
+        "hints": list(part.hints),
+    }
 
 
 @_part.register
@@ -209,6 +278,12 @@ def _(part: Tags) -> dict[str, object]:
         "hints": list(part.hints),
         "normals": None if part.normals is None else _packed(part.normals),
     }  # fmt: skip
+
+
+def _said(part: dict[str, object], say: Callable[[object], str]) -> dict[str, object]:
+    """Return a part with its hints in the language of the page."""
+    hints = part.get("hints")
+    return part | {"hints": list(map(say, hints))} if isinstance(hints, list) else part
 
 
 def _packed(values: FloatArray | IndexArray, kind: str = "<f4") -> str:

@@ -78,7 +78,8 @@ def embedded(data: Any) -> "Markup":
 @cache
 def _pages(code: str) -> "Environment":
     """Return the templates of pages, saying their words in a language."""
-    pages, say = templates("elastocal.report.pages", markup=True).overlay(), language_of(code).say
+    pages, language = templates("elastocal.report.pages", markup=True).overlay(), language_of(code)
+    say = language.say
     # An overlay shares these with what it lies over, and each language has its own.
     pages.globals = pages.globals | {
         "policy": _policy,
@@ -90,15 +91,17 @@ def _pages(code: str) -> "Environment":
         "embedded": embedded,
         "pieces": _pieces,
         "say": say,
+        # As say, for what stands between tags and not within one.
+        "shown": language.markup,
         # Words of the templates themselves.
         "words": lambda text: say(phrase(text)),
-        "drawn": partial(_data_url, say),
+        "drawn": partial(_data_url, language),
     }
     return pages
 
 
-def _data_url(say: Callable[[object], str], draw: "Callable[[], Figure]") -> str:
-    svg = themed_svg(draw, say)
+def _data_url(language: Language, draw: "Callable[[], Figure]") -> str:
+    svg = themed_svg(draw, None if language is ENGLISH else language.say)
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
 
 
@@ -130,9 +133,9 @@ def _plotly() -> "Markup":
 
 
 def _pieces(text: str) -> list[str]:
-    """Return a text in pieces, every second of which stood in backticks.
+    """Return a text in pieces, every second of which stood in backticks; of markup, markup.
 
     >>> _pieces("run `elastocal tool` & see")
     ['run ', 'elastocal tool', ' & see']
     """
-    return re.split(r"`([^`]+)`", text)
+    return [type(text)(piece) for piece in re.split(r"`([^`]+)`", text)]

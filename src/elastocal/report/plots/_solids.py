@@ -20,6 +20,7 @@ from elastocal.cell import TOOLING, Cell
 from elastocal.planning import collision_scene
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 _SECTIONS = 24
 """Sides of a drawn cylinder."""
@@ -96,7 +97,12 @@ class CoarseSolid:
         drawn = len(self.solid.faces)
         if drawn == self.whole:
             return ""
-        return f"{what} is drawn with {drawn} faces in place of {self.whole}."
+        return phrase(
+            "{what} is drawn with {drawn} faces in place of {whole}.",
+            what=what,
+            drawn=drawn,
+            whole=self.whole,
+        )
 
 
 def robot_solids(cell: Cell, surface: Surface, q: FloatArray) -> RobotSolids:
@@ -117,7 +123,7 @@ def robot_solids(cell: Cell, surface: Surface, q: FloatArray) -> RobotSolids:
         tuple(part.solid for part in parts),
         len(parts) - len(scene.tool),
         np.stack([body.T_frame_body for body in bodies], axis=1),
-        "Parts of the robot with fine meshes are drawn coarser." if finer else "",
+        phrase("Parts of the robot with fine meshes are drawn coarser.") if finer else "",
     )
 
 

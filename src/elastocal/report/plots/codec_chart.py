@@ -31,6 +31,7 @@ from elastocal.report.plots._box_plots import (
     legend_handles,
     legend_height,
     make_boxes,
+    round_values,
 )
 from elastocal.report.plots.style import VariantStyle, variant_styles
 from elastocal.results import brief_repr
@@ -164,6 +165,7 @@ def pose_count_figure(curves: Sequence[ErrorCurve], tolerance: float | None) -> 
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_yticks(round_values(*axes.get_ylim()))
     axes.set_xlabel(phrase("training poses"))
     axes.set_ylabel(phrase("mean error at held-out poses in mm"))
     style.open_frame(axes, grid="both")

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from elastocal.arrays import FloatArray
 from elastocal.geometry import GeometryAccuracy, GeometryParameter
 from elastocal.report.plots import style
+from elastocal.wording import phrase
 
 _WIDTH = 10.5
 _MAP, _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN = 2.6, 0.75, 0.8, 0.35, 0.5, 0.75
@@ -23,18 +24,21 @@ _GAPS = (0.4, 1.25)
 """After the maps of before and after, and after their bar, in inches."""
 _ROW, _AXIS = 0.17, 0.62
 """Height of a parameter's line, and of what belongs to a group of them, in inches."""
-_VIEWS = (("y in m", 1, "from above"), ("z in m", 2, "from the side"))
+_VIEWS = (
+    (phrase("y in m"), 1, phrase("from above")),
+    (phrase("z in m"), 2, phrase("from the side")),
+)
 MANY_POSITIONS = 2000
 """More positions are drawn as means over cells of the map."""
 _TOP = 98.0
 """Percentile of the errors at which a scale ends."""
 _GROUPS = (
-    ("shift", 1e3, "shifts of joints in mm"),
-    ("turn", 1e3, "turns of joints in mrad"),
-    ("offset", 1e3, "zeros of joints in mrad (mm)"),
-    ("compliance", 1e6, "yielding of joints in µrad/(N·m) (µm/N)"),
-    ("scale", 1e3, "transmission in per mille"),
-    ("gear", 1e3, "gears once and twice a turn in mrad"),
+    ("shift", 1e3, phrase("shifts of joints in mm")),
+    ("turn", 1e3, phrase("turns of joints in mrad")),
+    ("offset", 1e3, phrase("zeros of joints in mrad (mm)")),
+    ("compliance", 1e6, phrase("yielding of joints in µrad/(N·m) (µm/N)")),
+    ("scale", 1e3, phrase("transmission in per mille")),
+    ("gear", 1e3, phrase("gears once and twice a turn in mrad")),
 )
 """Kinds of errors, the scale that they are shown in, and what they are."""
 
@@ -51,22 +55,26 @@ def error_maps(accuracy: GeometryAccuracy) -> Figure:
     across = (_WIDTH - _LEFT - _RIGHT - sum(_GAPS)) / 3.0
     figure = style.new_figure(_WIDTH, _HEAD + 2 * _MAP + _BETWEEN + _FOOT)
     size = float(np.clip(1000.0 / np.sqrt(len(before)), 3.0, 30.0))
-    columns = ((before, "before", both), (after, "after", both), (after, "after, enlarged", own))
+    columns = (
+        (before, phrase("before"), both),
+        (after, phrase("after"), both),
+        (after, phrase("after, enlarged"), own),
+    )
     left = _LEFT
     for column, (error, when, scale) in enumerate(columns):
         for row, (label, axis, view) in enumerate(_VIEWS):
             bottom = _FOOT + (1 - row) * (_MAP + _BETWEEN)
             axes = figure.add_panel(left, bottom, across, _MAP)
             _draw_map(axes, accuracy.place[:, [0, axis]], error, scale, size)
-            axes.set_title(f"{when}, {view}", fontsize=9)
-            axes.set_xlabel("x in m")
+            axes.set_title(phrase("{when}, {view}", when=when, view=view), fontsize=9)
+            axes.set_xlabel(phrase("x in m"))
             if not column:
                 axes.set_ylabel(label)
         if column:
             bar = figure.add_panel(left + across + 0.1, _FOOT, 0.14, 2 * _MAP + _BETWEEN)
             figure.colorbar(
                 ScalarMappable(scale, style.SEQUENTIAL), cax=bar, extend="max"
-            ).set_label("Error in mm", size=8)
+            ).set_label(phrase("Error in mm"), size=8)
         left += across + (_GAPS[column] if column < len(_GAPS) else 0.0)
     return figure
 

@@ -28,7 +28,7 @@ from elastocal.report.plots._solids import (
 )
 from elastocal.report.plots._views import Camera, bounds_of, cameras_of, light_over, upward
 from elastocal.results import brief_repr
-from elastocal.wording import duration, millimetres, phrase, readable
+from elastocal.wording import duration, millimetres, phrase, readable, sentences
 
 _OFF_SURFACE = 0.004
 """Dots are drawn this far off the surface, as part of its size, so that it does not swallow half
@@ -211,7 +211,9 @@ def _tooling(surface: Surface) -> Layer:
     ends = np.stack([mesh.faces[face, (corner + step) % 3] for step in (0, 1)], axis=1)
     edges = Strokes(drawn.solid.vertices[drawn.edges(ends)], _QUIET, 1.5)
     paint = Paint(drawn.solid, _TOOLING)
-    return Layer(phrase("Tooling"), _TOOLING, (paint, edges), note=drawn.note("The tooling"))
+    return Layer(
+        phrase("Tooling"), _TOOLING, (paint, edges), note=drawn.note(phrase("The tooling"))
+    )
 
 
 def _fixtures(cell: Cell, surface: Surface) -> list[Layer]:
@@ -223,8 +225,8 @@ def _fixtures(cell: Cell, surface: Surface) -> list[Layer]:
     if not drawn:
         return []
     together = joined([fixture.solid for fixture in drawn.values()])
-    notes = (fixture.note(f"Fixture {name}") for name, fixture in drawn.items())
-    note = " ".join(filter(None, notes))
+    notes = (fixture.note(phrase("Fixture {name}", name=name)) for name, fixture in drawn.items())
+    note = sentences([note for note in notes if note])
     return [Layer(phrase("Fixtures"), _FIXTURE, (Paint(together, _FIXTURE),), note=note)]
 
 
@@ -238,8 +240,14 @@ def _candidates(pool: PoolData, lift: float) -> Layer:
     found = weakest_margins(pool)
     edge = [readable(float(distance), "m") for distance in pool.boundary_distance]
     hints = tuple(
-        f"candidate {number}\\nnearest to refusal: {label} ({share:.0%} of the pool's median)\\n"
-        f"distance to the edge: {far}"
+        phrase(
+            "candidate {number}\nnearest to refusal: {margin} ({share} of the pool's median)\n"
+            "distance to the edge: {distance}",
+            number=number,
+            margin=label,
+            share=f"{share:.0%}",
+            distance=far,
+        )
         for number, (label, share, far) in enumerate(
             zip(found.label, found.share, edge, strict=True)
         )
@@ -256,8 +264,12 @@ def _refused(pool: PoolData) -> list[Layer]:
     grey = [int(style.REFUSED[k : k + 2], 16) for k in (1, 3, 5)]
     for number in sorted(np.flatnonzero(counts), key=lambda k: -counts[k]):
         name, at = pool.refusal_names[number], pool.sampled[pool.refused_by == number]
-        dots = Dots(at, np.tile(grey, (len(at), 1)), (f"refused: {name}",) * len(at))
-        label = phrase("Refused by {check} ({count})", check=name, count=counts[number])
+        dots = Dots(
+            at,
+            np.tile(grey, (len(at), 1)),
+            (phrase("refused: {check}", check=phrase(name)),) * len(at),
+        )
+        label = phrase("Refused by {check} ({count})", check=phrase(name), count=counts[number])
         layers.append(Layer(label, style.REFUSED, (dots,), shown=False))
     return layers
 
@@ -275,16 +287,24 @@ def _poses(plan: PlanResult, lift: float) -> Tags:
 def _hint(plan: PlanResult, pose: PoseRecord) -> str:
     unit = {check.name: check.unit or "" for check in plan.pool.checks}
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
-    seen = f"seen by {pose.seen_by}" if pose.seen_by else "not seen by a station"
     lines = [
-        f"pose {pose.id}",
-        f"x, y, z: {millimetres(pose.tcp_position)} mm",
-        seen,
-        f"{duration(way)} on the way, {duration(pose.contact_time)} in contact",
-        "margins:",
-        *(f"{n}: {readable(m, unit.get(n, ''))}" for n, m in pose.margins.items()),
+        phrase("pose {pose}", pose=pose.id),
+        phrase("x, y, z: {place} mm", place=millimetres(pose.tcp_position)),
+        phrase("seen by {station}", station=pose.seen_by)
+        if pose.seen_by
+        else phrase("not seen by a station"),
+        phrase(
+            "{way} on the way, {contact} in contact",
+            way=duration(way),
+            contact=duration(pose.contact_time),
+        ),
+        phrase("margins:"),
+        *(
+            sentences((phrase(name), readable(margin, unit.get(name, ""))), ": ")
+            for name, margin in pose.margins.items()
+        ),
     ]
-    return "\\n".join(lines)
+    return sentences(lines, "\n")
 
 
 def _approaches(plan: PlanResult) -> Strokes:
@@ -302,7 +322,9 @@ def _above(pose: PoseRecord, distance: float) -> FloatArray:
 def _tour(cell: Cell, plan: PlanResult) -> tuple[Strokes, Tags]:
     path = _tool_path(cell, plan)
     way = Strokes(np.stack([path[:-1], path[1:]], axis=1), style.TOUR, 2.0)
-    return way, Tags(path[:1], ("HOME",), style.TOUR, ("HOME: where the robot starts and ends",))
+    return way, Tags(
+        path[:1], ("HOME",), style.TOUR, (phrase("HOME: where the robot starts and ends"),)
+    )
 
 
 def _trackers(cell: Cell) -> list[Layer]:
@@ -315,8 +337,13 @@ def _trackers(cell: Cell) -> list[Layer]:
         tuple(station.name for station in stations),
         style.SIGHT,
         tuple(
-            f"{station.name}\\nx, y, z: {millimetres(station.position)} mm\\n"
-            f"range {station.range[0]:g} m to {station.range[1]:g} m"
+            phrase(
+                "{station}\nx, y, z: {place} mm\nrange {near} m to {far} m",
+                station=station.name,
+                place=millimetres(station.position),
+                near=f"{station.range[0]:g}",
+                far=f"{station.range[1]:g}",
+            )
             for station in stations
         ),
     )
@@ -356,7 +383,7 @@ def weakest_margins(pool: PoolData) -> WeakestMargins:
     check = relative.argmin(axis=0)
     column = np.arange(len(check))
     label = tuple(
-        f"{pool.check_names[row]} {readable(float(margin), pool.check_units[row])}"
+        sentences((phrase(pool.check_names[row]), readable(float(margin), pool.check_units[row])))
         for row, margin in zip(check, pool.margin[check, column], strict=True)
     )
     return WeakestMargins(relative[check, column], check, label)

@@ -22,6 +22,7 @@ from matplotlib.collections import Collection, PathCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import Formatter
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import FileAccessError
@@ -317,7 +318,7 @@ def figure_bytes(draw: Callable[[], Figure], suffix: str, dpi: int) -> bytes:
     return buffer.getvalue()
 
 
-def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] = str) -> bytes:
+def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] | None = None) -> bytes:
     """Return a figure as SVG whose greys follow the colour scheme of the page that shows it.
 
     What has very many parts is held as an image in it, without a ground.
@@ -326,14 +327,14 @@ def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] = str) -
     ----------
     draw : callable
         Returns the figure; called with the settings of print.
-    say : callable
-        Returns a text in the language of the page.
+    say : callable, optional
+        Returns a text in the language of the page; by default it is English.
     """
     buffer = io.BytesIO()
     with matplotlib.rc_context(print_settings() | {"savefig.transparent": True}):
         figure = draw()
-        for text in figure.findobj(Text):
-            text.set_text(say(text.get_text()))
+        if say is not None:
+            _translate(figure, say)
         for many in figure.findobj(_has_many_parts):
             many.set_rasterized(True)
         figure.savefig(buffer, format="svg", dpi=_IMAGE_DPI, metadata=_metadata(".svg"))
@@ -342,6 +343,32 @@ def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] = str) -
         svg = svg.replace(colour, f"var(--{name})")
     opened = svg.index(">", svg.index("<svg")) + 1
     return f"{svg[:opened]}<style>{_SCHEMES}</style>{svg[opened:]}".encode()
+
+
+class _Said(Formatter):
+    """Writes the numbers of an axis as another formatter does, in the language of the page."""
+
+    def __init__(self, inner: Formatter, say: Callable[[object], str]) -> None:
+        self._inner, self._say = inner, say
+
+    def set_locs(self, locs: Any) -> None:
+        self._inner.set_locs(locs)
+
+    def get_offset(self) -> str:
+        return self._say(self._inner.get_offset())
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return self._say(self._inner(x, pos))
+
+
+def _translate(figure: Figure, say: Callable[[object], str]) -> None:
+    for text in figure.findobj(Text):
+        text.set_text(say(text.get_text()))
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            for ticker in (axis.major, axis.minor):
+                # Of a fixed text `findobj` has changed what is drawn.
+                ticker.formatter = _Said(ticker.formatter, say)
 
 
 def sequential_stops(count: int = 9) -> list[tuple[float, str]]:

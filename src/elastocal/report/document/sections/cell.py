@@ -192,8 +192,9 @@ def _stations(registration: RegistrationSummary) -> Iterator[blocks.Block]:
             partial(station_figure, residuals),
             phrase("Length of the registration's residual at each pose, for each station"),
             phrase(
-                "Unloaded marker readings against the robot's own position, after the fit of"
-                " station and lever arm."
+                "Unloaded marker readings against the robot's own position, in µm, after the fit of"
+                " station and lever arm: {poses} that were fitted, none held out.",
+                poses=counted(sum(len(each.poses) for each in residuals), "pose"),
             ),
         )
     yield blocks.Paragraph(

@@ -34,9 +34,11 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
             partial(pose_count_figure, curves, evidence.limits.tolerance),
             _alt(curves),
             phrase(
-                "Median over the splits of the mean error at held-out poses; the band holds the"
-                " middle half of the splits. Diamonds: more poses no longer help from there on."
-                " All comparisons in one picture; the paper shows them apart (Fig. 7, 9 and 10)."
+                "Median over {splits} of the mean error in mm at {poses}; the band holds the middle"
+                " half of the splits. Diamonds: more poses no longer help from there on. All"
+                " comparisons in one picture; the paper shows them apart (Fig. 7, 9 and 10).",
+                splits=counted(sets, "split"),
+                poses=counted(size, "held-out pose"),
             ),
         )
     else:

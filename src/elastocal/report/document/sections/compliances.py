@@ -14,7 +14,7 @@ from elastocal.identification.recertification import (
 from elastocal.report.document import blocks
 from elastocal.report.plots import SpringBar, recertification_figure, spring_bars, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
-from elastocal.wording import Phrase, lengths_with_interval, mm, phrase, phrases, sentences
+from elastocal.wording import Phrase, counted, lengths_with_interval, mm, phrase, phrases, sentences
 
 
 def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -24,7 +24,7 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
         return
     settings = found.figures.settings if found.figures else None
     springs = spring_bars(found.model, settings)
-    observable = sum(each.group is None and not each.too_weak for each in springs)
+    observable = sum(each.is_known for each in springs)
     yield _head(found, observable)
     yield from _ladder(found.figures)
     yield blocks.Picture(
@@ -36,13 +36,15 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
             open=len(springs) - observable,
         ),
         phrase(
-            "Filled: known by itself, with its 95 % interval. Hollow: not known by itself; the"
-            " number is the smallest one that explains the readings."
+            "Filled: known by itself, with its 95 % interval ({draws} bootstrap draws of whole"
+            " poses). Hollow: not known by itself; the number is the smallest one that explains the"
+            " readings. All poses were fitted, none held out.",
+            draws=len(found.model.draws),
         ),
     )
     heads = phrases("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
     yield blocks.Table(phrase("Compliances"), heads, tuple(map(_row, springs)), texts=2)
-    yield from _not_told_apart(found)
+    yield from _not_told_apart(found, sum(each.too_weak for each in springs))
     yield from _budget(found.figures)
 
 
@@ -58,7 +60,8 @@ def _row(spring: SpringBar) -> blocks.Row:
         stiff = _NONE
     known = phrase("at its bound") if spring.at_bound else phrase("zero")
     if value != 0.0 and not spring.at_bound:
-        known = phrase("{share}", share=f"±{(spring.high - spring.low) / 2 / abs(value):.0%}")
+        share = (spring.high - spring.low) / 2 / abs(value)
+        known = phrase("within no 100 %") if share > 1.0 else f"±{share:.0%}"
     span = phrase("{low} to {high}", low=f"{spring.low:.3f}", high=f"{spring.high:.3f}")
     return name, known, f"{value:.4f}", span, unit.shown, stiff
 
@@ -140,10 +143,18 @@ def _budget(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
     )
 
 
-def _not_told_apart(found: ModelEvidence) -> Iterator[blocks.Block]:
+def _not_told_apart(found: ModelEvidence, weak: int) -> Iterator[blocks.Block]:
     seen = found.model.observability
     if not seen.unobservable:
-        yield blocks.Paragraph(phrase("Every spring is observable by itself."))
+        yield blocks.Paragraph(
+            phrase(
+                "No spring is hidden behind others; {springs} too weak to see: the readings only"
+                " bound them from above.",
+                springs=counted(weak, "spring"),
+            )
+            if weak
+            else phrase("Every spring is observable by itself.")
+        )
         return
     attainable = found.figures.rank_attainable if found.figures else seen.rank
     missing = attainable - seen.rank

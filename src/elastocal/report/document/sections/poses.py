@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from functools import partial
 
-from elastocal.planning import PlanResult, ProductionRecord
+from elastocal.planning import PlanResult
 from elastocal.report.document import blocks
-from elastocal.report.pages import key_figures
+from elastocal.report.pages import expected_table, key_figures
 from elastocal.report.plots import plan_figure, plan_view
 from elastocal.verdict import Evidence
-from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences, um
+from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
 
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -20,7 +20,8 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     yield blocks.Facts(key_figures(plan))
     yield _spreads(plan)
     if plan.production is not None:
-        yield _expected(plan, plan.production)
+        expected = expected_table(plan, plan.production)
+        yield blocks.Table(expected.caption, expected.heads, expected.rows)
     pictures = tuple(_pictures(evidence, plan))
     yield from pictures or (
         blocks.Paragraph(phrase("Without cell, mesh and pool there is no picture.")),
@@ -83,26 +84,6 @@ def _spreads(plan: PlanResult) -> blocks.Block:
                 f"{spread.o1:.4f}",
             )
             for name, spread in rows
-        ),
-    )
-
-
-def _expected(plan: PlanResult, production: ProductionRecord) -> blocks.Block:
-    """Return the error to expect from some numbers of poses, and what they take."""
-    floor = production.floor
-    return blocks.Table(
-        phrase(
-            "Error to expect on production, planned with sigma {sigma}", sigma=um(production.sigma)
-        ),
-        phrases("Poses", "From noise", "With the model's own", "In the cell"),
-        tuple(
-            (
-                str(each.poses),
-                um(each.noise),
-                phrase("not known") if floor is None else um(each.error),
-                f"{plan.time_of(each.poses) / 60.0:.0f} min",
-            )
-            for each in production.some_expected()
         ),
     )
 

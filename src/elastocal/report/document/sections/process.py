@@ -139,8 +139,7 @@ def _table_1(record: SimulatedProcess) -> Iterator[blocks.Block]:
         yield blocks.Paragraph(
             phrase("Posture (paper 4.3.1): {sentence}.", sentence=table.posture.sentence), "sub"
         )
-    for note in (*_truth(table), *table.notes):
-        yield blocks.Paragraph(note, "sub")
+    yield blocks.Bullets((*_truth(table), *table.notes), "sub")
 
 
 def _means(means: tuple[SeedMeans, ...]) -> blocks.Block:
@@ -237,7 +236,8 @@ def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterato
             course=worst.course,
         ),
         phrase(
-            "The course with the largest deviation, {course}, as in the paper's Fig. 11g.",
+            "Deviation in mm over time of the course with the largest one, {course}, simulated, as"
+            " in the paper's Fig. 11g.",
             course=worst.course,
         ),
     )

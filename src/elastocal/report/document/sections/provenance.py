@@ -9,7 +9,7 @@ from elastocal import __version__
 from elastocal.records import to_data
 from elastocal.report.document import blocks
 from elastocal.verdict import BYTES, Evidence, LinkState
-from elastocal.wording import phrase, phrases
+from elastocal.wording import counted, phrase, phrases
 
 _STATES = {
     LinkState.WHOLE: phrase("whole"),
@@ -17,6 +17,14 @@ _STATES = {
     LinkState.UNSTATED: phrase("not verifiable"),
     LinkState.UNSIGNED: phrase("not signed"),
 }
+_LINKS = {
+    name: name
+    for name in phrases(
+        "signature", "cell and plan", "streams", "journal", "dataset", "summary", "model", "codec",
+        "process", "content",
+    )
+}  # fmt: skip
+"""Links of the chain; any other is a file."""
 _PACKAGES = ("numpy", "scipy", "pin", "xarray", "matplotlib", "plotly")
 
 
@@ -96,16 +104,19 @@ def _seeds(evidence: Evidence) -> Iterator[blocks.Row]:
 def _chain(evidence: Evidence) -> Iterator[blocks.Block]:
     if not evidence.chain:
         return
-    rows = tuple((link.name, _STATES[link.state], link.text) for link in evidence.chain)
-    yield blocks.Heading(phrase("From the streams to this report"))
-    yield blocks.Table(phrase("Links"), phrases("Link", "State", "Found"), rows, texts=3)
+    rows = tuple(
+        (_LINKS.get(link.name, link.name), _STATES[link.state], link.text)
+        for link in evidence.chain
+    )
+    yield blocks.Table(
+        phrase("From the streams to this report"), phrases("Link", "State", "Found"), rows, texts=3
+    )
 
 
 def _files(evidence: Evidence) -> Iterator[blocks.Block]:
     rows = tuple((each.name, blocks.Code(each.sha256), each.of) for each in evidence.files)
-    yield blocks.Heading(phrase("Files"))
-    yield blocks.Table(phrase("Files"), phrases("File", "SHA-256", "Of"), rows, texts=3)
-    yield blocks.Paragraph(
+    table = blocks.Table(phrase("Files"), phrases("File", "SHA-256", "Of"), rows, texts=3)
+    hashed = blocks.Paragraph(
         phrase(
             "Hashes of {bytes} are what sha256sum gives. Files that carry the time of the run, or"
             " the folder it was started in, are hashed without those, so that equal runs have equal"
@@ -114,6 +125,8 @@ def _files(evidence: Evidence) -> Iterator[blocks.Block]:
         ),
         "sub",
     )
+    files = counted(len(rows), "file")
+    yield blocks.Details(phrase("{files} with their SHA-256", files=files), (table, hashed))
 
 
 def _settings(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -126,10 +139,9 @@ def _settings(evidence: Evidence) -> Iterator[blocks.Block]:
         )
         return
     rows = tuple((key, _setting(key, value)) for key, value in blocks.flattened(to_data(settings)))
-    yield blocks.Heading(phrase("Settings"))
-    yield blocks.Table(
-        phrase("Settings of the calibration"), phrases("Key", "Value"), rows, texts=2
-    )
+    caption = phrase("Settings of the calibration")
+    table = blocks.Table(caption, phrases("Key", "Value"), rows, texts=2)
+    yield blocks.Details(caption, (table,))
 
 
 def _setting(key: str, value: str) -> str:

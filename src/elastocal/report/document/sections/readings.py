@@ -49,7 +49,7 @@ def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Blo
     )
     if summary is None:
         return
-    counts = tuple(summary.readings.counts.items())
+    counts = tuple((phrase(status), count) for status, count in summary.readings.counts.items())
     yield blocks.Table(phrase("Readings by status"), phrases("Status", "Readings"), counts)
     yield from _lines(summary.lines)
     lost = tuple(
@@ -57,7 +57,9 @@ def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Blo
             "pose {pose} {load_case}: {status}",
             pose=each.pose,
             load_case=each.load_case,
-            status=f"{each.status} ({each.note})" if each.note else str(each.status),
+            status=phrase("{status} ({note})", status=phrase(each.status.value), note=each.note)
+            if each.note
+            else phrase(each.status.value),
         )
         for each in summary.readings.not_ok
     )
@@ -119,7 +121,12 @@ def _grids(dataset: Dataset, reproduction: Reproduction | None) -> Iterator[bloc
     yield blocks.Picture(
         partial(pose_grid, panels, dataset.poses, dataset.load_cases),
         phrase("Shaded table of poses and load cases: measured deflection and error"),
-        phrase("Each pose under each load case. Bright is large; the two scales differ."),
+        phrase(
+            "Length in mm for each pose under each load case, {readings}. Above what was measured,"
+            " below the error where the pose was left out of the fit. Bright is large; the two"
+            " scales differ.",
+            readings=counted(len(dataset.readings(dataset.joint_names)), "reading"),
+        ),
     )
     tables = tuple(_number_table(dataset, title, values) for title, values in panels)
     yield blocks.Details(phrase("The same numbers as a table"), tables)
@@ -205,26 +212,27 @@ def _load_check(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
         phrase("Check at a load level that was kept out of the fit"),
         phrases(
             "Load case",
+            "Noise from",
             "Readings",
             "Deflection",
             "Error, mean",
             "95 %",
             "Largest",
             "Noise",
-            "Noise from",
         ),
         (
             (
                 ", ".join(check.load_cases),
+                check.source,
                 str(check.readings),
                 mm(check.deflection),
                 mm(check.mean),
                 mm(check.p95),
                 mm(check.max),
                 phrase("not known") if check.noise is None else mm(check.noise),
-                check.source,
             ),
         ),
+        texts=2,
     )
 
 
