@@ -6,6 +6,7 @@
 `machining`  figures of the machining example
 `small`      the k-centre problem, and the streams of one pose
 `budget`     what the error of a calibration is made of
+`notebooks`  the notebooks of the site, run
 `process_figures`  Table 1 over truths and seeds, measured by one command and quoted
 ===========  ====================================================================
 """
