@@ -257,7 +257,9 @@ def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) 
     old = options.old
     new = options.model or reader.folders.model or reader.folders.default(MODEL)
     if old is None:
-        reason = "no earlier calibration was given to compare with, so nothing is known of any change"
+        reason = (
+            "no earlier calibration was given to compare with, so nothing is known of any change"
+        )
         reader.note_missing("earlier calibration", reason)
         return evidence
     if new is None or evidence.calibrated is None:

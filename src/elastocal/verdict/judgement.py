@@ -119,7 +119,9 @@ def _light(
     if tolerance is None:
         return None, []
     if unseen is None:
-        own: list[str] = [phrase("the errors could not be made again from the readings, so they have no interval")]
+        own: list[str] = [
+            phrase("the errors could not be made again from the readings, so they have no interval")
+        ]
         stated = evidence.figures.held_out.max if evidence.figures is not None else 0.0
         if stated <= tolerance:
             return Light.YELLOW, own
@@ -140,9 +142,7 @@ _UNTRUSTED = phrase(
 )
 
 
-def _meaning(
-    evidence: Evidence, light: Light | None, by_the_errors: bool, useless: bool
-) -> Phrase:
+def _meaning(evidence: Evidence, light: Light | None, by_the_errors: bool, useless: bool) -> Phrase:
     """Return what is proved, and what follows for the use of the model."""
     tolerance = mm(evidence.limits.tolerance or 0.0)
     if evidence.calibrated is None:
@@ -171,8 +171,8 @@ def _meaning(
         return sentences([shown, use])
     if evidence.unseen is None:
         return phrase(
-            "Nothing is proved: the errors of this model could not be checked against its readings. Do"
-            " not release it for production."
+            "Nothing is proved: the errors of this model could not be checked against its readings."
+            " Do not release it for production."
         )
     if light is Light.RED:
         return phrase(

@@ -1,6 +1,5 @@
 """The first page of the report: a certificate that prints on one sheet of A4."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,12 +149,13 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
     """Return what is known of the calibration in rows, and what nobody stated."""
     entry, cell = evidence.certificate, evidence.cell
     sensor = None if cell is None else cell.file.sensor
+    named = None if sensor is None else sensor.name
     mass = () if cell is None else (phrase("{mass} kg", mass=f"{cell.file.tool.mass:g}"),)
     things = (
         (phrase("Robot"), entry.robot, evidence.robot, ()),
         (phrase("Controller"), entry.controller, None, ()),
         (phrase("Tool"), entry.tool, None, mass),
-        (phrase("Force sensor"), entry.sensor, sensor and sensor.name, ()),
+        (phrase("Force sensor"), entry.sensor, named, ()),
         (phrase("Tracker"), entry.tracker, None, ()),
     )
     rows, missing = list[_Row](), list[Phrase]()
@@ -222,7 +222,9 @@ def _tested_with(evidence: Evidence) -> Phrase | None:
 def _coverage(found: ProductionCoverage | None) -> Phrase:
     if found is None:
         return phrase("Not known: the cell file names no production path (process.file).")
-    reach = phrase("every joint but the last within {angle}°", angle=f"{np.degrees(JOINT_REACH):.0f}")
+    reach = phrase(
+        "every joint but the last within {angle}°", angle=f"{np.degrees(JOINT_REACH):.0f}"
+    )
     if found.rail is not None:
         rail = phrase("rail within {rail}", rail=mm(RAIL_REACH, 0))
         reach = sentences([reach, rail], ", ")
