@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, UnitError
 from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns, Vector
-from elastocal.logs.recordings import is_recording, read_recording
-from elastocal.logs.table import LogTable, read_text_log, read_workbook
+from elastocal.logs.recordings import is_recording, read_recording, read_workbook
+from elastocal.logs.table import LogTable, read_text_log
 from elastocal.procedure.record import ArmStream, PointStream, WrenchStream
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, nearest_rotation
