@@ -175,10 +175,7 @@ class Prediction(Result):
             ("rows", f"{len(size)}, predicted"),
             ("deflection", f"{mm(float(size.mean()))} mean, {mm(float(size.max()))} max"),
             ("95 % interval of the fit", fit),
-            (
-                "95 % interval of a measurement",
-                measured if known else "not known: nor is the misfit",
-            ),
+            ("95 % interval of a measurement", measured if known else "not known, as the misfit"),
         )
 
 

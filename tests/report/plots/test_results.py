@@ -90,7 +90,7 @@ def test_a_prediction_is_a_table_with_both_intervals(result):
     assert f">{len(found.deflection)}, predicted<" in html
     assert "95 % interval of a measurement" in html
     unsure = replace(found, measured_low=np.full_like(found.low, np.nan))
-    assert "not known: nor is the misfit" in repr(unsure)
+    assert "not known, as the misfit" in repr(unsure)
     assert "95 % interval of the fit: ±" in repr(unsure)
 
 

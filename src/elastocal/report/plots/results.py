@@ -211,8 +211,8 @@ def _calibration(result: CalibrateResult) -> Figure:
     if figures is not None:
         held = figures.held_out
         about = (
-            f"{counted(figures.readings, 'reading')} at {counted(figures.poses, 'pose')}, deflection"
-            f" {mm(figures.deflection.mean)} mean; error at left-out poses {mm(held.mean)} mean,"
+            f"{counted(figures.readings, 'reading')} at {counted(figures.poses, 'pose')},"
+            f" deflection {mm(figures.deflection.mean)} mean; error at left-out poses {mm(held.mean)} mean,"
             f" {mm(held.max)} max ({counted(held.folds, 'refit')})"
         )
     settings = None if figures is None else figures.settings
