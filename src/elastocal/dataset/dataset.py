@@ -82,8 +82,7 @@ class Dataset(Result):
     status: StatusArray
     """Index into ``STATUSES`` of each reading, shape (pose, load_case)."""
     marker_displacement: FloatArray | None = None
-    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; None: there
-    was no metrology."""
+    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; None: none."""
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (pose, load_case, 3), in N·m."""
     force_sigma: FloatArray | None = None

@@ -210,10 +210,11 @@ def _calibration(result: CalibrateResult) -> Figure:
     about = "how it was calibrated is not known"
     if figures is not None:
         held = figures.held_out
+        readings, poses = counted(figures.readings, "reading"), counted(figures.poses, "pose")
         about = (
-            f"{counted(figures.readings, 'reading')} at {counted(figures.poses, 'pose')},"
-            f" deflection {mm(figures.deflection.mean)} mean; error at left-out poses {mm(held.mean)} mean,"
-            f" {mm(held.max)} max ({counted(held.folds, 'refit')})"
+            f"{readings} at {poses}, deflection {mm(figures.deflection.mean)} mean; error at"
+            f" left-out poses {mm(held.mean)} mean, {mm(held.max)} max"
+            f" ({counted(held.folds, 'refit')})"
         )
     settings = None if figures is None else figures.settings
     bars = spring_bars(calibrated, settings)
