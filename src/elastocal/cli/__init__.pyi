@@ -12,6 +12,7 @@ from .options import (
     Marker as Marker,
     NewTool as NewTool,
     NewToolOrFile as NewToolOrFile,
+    PageLanguage as PageLanguage,
     Payload as Payload,
     PayloadCentre as PayloadCentre,
     RobotName as RobotName,

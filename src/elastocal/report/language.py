@@ -28,8 +28,10 @@ _PLACE = re.compile(r"\{(\w+)\}")
 _LETTER = re.compile("[A-Za-z]")
 _WORDS = re.compile(r"[A-Za-z]{2,}[,:;]? [A-Za-z(]{2,}|^\d+ [a-z]{3,}")
 """What a text has that may be a phrase: two words, or a count with its noun."""
-_SENTENCE = re.compile(r"\b[a-z]{2,}(?:[ ,:;]+[a-z]{2,}){3,}")
-"""What is no name: four small words, one after the other."""
+_SENTENCE = re.compile(
+    r"\b(?:a|an|and|are|as|by|from|has|is|no|not|of|on|that|the|to|was|with)\b(?=.* .* )"
+)
+"""What is no name: a small word of English, and two words after it."""
 _LEAST_LETTERS = 10
 """Letters that a template must have, or too much would look like it."""
 

@@ -1,6 +1,6 @@
 """The report of a calibrated geometry: one HTML file that runs no script."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,7 +10,7 @@ import numpy as np
 from elastocal import __version__
 from elastocal.arrays import FloatArray
 from elastocal.files import write_text
-from elastocal.geometry import GeometryAccuracy, GeometryModel, LinkNumber
+from elastocal.geometry import GeometryAccuracy, GeometryModel, LinkNumber, PoseAccuracy
 from elastocal.report.document import blocks
 from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages import render
@@ -218,9 +218,15 @@ def _iso(found: GeometryFindings) -> Iterator[blocks.Block]:
             " {fewest}; the standard asks for 30 visits of five poses at stated speed and load,"
             " which the table does not say. Where joints are those measured at the time, and not"
             " commanded, the scatter of the drives is not in RP.",
-poses=counted(len(poses), 'pose'),
-fewest=counted(fewest, 'visit')), "sub",
-    )  # fmt: skip
+            poses=counted(len(poses), "pose"),
+            fewest=counted(fewest, "visit"),
+        ),
+        "sub",
+    )
+    yield _poses_table(poses)
+
+
+def _poses_table(poses: Sequence[PoseAccuracy]) -> blocks.Block:
     rows: tuple[blocks.Row, ...] = tuple(
         (
             phrase("row {row}", row=each.row),
@@ -236,7 +242,7 @@ fewest=counted(fewest, 'visit')), "sub",
         "RP",
     )
     table = blocks.Table(phrase("By pose in mm, the least repeatable first"), heads, rows, texts=2)
-    yield blocks.Details(f"All poses ({len(rows)})", (table,), "long")
+    return blocks.Details(phrase("All poses ({count})", count=len(rows)), (table,), "long")
 
 
 def _errors(found: GeometryFindings) -> Iterator[blocks.Block]:
