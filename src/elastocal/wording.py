@@ -150,7 +150,7 @@ def lengths_with_interval(
         return phrase("not known"), ""
     if low is None or high is None:
         return mm(value), ""
-    return mm(value), f"{1e3 * low:.3f} to {1e3 * high:.3f}"
+    return mm(value), phrase("{low} to {high}", low=f"{1e3 * low:.3f}", high=f"{1e3 * high:.3f}")
 
 
 def mm(metres: float, digits: int = 3) -> str:
@@ -225,5 +225,10 @@ def spans(numbers: Sequence[int]) -> str:
             runs[-1].append(number)
         else:
             runs.append([number])
-    texts = (f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs)
-    return ", ".join(texts)
+    texts = [
+        phrase("{low} to {high}", low=run[0], high=run[-1])
+        if len(run) > 2
+        else ", ".join(map(str, run))
+        for run in runs
+    ]
+    return sentences(texts, ", ")

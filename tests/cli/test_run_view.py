@@ -74,3 +74,36 @@ def test_what_is_gone_is_left_alone(capfd, terminal):
     # Standard output is still there for data.
     print("data")
     assert capfd.readouterr().out == "data\n"
+
+
+class Answers(io.StringIO):
+    """What a person types on a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def identified(monkeypatch, typed, asks=True, stdin=Answers):
+    monkeypatch.setattr("sys.stdin", stdin(typed))
+    shown = io.StringIO()
+    operator = run_view.TerminalOperator(Console(file=shown, width=100), asks)
+    missing = ("operator", "robot.serial", "sensor.uncertainty")
+    return operator.identify(missing), shown.getvalue()
+
+
+class TestIdentify:
+    """What the certificate lacks is asked for on a terminal, one line each."""
+
+    def test_answers_are_taken_and_an_empty_line_leaves_one_out(self, monkeypatch):
+        found, shown = identified(monkeypatch, "M. Weber\n\n")
+        assert found == {"operator": "M. Weber"}
+        assert "robot, serial: " in shown
+
+    def test_an_answer_that_is_none_is_asked_for_again(self, monkeypatch):
+        found, shown = identified(monkeypatch, "\nKR-1\nmuch\n2 N\n")
+        assert found["robot.serial"] == "KR-1"
+        assert shown.count("sensor, uncertainty: ") == 2
+
+    @pytest.mark.parametrize(("asks", "stdin"), [(False, Answers), (True, io.StringIO)])
+    def test_nobody_is_asked_without_a_terminal_or_when_told_not_to(self, monkeypatch, asks, stdin):
+        assert identified(monkeypatch, "M. Weber\n", asks, stdin) == ({}, "")

@@ -20,6 +20,7 @@ from elastocal.progress import silent
 from elastocal.robot import T_from_xyzabc, catalogue
 from support.cli import elastocal
 from support.measured_arms import ARMS, MARKERS, kuka, measure, universal, write_positions
+from support.pages import english_left
 
 
 def ladder(data, robot):
@@ -148,6 +149,13 @@ def test_report_and_table_say_what_was_found(tmp_path):
         "What they go together with",
     ):
         assert expected in text, expected
+    again = elastocal(
+        *command, "--report", page, "--language", "de"
+    )  # it knows its page in English
+    assert again.code == 0
+    text = page.read_text(encoding="utf-8")
+    assert english_left(text) == []
+    assert "<title>Geometriebericht: KR 210 R2700-2</title>" in text
     rows = table.read_text(encoding="utf-8").splitlines()
     assert rows[0] == "joint,number,unit,nominal,calibrated,difference,low,high"
     a2 = next(row.split(",") for row in rows if row.startswith("joint_a2,a,mm"))

@@ -134,6 +134,47 @@ def test_what_is_no_phrase_stays_but_for_its_decimal_sign():
     assert language_of("en").say("1.5, 2.0") == "1.5, 2.0"
 
 
+class TestTextsFromFiles:
+    """A file holds the English sentence alone; the phrase is found again by its words."""
+
+    german = language_of("de")
+
+    def test_a_warning_is_said_in_german_with_its_values(self):
+        text = "dome.stl is an open mesh with 128 edges at its border; the contact disk keeps away"
+        said = self.german.say(f"{text} from them")
+        assert said.startswith("dome.stl ist ein offenes Netz mit 128 Kanten am Rand")
+
+    def test_phrases_within_it_are_said_too(self):
+        kept = str(phrase("{first} (and {more} more of this kind)", first=REPEATED, more=4))
+        assert self.german.say(kept) == (
+            "Posen 3, 4 sind eine Stellung: gemeinsam gezogen und ausgelassen"
+            " (und 4 weitere dieser Art)"
+        )
+        assert self.german.say("7 poses cannot show that a tracker station was bumped by less than"
+                               " about 2 mm (some thirty show 0.3 mm): see that nobody touches its"
+                               " stand").startswith("7 Posen können nicht zeigen")  # fmt: skip
+
+    def test_every_long_phrase_is_found_again(self):
+        for template in ALL:
+            names = PLACE.findall(template)
+            made = phrase(template, **{name: f"<{name}>" for name in names})
+            if len(template) > 60 and "number" not in names:
+                assert self.german.say(str(made)) == self.german.say(made), template
+
+    def test_what_is_none_of_ours_stays_and_is_marked_as_english(self):
+        text = "the fixture of bay 7 was moved by hand & put back"
+        assert self.german.say(text) == text
+        assert str(self.german.markup(text)) == (
+            '<span lang="en">the fixture of bay 7 was moved by hand &amp; put back</span>'
+        )
+        assert str(language_of("en").markup(text)).startswith("the fixture of bay 7")
+        for name in ("KR 120 R2700 extra HA", "rail, joint_a1, joint_a2", "normal, north, south"):
+            assert str(self.german.markup(name)) == name
+
+
+REPEATED = "poses 3, 4 are one configuration: resampled and left out together"
+
+
 def test_an_unknown_language_is_refused_with_those_that_there_are():
     with pytest.raises(ReportError, match="--language it: is not one of en, de, fr"):
         language_of("it")

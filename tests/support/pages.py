@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import re
 from html.parser import HTMLParser
 
 
@@ -36,3 +37,52 @@ class Page(HTMLParser):
 
     def count(self, tag):
         return sum(name == tag for name, _ in self.tags)
+
+
+class _Texts(HTMLParser):
+    """Collects what is read aloud: text nodes and labels, each with the language it is in."""
+
+    silent = ("script", "style", "code", "pre")
+    empty = ("meta", "img", "br", "input", "path", "rect", "circle", "stop", "line")
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.found = [], []
+
+    def handle_starttag(self, tag, attrs):
+        told = dict(attrs)
+        if tag not in self.empty:
+            self.open.append((tag, told.get("lang")))
+        self.found += [(self.language, told[key]) for key in ("aria-label", "alt") if told.get(key)]
+
+    def handle_startendtag(self, tag, attrs):
+        pass
+
+    def handle_endtag(self, tag):
+        while self.open and self.open.pop()[0] != tag:
+            pass
+
+    @property
+    def language(self):
+        return next((code for _, code in reversed(self.open) if code), "")
+
+    def handle_data(self, data):
+        text = " ".join(data.split())
+        if text and not any(tag in self.silent for tag, _ in self.open):
+            self.found.append((self.language, text))
+
+
+def texts_of(page):
+    """Return language and text of everything on a page that a person reads."""
+    reader = _Texts()
+    reader.feed(page)
+    return reader.found
+
+
+_ENGLISH = re.compile(r"\b(?:and|are|by|from|has|is|not|of|that|the|to|were|with)\b")
+"""Small words that neither German nor a name has."""
+
+
+def english_left(page):
+    """Return the texts of a page in another language that are English and not marked so."""
+    return [text for code, text in texts_of(page) if code != "en" and _ENGLISH.search(text)]

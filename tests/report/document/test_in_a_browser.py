@@ -1,4 +1,4 @@
-"""Report and plan page in a real browser, without a network: nothing fails, everything is seen.
+"""Pages in a real browser, without a network: nothing fails, everything is seen.
 
 Screenshots go to the folder that the environment names in ``ELASTOCAL_ARTEFACTS``.
 """
@@ -10,12 +10,14 @@ from pathlib import Path
 
 import pytest
 
+import elastocal as ec
 from elastocal.errors import FileAccessError
 from elastocal.report import LANGUAGES, language_of, write_plan_page
 from elastocal.report.document import find_browser, open_tab, write_pdf, write_report
 from elastocal.report.pages import templating
 from elastocal.verdict import Evidence
 from support.browser import Look, look
+from support.measured_arms import kuka, measure, write_positions
 from support.pages import with_script
 from support.reported import MADE
 
@@ -44,11 +46,23 @@ def plan(parts, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def pages(browser, report, plan):
-    """What is seen of both pages, the appendix unfolded."""
+def geometry(tmp_path_factory):
+    """In German, whose words are long; the report is looked at in English."""
+    folder = tmp_path_factory.mktemp("geometry")
+    path = write_positions(folder / "positions.csv", measure(kuka(), 40, blunders=2))
+    page = folder / "report.html"
+    ec.geometry(path, robot="KR 210 R2700-2", tcp="flange", draws=40, report_file=page,
+                language="de")  # fmt: skip
+    return page
+
+
+@pytest.fixture(scope="module")
+def pages(browser, report, plan, geometry):
+    """What is seen of the pages, the appendix unfolded."""
     found = {
         "report": look(browser, report, LOOKS, before="document.getElementById('unfold').click()"),
         "plan": look(browser, plan, LOOKS),
+        "geometry": look(browser, geometry, LOOKS, before=UNFOLDED),
     }
     artefacts = os.environ.get("ELASTOCAL_ARTEFACTS")
     for name, seen in found.items():
@@ -59,7 +73,10 @@ def pages(browser, report, plan):
     return found
 
 
-@pytest.fixture(params=("report", "plan"))
+UNFOLDED = "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
+
+
+@pytest.fixture(params=("report", "plan", "geometry"))
 def seen(request, pages):
     return pages[request.param]
 
@@ -86,6 +103,8 @@ def test_the_page_does_not_scroll_sideways(frame):
 
 def test_the_view_in_three_dimensions_is_drawn_in_the_colours_of_the_page(frame):
     view = frame["view"]
+    if view is None:
+        pytest.skip("a page without a view")
     assert view["colours"] > 100
     assert view["layers"] > 5
     assert view["width"] > 100
@@ -93,9 +112,15 @@ def test_the_view_in_three_dimensions_is_drawn_in_the_colours_of_the_page(frame)
     assert view["ground"] == ([0x1D, 0x20, 0x23] if frame["dark"] else [0xF6, 0xF6, 0xF3])
 
 
-def test_every_picture_shows_something(pages):
-    for frame in pages["report"].frames.values():
-        assert len(frame["images"]) >= 6
+def test_report_and_plan_have_a_view(pages):
+    for name in ("report", "plan"):
+        assert all(frame["view"] for frame in pages[name].frames.values())
+
+
+@pytest.mark.parametrize(("name", "least"), [("report", 6), ("geometry", 2)])
+def test_every_picture_shows_something(pages, name, least):
+    for frame in pages[name].frames.values():
+        assert len(frame["images"]) >= least
         for image in frame["images"]:
             assert image["width"] > 300, image
             assert image["colours"] > 20, image
@@ -137,6 +162,59 @@ def keys(browser, report):
         found["unfolded"] = tab.evaluate("document.getElementById('findings').open")
         found["stays"] = tab.evaluate("document.querySelector('nav').getBoundingClientRect().top")
     return found
+
+
+@pytest.fixture(scope="module")
+def reached(browser, plan, geometry):
+    """What the keyboard reaches on the plan's page, and how many sheets both pages print on."""
+    with open_tab(browser) as tab:
+        tab.open(plan)
+        tab.evaluate("new Promise((done) => setTimeout(done, 300))")
+        found = {"first": tab.evaluate("document.querySelector('a').getAttribute('href')")}
+        tab.evaluate("document.querySelector('#pose-table tbody tr:nth-child(2) button').focus()")
+        press(tab, "Enter")
+        found["chosen"] = tab.evaluate("document.getElementById('shown').textContent")
+        tab.evaluate("document.getElementById('view').focus()")
+        for _ in range(40):
+            press(tab, "ArrowDown")
+        found["low"] = tab.evaluate("document.getElementById('view').shown.eyeHeight()")
+        found["floor"] = tab.evaluate("document.getElementById('view').shown.floor")
+        found["deaf"] = tab.evaluate(DEAF)
+        found["plan"] = sheets_of(tab)
+        tab.open(geometry)
+        found["geometry"] = sheets_of(tab)
+        tab.evaluate("document.querySelector('.skip').focus()")
+        press(tab, "Enter")
+        found["skipped"] = tab.evaluate("document.activeElement.id")
+    return found
+
+
+DEAF = """[...document.querySelectorAll("button, input, a[href]")].filter((each) => {
+  each.focus();
+  const named = each.textContent || each.ariaLabel || each.labels?.length;
+  return document.activeElement !== each || !named;
+}).length"""
+"""How many controls the keyboard does not reach, or have no name."""
+
+
+def sheets_of(tab):
+    printed = tab.call("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
+    return base64.b64decode(printed["data"]).count(b"/Type /Page\n")
+
+
+class TestPlanAndGeometry:
+    def test_the_keyboard_reaches_everything_and_chooses_poses(self, reached):
+        assert reached["first"] == "#poses"
+        assert reached["chosen"].startswith("Pose 1:")
+        assert reached["deaf"] == 0
+        assert reached["skipped"] == "result"
+
+    def test_the_camera_stays_above_the_floor(self, reached):
+        assert reached["low"] > reached["floor"]
+
+    def test_both_print_on_a_few_sheets(self, reached):
+        assert 1 <= reached["plan"] <= 4
+        assert 3 <= reached["geometry"] <= 14
 
 
 DRAWN = "Boolean(document.getElementById('view').shown)"

@@ -12,6 +12,7 @@ from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.errors import FileAccessError
 from elastocal.procedure import file_sha256
+from elastocal.report import language_of, write_plan_page
 from elastocal.report.document import (
     SECTIONS,
     write_report,
@@ -22,6 +23,7 @@ from elastocal.verdict import (
     MissingPart,
     gather_evidence,
 )
+from support.pages import english_left, texts_of
 from support.reported import MADE
 
 LATER = "2027-08-09T10:11:12+00:00"
@@ -149,3 +151,30 @@ def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path):
     with pytest.raises(FileAccessError, match="cannot write"):
         write_report(tmp_path / "no" / "p.html", Evidence(made=MADE))
     assert not list(tmp_path.iterdir())
+
+
+class TestInGerman:
+    """No English sentence is left on a page in German that is not marked as English."""
+
+    german = language_of("de")
+
+    def test_the_report(self, parts, tmp_path):
+        page = write_report(tmp_path / "de.html", parts, language=self.german).path
+        text = page.read_text("utf-8")
+        assert english_left(text) == []
+        assert len(texts_of(text)) > 1000
+        # The data of the view are said too: hints, layers, cameras.
+        assert "nearest to refusal" not in text
+
+    def test_the_plan(self, parts, tmp_path):
+        path = tmp_path / "plan.html"
+        write_plan_page(path, parts.cell, parts.surface, parts.plan, parts.pool, self.german)
+        text = path.read_text("utf-8")
+        assert english_left(text) == []
+        assert "<title>Kalibrierplan: " in text
+        assert "liegen" in text or "Posen, gewählt mit" in text
+
+    def test_what_the_test_looks_for_is_there_in_english(self, parts, tmp_path):
+        page = write_report(tmp_path / "en.html", parts).path
+        text = page.read_text("utf-8").replace('<html lang="en"', '<html lang="de"')
+        assert len(english_left(text)) > 50

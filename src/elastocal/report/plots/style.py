@@ -375,7 +375,8 @@ def _translate(figure: Figure, say: Callable[[object], str]) -> None:
         for axis in (axes.xaxis, axes.yaxis):
             for ticker in (axis.major, axis.minor):
                 # Of a fixed text `findobj` has changed what is drawn.
-                ticker.formatter = _Said(ticker.formatter, say)
+                if ticker.formatter is not None:
+                    ticker.formatter = _Said(ticker.formatter, say)
 
 
 def sequential_stops(count: int = 9) -> list[tuple[float, str]]:

@@ -58,7 +58,7 @@ def _row(spring: SpringBar) -> blocks.Row:
     stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else phrase("rigid")
     if not unit.stiffness or value < 0.0:
         stiff = _NONE
-    known = phrase("at its bound") if spring.at_bound else phrase("zero")
+    known: str = phrase("at its bound") if spring.at_bound else phrase("zero")
     if value != 0.0 and not spring.at_bound:
         share = (spring.high - spring.low) / 2 / abs(value)
         known = phrase("within no 100 %") if share > 1.0 else f"±{share:.0%}"

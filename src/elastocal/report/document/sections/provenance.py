@@ -17,7 +17,7 @@ _STATES = {
     LinkState.UNSTATED: phrase("not verifiable"),
     LinkState.UNSIGNED: phrase("not signed"),
 }
-_LINKS = {
+_LINKS: dict[str, str] = {
     name: name
     for name in phrases(
         "signature", "cell and plan", "streams", "journal", "dataset", "summary", "model", "codec",
