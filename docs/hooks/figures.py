@@ -26,7 +26,7 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / ".cache" / "figures"
-PROCESSES = (("placement",), ("machining", "small", "budget", "studio"))
+PROCESSES = (("placement",), ("machining", "small", "budget", "demos", "studio"))
 """Modules of ``gallery``, by the process that runs them."""
 TOLD = "told.json"
 _PACKAGES = ("numpy", "scipy", "pin", "matplotlib", "plotly")

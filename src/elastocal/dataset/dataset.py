@@ -58,7 +58,8 @@ class Dataset:
     Raises
     ------
     DatasetError
-        If the data break the contract of docs/reference/files.md; the message names the place.
+        If the data break the contract of docs/reference/files/dataset.md; the message names the
+        place.
     SchemaError
         If the schema is not known.
     """

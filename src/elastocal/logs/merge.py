@@ -284,8 +284,7 @@ def _warnings(
         )
     if not registration.stations and not registration.unregistered:
         found.append(
-            "no log holds a marker: the dataset has no marker displacement, and springs need"
-            " `calibrate --contact`"
+            "no log holds a marker: the dataset has no marker displacement, which `calibrate` needs"
         )
     elif registration.undetermined_lever:
         axes = ", ".join(registration.undetermined_lever)
