@@ -29,8 +29,8 @@ def test_a_report_is_written_and_its_verdict_is_told(finished, tmp_path):
     assert result.code == 0, result.err
     assert result.out == ""
     told = " ".join(result.err.split())
-    assert "At poses that the fit had not seen" in told
-    assert "The tolerance is 0.300 mm (of the cell file)" in told
+    assert f"made from the other {reported.POSES - 1}" in told
+    assert "The tolerance is 0.300 mm (set in the cell file)" in told
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 

@@ -114,7 +114,7 @@ class ReportResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (
-            (f"{self.verdict.word}{self.light}", self.verdict.sentence),
+            (f"{self.verdict.word}{self.light}", f"{self.verdict.meaning} {self.verdict.sentence}"),
             *(("because", reason) for reason in self.verdict.reasons),
             ("written to", self.files),
         )
@@ -197,7 +197,7 @@ def _figures(
         pdf=str(paper) if paper else None,
         xlsx=str(tables) if tables else None,
         light=verdict.light.value if verdict.light else None,
-        verdict=verdict.sentence,
+        verdict=f"{verdict.meaning} {verdict.sentence}",
         reasons=tuple(verdict.reasons),
         advice=tuple(verdict.advice),
         tolerance=evidence.limits.tolerance,

@@ -22,7 +22,7 @@ from elastocal.verdict import (
     judge_evidence,
     manifest_of,
 )
-from elastocal.wording import phrase
+from elastocal.wording import Phrase, phrase
 
 _EXPORTED = (getattr(exported, name) for name in dir(exported))
 SECTIONS: tuple[Section, ...] = tuple(
@@ -73,7 +73,7 @@ def write_report(
     page = render(
         "report.html",
         language,
-        title=phrase("Calibration certificate: {name}", name=evidence.name),
+        title=_title(evidence),
         styles=("page.css", "report.css"),
         scripts=("view.js", "report.js"),
         data=data,
@@ -87,6 +87,12 @@ def write_report(
     manifest = manifest_of(page, evidence, verdict, __version__, sign)
     write_text(path, embed_manifest(page, manifest))
     return WrittenReport(Path(path), verdict)
+
+
+def _title(evidence: Evidence) -> Phrase:
+    if evidence.simulated:
+        return phrase("Simulation, not a calibration of a robot: cell {name}", name=evidence.name)
+    return phrase("Calibration certificate: {name}", name=evidence.name)
 
 
 def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
