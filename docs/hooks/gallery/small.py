@@ -64,7 +64,7 @@ def _k_centre(folder: Path) -> dict[str, str]:
 
 def _draw_k_centre(points: np.ndarray, found: dict[str, tuple[np.ndarray, float]]) -> Figure:
     figure = new_figure(9.0, 3.6)
-    panels = figure.subplots(1, 2)
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes, (name, (chosen, radius)) in zip(panels, found.items(), strict=True):
         axes.scatter(*points.T, s=18, c=style.SKY, lw=0)
         axes.scatter(*points[chosen].T, s=45, c=style.INK, lw=0, zorder=3)
@@ -73,7 +73,7 @@ def _draw_k_centre(points: np.ndarray, found: dict[str, tuple[np.ndarray, float]
             axes.update_datalim([centre - radius, centre + radius])
         axes.set_title(f"{name}: largest distance {radius:.3f}")
         axes.autoscale_view()
-        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_aspect("equal")
         axes.set_axis_off()
     figure.subplots_adjust(left=0.01, right=0.99, top=0.9, bottom=0.01, wspace=0.02)
     return figure
@@ -196,5 +196,5 @@ def _draw_streams(cell: Cell, streams: Streams, commit: PoseLog) -> Figure:
     for axes, corner in ((upper, "lower left"), (lower, "lower right")):
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(loc=corner, fontsize=8, framealpha=1.0)
-    figure.subplots_adjust(left=0.08, right=0.97, top=0.86, bottom=0.1, hspace=0.08)
+    figure.subplots_adjust(left=0.09, right=0.97, top=0.86, bottom=0.1, hspace=0.08)
     return figure
