@@ -41,6 +41,7 @@ from .recordings import (
     is_recording as is_recording,
     read_recording as read_recording,
     read_topics as read_topics,
+    read_workbook as read_workbook,
 )
 from .streams import (
     LogStreams as LogStreams,
@@ -54,5 +55,4 @@ from .streams import (
 from .table import (
     LogTable as LogTable,
     read_text_log as read_text_log,
-    read_workbook as read_workbook,
 )

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, UnitError
 from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns, Vector
-from elastocal.logs.recordings import is_recording, read_recording
-from elastocal.logs.table import LogTable, read_text_log, read_workbook
+from elastocal.logs.recordings import is_recording, read_recording, read_workbook
+from elastocal.logs.table import LogTable, read_text_log
 from elastocal.procedure.record import ArmStream, PointStream, WrenchStream
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, nearest_rotation
@@ -27,6 +27,7 @@ _LARGEST_GAP = (20e-3, np.radians(2.0))
 that is not calibrated is off by some millimetres, another frame by more."""
 _BEYOND_LIMITS = 0.2
 """Share of a joint's travel by which a log may be outside its limits."""
+_ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
 _K = 2.0
 """Coverage factor of a 95 % uncertainty."""
 
@@ -180,15 +181,13 @@ def _joined(parts: Sequence[LogStreams]) -> LogStreams:
         each = [stream for stream in streams if stream is not None]
         return joined_streams(each) if each else None
 
-    words = None
-    if first.handshake is not None:
-        words = tuple(word for part in parts for word in part.handshake or ())
+    words = tuple(word for part in parts for word in part.handshake or ())
     return LogStreams(
         first.entry.log,
         first.entry.clock or first.entry.log,
         first.entry,
         np.concatenate([part.time for part in parts]),
-        words,
+        words if first.handshake is not None else None,
         chain(part.arm for part in parts),
         chain(part.wrench for part in parts),
         chain(part.points for part in parts),
@@ -225,9 +224,12 @@ def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> Ar
     if missing:
         raise LogError(f"{table.name}: no column is mapped to joint {', '.join(missing)}")
     _require_within_limits(table.name, q, robot)
-    T = robot.forward(q)
     if entry.pose is not None:
-        T = _stated_poses(entry, table, T)
+        return ArmStream(time, q, _stated_poses(entry, table, q, robot))
+    T: FloatArray = np.empty((len(q), 4, 4))
+    for start in range(0, len(q), _ROWS_AT_A_TIME):
+        rows = slice(start, start + _ROWS_AT_A_TIME)
+        T[rows] = robot.forward(q[rows])
     return ArmStream(time, q, T)
 
 
@@ -281,7 +283,7 @@ def _require_within_limits(name: str, q: FloatArray, robot: Robot) -> None:
         )
 
 
-def _stated_poses(entry: LogEntry, table: LogTable, T_joints: FloatArray) -> FloatArray:
+def _stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) -> FloatArray:
     """Return the tool frames that a log states, shape (row, 4, 4), if they are of the tcp.
 
     Raises
@@ -292,17 +294,21 @@ def _stated_poses(entry: LogEntry, table: LogTable, T_joints: FloatArray) -> Flo
     assert entry.pose is not None
     position = _vectors(table, entry.pose.position, "length")
     angles = _vectors(table, entry.pose.angles, "angle")
-    known = np.asarray(np.isfinite(np.hstack([position, angles])).all(axis=1))
+    known = np.asarray(np.isfinite(position).all(axis=1) & np.isfinite(angles).all(axis=1))
     if not known.any():
         raise LogError(f"{table.name}: no row states the whole tool frame")
     T: FloatArray = np.full((len(table), 4, 4), np.nan)
-    T[known] = np.eye(4)
-    T[known, :3, :3] = Rotation.from_euler("ZYX", angles[known]).as_matrix()
-    T[:, :3, 3] = position
-    gap = np.linalg.norm(position - T_joints[:, :3, 3], axis=1)
-    relative = np.swapaxes(T_joints[known, :3, :3], 1, 2) @ T[known, :3, :3]
-    turn = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
-    worst = float(np.nanmedian(gap)), float(np.median(turn))
+    gap, turn = np.empty(len(table)), np.full(len(table), np.nan)
+    for start in range(0, len(table), _ROWS_AT_A_TIME):
+        rows = slice(start, start + _ROWS_AT_A_TIME)
+        T_joints, whole = robot.forward(q[rows]), np.flatnonzero(known[rows]) + start
+        T[whole, 3] = (0.0, 0.0, 0.0, 1.0)
+        T[whole, :3, :3] = Rotation.from_euler("ZYX", angles[whole]).as_matrix()
+        T[rows, :3, 3] = position[rows]
+        gap[rows] = np.linalg.norm(position[rows] - T_joints[:, :3, 3], axis=1)
+        relative = np.swapaxes(T_joints[known[rows], :3, :3], 1, 2) @ T[whole, :3, :3]
+        turn[whole] = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
+    worst = float(np.nanmedian(gap)), float(np.median(turn[known]))
     if not (worst[0] <= _LARGEST_GAP[0] and worst[1] <= _LARGEST_GAP[1]):
         raise LogError(
             f"{table.name}: the logged tool frame lies {1e3 * worst[0]:.4g} mm and"
