@@ -1,6 +1,7 @@
 """One catalogue a language: every phrase of the program in it, and nothing else."""
 
 import ast
+import functools
 import json
 import re
 from pathlib import Path
@@ -20,12 +21,14 @@ CATALOGUES = {
     for code in LANGUAGES
     if code != "en"
 }
-TREES = {
-    path: ast.parse(path.read_text(encoding="utf-8"))
-    for path in SOURCE.rglob("*.py")
-    if "phrase" in path.read_text(encoding="utf-8")
-}
 PLACE = re.compile(r"\{(\w+)\}")
+
+
+@functools.cache
+def trees():
+    """Return what is parsed of every source that has a phrase."""
+    texts = {path: path.read_text(encoding="utf-8") for path in SOURCE.rglob("*.py")}
+    return {path: ast.parse(text) for path, text in texts.items() if "phrase" in text}
 
 
 def constants(node):
@@ -39,7 +42,7 @@ def constants(node):
 
 def phrases_of_the_program():
     found = set()
-    for tree in TREES.values():
+    for tree in trees().values():
         for node in ast.walk(tree):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args):
                 continue
@@ -62,7 +65,7 @@ def phrases_of_the_program():
 def counts_of_the_pages():
     """Return the templates of numbers with a noun, where a phrase may hold them."""
     nouns = set()
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         calls = [
             node
             for node in ast.walk(tree)
@@ -89,16 +92,20 @@ CHECKS = {UNREACHABLE} | {
 }
 """What may refuse a candidate: names in files, words on a page."""
 STATUSES = {status.value for status in ReadingStatus}
-ALL = phrases_of_the_program() | counts_of_the_pages() | LIGHTS | CHECKS | STATUSES
+
+
+@functools.cache
+def all_phrases():
+    return phrases_of_the_program() | counts_of_the_pages() | LIGHTS | CHECKS | STATUSES
 
 
 @pytest.mark.parametrize("code", CATALOGUES)
 class TestEveryCatalogue:
     def test_it_has_every_phrase(self, code):
-        assert sorted(ALL - CATALOGUES[code].keys()) == []
+        assert sorted(all_phrases() - CATALOGUES[code].keys()) == []
 
     def test_it_has_no_phrase_that_nobody_says(self, code):
-        assert sorted(CATALOGUES[code].keys() - ALL) == []
+        assert sorted(CATALOGUES[code].keys() - all_phrases()) == []
 
     def test_every_value_has_its_place(self, code):
         for english, other in CATALOGUES[code].items():
@@ -115,7 +122,7 @@ class TestEveryCatalogue:
 
 
 def test_there_are_hundreds_of_phrases():
-    assert len(ALL) > 300
+    assert len(all_phrases()) > 300
 
 
 def test_a_phrase_within_a_phrase_is_said_too():
@@ -155,7 +162,7 @@ class TestTextsFromFiles:
                                " stand").startswith("7 Posen können nicht zeigen")  # fmt: skip
 
     def test_every_long_phrase_is_found_again(self):
-        for template in ALL:
+        for template in all_phrases():
             names = PLACE.findall(template)
             made = phrase(template, **{name: f"<{name}>" for name in names})
             if len(template) > 60 and "number" not in names:
@@ -181,4 +188,4 @@ def test_an_unknown_language_is_refused_with_those_that_there_are():
 
 
 if __name__ == "__main__":
-    print("\n".join(sorted(ALL)))
+    print("\n".join(sorted(all_phrases())))
