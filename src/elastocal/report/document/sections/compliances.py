@@ -51,14 +51,14 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
 def _row(spring: SpringBar) -> blocks.Row:
     name, unit, value = spring.name, spring.unit, spring.value
     if spring.group is not None:
-        known = phrase("not by itself, group {group}", group=spring.group)
+        known: str = phrase("not by itself, group {group}", group=spring.group)
         return name, known, f"({value:.4f})", _NONE, unit.shown, _NONE
     if spring.too_weak:
         return name, phrase("too weak to see"), f"({value:.4f})", _NONE, unit.shown, _NONE
     stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else phrase("rigid")
     if not unit.stiffness or value < 0.0:
         stiff = _NONE
-    known: str = phrase("at its bound") if spring.at_bound else phrase("zero")
+    known = phrase("at its bound") if spring.at_bound else phrase("zero")
     if value != 0.0 and not spring.at_bound:
         share = (spring.high - spring.low) / 2 / abs(value)
         known = phrase("within no 100 %") if share > 1.0 else f"±{share:.0%}"
