@@ -53,6 +53,8 @@ class LogTable:
     """Cells of each column: texts, numbers, times."""
     decimal_comma: bool = False
     """Whether numbers in texts have one."""
+    above: str = ""
+    """Lines that a program wrote above the header: units, scales."""
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -203,7 +205,8 @@ def read_text_log(path: Path) -> LogTable:
     comma = delimiter != "," and any(
         _DECIMAL_COMMA.fullmatch(cell.strip()) for row in body[:_LOOKED_AT] for cell in row
     )
-    return LogTable(str(path), header or _numbered(width), cells, comma)
+    above = "\n".join(lines[: max(first - 1, 0)])
+    return LogTable(str(path), header or _numbered(width), cells, comma, above)
 
 
 def read_workbook(path: Path, sheet: str | None = None) -> LogTable:

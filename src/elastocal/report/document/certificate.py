@@ -148,7 +148,7 @@ def _identity(
     yield phrase("Controller"), _equipment(entry.controller)
     yield phrase("Tool"), _equipment(entry.tool)
     sensor = None if evidence.cell is None else evidence.cell.file.sensor
-    named = entry.sensor.type or (sensor.name if sensor is not None else _NOT_STATED)
+    named = entry.sensor.type or (sensor and sensor.name) or _NOT_STATED
     yield (
         phrase("Force sensor"),
         (named, _serial(entry.sensor), _calibrated(entry.sensor.certificate)),
@@ -277,6 +277,11 @@ def _uncertainty(statement: UncertaintyStatement | None) -> Phrase:
 
 
 def _run_signature(evidence: Evidence) -> Phrase:
+    if evidence.logs:
+        return phrase(
+            "The readings were imported from logs, which carry no signature of their own; this"
+            " report names them by their SHA-256."
+        )
     states = {link.state for link in evidence.chain if link.name == "signature"}
     if LinkState.WHOLE in states:
         return phrase("The record of the run is signed, and the signature holds.")
