@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Neighbours stay together, so that what a file prepares is seldom prepared twice.
 SHARED_OUT := -n auto --dist worksteal
 
-.PHONY: demo test checks lint units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation docs docs-version bench house fuzz clean
+.PHONY: demo test checks lint units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -41,10 +41,15 @@ UNTIL ?= -max_total_time=10
 fuzz-lines: $(VENV)/installed-fuzz
 	cd tests && ../$(BIN)/python -m fuzz.lines $(UNTIL) -max_len=4096 -verbosity=0 -print_final_stats=1
 
-nightly: slow process-figures coverage lowest package mutation
+nightly: slow notebooks process-figures coverage lowest package mutation
 
 slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
+
+# The notebooks that readers download, as they run them: by Jupyter, in a fresh kernel and an empty
+# folder each. The site's build runs their cells, too, but all in one process.
+notebooks: $(VENV)/installed-nightly
+	cd docs/hooks && OMP_NUM_THREADS=1 ../../$(BIN)/python -m gallery.notebooks
 
 # The tables of simulated processes that the site and the README quote: what is not yet written down
 # in docs/hooks/gallery/process_figures.json, or all of it with ANEW=--anew. Up to an hour.

@@ -13,9 +13,11 @@ from typing import get_args
 import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from typer.main import get_command
 
 from elastocal.cell import RUN_SECTIONS, CellFile, ProcedureSettings
 from elastocal.cell.simulation import FaultKind
+from elastocal.cli.main import app
 from elastocal.procedure.run.steps import Fault
 from elastocal.workflows import chapters
 from support.cli import Result, elastocal
@@ -170,17 +172,18 @@ def messages() -> list[str]:
 
 
 def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
-    page = (ROOT / "docs/how-to/when-it-refuses.md").read_text(encoding="utf-8")
-    quoted = re.findall(r"^\| `([^`]+)`", page, flags=re.MULTILINE)
+    pages = (ROOT / "docs/how-to/when-it-refuses").glob("*.md")
+    first = ROOT / "docs/how-to/when-it-refuses.md"
+    text = "\n".join(page.read_text(encoding="utf-8") for page in (first, *pages))
+    quoted = re.findall(r"^\| `([^`]+)`", text, flags=re.MULTILINE)
     known = messages()
-    assert len(quoted) > 20
+    assert len(quoted) > 100
     assert not [text for text in quoted if not any(text in message for message in known)]
 
 
 def test_the_faults_that_drivers_are_held_against_have_their_messages_and_their_tests():
-    page = (ROOT / "docs/how-to/write-a-driver.md").read_text(encoding="utf-8")
-    table = page.split("{ #faults }")[1].split("\n## ")[0]
-    rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", table, flags=re.MULTILINE)
+    page = (ROOT / "docs/how-to/when-devices-go-wrong.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", page, flags=re.MULTILINE)
     assert len(rows) > 10
     known = messages()
     for _, told, tests in rows:
@@ -200,13 +203,64 @@ def test_every_face_has_its_page_in_the_reference():
     assert sorted(marked) == sorted(face for face in faces if ".cli" not in face)
 
 
+def test_every_command_stands_on_the_page_of_its_group():
+    page = (ROOT / "docs/reference/commands.md").read_text(encoding="utf-8")
+    listed = {}
+    for group in page.split("\n## ")[1:]:
+        title, _, text = group.partition("\n")
+        links = re.findall(r"\[`([\w-]+)`\]\((commands/\w+\.md)#", text)
+        listed |= dict.fromkeys((name for name, _ in links), title)
+        for name, path in links:
+            own = (ROOT / "docs/reference" / path).read_text(encoding="utf-8")
+            assert f"\n## elastocal {name}\n" in own, name
+    told = {each.name: each.rich_help_panel for each in app.registered_commands}
+    assert told.pop("demo") == "See all of it"
+    assert listed == told
+
+
+def test_the_reference_of_a_command_has_its_options_and_no_others():
+    pages = [*(ROOT / "docs/reference/commands").glob("*.md"), ROOT / "docs/reference/commands.md"]
+    text = "".join(f"\n{page.read_text(encoding='utf-8')}" for page in pages)
+    told = {}
+    for part in re.split(r"\n###? elastocal ", text)[1:]:
+        rows = re.findall(r"^\| (`.*?) \|", part.split("\n## ")[0], flags=re.MULTILINE)
+        told[part.split("\n")[0]] = set(re.findall(r"`(--[a-z][\w-]*)", "".join(rows)))
+    assert told == options()
+
+
+def test_the_options_of_commands_that_pages_show_exist():
+    known, wrong = options(), []
+    for page in [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]:
+        for name, rest in re.findall(
+            r"(?:^|`)elastocal ([a-z-]+)((?: [^\n`]|\\\n)*[^\n`#|]*)",
+            page.read_text(encoding="utf-8"), flags=re.MULTILINE,
+        ):  # fmt: skip
+            given = set(re.findall(r"(?<!\S)--[a-z][\w-]*", rest))
+            wrong += [(page.name, name, each) for each in given - known.get(name, given)]
+    assert not wrong
+
+
+def options() -> dict[str, set[str]]:
+    """Return the options of each command, their short forms apart."""
+    program = get_command(app)
+    return {
+        name: {
+            option
+            for parameter in command.params
+            for option in (*parameter.opts, *parameter.secondary_opts)
+            if option.startswith("--")
+        }
+        for name, command in program.commands.items()
+    }
+
+
 def cell_file_section(heading=None):
-    """Return a part of the page about the cell file; without heading, what comes first."""
-    page = (ROOT / "docs/reference/files.md").read_text(encoding="utf-8")
-    page = page.split("## Cell .yaml")[1].split("\n## ")[0]
+    """Return a part of the pages about the cell file; without heading, what comes first."""
+    pages = (ROOT / f"docs/reference/files/{name}.md" for name in ("cell", "cell-simulation"))
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
     if heading:
-        page = page.split(f"### {heading}\n")[1]
-    return page.split("\n### ")[0]
+        text = text.split(f"## {heading}\n")[1]
+    return text.split("\n## ")[0]
 
 
 def shown_words(section):
@@ -255,7 +309,7 @@ def test_every_kind_of_fault_is_on_both_pages_that_list_them():
 
 
 def test_every_fault_that_ends_an_attempt_or_a_run_is_explained():
-    page = (ROOT / "docs/how-to/run-the-procedure.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how-to/when-a-run-stops.md").read_text(encoding="utf-8")
     table = page.split("| message begins with |")[1].split("\n\n")[0]
     shown = set(re.findall(r"^\| `([^`]+)`", table, flags=re.MULTILINE))
     begins = {fault.message("").rstrip(": ") for fault in Fault} - {"interrupted"}

@@ -2,38 +2,58 @@
 
 The figures stand in ``gallery/process_figures.json``, which ``make process-figures`` measures; the
 paper's row comes from the report's own copy of it. ``<!-- process campaigns: afp -->`` becomes the
-table of shorter campaigns, ``<!-- process summary: typical -->`` the sentences that the README has.
+table of shorter campaigns, ``<!-- process summary: typical -->`` the sentences that the README has,
+``<!-- process demos: typical -->`` what every example cell reaches on a truth (``all``: on each).
 """
 
 import json
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elastocal.compensation.process import SeedMean
-from elastocal.report.document.sections.process import PAPER
+from elastocal.report.document.sections.process import PAPER, PublishedCase
 
 if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
 _QUOTED = Path(__file__).parent / "gallery" / "process_figures.json"
-_MARK = re.compile(r"<!-- process (table|campaigns|summary|short): (\S+) -->")
+_MARK = re.compile(r"<!-- process (table|campaigns|summary|short|demos): (\S+) -->")
 _HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
          "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
 _CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out error, µm",
               "left of the mean, µm", "reduction", "seeds")  # fmt: skip
 _README = Path(__file__).parents[2] / "README.md"
 _NAMES = {"afp": "fibre placement", "machining": "roughing"}
-_TRUTHS = ("kind", "typical", "harsh")
+TRUTHS = ("kind", "typical", "harsh")
+_DEMO_HEAD = ("cell", "truth", "mean, mm", "reduction", "max, mm", "reduction", "seeds")
 Figures = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Demo:
+    """An example cell, and the length that is counted on it."""
+
+    name: str
+    counted: str
+
+
+DEMOS = {
+    "afp": Demo("Fibre placement", "deviation aside of the course"),
+    "machining": Demo("Roughing", "deviation normal to the part"),
+    "ur20": Demo("UR20 on a block", "deflection at left-out poses"),
+}
+"""By the word that `init --like` takes, in the order of the figure."""
 
 
 def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: ARG001 (mkdocs')
     """Return the page with the tables in place of their marks."""
     made: dict[str, Callable[[str], str]] = {
         "table": table, "campaigns": campaigns, "summary": summary, "short": short,
+        "demos": demos,
     }  # fmt: skip
     return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
 
@@ -43,15 +63,13 @@ def table(kind: str) -> str:
     found = [each for each in quoted() if each["campaign"] == "template"]
     rows = [
         row
-        for truth in _TRUTHS
+        for truth in TRUTHS
         for springs in ("bearing", "auto")
         for row in _rows(_of(found, kind, truth, springs=springs))
     ]
     paper = PAPER[kind]
     own = (
-        "paper", "18 springs", "", "Table 1",
-        f"{paper.before[0]:.3f} → {paper.after[0]:.3f}", f"{paper.reduction[0]:.2%}",
-        f"{paper.before[1]:.3f} → {paper.after[1]:.3f}", f"{paper.reduction[1]:.2%}", "",
+        "paper", "18 springs", "", "Table 1", *_published(paper), "",
     )  # fmt: skip
     return f"{_markdown(_HEAD, [*rows, own])}\n\n{_INTERVALS} {paper.measures}"
 
@@ -83,6 +101,21 @@ def campaigns(kind: str) -> str:
             _mean([_reduction(each["mean"]) for each in lateral], ".1%"), str(len(seeds)),
         ))  # fmt: skip
     return _markdown(_CAMPAIGNS, rows)
+
+
+def demos(preset: str) -> str:
+    """Return what every example cell reaches on a truth, or on all, and the paper's rows."""
+    rows = []
+    for kind, demo in DEMOS.items():
+        for truth in TRUTHS if preset == "all" else (preset,):
+            seeds = _of(quoted(), kind, truth, campaign="template", springs="auto")
+            own = [each["deviations"][0] for each in seeds]
+            cells = [cell for key in ("mean", "max") for cell in _before_and_after(own, key)]
+            if seeds:
+                rows.append((demo.name, truth, *cells, str(len(seeds))))
+        if kind in PAPER:
+            rows.append((demo.name, "paper", *_published(PAPER[kind]), ""))
+    return _markdown(_DEMO_HEAD, rows)
 
 
 def summary(preset: str = "typical") -> str:
@@ -168,14 +201,31 @@ def _rows(seeds: list[Figures]) -> list[tuple[str, ...]]:
         some = [each["deviations"][number] for each in seeds]
         cells: list[str] = []
         for key in ("mean", "max"):
-            before, after = (sum(each[key][k] for each in some) / len(some) for k in (0, 1))
-            cells.append(f"{1e3 * before:.3f} → {1e3 * after:.3f}")
-            cells.append(_mean([_reduction(each[key]) for each in some], ".1%"))
+            cells += _before_and_after(some, key)
         rows.append((
             first["case"]["preset"], springs, left_out, _title(own), *cells,
             str(len(seeds)),
         ))  # fmt: skip
     return rows
+
+
+def _before_and_after(deviations: list[Figures], key: str) -> tuple[str, str]:
+    """Return means over seeds before and after correction in mm, and the reduction."""
+    before, after = (sum(each[key][k] for each in deviations) / len(deviations) for k in (0, 1))
+    reduction = _mean([_reduction(each[key]) for each in deviations], ".1%")
+    return f"{1e3 * before:.3f} → {1e3 * after:.3f}", reduction
+
+
+def _published(paper: PublishedCase) -> tuple[str, ...]:
+    """Return mean and largest of the paper's Table 1, each with its reduction."""
+    return tuple(
+        cell
+        for number in (0, 1)
+        for cell in (
+            f"{paper.before[number]:.3f} → {paper.after[number]:.3f}",
+            f"{paper.reduction[number]:.2%}",
+        )
+    )
 
 
 def _title(deviation: Figures) -> str:

@@ -281,6 +281,24 @@ def write_json(path: Path, data: Any) -> None:
     write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
+@contextlib.contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Refuse what is no file (`require_file`), and say in our words that reading it failed.
+
+    Raises
+    ------
+    FileAccessError
+        In place of any `OSError` of the block.
+    """
+    require_file(path)
+    try:
+        yield
+    except FileAccessError:
+        raise  # of another file: it says so itself
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
@@ -291,12 +309,10 @@ def read_text(path: Path) -> str:
     SchemaError
         If it is too large to be read whole.
     """
-    require_file(path)
     try:
-        require_size(path)
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+        with readable(path):
+            require_size(path)
+            text = Path(path).read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise FileAccessError(f"cannot read {path}: not a UTF-8 text file") from error
     if not text.strip():
@@ -321,12 +337,9 @@ def read_bytes(path: Path, most: Limit | None = None) -> bytes:
     SchemaError
         If it is too large to be read whole.
     """
-    require_file(path)
-    try:
+    with readable(path):
         require_size(path, most or _MOST_READ)
         return Path(path).read_bytes()
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def require_file(path: Path) -> None:

@@ -9,7 +9,7 @@ how long a row must be, is for whoever reads it to refuse in the words of its fi
 import csv
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -21,7 +21,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import ElastocalError, FileAccessError
-from elastocal.files import Limit, replacing, require_file
+from elastocal.files import Limit, readable, replacing
 from elastocal.units import parse_number
 
 _MOST_ROW = Limit("ELASTOCAL_MAX_ROW_KB", 4_000, "kB")
@@ -29,6 +29,8 @@ _MOST_CELL = Limit("ELASTOCAL_MAX_CELL_KB", 128, "kB")
 _KILOBYTE = 1_000
 DELIMITERS = ",;\t"
 """Delimiters that are recognised; the first is the one that is written."""
+_BETWEEN = "\x1f"
+"""Between packed cells: what ASCII has for it, and no cell holds."""
 _NUMBER = r"\s*[-+]?[0-9]*{}[0-9]*(?:[eE][-+]?[0-9]+)?\s*"
 _POINT, _COMMA = (re.compile(_NUMBER.format(re.escape(sign))) for sign in ".,")
 
@@ -71,6 +73,55 @@ class TableLayout:
     """Comment and blank lines above the header, with their line ends."""
     delimiter: str = DELIMITERS[0]
     line_end: str = "\n"
+
+
+class PackedColumn(Collection[str]):
+    """Texts of a column, thousands in one: each for itself takes ten times the memory."""
+
+    def __init__(self) -> None:
+        self._pieces: list[str | tuple[str, ...]] = []
+        self._length = 0
+
+    def append(self, cells: Sequence[str]) -> None:
+        """Add some cells at the end."""
+        packed = _BETWEEN.join(cells)
+        alone = packed.count(_BETWEEN) == len(cells) - 1
+        self._pieces.append(packed if alone else tuple(cells))
+        self._length += len(cells)
+
+    def pieces(self) -> Iterator[Sequence[str]]:
+        """Yield the cells as they were added."""
+        for piece in self._pieces:
+            yield piece.split(_BETWEEN) if isinstance(piece, str) else piece
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the cells."""
+        return chain.from_iterable(self.pieces())
+
+    def __len__(self) -> int:
+        """Return the number of cells."""
+        return self._length
+
+    def __contains__(self, cell: object) -> bool:
+        """Return whether a cell is this text."""
+        return any(each == cell for each in self)
+
+
+def plain_numbers(cells: Sequence[object], comma: str = "") -> FloatArray | None:
+    """Return the numbers of texts of nothing but finite ones; None: look at each cell.
+
+    ``comma`` is the decimal sign where it is no point.
+    """
+    try:
+        text = _BETWEEN.join(cells)  # type: ignore[arg-type]
+        # What `parse_number` takes for no number, Python would read.
+        if "_" in text or not text.isascii():
+            return None
+        pointed = text.replace(comma, ".").split(_BETWEEN) if comma else cells
+        values = np.array(pointed, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    return values if len(values) == len(cells) and np.isfinite(values).all() else None
 
 
 @dataclass(frozen=True)
@@ -123,13 +174,8 @@ class TableRows:
         """
         parse = _finite_number if parse is None else parse
         cells = [row[column.index] for row in self.cells]
-        try:
-            values = np.array([float(cell) for cell in cells])
-            text = "".join(cells)
-            ordinary = bool(np.isfinite(values).all()) and "_" not in text and text.isascii()
-        except ValueError:
-            ordinary = False
-        if not ordinary:
+        values = plain_numbers(cells)
+        if values is None:
             # Rarely taken: some cell is blank or no number, and its row has to be found.
             comma = "," if self.decimal_comma else ""
             pairs = zip(self.lines, cells, strict=True)
@@ -210,7 +256,7 @@ class TableReader:
             raise TableError(f"row {self._above + self._reader.line_num}: {reason}") from error
 
 
-def _bounded_lines(file: TextIO) -> Iterator[str]:
+def bounded_lines(file: TextIO) -> Iterator[str]:
     """Yield the lines of a file, none of which fills the memory.
 
     Raises
@@ -236,18 +282,13 @@ def opened_table(path: Path) -> Iterator[TableReader]:
     FileAccessError
         If the file cannot be read, or is no text; also while rows are taken.
     """
-    require_file(path)
     try:
-        with Path(path).open(encoding="utf-8-sig", newline="") as file:
-            yield TableReader(_bounded_lines(file))
+        with readable(path), Path(path).open(encoding="utf-8-sig", newline="") as file:
+            yield TableReader(bounded_lines(file))
     except UnicodeDecodeError as error:
         raise FileAccessError(
             f"cannot read {path}: not a UTF-8 text file (Excel saves one as CSV UTF-8)"
         ) from error
-    except OSError as error:
-        if isinstance(error, FileAccessError):
-            raise
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def number_in_cell(cell: str) -> float:

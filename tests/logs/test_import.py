@@ -364,7 +364,7 @@ def test_without_a_marker_the_readings_have_forces_and_no_displacement_of_one(
         tmp_path, reported.finished() / "cell" / "cell.yaml", MAP[: MAP.index("  - log: tracker")]
     )
     found = ec.import_logs([controller, force], map=path, out=tmp_path / "data.nc")
-    assert "calibrate --contact" in " ".join(found.figures.warnings)
+    assert "which `calibrate` needs" in " ".join(found.figures.warnings)
     dataset = read_dataset(tmp_path / "data.nc")
     assert dataset.marker_displacement is None
     assert dataset.usable.sum() == derived.usable.sum()

@@ -1,6 +1,9 @@
 """Logs of any form become one table of named columns."""
 
 import datetime
+import os
+import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,6 +107,51 @@ def test_what_is_no_text_is_refused(tmp_path):
         read_text_log(tmp_path / "log.csv")
     with pytest.raises(FileAccessError):
         read_text_log(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1,2\n" * 110_000 + "3,x\n", "row 110001 of the data, column '2': 'x' is not a number"),
+        ("1,2\n" * 110_000 + "3\n4,5\n", "row 110001 of the data has 1 cells, the others 2"),
+        (",".join(["1"] * 10_001), "10001 cells is more than 10000 columns"),
+        ("1 " * 2_000_001, "row 1 is more than 4000 kB"),
+    ],
+)
+def test_a_row_far_down_is_named_as_one_at_the_top(tmp_path, text, message):
+    with pytest.raises(LogError, match=message):
+        _log(tmp_path, text).numbers("2")
+
+
+def test_words_far_above_the_numbers_and_alone_are_read(tmp_path):
+    assert _log(tmp_path, "a,b\n" * 500 + "t,x\n1,2\n").numbers("x").tolist() == [2.0]
+    table = _log(tmp_path, "name,word\n" + "p,q\n" * 300)
+    assert (table.header, len(table), set(table.texts("word"))) == (("name", "word"), 300, {"q"})
+    assert len(_log(tmp_path, "1;2\n" * 300 + "1;2;3\n" * 400)) == 400
+    assert _log(tmp_path, "one\ttwo\n" * 250 + "1 2\t3\t4\n" * 251).header == ("1", "2", "3")
+
+
+def test_a_long_log_takes_less_than_three_times_its_size(tmp_path):
+    row = "0.0040,-123.456789,98.765432,-45.678901,0.123456,1.234567,-2.345678\n"
+    (tmp_path / "log.csv").write_text(row * 15_000)
+    size = (tmp_path / "log.csv").stat().st_size
+    tracemalloc.start()
+    table = read_text_log(tmp_path / "log.csv")
+    kept = tracemalloc.get_traced_memory()[0]
+    assert table.numbers("7")[-1] == -2.345678
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert kept < 1.2 * size
+    # A piece is in work, beside what is kept.
+    assert peak < 1.2 * size + 25e6
+
+
+def test_what_a_shell_pipes_is_read(tmp_path):
+    reading, writing = os.pipe()
+    os.write(writing, b"t,x\n1,2\n")
+    os.close(writing)
+    assert read_text_log(Path(f"/dev/fd/{reading}")).numbers("x").tolist() == [2.0]
+    os.close(reading)
 
 
 def test_a_sheet_of_a_workbook_is_read(tmp_path):

@@ -86,8 +86,8 @@ def accuracy(done: Campaign) -> str:
     figures = summary(done.calibration)
     return (
         f"{figures.readings} readings at {figures.poses} poses; measured deflection"
-        f" {1e3 * figures.deflection.mean:.2f} mm mean; residual of the fit"
-        f" {1e3 * figures.residual.mean:.3f} mm mean; error at left-out poses"
+        f" {1e3 * figures.deflection.mean:.2f} mm mean; residual of the fit, not held out,"
+        f" {1e3 * figures.residual.mean:.3f} mm mean; error at poses held out one by one"
         f" {1e3 * figures.held_out.mean:.3f} mm mean"
     )
 
@@ -96,7 +96,8 @@ def reduction(line: DeviationComparison) -> str:
     """Return in words what the correction does to a process."""
     before, after = line.before, line.after
     return (
-        f"mean {1e3 * before.mean:.3f} mm without and {1e3 * after.mean:.3f} mm with correction"
+        f"{line.points} points of the path, none of which entered the fit:"
+        f" mean {1e3 * before.mean:.3f} mm without and {1e3 * after.mean:.3f} mm with correction"
         f" ({1 - after.mean / before.mean:.1%} less), largest {1e3 * before.max:.3f} and"
         f" {1e3 * after.max:.3f} mm"
     )

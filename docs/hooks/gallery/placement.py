@@ -15,6 +15,8 @@ from elastocal.report.plots import (
     displacement_figure,
     index_chart,
     process_maps,
+    spring_bars,
+    spring_figure,
     write_figure,
 )
 from gallery.campaign import SEED, Campaign, accuracy, campaign, example_cell, process, reduction
@@ -32,10 +34,10 @@ CODECS = {
 def make(folder: Path) -> dict[str, str]:
     """Make the figures; return what is told of each."""
     done = campaign(example_cell(folder / "cell", "afp", {}), "ioops")
-    told = _plan(folder, done) | {"placement": accuracy(done)}
+    told = _plan(folder, done) | {"placement": accuracy(done)} | _springs(folder, done)
     draw_displacements(folder / "displacements-placement.svg", done)
     for name, (key, values) in CODECS.items():
-        told[name] = _codec(folder, done, name, key, values)
+        told |= _codec(folder, done, name, key, values)
     outcome = process(done, "afp", FibrePlacement.compensator, COURSES)
     traces = [
         CourseDeviation.of(SEED, *pair) for pair in zip(outcome.before, outcome.after, strict=True)
@@ -63,7 +65,8 @@ def _plan(folder: Path, done: Campaign) -> dict[str, str]:
     write_plan_page(folder / "plan.html", done.cell, planned.surface, planned.plan, planned.pool)
     search, other = planned.plan.search.spread, planned.plan.comparison.spread
     text = (
-        f"{len(planned.plan.poses)} poses of {planned.plan.pool.valid} candidates. Covering radius"
+        f"{len(planned.plan.poses)} poses of {planned.plan.pool.valid} candidates; geometry alone,"
+        f" nothing is fitted. Covering radius"
         f" {1e3 * search.covering_radius:.0f} mm by COVER and {1e3 * other.covering_radius:.0f} mm"
         f" by IOOPS; distance to the next pose {1e3 * search.nearest_neighbour:.0f} and"
         f" {1e3 * other.nearest_neighbour:.0f} mm; to the edge"
@@ -73,18 +76,41 @@ def _plan(folder: Path, done: Campaign) -> dict[str, str]:
     return {"cover-and-ioops": text}
 
 
-def _codec(folder: Path, done: Campaign, name: str, key: str, values: tuple[str, ...]) -> str:
+def _springs(folder: Path, done: Campaign) -> dict[str, str]:
+    bars = spring_bars(done.calibration.calibrated)
+    write_figure(folder / "springs-placement.svg", partial(spring_figure, bars))
+    readings = int(done.calibration.used.sum())
+    return {
+        "springs": f"{len(bars)} compliances from {readings} readings at"
+        f" {len(done.planned.plan.poses)} poses, all of them fitted; each with the interval that"
+        " holds it with 95 %, by the bootstrap over poses"
+    }
+
+
+def _codec(
+    folder: Path, done: Campaign, name: str, key: str, values: tuple[str, ...]
+) -> dict[str, str]:
     robot, variants = done.cell.robot, make_variants({key: values})
     data: CodecData = cross_validate(
         robot, done.readings, variants, marker_offset=done.marker, jobs=1
     )
     verdicts = judge(data)
     write_figure(folder / f"{name}.svg", partial(codec_chart, data, verdicts))
+    sets, held_out = data.verification.shape
+    told = {
+        name: f"Norm of the error in mm at held-out poses: {sets} verification sets of {held_out},"
+        f" {data.n_train[-1]} training poses at most."
+        f" {_last_errors(data) if key == 'load_cases' else _sentence(verdicts)}"
+    }
     if key == "springs":
         found = analyse(robot, done.readings, data, marker_offset=done.marker, with_indices=True)
         draw = partial(index_chart, data, found.indices, found.correlations)
         write_figure(folder / "indices.svg", draw)
-    return _last_errors(data) if key == "load_cases" else _sentence(verdicts)
+        told["indices"] = (
+            f"Rank correlation, no unit, with the error at held-out poses: {sets} verification sets"
+            f" of {held_out}, training sets of 1 to {data.n_train[-1]} poses; 95 % intervals"
+        )
+    return told
 
 
 def _sentence(verdicts: Verdicts) -> str:

@@ -7,7 +7,8 @@ where it ended. ``docs/hooks/process_tables.py`` makes the tables and the README
 A case is an example cell with a preset and a seed. The procedure is run, calibrated with each
 layout of springs, the tool is weighed, and the process simulated at the programmed, half and turned
 load, as `elastocal simulate-process` does. On `typical` the same is done, at the programmed load,
-with shorter campaigns and with that of the paper.
+with shorter campaigns and with that of the paper. Of `ur20`, an example without a process, the
+deflection at left-out poses is measured, and what its prediction leaves of it.
 """
 
 import argparse
@@ -33,7 +34,7 @@ from elastocal.robot import Robot
 from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_loads, tool
 
 QUOTED = Path(__file__).with_name("process_figures.json")
-KINDS = ("afp", "machining")
+KINDS = (*process.PROCESSES, "ur20")
 TYPICAL, OTHERS = "typical", ("kind", "harsh")
 SEEDS = (1, 2, 3, 4, 5)
 _LOADS = (1.0, 0.5, -1.0)
@@ -68,7 +69,11 @@ class Case:
 
 @record()
 class Deviation:
-    """One measure of the deviation at one load: before and after correction, in m."""
+    """One measure of the deviation at one load: before and after correction, in m.
+
+    `left out`, of a cell without a process: the deflection at left-out poses, and the error of its
+    prediction.
+    """
 
     name: str
     load: float
@@ -104,9 +109,10 @@ def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
     for preset, seed in dict.fromkeys((*order, *every)):
         for kind in KINDS:
             case = Case(kind, preset, seed)
-            yield case, (TEMPLATE, *SHORTER) if (preset, seed) == (TYPICAL, 1) else (TEMPLATE,)
+            first = (preset, seed) == (TYPICAL, 1) and kind in process.PROCESSES
+            yield case, (TEMPLATE, *SHORTER) if first else (TEMPLATE,)
     for seed in SEEDS[1:]:
-        for kind in KINDS:
+        for kind in process.PROCESSES:
             yield Case(kind, TYPICAL, seed), SHORTER
 
 
@@ -131,7 +137,8 @@ class _Model:
     poses: int
     minutes: float
     result: CalibrateResult
-    trial: ProcessTrial
+    trial: ProcessTrial | None
+    """None of a cell without a process."""
     deviations: list[Deviation] = field(default_factory=list)
 
     def figures(self, case: Case) -> ProcessFigures:
@@ -161,8 +168,21 @@ class Measurement:
         Loads other than the programmed one are run with the first campaign alone.
         """
         models = [each for campaign in campaigns for each in self._models(case, campaign)]
-        first = models[0].trial
-        courses = process.process_courses(case.kind, first.cell, case.seed, None)
+        if case.kind in process.PROCESSES:
+            self._run_process(case, models, campaigns, loads)
+        else:
+            for each in models:
+                each.deviations.append(_left_out(each.result))
+        return [model.figures(case) for model in models]
+
+    def _run_process(
+        self,
+        case: Case,
+        models: list[_Model],
+        campaigns: tuple[Campaign, ...],
+        loads: tuple[float, ...],
+    ) -> None:
+        courses = process.process_courses(case.kind, models[0].trial.cell, case.seed, None)
         name = process.PROCESSES[case.kind].direction
         for campaign in campaigns:
             some = [each for each in models if each.campaign == campaign]
@@ -172,7 +192,6 @@ class Measurement:
                 for model, own in zip(some, runs, strict=True):
                     model.deviations.append(_deviation(own.line(name), load))
                     model.deviations.append(_deviation(own.spatial("3-D"), load))
-        return [model.figures(case) for model in models]
 
     def _models(self, case: Case, campaign: Campaign) -> Iterator[_Model]:
         """Run a campaign, and yield a model for each of its layouts of springs."""
@@ -180,16 +199,21 @@ class Measurement:
         made = self.folder / f"{campaign.name} {case.kind} {case.preset} {case.seed}"
         ended = run(cell, plan=cell.parent / "plan", out=made / "run", seed=case.seed)
         poses, minutes = ended.figures.committed, round(ended.figures.seconds / 60.0, 2)
-        tool(made / "run", out=made / "tool.json")
-        settings = process.PROCESSES[case.kind].compensator
+        path = cell.parent / PROCESS_FILE if case.kind in process.PROCESSES else None
         for springs in campaign.springs:
-            data = made / "run" / "dataset.nc"
-            result = calibrate(data, springs=springs, process=cell.parent / PROCESS_FILE)
-            load = _load(made / "tool.json", result.calibrated.model.robot)
-            trial = ProcessTrial(
-                load_cell(cell), result.calibrated, load, settings, case.seed, jobs=self.jobs
-            )
+            result = calibrate(made / "run" / "dataset.nc", springs=springs, process=path)
+            trial = self._trial(case, cell, result, made) if path else None
             yield _Model(campaign, springs, poses, minutes, result, trial)
+
+    def _trial(self, case: Case, cell: Path, result: CalibrateResult, made: Path) -> ProcessTrial:
+        file = made / "tool.json"
+        if not file.is_file():
+            tool(made / "run", out=file)
+        load = _load(file, result.calibrated.model.robot)
+        settings = process.PROCESSES[case.kind].compensator
+        return ProcessTrial(
+            load_cell(cell), result.calibrated, load, settings, case.seed, jobs=self.jobs
+        )
 
     def _cell(self, case: Case, campaign: Campaign) -> Path:
         """Return the cell file of a case beside its plan; presets share a plan."""
@@ -219,6 +243,15 @@ def _load(path: Path, robot: Robot) -> SensorLoad | None:
         return read_sensor_load(path, robot)
     except CompensationError:
         return None
+
+
+def _left_out(result: CalibrateResult) -> Deviation:
+    """Return what a prediction takes away of the deflection at poses that the fit has not seen."""
+    found = result.calibration
+    assert found is not None
+    mean = _rounded(found.deflection.mean), _rounded(found.held_out.mean)
+    largest = _rounded(found.deflection.max), _rounded(found.held_out.max)
+    return Deviation("left out", 1.0, mean, largest)
 
 
 def _deviation(line: DeviationComparison, load: float) -> Deviation:

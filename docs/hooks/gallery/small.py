@@ -57,7 +57,8 @@ def _k_centre(folder: Path) -> dict[str, str]:
     write_figure(folder / "k-centre.svg", partial(_draw_k_centre, points, found))
     ratio = cover.covering_radius / float(radius[best])
     return {
-        "k-centre": f"The distance of COVER is {ratio:.2f} times the best one; never over 2 times"
+        "k-centre": f"{POINTS} points, {CENTRES} centres, no unit, nothing is fitted. The distance"
+        f" of COVER is {ratio:.2f} times the best one; never over 2 times"
     }
 
 
@@ -90,8 +91,15 @@ def _streams(folder: Path) -> dict[str, str]:
     shutil.rmtree(folder / "cell")
     shutil.rmtree(folder / "run")
     seconds = streams.arm.time[-1] - streams.arm.time[0]
-    samples = len(streams.wrench.time)
-    return {"pose-streams": f"{seconds:.0f} s of the cell's time, {samples} samples of the sensor"}
+    samples, points = len(streams.wrench.time), len(streams.points.time)
+    used = [each for each in found.plateaus if each.pose >= 0]
+    return {
+        "pose-streams": f"Force in N, displacement in mm over {seconds:.0f} s of the cell's time:"
+        f" {samples} samples of the sensor, {points} of the tracker, raw; nothing is fitted",
+        "merged-logs": f"Force in N, displacement in mm: {len(used)} plateaus at"
+        f" {len({each.pose for each in used})} poses, found in {len(logs)} logs with clocks of"
+        " their own; nothing is fitted but the clocks",
+    }
 
 
 def _write_logs(folder: Path, visits: list[Streams]) -> list[Path]:

@@ -136,8 +136,9 @@ def _root(
     """In-situ elastic calibration of industrial robots."""
     import logging  # not for help
 
-    # What libraries log is, as their warnings are, for whoever sets up a handler.
-    logging.lastResort = None
+    # What libraries log is, as their warnings are, for whoever sets up a handler. Without any,
+    # logging would say that there is none.
+    logging.basicConfig(handlers=[logging.NullHandler()])
 
 
 def run() -> None:

@@ -1,4 +1,4 @@
-"""The verdicts on a codec, and its file ``codec.json`` (docs/reference/files.md).
+"""The verdicts on a codec, and its file ``codec.json`` (docs/reference/files/codec.md).
 
 Each variant is judged by its saturation, each pair by its errors on the same held-out poses.
 """

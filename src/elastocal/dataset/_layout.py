@@ -1,4 +1,4 @@
-"""The contents of a dataset: variables, dimensions, units, attributes (docs/reference/files.md).
+"""The contents of a dataset: variables, dimensions, units (docs/reference/files/dataset.md).
 
 This is the one list; the NetCDF file, its CSV twin and every check are made from it. The
 variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``Theta^c``.

@@ -145,7 +145,7 @@ class SuspiciousReading:
 @brief_repr
 @record("elastocal.calibration/1")
 class CalibrationSummary:
-    """The figures of a calibration (docs/reference/files.md)."""
+    """The figures of a calibration (docs/reference/commands/identify.md)."""
 
     robot: str
     springs: tuple[SpringSummary, ...]

@@ -46,6 +46,7 @@ from .recordings import (
     is_recording as is_recording,
     read_recording as read_recording,
     read_topics as read_topics,
+    read_workbook as read_workbook,
 )
 from .streams import (
     LogStreams as LogStreams,
@@ -59,5 +60,4 @@ from .streams import (
 from .table import (
     LogTable as LogTable,
     read_text_log as read_text_log,
-    read_workbook as read_workbook,
 )

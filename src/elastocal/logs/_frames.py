@@ -14,12 +14,13 @@ from elastocal.errors import LogError
 from elastocal.logs.map import LogEntry, MarkerColumns, Site, ToolPose, Vector
 from elastocal.logs.table import LogTable
 from elastocal.procedure import PoseReadings
-from elastocal.robot import nearest_rotation, xyzabc_from_T
+from elastocal.robot import Robot, nearest_rotation, xyzabc_from_T
 from elastocal.units import factor
 
 _LARGEST_GAP = (20e-3, np.radians(2.0))
 """Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
 that is not calibrated is off by some millimetres, another frame by more."""
+ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
 _UNIT_NORM = 1e-2
 """Distance of a quaternion's norm from 1: four columns of few digits are nearer."""
 _PULL = 0.5
@@ -42,7 +43,7 @@ def vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> 
     return scale * np.column_stack([table.numbers(column) for column in vector.columns])
 
 
-def stated_poses(entry: LogEntry, table: LogTable, T_joints: FloatArray) -> FloatArray:
+def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) -> FloatArray:
     """Return the tool frames that a log states, shape (row, 4, 4), if they are of the tcp.
 
     Raises
@@ -52,18 +53,23 @@ def stated_poses(entry: LogEntry, table: LogTable, T_joints: FloatArray) -> Floa
     """
     assert entry.pose is not None
     position = vectors(table, entry.pose.position, "length")
-    turns = _stated_turns(table, entry.pose, T_joints[:, :3, :3])
-    known = np.asarray(np.isfinite(position).all(axis=1) & np.isfinite(turns).all(axis=(1, 2)))
+    stated = _stated_turns(table, entry.pose)
+    known = np.asarray(np.isfinite(position).all(axis=1) & np.isfinite(stated).all(axis=1))
     if not known.any():
         raise LogError(f"{table.name}: no row states the whole tool frame")
     T: FloatArray = np.full((len(table), 4, 4), np.nan)
-    T[known] = np.eye(4)
-    T[known, :3, :3] = turns[known]
-    T[:, :3, 3] = position
-    gap = np.linalg.norm(position - T_joints[:, :3, 3], axis=1)
-    relative = np.swapaxes(T_joints[known, :3, :3], 1, 2) @ T[known, :3, :3]
-    turn = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
-    worst = float(np.nanmedian(gap)), float(np.median(turn))
+    gap, turn = np.empty(len(table)), np.full(len(table), np.nan)
+    for start in range(0, len(table), ROWS_AT_A_TIME):
+        rows = slice(start, start + ROWS_AT_A_TIME)
+        T_joints, whole = robot.forward(q[rows]), np.flatnonzero(known[rows]) + start
+        R_joints = T_joints[known[rows], :3, :3]
+        T[whole, 3] = (0.0, 0.0, 0.0, 1.0)
+        T[whole, :3, :3] = _rotations(entry.pose, stated[whole], R_joints)
+        T[rows, :3, 3] = position[rows]
+        gap[rows] = np.linalg.norm(position[rows] - T_joints[:, :3, 3], axis=1)
+        relative = np.swapaxes(R_joints, 1, 2) @ T[whole, :3, :3]
+        turn[whole] = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
+    worst = float(np.nanmedian(gap)), float(np.median(turn[known]))
     if not (worst[0] <= _LARGEST_GAP[0] and worst[1] <= _LARGEST_GAP[1]):
         raise LogError(
             f"{table.name}: the logged tool frame lies {1e3 * worst[0]:.4g} mm and"
@@ -74,32 +80,31 @@ def stated_poses(entry: LogEntry, table: LogTable, T_joints: FloatArray) -> Floa
     return T
 
 
-def _stated_turns(table: LogTable, pose: ToolPose, R_joints: FloatArray) -> FloatArray:
+def _stated_turns(table: LogTable, pose: ToolPose) -> FloatArray:
+    """Return the numbers by which a log says how the tool is turned, shape (row, number)."""
+    if pose.angles is not None:
+        return vectors(table, pose.angles, "angle")
+    if pose.quaternion is None:
+        return np.empty((len(table), 0))
+    w, x, y, z = (table.numbers(name) for name in pose.quaternion)
+    stated = np.column_stack([x, y, z, w])
+    norm = np.linalg.norm(stated[np.isfinite(stated).all(axis=1)], axis=1)
+    if len(norm) and not abs(float(np.median(norm)) - 1.0) < _UNIT_NORM:
+        raise LogError(
+            f"{table.name}: the quaternion has norm {float(np.median(norm)):.4g}: is one of its"
+            " columns another quantity?"
+        )
+    stated[~(np.linalg.norm(stated, axis=1) > 0.0)] = np.nan
+    return stated
+
+
+def _rotations(pose: ToolPose, stated: FloatArray, R_joints: FloatArray) -> FloatArray:
     """Return how the tool is turned, shape (row, 3, 3): as stated, else as the joints say."""
-    if pose.quaternion is not None:
-        w, x, y, z = (table.numbers(name) for name in pose.quaternion)
-        stated = np.column_stack([x, y, z, w])
-        norm = float(np.nanmedian(np.linalg.norm(stated, axis=1)))
-        if not abs(norm - 1.0) < _UNIT_NORM:
-            raise LogError(
-                f"{table.name}: the quaternion has norm {norm:.4g}: is one of its columns another"
-                " quantity?"
-            )
-    elif pose.angles is not None:
-        stated = vectors(table, pose.angles, "angle")
-    else:
+    if not len(stated) or (pose.angles is None and pose.quaternion is None):
         return R_joints
-    known = np.asarray(np.isfinite(stated).all(axis=1))
-    turns: FloatArray = np.full((len(table), 3, 3), np.nan)
-    if not known.any():
-        return turns
-    found = (
-        Rotation.from_euler("ZYX", stated[known])
-        if pose.quaternion is None
-        else Rotation.from_quat(stated[known])
-    )
-    turns[known] = found.as_matrix()
-    return turns
+    if pose.angles is not None:
+        return np.asarray(Rotation.from_euler("ZYX", stated).as_matrix())
+    return np.asarray(Rotation.from_quat(stated).as_matrix())
 
 
 def sensor_doubts(poses: Sequence[PoseReadings], loads: FloatArray, site: Site) -> tuple[str, ...]:

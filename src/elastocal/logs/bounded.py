@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TypeVar
 from zipfile import BadZipFile
 
-from elastocal.errors import ElastocalError, FileAccessError, LogError
-from elastocal.files import Limit, require_file
+from elastocal.errors import ElastocalError, LogError
+from elastocal.files import Limit, readable, require_file
 from elastocal.parallel import GuardedError, guarded
 
 _MOST_MEMORY = Limit("ELASTOCAL_MAX_LOG_MB", 500, "MB of memory")
@@ -64,7 +64,7 @@ def read_bounded(path: Path, what: str, read: Callable[[], _Result]) -> _Result:
     ElastocalError
         Whatever ``read`` raises of ours.
     """
-    try:
+    with readable(path):
         parts = [*path.iterdir()] if path.is_dir() else [path]
         for part in parts:
             require_file(part)
@@ -72,10 +72,6 @@ def read_bounded(path: Path, what: str, read: Callable[[], _Result]) -> _Result:
             if begin and part.is_file() and _first(part, len(begin)) != begin:
                 raise LogError(f"{part} is no {what}, or damaged: it does not begin like one")
         size = sum(part.stat().st_size for part in parts) / _MEGABYTE
-    except OSError as error:
-        if isinstance(error, FileAccessError):
-            raise
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
     seconds = _MOST_SECONDS.most + int(_SECONDS_PER_MEGABYTE * size)
     memory = _MOST_MEMORY.most + int(_MEMORY_PER_SIZE * size)
     try:

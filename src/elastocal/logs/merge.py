@@ -148,7 +148,8 @@ def _merged(logs: Sequence[LogStreams], site: Site) -> Streams:
     """Return the streams of all logs by one clock, forces in the sensor's frame."""
     arm = next(log.arm for log in logs if log.arm is not None)
     known = np.isfinite(arm.q).all(axis=1) & np.isfinite(arm.T_base_tcp).all(axis=(1, 2))
-    arm = stream_rows(arm, np.asarray(known))
+    if not known.all():  # else a copy of what may be half a gigabyte
+        arm = stream_rows(arm, np.asarray(known))
     wrenches = [_in_sensor(log, arm, site) for log in logs if log.wrench is not None]
     points = [log.points for log in logs if log.points is not None]
     none = PointStream(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=np.str_))
@@ -312,8 +313,7 @@ def _warnings(
         )
     if not registration.stations and not registration.unregistered:
         found.append(
-            "no log holds a marker: the dataset has no marker displacement, and springs need"
-            " `calibrate --contact`"
+            "no log holds a marker: the dataset has no marker displacement, which `calibrate` needs"
         )
     elif registration.undetermined_lever:
         axes = ", ".join(registration.undetermined_lever)

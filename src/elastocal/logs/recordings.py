@@ -1,4 +1,4 @@
-"""Recordings of middleware as tables: MCAP with JSON messages, ROS 1 and ROS 2 bags.
+"""Recordings of middleware as tables: MCAP with JSON messages, ROS 1 and ROS 2 bags; workbooks.
 
 A topic becomes a table with a column a number: fields by their path (``wrench.force.x``), joints
 of a ``JointState`` by their names (``position.joint_a1``), and the column ``time``: the stamp of
@@ -55,6 +55,38 @@ def read_topics(path: Path) -> dict[str, int]:
     """
     _require_rosbags(path)
     return read_bounded(path, _WHAT, partial(_topics, path))
+
+
+def read_workbook(path: Path, sheet: str | None = None) -> LogTable:
+    """Return a sheet of an Excel workbook as a table, by default the first.
+
+    Raises
+    ------
+    LogError
+        If it is no workbook, has no such sheet, or the sheet is empty.
+    FileAccessError
+        If it cannot be read, or openpyxl is not installed.
+    """
+    try:
+        import openpyxl  # noqa: F401 - here, or the child would do it anew
+    except ImportError as error:
+        raise FileAccessError(
+            f"cannot read {path}: Excel needs openpyxl: pip install 'elastocal[logs]'"
+        ) from error
+    return read_bounded(path, "Excel workbook", partial(_sheet, path, sheet))
+
+
+def _sheet(path: Path, sheet: str | None) -> LogTable:
+    from openpyxl import load_workbook
+
+    book = load_workbook(path, read_only=True, data_only=True)
+    try:
+        if sheet is not None and sheet not in book.sheetnames:
+            raise LogError(f"{path}: there is no sheet {sheet!r} ({', '.join(book.sheetnames)})")
+        rows = list(book[sheet or book.sheetnames[0]].iter_rows(values_only=True))
+    finally:
+        book.close()
+    return LogTable.from_rows(str(path), rows)
 
 
 def _topics(path: Path) -> dict[str, int]:

@@ -10,10 +10,10 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, UnitError
-from elastocal.logs._frames import stated_poses, vectors
+from elastocal.logs._frames import ROWS_AT_A_TIME, stated_poses, vectors
 from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns
-from elastocal.logs.recordings import is_recording, read_recording
-from elastocal.logs.table import LogTable, read_text_log, read_workbook
+from elastocal.logs.recordings import is_recording, read_recording, read_workbook
+from elastocal.logs.table import LogTable, read_text_log
 from elastocal.procedure.record import ArmStream, PointStream, WrenchStream
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, nearest_rotation
@@ -177,15 +177,13 @@ def _joined(parts: Sequence[LogStreams]) -> LogStreams:
         each = [stream for stream in streams if stream is not None]
         return joined_streams(each) if each else None
 
-    words = None
-    if first.handshake is not None:
-        words = tuple(word for part in parts for word in part.handshake or ())
+    words = tuple(word for part in parts for word in part.handshake or ())
     return LogStreams(
         first.entry.log,
         first.entry.clock or first.entry.log,
         first.entry,
         np.concatenate([part.time for part in parts]),
-        words,
+        words if first.handshake is not None else None,
         chain(part.arm for part in parts),
         chain(part.wrench for part in parts),
         chain(part.points for part in parts),
@@ -222,9 +220,12 @@ def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> Ar
     if missing:
         raise LogError(f"{table.name}: no column is mapped to joint {', '.join(missing)}")
     _require_within_limits(table.name, q, robot)
-    T = robot.forward(q)
     if entry.pose is not None:
-        T = stated_poses(entry, table, T)
+        return ArmStream(time, q, stated_poses(entry, table, q, robot))
+    T: FloatArray = np.empty((len(q), 4, 4))
+    for start in range(0, len(q), ROWS_AT_A_TIME):
+        rows = slice(start, start + ROWS_AT_A_TIME)
+        T[rows] = robot.forward(q[rows])
     return ArmStream(time, q, T)
 
 

@@ -2,32 +2,38 @@
 
 Text files of any delimiter, with decimal points or commas, with a header (and a row of units under
 it, as PolyWorks and data loggers have) or without one (columns are then called by their number,
-from 1); SpatialAnalyzer's point lists (``//`` comments,
-``Collection Group Target x y z``); Excel workbooks. Recordings of middleware are read by
-`elastocal.logs.bags`. What a column means is for the map (`elastocal.logs.map`) to say.
+from 1); SpatialAnalyzer's point lists (``//`` comments, ``Collection Group Target x y z``). They
+are read line by line and kept packed. Workbooks and recordings of middleware are read by
+`elastocal.logs.recordings`. What a column means is for the map (`elastocal.logs.map`) to say.
 """
 
+import codecs
 import csv
 import math
 import re
-from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections import Counter, deque
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
 from functools import partial
+from io import BytesIO, TextIOWrapper
+from itertools import chain, islice
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import FileAccessError, LogError, nearest
-from elastocal.files import Limit, read_bytes
-from elastocal.logs.bounded import read_bounded
+from elastocal.errors import LogError, nearest
+from elastocal.files import Limit, readable, require_size
 from elastocal.results import brief_repr
+from elastocal.tables import PackedColumn, TableError, bounded_lines, plain_numbers
 from elastocal.units import parse_number
 
 _MOST_TEXT = Limit("ELASTOCAL_MAX_TEXT_LOG_MB", 256, "MB")
-"""Two hours of twelve columns at 250 Hz; to read it takes twelve times as much memory."""
+"""Two hours of twelve columns at 250 Hz."""
+_MOST_COLUMNS = Limit("ELASTOCAL_MAX_LOG_COLUMNS", 10_000, "columns")
+_CELLS_AT_A_TIME = 200_000
 _COMMENTS = ("#", "//", "%", "!")
 _DELIMITERS = ";\t,|"
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?", re.ASCII)
@@ -35,7 +41,10 @@ _NUMBER = re.compile(r"\s*[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?\s*", re.
 _UNIT = re.compile(
     r"[\[(]?\s*(?:mm|m|[uµ]m|in|s|sec|ms|us|deg|°|rad|k?N|N[*·]?m|N[*·]?mm|°C|mbar|hPa|%)\s*[\])]?"
 )
+_NOT_FINITE = ("", "nan", "-", "n/a", "null", "none", "-nan", "inf", "-inf")
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)", re.ASCII)
+_MEGABYTE = 1_000_000
+_OLD_CODE_PAGE = "cp1252"
 _LOOKED_AT = 200
 """Lines by which the form of a text is told."""
 
@@ -49,18 +58,35 @@ class LogTable:
     """File, and the topic of a recording, for messages."""
     header: tuple[str, ...]
     """Name of each column; ``1``, ``2`` … where the file names none."""
-    cells: tuple[Sequence[object], ...]
+    cells: tuple[Collection[object], ...]
     """Cells of each column: texts, numbers, times."""
     decimal_comma: bool = False
     """Whether numbers in texts have one."""
     above: str = ""
-    """Lines that a program wrote above the header: units, scales."""
+    """The first lines that a program wrote above the header: units, scales."""
+
+    @classmethod
+    def from_rows(cls, name: str, rows: Sequence[Sequence[object]]) -> "LogTable":
+        """Return rows as a table; the first holds the names, unless it holds data.
+
+        Raises
+        ------
+        LogError
+            If there are none.
+        """
+        rows = [row for row in rows if any(cell is not None for cell in row)]
+        if not rows:
+            raise LogError(f"{name}: there are no rows in it")
+        head = [_as_text(cell) for cell in rows[0]]
+        names = _named([""] * len(head) if _is_data(head) else head)
+        body = rows if _is_data(head) else rows[1:]
+        return cls(name, names, tuple(zip(*body, strict=True)) or ((),) * len(head))
 
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(self.cells[0]) if self.cells else 0
 
-    def column(self, name: str) -> Sequence[object]:
+    def column(self, name: str) -> Collection[object]:
         """Return the cells of a column, named by its header or by its number from 1.
 
         Raises
@@ -102,54 +128,44 @@ class LogTable:
             If there is no such column, or a cell is no time.
         """
         times = self._read(name, self._time, "is no date and time, no time of day and no number")
-        clock = any(isinstance(c, str) and _CLOCK.fullmatch(c.strip()) for c in self.column(name))
-        if clock:
+        if any(isinstance(c, str) and _CLOCK.fullmatch(c.strip()) for c in self.column(name)):
             times = times + 86400.0 * np.cumsum(np.diff(times, prepend=times[:1]) < -43200.0)
         return times
 
     def texts(self, name: str) -> tuple[str, ...]:
         """Return the cells of a column as texts without blanks around them, shape (row,)."""
-        return tuple(_as_text(cell) for cell in self.column(name))
+        # Most words stand in many rows: each is kept once.
+        known: dict[str, str] = {}
+        return tuple(known.setdefault(t, t) for t in map(_as_text, self.column(name)))
 
     def _read(self, name: str, parse: Callable[[object], float], problem: str) -> FloatArray:
         cells = self.column(name)
         if isinstance(cells, np.ndarray):
             return np.asarray(cells, dtype=float)
-        if (plain := self._plain(cells)) is not None:
-            return plain
-        values = np.empty(len(cells))
-        for row, cell in enumerate(cells):
-            try:
-                values[row] = parse(cell)
-            except (ValueError, TypeError, OverflowError) as error:
-                raise LogError(
-                    f"{self.name}: row {row + 1} of the data, column {name!r}: {cell!r} {problem}"
-                ) from error
+        comma, values, row = "," if self.decimal_comma else "", np.empty(len(cells)), 0
+        for piece in cells.pieces() if isinstance(cells, PackedColumn) else [[*cells]]:
+            if (plain := plain_numbers(piece, comma)) is not None:
+                values[row : row + len(piece)] = plain
+                row += len(piece)
+                continue
+            for cell in piece:
+                try:
+                    values[row] = parse(cell)
+                except (ValueError, TypeError, OverflowError) as error:
+                    raise LogError(
+                        f"{self.name}: row {row + 1} of the data, column {name!r}: {cell!r}"
+                        f" {problem}"
+                    ) from error
+                row += 1
         return values
-
-    def _plain(self, cells: Sequence[object]) -> FloatArray | None:
-        """Return the numbers of a column of nothing but finite ones; None: look at each cell."""
-        if not all(type(cell) is str for cell in cells):
-            return None
-        text = "\n".join(cells)  # type: ignore[arg-type]
-        # What `parse_number` takes for no number, numpy would read.
-        if "_" in text or not text.isascii():
-            return None
-        if self.decimal_comma:
-            text = text.replace(",", ".")
-        try:
-            values = np.array(text.split("\n"), dtype=float)
-        except ValueError:
-            return None
-        return values if np.isfinite(values).all() else None
 
     def _number(self, cell: object) -> float:
         if isinstance(cell, str):
             text = cell.strip()
-            if not text:
+            if text.lower() in _NOT_FINITE:
                 return math.nan
             if not _NUMBER.fullmatch(text):
-                return _not_finite(text)
+                raise ValueError(text)
             return parse_number(text.replace(",", ".") if self.decimal_comma else text)
         return math.nan if cell is None else float(cell)  # type: ignore[arg-type]
 
@@ -176,100 +192,156 @@ def read_text_log(path: Path) -> LogTable:
     FileAccessError
         If it cannot be read.
     SchemaError
-        If it is too large to be read whole.
+        If it is too large.
     """
-    lines = [
-        line for line in _text(path).splitlines() if line.strip() and not _is_comment(line.strip())
-    ]
-    if not lines:
+    text = _LogText.of(path)
+    some = list(islice(text.lines(), _LOOKED_AT))
+    if not some:
         raise LogError(f"{path}: there are no rows in it")
-    delimiter = _delimiter(lines)
-    try:
-        rows = list(csv.reader(lines, delimiter=delimiter)) if delimiter else [*map(_split, lines)]
-    except csv.Error as error:
-        raise LogError(f"{path}: {error}") from error
-    width = Counter(len(row) for row in rows).most_common(1)[0][0]
-    first = next(
-        (index for index, row in enumerate(rows) if len(row) == width and _is_data(row)), 1
-    )
-    # Lines of another program stand above the header, which stands right above the data.
-    header = _header(rows[:first], width)
-    body = rows[first:]
-    uneven = next((n for n, row in enumerate(body) if len(row) != width), None)
-    if uneven is not None:
+    delimiter = _delimiter(some)
+    width, start = _Body.read(text.rows(some, delimiter), 0).usual_width, None
+    while True:
+        body = _Body.read(text.rows(text.lines(), delimiter), width, start)
+        if width == body.usual_width and body.start is not None:
+            break
+        # Seldom: rows further down are of another width, or none holds a number.
+        width, start = body.usual_width, 1 if width == body.usual_width else None
+    if body.uneven is not None:
+        row, count = body.uneven
         raise LogError(
-            f"{path}: row {uneven + 1} of the data has {len(body[uneven])} cells, the others"
-            f" {width}: is the file cut off, or a text unquoted?"
+            f"{path}: row {row + 1} of the data has {count} cells, the others {width}: is the file"
+            " cut off, or a text unquoted?"
         )
-    cells = tuple(zip(*body, strict=True)) or ((),) * width
-    comma = delimiter != "," and any(
-        _DECIMAL_COMMA.fullmatch(cell.strip()) for row in body[:_LOOKED_AT] for cell in row
-    )
-    above = "\n".join(lines[: max(first - 1, 0)])
-    return LogTable(str(path), header or _numbered(width), cells, comma, above)
+    # Lines of another program stand above the header, which stands right above the data.
+    header = _header(body.above, width) or _named([""] * width)
+    first = chain.from_iterable(islice(column, _LOOKED_AT) for column in body.columns)
+    comma = delimiter != "," and any(_DECIMAL_COMMA.fullmatch(cell.strip()) for cell in first)
+    above = some[: max(body.start or 0, 1) - 1]
+    return LogTable(str(path), header, body.columns, comma, "\n".join(above))
 
 
-def read_workbook(path: Path, sheet: str | None = None) -> LogTable:
-    """Return a sheet of an Excel workbook as a table, by default the first.
+@dataclass
+class _Body:
+    """The rows of a text, packed by columns if they have the width that was expected."""
 
-    Raises
-    ------
-    LogError
-        If it is no workbook, has no such sheet, or the sheet is empty.
-    FileAccessError
-        If it cannot be read, or openpyxl is not installed.
-    """
-    try:
-        import openpyxl  # noqa: F401 - here, or the child would do it anew
-    except ImportError as error:
-        raise FileAccessError(
-            f"cannot read {path}: Excel needs openpyxl: pip install 'elastocal[logs]'"
-        ) from error
-    return read_bounded(path, "Excel workbook", partial(_sheet, path, sheet))
+    width: int
+    start: int | None
+    """The row where the data begin; None: nowhere."""
+    columns: tuple[PackedColumn, ...]
+    widths: Counter[int] = field(default_factory=Counter)
+    above: deque[list[str]] = field(default_factory=lambda: deque(maxlen=2))
+    """The last rows above the data."""
+    uneven: tuple[int, int] | None = None
+    """The first row of another width, counted from 0 in the data, and its cells."""
+
+    @property
+    def usual_width(self) -> int:
+        """The width of most rows."""
+        return self.widths.most_common(1)[0][0]
+
+    @classmethod
+    def read(cls, rows: Iterator[list[str]], width: int, start: int | None = None) -> "_Body":
+        """Take all rows; those without ``start`` begin with the first of numbers or times."""
+        body = cls(width, start, tuple(PackedColumn() for _ in range(width)))
+        for number, row in enumerate(rows):
+            if start is None and len(row) == width and _is_data(row):
+                body.start = number
+            if number == body.start:
+                body._take_data(chain([row], rows))
+                break
+            body.widths[len(row)] += 1
+            body.above.append(row)
+        return body
+
+    def _take_data(self, rows: Iterator[list[str]]) -> None:
+        at, size = 0, _CELLS_AT_A_TIME // self.width + 1
+        while some := list(islice(rows, size)):
+            widths = [len(row) for row in some]
+            self.widths.update(widths)
+            whole = some
+            if widths.count(self.width) != len(some):
+                first = next(n for n, width in enumerate(widths) if width != self.width)
+                self.uneven = self.uneven or (at + first, widths[first])
+                whole = [row for row in some if len(row) == self.width]
+            for column, cells in zip(self.columns, zip(*whole, strict=True), strict=False):
+                column.append(cells)
+            at += len(some)
 
 
-def _sheet(path: Path, sheet: str | None) -> LogTable:
-    from openpyxl import load_workbook
+@dataclass(frozen=True)
+class _LogText:
+    """A text in UTF-8, UTF-16 with its mark, or a code page of Windows."""
 
-    book = load_workbook(path, read_only=True, data_only=True)
-    try:
-        if sheet is not None and sheet not in book.sheetnames:
-            raise LogError(f"{path}: there is no sheet {sheet!r} ({', '.join(book.sheetnames)})")
-        rows = list(book[sheet or book.sheetnames[0]].iter_rows(values_only=True))
-    finally:
-        book.close()
-    rows = [row for row in rows if any(cell is not None for cell in row)]
-    if not rows:
-        raise LogError(f"{path}: there are no rows in it")
-    head = [_as_text(cell) for cell in rows[0]]
-    names = _numbered(len(head)) if _is_data(head) else tuple(_named(head))
-    body = rows if _is_data(head) else rows[1:]
-    return LogTable(str(path), names, tuple(zip(*body, strict=True)) or ((),) * len(head))
+    path: Path
+    opened: Callable[[], BinaryIO]
+    """Opens its content from the begin."""
+    encoding: str
+
+    @classmethod
+    def of(cls, path: Path) -> "_LogText":
+        with readable(path):
+            require_size(path, _MOST_TEXT)
+            piped = None if path.is_file() or path.is_dir() else path.read_bytes()
+
+            def opened() -> BinaryIO:
+                return path.open("rb") if piped is None else BytesIO(piped)
+
+            with opened() as file:
+                return cls(path, opened, _encoding(path, file))
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines that are neither blank nor comments."""
+        errors = "replace" if self.encoding == _OLD_CODE_PAGE else "strict"
+        try:
+            with (
+                readable(self.path),
+                TextIOWrapper(self.opened(), self.encoding, errors) as file,
+            ):
+                for whole in bounded_lines(file):
+                    for line in whole.splitlines():
+                        text = line.strip()
+                        if text and not text.startswith(_COMMENTS):
+                            yield line
+        except TableError as error:
+            raise LogError(f"{self.path}: {error}") from error
+        except UnicodeDecodeError as error:
+            raise LogError(f"{self.path} has changed while it was read") from error
+
+    def rows(self, lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
+        """Yield the cells of each line."""
+        cut = csv.reader(lines, delimiter=delimiter) if delimiter else map(_split, lines)
+        most = _MOST_COLUMNS.most
+        try:
+            for row in cut:
+                if len(row) > most:
+                    raise LogError(f"{self.path}: {len(row)} cells {_MOST_COLUMNS.exceeded}")
+                yield row
+        except csv.Error as error:
+            raise LogError(f"{self.path}: {error}") from error
 
 
-def _text(path: Path) -> str:
-    """Return the text of a file in UTF-8, UTF-16 with its mark, or a code page of Windows."""
-    data = read_bytes(path, _MOST_TEXT)
-    if b"\0" in data[:4096] and data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+def _encoding(path: Path, file: BinaryIO) -> str:
+    begin = file.read(4096)
+    marked = begin[:2] in (b"\xff\xfe", b"\xfe\xff")
+    if b"\0" in begin and not marked:
         raise LogError(f"{path} is no text: logs are CSV or text, Excel, MCAP or ROS bags")
-    encoding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    encoding = "utf-16" if marked else "utf-8-sig"
+    decoder = codecs.getincrementaldecoder(encoding)()
     try:
-        return data.decode(encoding)
+        for piece in chain([begin], iter(partial(file.read, _MEGABYTE), b"")):
+            decoder.decode(piece)
+        decoder.decode(b"", final=True)
     except UnicodeDecodeError:
-        return data.decode("cp1252", errors="replace")
-
-
-def _is_comment(line: str) -> bool:
-    return line.startswith(_COMMENTS)
+        return _OLD_CODE_PAGE
+    return encoding
 
 
 def _delimiter(lines: Sequence[str]) -> str:
     """Return the delimiter of a text; empty where blanks stand between the cells."""
-    some = lines[:_LOOKED_AT]
     for delimiter in _DELIMITERS:
-        counts = Counter(line.count(delimiter) for line in some)
+        counts = Counter(line.count(delimiter) for line in lines)
         most, times = counts.most_common(1)[0]
-        if most and times >= 0.6 * len(some) and not _all_decimal(some, delimiter):
+        if most and times >= 0.6 * len(lines) and not _all_decimal(lines, delimiter):
             return delimiter
     return ""
 
@@ -307,7 +379,7 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[str, ...] | Non
         units = [cell.strip().strip("[]()").strip() for cell in above[-1]]
         names = _named(above[-2])
         return tuple(f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True))
-    return tuple(_named(above[-1]))
+    return _named(above[-1])
 
 
 def _are_units(row: Sequence[str]) -> bool:
@@ -315,13 +387,9 @@ def _are_units(row: Sequence[str]) -> bool:
     return len(cells) > 1 and all(_UNIT.fullmatch(cell.strip()) for cell in cells)
 
 
-def _numbered(width: int) -> tuple[str, ...]:
-    """Return the names of columns without any: their numbers."""
-    return tuple(str(number) for number in range(1, width + 1))
-
-
-def _named(row: Sequence[str]) -> list[str]:
-    return [cell.strip() or str(number) for number, cell in enumerate(row, 1)]
+def _named(row: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of columns; those without one have their number."""
+    return tuple(cell.strip() or str(number) for number, cell in enumerate(row, 1))
 
 
 def _as_text(cell: object) -> str:
@@ -330,9 +398,3 @@ def _as_text(cell: object) -> str:
     if isinstance(cell, float | np.floating) and float(cell).is_integer():
         return str(int(cell))
     return cell.isoformat() if isinstance(cell, datetime | date) else str(cell).strip()
-
-
-def _not_finite(text: str) -> float:
-    if text.lower() in ("nan", "-", "n/a", "null", "none", "-nan", "inf", "-inf"):
-        return math.nan
-    raise ValueError(text)

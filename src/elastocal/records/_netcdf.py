@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import Limit, require_file, write_bytes
+from elastocal.files import Limit, readable, write_bytes
 from elastocal.parallel import GuardedError, guarded
 from elastocal.records._codec import SEAL
 from elastocal.results import brief_repr
@@ -193,12 +193,8 @@ def netcdf_image(arrays: LabelledArrays) -> memoryview:
 
 
 def _check_signature(path: Path) -> None:
-    require_file(path)
-    try:
-        with Path(path).open("rb") as file:
-            start = file.read(len(_SIGNATURE))
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    with readable(path), Path(path).open("rb") as file:
+        start = file.read(len(_SIGNATURE))
     if not start:
         raise FileAccessError(f"cannot read {path}: the file is empty")
     if start != _SIGNATURE:

@@ -15,8 +15,8 @@ from elastocal.compensation.offline.correct import (
 )
 from elastocal.compensation.offline.summary import CorrectionSummary
 from elastocal.dataset import PathRows, PathTable, find_columns, in_file, new_rows
-from elastocal.errors import FileAccessError, PathError
-from elastocal.files import require_file
+from elastocal.errors import PathError
+from elastocal.files import readable
 from elastocal.identification import CalibratedModel
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
@@ -185,10 +185,6 @@ def _corrected_columns(
 
 def _count_lines(path: Path) -> int:
     """Return the number of lines of a file, for a progress bar."""
-    require_file(path)
-    try:
-        with Path(path).open("rb") as file:
-            blocks = iter(lambda: file.read(_BYTES_AT_A_TIME), b"")
-            return sum(block.count(b"\n") for block in blocks)
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    with readable(path), Path(path).open("rb") as file:
+        blocks = iter(lambda: file.read(_BYTES_AT_A_TIME), b"")
+        return sum(block.count(b"\n") for block in blocks)

@@ -21,7 +21,7 @@ from mcap.writer import Writer
 from elastocal.compensation.online.live import LiveCycle
 from elastocal.compensation.online.state import Status
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import require_file
+from elastocal.files import readable, require_file
 from elastocal.records import check_schema
 from elastocal.results import brief_repr
 
@@ -137,12 +137,8 @@ class LiveLogFacts:
 
 def is_live_log(path: Path) -> bool:
     """Return whether a file begins as a log of a live compensation."""
-    require_file(path)
-    try:
-        with path.open("rb") as file:
-            return LIVE_LOG_SCHEMA.partition("/")[0].encode() in file.read(_HEAD)
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    with readable(path), path.open("rb") as file:
+        return LIVE_LOG_SCHEMA.partition("/")[0].encode() in file.read(_HEAD)
 
 
 def read_live_log_facts(path: Path) -> LiveLogFacts:

@@ -222,7 +222,8 @@ def _median(values: Sequence[float] | Sequence[FloatArray]) -> summary.Number:
 
 
 def _vector(values: FloatArray) -> summary.Vector:
-    return tuple(_number(float(value)) for value in values)
+    x, y, z = (_number(float(value)) for value in values)
+    return x, y, z
 
 
 def _number(value: float) -> summary.Number:

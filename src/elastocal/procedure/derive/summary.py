@@ -14,7 +14,7 @@ from elastocal.records import read_json, record
 from elastocal.results import Result, brief_repr
 
 Number = float | None
-Vector = tuple[Number, ...]
+Vector = tuple[Number, Number, Number]
 
 
 @brief_repr

@@ -34,8 +34,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, PointBlock, WrenchBlock
-from elastocal.errors import FileAccessError, SchemaError
-from elastocal.files import Limit, require_file, require_size, write_bytes
+from elastocal.errors import SchemaError
+from elastocal.files import Limit, read_bytes, write_bytes
 
 TimeArray = NDArray[np.int64]
 """Times in ns."""
@@ -140,12 +140,7 @@ def read_mcap(path: Path) -> Contents:
     SchemaError
         If it is no MCAP file, cut off or damaged.
     """
-    require_file(path)
-    try:
-        require_size(path)
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+    data = read_bytes(path)
     if not data.startswith(_MAGIC):
         raise SchemaError(f"{path} is not an MCAP file: it does not begin with the MCAP signature")
     if not data.endswith(_MAGIC) or len(data) == len(_MAGIC):

@@ -22,7 +22,7 @@ from elastocal.records import StrictModel
 
 
 class ReadingStatus(Enum):
-    """Quality of a reading; the flags of the dataset's ``status`` (docs/reference/files.md)."""
+    """Quality of a reading; the flags of ``status`` (docs/reference/files/dataset.md)."""
 
     OK = "ok"
     SLIPPED = "slipped"

@@ -269,8 +269,7 @@ def _tool(tool: ToolSummary) -> Iterator[blocks.Block]:
     mass, centre = tool.mass_kg, tool.centre_of_mass
     rows = [(phrase("Mass in kg"), *_scaled(1.0, mass.value, mass.half_width_95, mass.cell))]
     for k, axis in enumerate("xyz"):
-        values = (each[k] if each else None for each in (centre.value, centre.half_width_95,
-                                                         centre.cell))  # fmt: skip
+        values = (each[k] for each in (centre.value, centre.half_width_95, centre.cell))
         name = phrase("Centre of mass, {axis} of the sensor in mm", axis=axis)
         rows.append((name, *_scaled(1e3, *values)))
     yield blocks.Table(
