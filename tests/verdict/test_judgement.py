@@ -31,7 +31,8 @@ def test_green_when_interval_and_every_reading_are_within(parts):
     assert verdict.light is Light.GREEN
     assert verdict.word == "Within the tolerance"
     assert verdict.reasons == ()
-    assert "nothing essential is missing" in verdict.sentence
+    assert "err by at most 0.300 mm" in verdict.meaning
+    assert "releases no real robot" in verdict.meaning
 
 
 def test_yellow_when_the_interval_reaches_beyond(parts):
@@ -45,7 +46,10 @@ def test_yellow_when_a_single_reading_is_beyond(parts):
     assert verdict.light is Light.YELLOW
     (reason,) = verdict.reasons
     assert reason == (
-        "1 of 20 readings at unseen poses is beyond 0.300 mm, the largest with 0.400 mm"
+        "1 of 20 readings was predicted wrong by more than 0.300 mm: by 0.400 mm, at pose 19 normal"
+    )
+    assert verdict.meaning == (
+        "Not proved that the predictions keep within 0.300 mm. Do not release for production."
     )
 
 
@@ -67,6 +71,16 @@ def test_a_finding_that_holds_back_makes_it_yellow_and_is_told(parts):
     assert verdict.reasons == ("the station moved",)
     assert verdict.notes == ("a note",)
     assert verdict.advice == ("Fix it.",)
+
+
+def test_files_that_were_changed_are_told_before_every_figure(parts):
+    findings = (Finding("a warning"), Finding("model.json was changed", breaks_trust=True))
+    verdict = judged(parts, worst=0.4, low=0.1, high=0.2, findings=findings)
+    assert verdict.reasons[0] == "model.json was changed"
+    assert "cannot be relied on. Do not release" in verdict.meaning
+    again = replace(parts.reproduction, same=False)
+    verdict = judge(replace(parts, reproduction=again), findings)
+    assert verdict.word == "Not to be relied on"
 
 
 def test_a_note_alone_leaves_it_green(parts):
@@ -165,4 +179,4 @@ def test_red_whatever_the_tolerance_when_the_model_leaves_more_than_half(parts, 
     )
     assert (verdict.light, verdict.word) == (Light.RED, "Not fit for use")
     assert "60% of the deflection unexplained" in verdict.reasons[0]
-    assert "less than half" in verdict.sentence
+    assert "less than half" in verdict.meaning

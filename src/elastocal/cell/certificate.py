@@ -1,6 +1,6 @@
 """The identity of a calibration: what was calibrated with what, where, when and by whom.
 
-Everything is optional; a certificate says "not stated" where nothing is. What a person states at
+Everything is optional; a certificate names in one line what nobody entered. What a person states at
 the run or for the report goes before the cell file.
 """
 

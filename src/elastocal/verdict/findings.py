@@ -29,6 +29,8 @@ class Finding:
     """Whether it keeps the light from being green."""
     advice: str = ""
     """Advice that follows; empty where the text says it."""
+    breaks_trust: bool = False
+    """Whether files were changed or contradict one another; such findings are told first."""
 
 
 def find_everything(evidence: Evidence) -> tuple[Finding, ...]:
@@ -205,7 +207,7 @@ def codec_findings(evidence: Evidence) -> Iterator[Finding]:
     if best is None:
         return
     yield from _codec_of_others(evidence)
-    yield _saturation(best)
+    yield _saturation(best, len(evidence.codecs[0].data.contact))
 
 
 def _codec_of_others(evidence: Evidence) -> Iterator[Finding]:
@@ -223,15 +225,15 @@ def _codec_of_others(evidence: Evidence) -> Iterator[Finding]:
         )
 
 
-def _saturation(best: Saturation) -> Finding:
+def _saturation(best: Saturation, poses: int) -> Finding:
     """Return whether the error had stopped to fall."""
-    last = counted(best.last, "training pose")
+    check = {"last": best.last, "poses": counted(poses, "pose")}
     if not best.explains:
         return Finding(
             phrase(
-                "the codec has not saturated: with {last} its springs leave more than half of the"
-                " deflection",
-                last=last,
+                "it is not shown that there were enough poses: in a check that fitted up to {last}"
+                " of the {poses}, the springs left more than half of the deflection",
+                **check,
             ),
             advice=phrase(
                 "Calibrate with other springs, or look at the readings: more poses do not help."
@@ -239,24 +241,30 @@ def _saturation(best: Saturation) -> Finding:
         )
     if best.n_train == best.last:
         return Finding(
-            phrase("the codec has not saturated: the error still falls at {last}", last=last),
+            phrase(
+                "there were not enough poses: in a check that fitted up to {last} of the {poses},"
+                " the error was still falling",
+                **check,
+            ),
             advice=phrase("Measure more poses: the error still falls with every one."),
         )
     if not best.settled:
         return Finding(
             phrase(
-                "the codec does not show that the error has saturated: its interval reaches {last}",
-                last=last,
+                "it is not shown that there were enough poses: in a check that fitted up to {last}"
+                " of the {poses}, the error may still have been falling",
+                **check,
             ),
             advice=phrase("Measure some more poses to see that the error no longer falls."),
         )
     return Finding(
         phrase(
-            "the error no longer fell from {poses} on (95 % interval {low} to {high}), so there"
-            " were enough poses",
-            poses=counted(best.n_train, "training pose"),
+            "there were enough poses: in a check that fitted up to {last} of the {poses}, the error"
+            " no longer fell from {enough} on (95 % interval {low} to {high})",
+            enough=best.n_train,
             low=best.low,
             high=best.high,
+            **check,
         ),
         holds_back=False,
     )
@@ -325,7 +333,7 @@ def missing_findings(evidence: Evidence) -> Iterator[Finding]:
         )
         yield Finding(text, holds_back, advice)
     for doubt in evidence.doubts:
-        yield Finding(doubt)
+        yield Finding(doubt, breaks_trust=True)
     unstated = [link.name for link in evidence.chain if link.state is LinkState.UNSTATED]
     if unstated:
         yield Finding(

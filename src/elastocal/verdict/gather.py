@@ -117,7 +117,7 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
     return replace(
         evidence,
         name=evidence.cell.name if evidence.cell else evidence.robot or "robot",
-        doubts=tuple(dict.fromkeys((*find_doubts(evidence), *broken))),
+        doubts=tuple(dict.fromkeys((*broken, *find_doubts(evidence)))),
     )
 
 
@@ -257,7 +257,9 @@ def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) 
     old = options.old
     new = options.model or reader.folders.model or reader.folders.default(MODEL)
     if old is None:
-        reason = "no earlier calibration was given (--old), so nothing is known of any change"
+        reason = (
+            "no earlier calibration was given to compare with, so nothing is known of any change"
+        )
         reader.note_missing("earlier calibration", reason)
         return evidence
     if new is None or evidence.calibrated is None:
@@ -286,5 +288,5 @@ def _limits(cell: Cell | None, options: EvidenceOptions) -> AcceptanceLimits:
     if options.tolerance is not None:
         return AcceptanceLimits(options.tolerance, drift, phrase("given with --tolerance"))
     if stated is not None and stated.tolerance is not None:
-        return AcceptanceLimits(stated.tolerance, drift, phrase("of the cell file"))
+        return AcceptanceLimits(stated.tolerance, drift, phrase("set in the cell file"))
     return AcceptanceLimits(None, drift)

@@ -14,7 +14,7 @@ from elastocal.identification import MOST_UNEXPLAINED, UnseenErrors
 from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import Finding, find_everything
-from elastocal.wording import Phrase, counted, mm, phrase, sentences, um
+from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
 _LOUD = 0.3
 """Part of the mean error from which on the noise of a reading is worth less of it."""
@@ -37,7 +37,10 @@ class Verdict:
     """None where no tolerance was given or there is nothing to judge."""
     word: str
     """Says the same as the colour."""
+    meaning: str
+    """What is proved or not, and what follows for the use of the model."""
     sentence: str
+    """What that rests on."""
     reasons: tuple[str, ...]
     """Why the light is not green; what else has to be known where there is none."""
     notes: tuple[str, ...]
@@ -65,6 +68,7 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     """
     unseen, tolerance = evidence.unseen, evidence.limits.tolerance
     held = list(dict.fromkeys(each.text for each in findings if each.holds_back))
+    broken = [each.text for each in findings if each.breaks_trust]
     notes = list(dict.fromkeys(each.text for each in findings if not each.holds_back))
     all_advice = dict.fromkeys((*(each.advice for each in findings if each.advice), *advice))
     light, own = _light(evidence, unseen, tolerance, bool(held))
@@ -72,7 +76,7 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     useless = left > MOST_UNEXPLAINED
     if useless:
         left_over = phrase(
-            "the model leaves {share} of the deflection unexplained at left-out poses",
+            "the model leaves {share} of the deflection unexplained at poses left out of the fit",
             share=f"{left:.0%}",
         )
         own = [left_over, *own]
@@ -80,9 +84,21 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     if evidence.calibrated is None:
         light = None
         own = [phrase("there is no calibrated model, so there is no accuracy to judge")]
-    word = phrase("Not fit for use") if useless and light else _word(light, bool(own))
-    sentence = _sentence(evidence, unseen, light, useless)
-    return Verdict(light, word, sentence, (*own, *held), tuple(notes), tuple(all_advice))
+    word = _word(light, bool(own))
+    if useless and light:
+        word = phrase("Not fit for use")
+    elif broken and light and unseen is None:
+        word = phrase("Not to be relied on")
+    return Verdict(
+        light,
+        word,
+        _UNTRUSTED if broken and light else _meaning(evidence, light, bool(own), useless),
+        _sentence(evidence, unseen),
+        # Nothing else counts as long as the files are not what they were made as.
+        tuple(dict.fromkeys((*broken, *own, *held))),
+        tuple(notes),
+        tuple(all_advice),
+    )
 
 
 def _word(light: Light | None, by_the_errors: bool) -> str:
@@ -103,13 +119,15 @@ def _light(
     if tolerance is None:
         return None, []
     if unseen is None:
-        own: list[str] = [phrase("the errors at unseen poses have no interval")]
+        own: list[str] = [
+            phrase("the errors could not be made again from the readings, so they have no interval")
+        ]
         stated = evidence.figures.held_out.max if evidence.figures is not None else 0.0
         if stated <= tolerance:
             return Light.YELLOW, own
         # To take the dataset away must not lift a red light.
         return Light.RED, [
-            phrase("the model file states errors of up to {error}", error=mm(stated)),
+            phrase("the model file itself states errors of up to {error}", error=mm(stated)),
             *own,
         ]
     own = list(_against(unseen, tolerance))
@@ -118,46 +136,108 @@ def _light(
     return (Light.YELLOW if own or held else Light.GREEN), own
 
 
+_UNTRUSTED = phrase(
+    "Files were changed or contradict one another, so the figures cannot be relied on. Do not"
+    " release for production."
+)
+
+
+def _meaning(evidence: Evidence, light: Light | None, by_the_errors: bool, useless: bool) -> Phrase:
+    """Return what is proved, and what follows for the use of the model."""
+    tolerance = mm(evidence.limits.tolerance or 0.0)
+    if evidence.calibrated is None:
+        return phrase("There is no calibrated model, so nothing can be released.")
+    if light is None:
+        return phrase(
+            "Without a tolerance it cannot be said whether the model is good enough. Do not"
+            " release it for production on this report alone."
+        )
+    if useless:
+        return phrase(
+            "The model explains less than half of the deflection that it should predict. Do not"
+            " use it."
+        )
+    if light is Light.GREEN:
+        shown = phrase(
+            "95 % of predictions err by at most {tolerance} at poses and under forces like those"
+            " of the test (95 % confidence), and no reading was beyond.",
+            tolerance=tolerance,
+        )
+        use = (
+            phrase("A simulation releases no real robot.")
+            if evidence.simulated
+            else phrase("It can be released for production within the limits stated below.")
+        )
+        return sentences([shown, use])
+    if evidence.unseen is None:
+        return phrase(
+            "Nothing is proved: the errors of this model could not be checked against its readings."
+            " Do not release it for production."
+        )
+    if light is Light.RED:
+        return phrase(
+            "The predictions err by more than {tolerance} too often. Do not release for"
+            " production.",
+            tolerance=tolerance,
+        )
+    if by_the_errors:
+        return phrase(
+            "Not proved that the predictions keep within {tolerance}. Do not release for"
+            " production.",
+            tolerance=tolerance,
+        )
+    return phrase(
+        "The errors found are within {tolerance}, but not everything is proved. Do not release for"
+        " production before the open points are settled.",
+        tolerance=tolerance,
+    )
+
+
 def _against(unseen: UnseenErrors, tolerance: float) -> Iterator[Phrase]:
     p95 = unseen.p95
-    span = phrase("{low} to {high}", low=mm(p95.low), high=mm(p95.high))
+    values = {
+        "value": mm(p95.value),
+        "span": phrase("{low} to {high}", low=mm(p95.low), high=mm(p95.high)),
+        "tolerance": mm(tolerance),
+    }
     if not p95.low <= tolerance:
         yield phrase(
-            "the whole interval of the 95 % error ({span}) is beyond {tolerance}",
-            span=span,
-            tolerance=mm(tolerance),
+            "95 % of errors are below {value} (95 % interval {span}): the whole interval is beyond"
+            " {tolerance}",
+            **values,
         )
     elif not p95.high <= tolerance:
         yield phrase(
-            "the interval of the 95 % error ({span}) reaches beyond {tolerance}",
-            span=span,
-            tolerance=mm(tolerance),
+            "95 % of errors are below {value} (95 % interval {span}): the interval reaches beyond"
+            " {tolerance}",
+            **values,
         )
-    beyond = unseen.beyond(tolerance)
+    beyond, worst = unseen.beyond(tolerance), int(unseen.error.argmax())
     if beyond:
-        readings, most = counted(len(unseen.error), "reading"), mm(unseen.max)
+        found = {
+            "readings": counted(len(unseen.error), "reading"),
+            "tolerance": mm(tolerance),
+            "most": mm(unseen.max),
+            "pose": unseen.pose[worst],
+            "load_case": unseen.load_case[worst],
+        }
         yield (
             phrase(
-                "1 of {readings} at unseen poses is beyond {tolerance}, the largest with {most}",
-                readings=readings,
-                tolerance=mm(tolerance),
-                most=most,
+                "1 of {readings} was predicted wrong by more than {tolerance}: by {most}, at pose"
+                " {pose} {load_case}",
+                **found,
             )
             if beyond == 1
             else phrase(
-                "{beyond} of {readings} at unseen poses are beyond {tolerance}, the largest with"
-                " {most}",
+                "{beyond} of {readings} were predicted wrong by more than {tolerance}, the worst by"
+                " {most}, at pose {pose} {load_case}",
                 beyond=beyond,
-                readings=readings,
-                tolerance=mm(tolerance),
-                most=most,
+                **found,
             )
         )
 
 
-def _sentence(
-    evidence: Evidence, unseen: UnseenErrors | None, light: Light | None, useless: bool
-) -> Phrase:
+def _sentence(evidence: Evidence, unseen: UnseenErrors | None) -> Phrase:
     tolerance = evidence.limits.tolerance
     against = (
         phrase("No tolerance was given, so this report does not say whether that is enough.")
@@ -172,34 +252,36 @@ def _sentence(
         return phrase("No calibrated model was found.")
     if unseen is None:
         return sentences([_stated(evidence), against])
+    left_out = (
+        phrase(
+            "Every pose was predicted by a model made from the other {others}.",
+            others=unseen.poses - 1,
+        )
+        if unseen.folds == unseen.poses
+        else phrase(
+            "Every pose was predicted by a model made without it ({folds} refits).",
+            folds=unseen.folds,
+        )
+    )
     accuracy = phrase(
-        "At poses that the fit had not seen, the model predicted the deflection to {mean} on"
-        " average; 95 % of {readings} at {poses} were within {p95}, all within {max}.",
-        mean=mm(unseen.mean.value),
+        "Of {readings} at {poses}, the prediction was wrong by {mean} on average, by at most {p95}"
+        " for 95 % of them, and by {max} at worst (length of the error in space).",
         readings=counted(len(unseen.error), "reading"),
         poses=counted(unseen.poses, "pose"),
+        mean=mm(unseen.mean.value),
         p95=mm(unseen.p95.value),
         max=mm(unseen.max),
     )
-    closing = {
-        Light.GREEN: phrase("The errors are within it, and nothing essential is missing."),
-        Light.YELLOW: phrase(
-            "Not everything that a green light needs is there; the reasons follow."
-        ),
-        Light.RED: phrase("The errors are beyond it."),
-    }
-    if useless:
-        closing[Light.RED] = phrase("The model explains less than half of what it should predict.")
-    return sentences([accuracy, against, *([closing[light]] if light else [])])
+    return sentences([left_out, accuracy, against])
 
 
 def _stated(evidence: Evidence) -> Phrase:
     held_out = evidence.figures.held_out if evidence.figures else None
     if held_out is None:
-        return phrase("The model file tells no error at unseen poses.")
+        return phrase("The model file tells no error at poses left out of the fit.")
     return phrase(
-        "The model file states {mean} on average and {max} at most at poses left out of the fit;"
-        " this could not be made again here.",
+        "The model file states errors of {mean} on average and {max} at most, each at a pose left"
+        " out of the fit; this could not be made again here.",
         mean=mm(held_out.mean),
         max=mm(held_out.max),
     )
@@ -234,8 +316,8 @@ def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
         return
     compared = phrase(
         "its readings scatter by {noise}, the errors are {error} on average.",
-        noise=um(noise),
-        error=um(unseen.mean.value),
+        noise=mm(noise),
+        error=mm(unseen.mean.value),
     )
     if noise > _LOUD * unseen.mean.value:
         nearer = phrase("Average longer or bring the tracker nearer:")
@@ -245,7 +327,7 @@ def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
     if sigma is not None and scatter is not None and scatter > sigma:
         said.append(
             phrase(
-                "Where the arm stops scatters by {scatter} in a coordinate.", scatter=um(scatter)
+                "Where the arm stops scatters by {scatter} in a coordinate.", scatter=mm(scatter)
             )
         )
     rest = phrase(
@@ -260,7 +342,7 @@ def _largest(unseen: UnseenErrors) -> Iterator[str]:
     k = int(unseen.error.argmax())
     if unseen.max > 2.0 * unseen.mean.value:
         yield phrase(
-            "Look at pose {pose} {load_case} first, contact, stand and line of sight: it has the"
+            "Look at pose {pose} {load_case} first (contact, stand, line of sight): it has the"
             " largest error, {error}.",
             pose=unseen.pose[k],
             load_case=unseen.load_case[k],

@@ -95,9 +95,9 @@ class CompensateResult(Result, CorrectionFigures):
         first = f", first at {self.first_jump}" if self.posture_jumps else ""
         return (
             ("tool", self.tool),
-            ("rows", str(self.rows)),
+            ("rows", f"{self.rows}; all figures are predicted by the model, nothing is measured"),
             *(
-                (label, f"{1e3 * each.mean:.3g} mm mean, {1e3 * each.max:.3g} mm max at {each.at}")
+                (label, f"{_shown(each.mean)} mean, {_shown(each.max)} max at {each.at}")
                 for label, each in lengths.items()
             ),
             ("posture jumps", f"{self.posture_jumps}{first}"),
@@ -201,6 +201,11 @@ def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> 
             " posture deflects otherwise, give --start if it is another"
         )
     return tuple(notes)
+
+
+def _shown(metres: float) -> str:
+    """Return a length in mm; how little a solver left is of no use below that."""
+    return f"{1e3 * metres:.3g} mm" if metres >= 1e-8 else "under 0.00001 mm"
 
 
 def _built(settings: CompensateSettings) -> tuple[str, ...]:

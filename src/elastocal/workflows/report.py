@@ -114,7 +114,7 @@ class ReportResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (
-            (f"{self.verdict.word}{self.light}", self.verdict.sentence),
+            (f"{self.verdict.word}{self.light}", f"{self.verdict.meaning} {self.verdict.sentence}"),
             *(("because", reason) for reason in self.verdict.reasons),
             ("written to", self.files),
         )
@@ -175,13 +175,17 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     evidence = gather_evidence(options, made)
     progress("report", 1, steps)
     signed = None if key is None else partial(sign, key, OF_REPORT, made=made)
-    written = write_report(out, evidence, signed, language, public_key(key) if key else "")
-    if tables is not None:
-        write_tables(tables, evidence, language)
-    progress("report", 2, steps)
-    if paper is not None:
-        write_pdf(out, paper, browser)
-        progress("report", 3, steps)
+
+    def write_beside(page: Path) -> None:
+        progress("report", 2, steps)
+        if paper is not None:
+            write_pdf(page, paper, browser)
+            progress("report", 3, steps)
+        if tables is not None:
+            write_tables(tables, evidence, language)
+
+    signer = public_key(key) if key else ""
+    written = write_report(out, evidence, signed, language, signer, write_beside)
     return ReportResult(written.verdict, _figures(written, evidence, paper, tables))
 
 
@@ -197,7 +201,7 @@ def _figures(
         pdf=str(paper) if paper else None,
         xlsx=str(tables) if tables else None,
         light=verdict.light.value if verdict.light else None,
-        verdict=verdict.sentence,
+        verdict=f"{verdict.meaning} {verdict.sentence}",
         reasons=tuple(verdict.reasons),
         advice=tuple(verdict.advice),
         tolerance=evidence.limits.tolerance,

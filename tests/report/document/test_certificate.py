@@ -35,11 +35,23 @@ def test_every_reading_is_drawn_before_and_after(certificate, parts):
     assert certificate.picture.after.count("M") == len(parts.unseen.error)
 
 
-def test_what_is_stated_stands_there_and_the_rest_is_said_to_be_missing(certificate):
+def test_what_is_stated_stands_there_and_the_rest_is_said_to_be_missing_in_one_line(certificate):
     rows = {str(name): list(map(str, found)) for name, found in certificate.identity}
     assert rows["Operator"] == ["A. Meyer"]
-    assert rows["Tracker"] == ["not stated", "serial 750123", "certificate not stated"]
-    assert rows["Place"] == ["not stated"]
+    assert rows["Tracker"] == ["serial 750123"]
+    assert "Place" not in rows
+    assert "Tracker (type, calibration certificate), Place" in certificate.not_entered
+
+
+def test_the_forces_of_the_test_stand_on_the_first_page(certificate, parts):
+    (tested,) = {str(name): found for name, found in certificate.identity}["Tested with"]
+    forces = np.array(list(parts.cell.file.presses.values()))
+    assert f" {np.abs(forces[:, 2]).max():.0f} N pressing" in tested
+
+
+def test_the_picture_names_the_reading_with_the_largest_error(certificate, parts):
+    worst = parts.unseen.pose[parts.unseen.error.argmax()]
+    assert certificate.picture.worst.text.startswith(f"pose {worst}: ")
 
 
 def test_without_anything_there_is_a_certificate_that_says_so():

@@ -296,7 +296,7 @@ def _show_suspicious(console: Console, suspicious: tuple[SuspiciousReading, ...]
 def show_report(console: Console, result: "ReportResult") -> None:
     """Print the verdict of a report."""
     verdict = result.verdict
-    console.print(f"{bold(verdict.word)}{result.light}: {verdict.sentence}")
+    console.print(f"{bold(verdict.word)}{result.light}: {verdict.meaning} {verdict.sentence}")
     for reason in verdict.reasons:
         console.print(f"   {reason}")
     console.print(f"written to {result.files}")

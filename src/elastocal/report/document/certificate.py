@@ -1,12 +1,12 @@
 """The first page of the report: a certificate that prints on one sheet of A4."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import CertificateEntry, Equipment
+from elastocal.cell import Equipment, SensorIdentity, TrackerIdentity
+from elastocal.identification import JOINT_REACH, RAIL_REACH, ProductionCoverage
 from elastocal.report.document.blocks import Stamp
 from elastocal.results import brief_repr
 from elastocal.verdict import (
@@ -16,12 +16,11 @@ from elastocal.verdict import (
     Verdict,
     state_uncertainty,
 )
-from elastocal.wording import Phrase, counted, mm, phrase, sentences, um
+from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
-_MOST_REASONS, _LONGEST = 3, 150
+_MOST_REASONS, _LONGEST = 3, 170
 """Reasons on the sheet, and letters of one: the rest stands in the appendix."""
-_LONG_REASON, _LONG_NAME = 100, 60
-_NOT_STATED = phrase("not stated")
+_LONG_REASON, _LONG_NAME = 110, 60
 _WIDE, _HIGH = 600.0, 190.0
 """Inner size of the picture before and after, in its own units."""
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
@@ -34,6 +33,11 @@ class Mark:
     at: float
     text: str
 
+    @property
+    def anchor(self) -> str:
+        """Side of the text on which the place lies, so that it stays within the scale."""
+        return "start" if self.at < 34.0 else "end" if self.at > 66.0 else "middle"
+
 
 @brief_repr
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ class ToleranceBar:
     low: float
     high: float
     """Ends of the interval of the 95 % error."""
+    span: Phrase
+    """The interval in words."""
     largest: Mark
     tolerance: Mark | None
     ticks: tuple[Mark, ...]
@@ -53,7 +59,7 @@ class ToleranceBar:
 @brief_repr
 @dataclass(frozen=True)
 class BeforeAfter:
-    """Every reading twice: what the arm gave way, and what the model leaves of it."""
+    """Every reading twice: how far the arm gave way, and how wrong the prediction was."""
 
     before: str
     after: str
@@ -64,6 +70,9 @@ class BeforeAfter:
     """Lines of the scale upwards, ``at`` in units of the picture."""
     columns: tuple[Mark, ...]
     """Numbers of poses."""
+    worst: Mark
+    """The reading with the largest error, ``at`` along the picture."""
+    worst_height: float
     text: Phrase
     width: float = _WIDE
     height: float = _HIGH
@@ -76,14 +85,14 @@ class Certificate:
 
     number: str
     identity: tuple[tuple[Phrase, tuple[str | Stamp, ...]], ...]
-    """Rows: what, and its parts; of unknown ones it says so."""
+    """Rows: what, and the parts that are known."""
+    not_entered: Phrase | None
+    """What nobody stated, in a line."""
     bar: ToleranceBar | None
     picture: BeforeAfter | None
     reasons: tuple[str, ...]
     more_reasons: int
     coverage: Phrase
-    covered: float | None
-    """Share of production, from 0 to 100."""
     uncertainty: Phrase
     signature: Phrase
     run_signature: Phrase
@@ -107,24 +116,17 @@ def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = 
     signer : str
         Public key of who signs the report; empty where nobody does.
     """
-    entry, found = evidence.certificate, evidence.coverage
     reasons = tuple(map(_short, verdict.reasons[:_MOST_REASONS]))
+    known, missing = _identity(evidence)
     return Certificate(
-        entry.number or "",
-        tuple(_identity(evidence, entry)),
+        evidence.certificate.number or "",
+        known,
+        phrase("Not entered: {names}.", names=sentences(missing, ", ")) if missing else None,
         _bar(evidence),
         _before_after(evidence),
         reasons,
         len(verdict.reasons) - len(reasons),
-        phrase("Not known: the cell file names no production path (process.file).")
-        if found is None
-        else phrase(
-            "{share} of {rows} of production lie within the postures and loads that were"
-            " calibrated.",
-            share=f"{found.covered:.0%}",
-            rows=counted(found.rows, "row"),
-        ),
-        None if found is None else 100.0 * found.covered,
+        _coverage(evidence.coverage),
         _uncertainty(state_uncertainty(evidence)),
         phrase(
             "This report carries an ed25519 signature, key {key}…; elastocal verify checks it.",
@@ -140,45 +142,108 @@ def _short(reason: str) -> str:
     return reason if len(reason) <= _LONGEST else f"{reason[: _LONGEST - 1].rstrip()}…"
 
 
-def _identity(
-    evidence: Evidence, entry: CertificateEntry
-) -> Iterator[tuple[Phrase, tuple[str | Stamp, ...]]]:
-    robot = entry.robot.type or evidence.robot or _NOT_STATED
-    yield phrase("Robot"), (robot, _serial(entry.robot))
-    yield phrase("Controller"), _equipment(entry.controller)
-    yield phrase("Tool"), _equipment(entry.tool)
-    sensor = None if evidence.cell is None else evidence.cell.file.sensor
-    named = entry.sensor.type or (sensor.name if sensor is not None else _NOT_STATED)
-    yield (
-        phrase("Force sensor"),
-        (named, _serial(entry.sensor), _calibrated(entry.sensor.certificate)),
+_Row = tuple[Phrase, tuple[str | Stamp, ...]]
+
+
+def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
+    """Return what is known of the calibration in rows, and what nobody stated."""
+    entry, cell = evidence.certificate, evidence.cell
+    sensor = None if cell is None else cell.file.sensor
+    named = None if sensor is None else sensor.name
+    mass = () if cell is None else (phrase("{mass} kg", mass=f"{cell.file.tool.mass:g}"),)
+    things = (
+        (phrase("Robot"), entry.robot, evidence.robot, ()),
+        (phrase("Controller"), entry.controller, None, ()),
+        (phrase("Tool"), entry.tool, None, mass),
+        (phrase("Force sensor"), entry.sensor, named, ()),
+        (phrase("Tracker"), entry.tracker, None, ()),
     )
-    yield (
-        phrase("Tracker"),
-        (
-            entry.tracker.type or _NOT_STATED,
-            _serial(entry.tracker),
-            _calibrated(entry.tracker.certificate),
-        ),
-    )
+    rows, missing = list[_Row](), list[Phrase]()
+    for name, thing, own, more in things:
+        parts, lacking = _equipment(thing, own)
+        rows += [(name, (*parts, *more))] if parts or more else []
+        names = sentences(lacking, ", ")
+        missing += [phrase("{thing} ({names})", thing=name, names=names)] if lacking else []
     record = evidence.run_record
-    began = _NOT_STATED if record is None else Stamp(record.started)
-    yield phrase("Date of the measurement"), (entry.date or began,)
-    yield phrase("Place"), (entry.place or _NOT_STATED,)
-    yield phrase("Temperature"), (entry.temperature or _NOT_STATED,)
-    yield phrase("Operator"), (entry.operator or _NOT_STATED,)
+    began = None if record is None else Stamp(record.started)
+    day = (
+        phrase("Date of the simulated run")
+        if evidence.simulated
+        else phrase("Date of the measurement")
+    )
+    others: tuple[tuple[Phrase, str | Stamp | None], ...] = (
+        (phrase("Tested with"), _tested_with(evidence)),
+        (day, entry.date or began),
+        (phrase("Place"), entry.place),
+        (phrase("Temperature"), entry.temperature),
+        (phrase("Operator"), entry.operator),
+    )
+    for name, value in others:
+        if value is None:
+            missing.append(name)
+        else:
+            rows.append((name, (value,)))
+    return tuple(rows), missing
 
 
-def _equipment(equipment: Equipment) -> tuple[str, ...]:
-    return equipment.type or _NOT_STATED, _serial(equipment)
+def _equipment(thing: Equipment, own: str | None) -> tuple[tuple[str, ...], list[Phrase]]:
+    """Return what is known of a thing, and what is not; ``own`` stands where it has no type."""
+    kind = thing.type or own
+    parts, lacking = [kind] if kind else [], [] if kind else [phrase("type")]
+    if thing.serial:
+        parts.append(phrase("serial {number}", number=thing.serial))
+    else:
+        lacking.append(phrase("serial number"))
+    if isinstance(thing, SensorIdentity | TrackerIdentity):
+        if thing.certificate:
+            parts.append(phrase("certificate {number}", number=thing.certificate))
+        else:
+            lacking.append(phrase("calibration certificate"))
+    return tuple(parts), lacking
 
 
-def _serial(equipment: Equipment) -> Phrase:
-    return phrase("serial {number}", number=equipment.serial or _NOT_STATED)
+def _tested_with(evidence: Evidence) -> Phrase | None:
+    """Return the poses and the forces of the test."""
+    cell, dataset = evidence.cell, evidence.dataset
+    if cell is None or dataset is None:
+        return None
+    forces = np.array(list(cell.file.presses.values()))
+    push, aside = np.abs(forces[:, 2]), np.hypot(forces[:, 0], forces[:, 1])
+    poses, high = counted(len(dataset.poses), "pose"), f"{push.max():.0f}"
+    low = f"{push.min():.0f}"
+    return phrase(
+        "{poses}; {press} N pressing, up to {aside} N sideways",
+        poses=poses,
+        press=high if low == high else phrase("{low} to {high}", low=low, high=high),
+        aside=f"{aside.max():.0f}",
+    )
 
 
-def _calibrated(certificate: str | None) -> Phrase:
-    return phrase("certificate {number}", number=certificate or _NOT_STATED)
+def _coverage(found: ProductionCoverage | None) -> Phrase:
+    if found is None:
+        return phrase("Not known: the cell file names no production path (process.file).")
+    reach = phrase(
+        "every joint but the last within {angle}°", angle=f"{np.degrees(JOINT_REACH):.0f}"
+    )
+    if found.rail is not None:
+        rail = phrase("rail within {rail}", rail=mm(RAIL_REACH, 0))
+        reach = sentences([reach, rail], ", ")
+    points = counted(found.rows, "point")
+    if found.covered >= 1.0:
+        return phrase(
+            "All {points} of the production path are near a tested posture ({reach}) and within"
+            " the forces tested there.",
+            points=points,
+            reach=reach,
+        )
+    return phrase(
+        "{share} of {points} of the production path are near a tested posture ({reach}) and within"
+        " the forces tested there.",
+        # Not rounded up: less than all must not look like all.
+        share=f"{np.floor(1e3 * found.covered) / 10.0:g}%",
+        points=points,
+        reach=reach,
+    )
 
 
 def _bar(evidence: Evidence) -> ToleranceBar | None:
@@ -200,6 +265,7 @@ def _bar(evidence: Evidence) -> ToleranceBar | None:
         mark(unseen.p95.value),
         at(unseen.p95.low),
         at(unseen.p95.high),
+        phrase("{low} to {high}", low=mm(unseen.p95.low), high=mm(unseen.p95.high)),
         mark(unseen.max),
         None if tolerance is None else mark(tolerance),
         tuple(Mark(100.0 * tick / end, f"{tick:.{_digits(step)}f}") for tick in ticks),
@@ -226,15 +292,20 @@ def _before_after(evidence: Evidence) -> BeforeAfter | None:
     level = None if tolerance is None else _HIGH * (1.0 - 1e3 * tolerance / end)
     every = max(1, -(-len(poses) // 16))
     ticks = np.arange(0.0, end + 0.5 * step, step)
+    k = int(unseen.error.argmax())
+    worst = 100.0 * (place[int(unseen.pose[k])] + 0.62) / len(poses)
+    named = phrase("pose {pose}: {error}", pose=unseen.pose[k], error=mm(unseen.max))
     return BeforeAfter(
         dots(readings.pose, size, -0.12),
         dots(unseen.pose, unseen.error, 0.12),
         level if level is not None and level >= 0.0 else None,
         tuple(Mark(_HIGH * (1.0 - t / end), f"{t:.{_digits(step)}f}") for t in ticks),
         tuple(Mark((place[pose] + 0.5) * between, str(pose)) for pose in poses[::every]),
+        Mark(worst, named),
+        _HIGH * (1.0 - 1e3 * unseen.max / end),
         phrase(
-            "Deflection under the test forces, {before} on average, and what the model leaves of"
-            " it at poses that it had not seen, {after}.",
+            "On average the arm gave way by {before}, and the prediction was wrong by {after}."
+            " Nothing was corrected here.",
             before=mm(float(size.mean())),
             after=mm(unseen.mean.value),
         ),
@@ -265,15 +336,21 @@ def _digits(step: float) -> int:
 def _uncertainty(statement: UncertaintyStatement | None) -> Phrase:
     if statement is None:
         return phrase("Not stated: no error at poses left out of the fit is known.")
-    said = phrase(
-        "Predicted deflection along one direction: U = {expanded} (k = 2, about 95 %).",
-        expanded=um(statement.expanded),
-    )
+    expanded = mm(statement.expanded)
     if statement.is_complete:
-        return said
+        return phrase(
+            "A predicted deflection is known to ±{expanded} in any one direction (U, k = 2, about"
+            " 95 %). The errors above are lengths in space.",
+            expanded=expanded,
+        )
     names = [each.name for each in statement.sources if each.standard is None]
-    lacking = phrase("Not stated, and so not in it: {names}.", names=sentences(names, ", "))
-    return phrase("{said} {lacking}", said=said, lacking=lacking)
+    return phrase(
+        "A predicted deflection is known to ±{expanded} at best in any one direction (U, k = 2,"
+        " about 95 %). Not known, and so not in it: {names}. The errors above are lengths in"
+        " space.",
+        expanded=expanded,
+        names=sentences(names, ", "),
+    )
 
 
 def _run_signature(evidence: Evidence) -> Phrase:
@@ -282,4 +359,4 @@ def _run_signature(evidence: Evidence) -> Phrase:
         return phrase("The record of the run is signed, and the signature holds.")
     if LinkState.BROKEN in states:
         return phrase("The signature of the record of the run does not hold.")
-    return phrase("The record of the run is not signed.")
+    return phrase("The record of the run is not signed: whoever edits it can hide that.")

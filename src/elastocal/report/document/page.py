@@ -7,7 +7,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from elastocal import __version__
-from elastocal.files import write_text
+from elastocal.files import replacing
 from elastocal.report.document import sections as exported
 from elastocal.report.document.blocks import Section
 from elastocal.report.document.certificate import certificate_of_evidence
@@ -22,7 +22,7 @@ from elastocal.verdict import (
     judge_evidence,
     manifest_of,
 )
-from elastocal.wording import phrase
+from elastocal.wording import Phrase, phrase
 
 _EXPORTED = (getattr(exported, name) for name in dir(exported))
 SECTIONS: tuple[Section, ...] = tuple(
@@ -45,6 +45,7 @@ def write_report(
     sign: Callable[[str], Signature] | None = None,
     language: Language = ENGLISH,
     signer: str = "",
+    beside: Callable[[Path], object] | None = None,
 ) -> WrittenReport:
     """Write the report, atomically: a certificate on one sheet, and an appendix that folds.
 
@@ -60,6 +61,9 @@ def write_report(
         Of its words; what other parts of the program said stays English.
     signer : str
         Public key of who signs it.
+    beside : callable, optional
+        Makes what stands beside the report, from the finished page: where it raises, no report is
+        written either.
 
     Raises
     ------
@@ -73,7 +77,7 @@ def write_report(
     page = render(
         "report.html",
         language,
-        title=phrase("Calibration certificate: {name}", name=evidence.name),
+        title=_title(evidence),
         styles=("page.css", "report.css"),
         scripts=("view.js", "report.js"),
         data=data,
@@ -85,8 +89,17 @@ def write_report(
         empty_manifest=Markup(EMPTY_MANIFEST),
     )
     manifest = manifest_of(page, evidence, verdict, __version__, sign)
-    write_text(path, embed_manifest(page, manifest))
+    with replacing(path) as finished:
+        finished.write_text(embed_manifest(page, manifest), encoding="utf-8", newline="")
+        if beside is not None:
+            beside(finished)
     return WrittenReport(Path(path), verdict)
+
+
+def _title(evidence: Evidence) -> Phrase:
+    if evidence.simulated:
+        return phrase("Simulation, not a calibration of a robot: cell {name}", name=evidence.name)
+    return phrase("Calibration certificate: {name}", name=evidence.name)
 
 
 def verdict_html(evidence: Evidence, verdict: Verdict) -> str:
