@@ -102,7 +102,10 @@ def displacement_figure(
 
 
 def pose_grid(
-    panels: Sequence[tuple[str, FloatArray]], poses: Sequence[int], cases: Sequence[str]
+    panels: Sequence[tuple[str, FloatArray]],
+    poses: Sequence[int],
+    cases: Sequence[str],
+    check: Sequence[str] = (),
 ) -> Figure:
     """Return the figure: a panel below the other, load cases downwards, poses across.
 
@@ -114,6 +117,8 @@ def pose_grid(
         Their labels.
     cases : sequence of str
         Names of the load cases.
+    check : sequence of str
+        Those among them that no fit sees.
     """
     each = _HEAD + _CELL * len(cases)
     height = each * len(panels) + _AXIS
@@ -122,14 +127,23 @@ def pose_grid(
         bottom = height - each * (number + 1) + 0.05
         across = _READINGS_WIDTH - _LEFT - 0.1
         axes = figure.add_panel(_LEFT, bottom, across, _CELL * len(cases))
-        _draw_shades(axes, title, values, poses, cases)
+        _draw_shades(axes, title, values, poses, cases, check)
         if number == len(panels) - 1:
-            axes.set_xlabel(phrase("pose; a cross: no usable reading"))
+            axes.set_xlabel(
+                phrase("pose; ×: no usable reading; –: kept back as a check")
+                if check
+                else phrase("pose; ×: no usable reading")
+            )
     return figure
 
 
 def _draw_shades(
-    axes: Axes, title: str, values: FloatArray, poses: Sequence[int], cases: Sequence[str]
+    axes: Axes,
+    title: str,
+    values: FloatArray,
+    poses: Sequence[int],
+    cases: Sequence[str],
+    check: Sequence[str],
 ) -> None:
     top = float(np.nanmax(values)) if np.any(np.isfinite(values)) else 1.0
     axes.imshow(values.T, cmap=style.SEQUENTIAL, vmin=0.0, vmax=top or 1.0, aspect="auto")
@@ -141,7 +155,9 @@ def _draw_shades(
     axes.spines[:].set_visible(False)
     for (pose, case), value in np.ndenumerate(values):
         if not np.isfinite(value):
-            axes.text(pose, case, "×", ha="center", va="center", color=style.VERMILLION)
+            kept = cases[case] in check
+            sign, colour = ("–", style.MUTED) if kept else ("×", style.VERMILLION)
+            axes.text(pose, case, sign, ha="center", va="center", color=colour)
         elif len(poses) <= _MANY:
             ink = style.ON_BRIGHT if value > 0.55 * top else style.ON_DARK
             # In little room: 1.23, .041.
