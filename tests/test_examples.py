@@ -1,4 +1,8 @@
-"""Every script of examples/ runs as a user would run it, and says what it should."""
+"""Every script of examples/ runs as a user would run it, and says what it should.
+
+Notebooks of the documentation, too, import only what the reference lists; what else is asked of
+them stands in ``test_notebooks.py``.
+"""
 
 import ast
 import importlib
@@ -12,6 +16,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
+NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("[!i]*.md"))
 LONGEST = 100
 """Lines."""
 
@@ -78,11 +83,19 @@ def test_every_example_is_in_the_table_and_in_the_tests():
     assert set(TOLD) == names
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+def python_of(path):
+    """Return the Python of a script, or of a page."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".py":
+        return text
+    return "".join(re.findall(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL))
+
+
+@pytest.mark.parametrize("path", EXAMPLES + NOTEBOOKS, ids=lambda path: path.name)
 def test_an_example_imports_only_what_the_reference_lists(path, reference):
     missing = [
         f"{node.module}.{alias.name}"
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(ast.parse(python_of(path)))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("elastocal")
         for alias in node.names
         if not listed(f"{node.module}", alias.name, reference)

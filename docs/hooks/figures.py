@@ -26,7 +26,7 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / ".cache" / "figures"
-PROCESSES = (("placement",), ("machining", "small", "budget", "demos", "studio"))
+PROCESSES = (("placement", "notebooks"), ("machining", "small", "budget", "demos", "studio"))
 """Modules of ``gallery``, by the process that runs them."""
 TOLD = "told.json"
 _PACKAGES = ("numpy", "scipy", "pin", "matplotlib", "plotly")
@@ -70,7 +70,7 @@ def _hash() -> str:
     """Return a hash of everything that the figures are made by."""
     beside = ROOT.parent / "shared" / "data" / "fanuc_r2000ic"
     found = hashlib.sha256("".join(version(name) for name in _PACKAGES).encode())
-    for folder in (ROOT / "src", Path(__file__).parent, beside):
+    for folder in (ROOT / "src", Path(__file__).parent, ROOT / "docs" / "notebooks", beside):
         for path in sorted(folder.rglob("*")):
             if path.is_file() and "__pycache__" not in path.parts:
                 found.update(str(path.relative_to(folder)).encode() + path.read_bytes())

@@ -13,6 +13,7 @@ from mkdocs.structure.pages import Page
 BOOSTS = {
     "how-to/": 4.0,
     "tutorial": 3.0,
+    "notebooks/": 2.0,
     "explanation/": 1.5,
     "reference/api/": 0.0003,
     "decisions/": 0.0002,

@@ -17,15 +17,18 @@ _REMARKS = ("warning", "finding")
 """Labels of facts of which there may be hundreds of one kind."""
 _LONGEST = 60
 _LONGEST_LINE = 200
+_LEFT = "style='text-align:left'"
+"""Jupyter would set them to the right."""
 
 T = TypeVar("T")
 
 
 class Result:
-    """Base of the records that workflows return.
+    """Base of the records that workflows return, and of data that a notebook shows.
 
     Sub-classes are frozen dataclasses; `facts` may be overridden where the fields alone do not
-    say what a person wants to know first.
+    say what a person wants to know first. Every figure among them carries its unit, what it counts
+    and, where it is an error, whether it was held out.
     """
 
     def facts(self) -> tuple[tuple[str, str], ...]:
@@ -73,7 +76,8 @@ class Result:
     def _repr_html_(self) -> str:
         """Return the facts as a table, for notebooks."""
         rows = "".join(
-            f"<tr><th scope='row'>{html.escape(label)}</th><td>{html.escape(text)}</td></tr>"
+            f"<tr><th scope='row' {_LEFT}>{html.escape(label)}</th>"
+            f"<td {_LEFT}>{html.escape(text)}</td></tr>"
             for label, text in self._shown()
         )
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"

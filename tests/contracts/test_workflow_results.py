@@ -21,7 +21,6 @@ CLASSES = {
 }
 WITHOUT = {
     "CheckResult",
-    "GeometryResult",
     "GuessMapResult",
     "DryRunResult",
     "ExportResult",

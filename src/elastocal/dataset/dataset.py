@@ -42,13 +42,14 @@ from elastocal.dataset._validation import check_numbers, check_plausible
 from elastocal.dataset.merging import selected, usable_readings
 from elastocal.dataset.readings import Readings
 from elastocal.records import LabelledArrays
+from elastocal.results import Result
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Dataset:
+class Dataset(Result):
     """Measured displacements, forces and joint positions, by pose and load case.
 
     All in SI units, in the order of their labels; arrays are copied in and read-only. Plain arrays
@@ -81,8 +82,7 @@ class Dataset:
     status: StatusArray
     """Index into ``STATUSES`` of each reading, shape (pose, load_case)."""
     marker_displacement: FloatArray | None = None
-    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; None: there
-    was no metrology."""
+    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; None: none."""
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (pose, load_case, 3), in N·m."""
     force_sigma: FloatArray | None = None
@@ -120,11 +120,14 @@ class Dataset:
         check_structure(self._labels, self._variables, self.joint_units)
         check_numbers(self._labels, self._variables)
 
-    def __repr__(self) -> str:
-        """Return the size of the dataset and where it comes from, in one line."""
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return how much was measured, and where it comes from."""
+        usable, poses = self.usable, len(self.poses)
         return (
-            f"Dataset({self.robot_name or 'robot without name'}: {int(self.usable.sum())} usable"
-            f" readings at {len(self.poses)} poses, load cases {', '.join(self.load_cases)})"
+            ("robot", self.robot_name or "without a name"),
+            ("readings", f"{int(usable.sum())} usable of {usable.size}, at {poses} poses"),
+            ("load cases", ", ".join(self.load_cases)),
+            ("provenance", self.provenance or "not known"),
         )
 
     @classmethod

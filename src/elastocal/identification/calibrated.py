@@ -20,7 +20,7 @@ from elastocal.identification.prediction_doubt import PredictionDoubt, Productio
 from elastocal.identification.production import CoveredRows, ProductionCoverage, covered_rows
 from elastocal.identification.uncertainty import interval
 from elastocal.records import record
-from elastocal.results import brief_repr
+from elastocal.results import Result, brief_repr
 from elastocal.robot import (
     Robot,
     T_from_xyzabc,
@@ -30,6 +30,7 @@ from elastocal.robot import (
     xyzabc_from_T,
 )
 from elastocal.units import impossible
+from elastocal.wording import mm, um
 
 _LINK = "tool_tcp"
 """Name of the link at another tool's tcp; with a number where it is taken."""
@@ -143,9 +144,8 @@ _CHUNK = 2000
 """Configurations predicted at a time, so that the draws of a long path fit into memory."""
 
 
-@brief_repr
-@dataclass(frozen=True)
-class Prediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Result):
     """Predicted deflections with 95 % intervals: of the fit, and of what would be measured."""
 
     deflection: FloatArray
@@ -159,6 +159,24 @@ class Prediction:
     express, and the noise of a measurement. NaN where the model does not know its misfit."""
     measured_high: FloatArray
     """Upper ends of that, shape (row, 3), in m."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return how far the tool yields, and how sure that is."""
+        size = np.linalg.norm(self.deflection, axis=1)
+        fit, measured = (
+            f"±{um(float(np.mean(high - low)) / 2)} mean along an axis"
+            for low, high in (
+                (self.low, self.high),
+                (self.measured_low, self.measured_high),
+            )
+        )
+        known = bool(np.isfinite(self.measured_low).all())
+        return (
+            ("rows", f"{len(size)}, predicted"),
+            ("deflection", f"{mm(float(size.mean()))} mean, {mm(float(size.max()))} max"),
+            ("95 % interval of the fit", fit),
+            ("95 % interval of a measurement", measured if known else "not known, as the misfit"),
+        )
 
 
 @brief_repr

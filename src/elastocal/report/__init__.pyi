@@ -9,6 +9,7 @@ from .plots import (
     Curve as Curve,
     codec_chart as codec_chart,
     drawn as drawn,
+    error_maps as error_maps,
     plot_result as plot_result,
     stiffness_figure as stiffness_figure,
     study_figure as study_figure,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from elastocal.geometry import (
 )
 from elastocal.progress import Progress
 from elastocal.records import write_json
+from elastocal.report import drawn, error_maps
 from elastocal.report.document import REPORT_TITLE, GeometryFindings, write_geometry_page
 from elastocal.results import Result, brief_repr
 from elastocal.robot import BUILT_MARK
@@ -85,6 +87,11 @@ class GeometryResult(Result):
             ("errors of the arm", f"{known} known of {len(model.parameters)} fitted"),
             *(("warning", each) for each in model.findings),
         )
+
+    def plot(self) -> Any:
+        """Return maps of the errors before and after, as a Matplotlib figure."""
+        title = f"{self.model.robot.name}: error of positions before and after calibration"
+        return drawn(error_maps, self.accuracy, title)
 
 
 @workflow(

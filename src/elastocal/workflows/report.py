@@ -175,13 +175,17 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     evidence = gather_evidence(options, made)
     progress("report", 1, steps)
     signed = None if key is None else partial(sign, key, OF_REPORT, made=made)
-    written = write_report(out, evidence, signed, language, public_key(key) if key else "")
-    if tables is not None:
-        write_tables(tables, evidence, language)
-    progress("report", 2, steps)
-    if paper is not None:
-        write_pdf(out, paper, browser)
-        progress("report", 3, steps)
+
+    def write_beside(page: Path) -> None:
+        progress("report", 2, steps)
+        if paper is not None:
+            write_pdf(page, paper, browser)
+            progress("report", 3, steps)
+        if tables is not None:
+            write_tables(tables, evidence, language)
+
+    signer = public_key(key) if key else ""
+    written = write_report(out, evidence, signed, language, signer, write_beside)
     return ReportResult(written.verdict, _figures(written, evidence, paper, tables))
 
 

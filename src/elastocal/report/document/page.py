@@ -7,7 +7,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from elastocal import __version__
-from elastocal.files import write_text
+from elastocal.files import replacing
 from elastocal.report.document import sections as exported
 from elastocal.report.document.blocks import Section
 from elastocal.report.document.certificate import certificate_of_evidence
@@ -45,6 +45,7 @@ def write_report(
     sign: Callable[[str], Signature] | None = None,
     language: Language = ENGLISH,
     signer: str = "",
+    beside: Callable[[Path], object] | None = None,
 ) -> WrittenReport:
     """Write the report, atomically: a certificate on one sheet, and an appendix that folds.
 
@@ -60,6 +61,9 @@ def write_report(
         Of its words; what other parts of the program said stays English.
     signer : str
         Public key of who signs it.
+    beside : callable, optional
+        Makes what stands beside the report, from the finished page: where it raises, no report is
+        written either.
 
     Raises
     ------
@@ -85,7 +89,10 @@ def write_report(
         empty_manifest=Markup(EMPTY_MANIFEST),
     )
     manifest = manifest_of(page, evidence, verdict, __version__, sign)
-    write_text(path, embed_manifest(page, manifest))
+    with replacing(path) as finished:
+        finished.write_text(embed_manifest(page, manifest), encoding="utf-8", newline="")
+        if beside is not None:
+            beside(finished)
     return WrittenReport(Path(path), verdict)
 
 

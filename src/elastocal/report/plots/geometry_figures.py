@@ -15,8 +15,11 @@ from matplotlib.figure import Figure
 from elastocal.arrays import FloatArray
 from elastocal.geometry import GeometryAccuracy, GeometryParameter
 from elastocal.report.plots import style
+from elastocal.wording import counted, mm
 
 _WIDTH = 10.5
+_TITLE = 0.62
+"""Room for a title and what is said below it, in inches."""
 _MAP, _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN = 2.6, 0.75, 0.8, 0.35, 0.5, 0.75
 """Height of a map, margins, and what is between rows of maps, in inches."""
 _GAPS = (0.4, 1.25)
@@ -39,17 +42,27 @@ _GROUPS = (
 """Kinds of errors, the scale that they are shown in, and what they are."""
 
 
-def error_maps(accuracy: GeometryAccuracy) -> Figure:
+def error_maps(accuracy: GeometryAccuracy, title: str = "") -> Figure:
     """Return the maps of the errors before and after, from above and from the side.
 
     Before and after on one scale; what is left once more on a scale of its own.
+
+    Parameters
+    ----------
+    accuracy : GeometryAccuracy
+        The errors.
+    title : str, optional
+        Written above with what the errors are of, where no page says it.
     """
     before, after = (
         1e3 * np.linalg.norm(e, axis=1) for e in (accuracy.registration, accuracy.chosen)
     )
     both, own = _scale(before), _scale(after)
     across = (_WIDTH - _LEFT - _RIGHT - sum(_GAPS)) / 3.0
-    figure = style.new_figure(_WIDTH, _HEAD + 2 * _MAP + _BETWEEN + _FOOT)
+    height = _HEAD + 2 * _MAP + _BETWEEN + _FOOT
+    figure = style.new_figure(_WIDTH, height + (_TITLE if title else 0.0))
+    if title:
+        figure.add_title(title, 0.15, about=_about(accuracy))
     size = float(np.clip(1000.0 / np.sqrt(len(before)), 3.0, 30.0))
     columns = ((before, "before", both), (after, "after", both), (after, "after, enlarged", own))
     left = _LEFT
@@ -69,6 +82,16 @@ def error_maps(accuracy: GeometryAccuracy) -> Figure:
             ).set_label("Error in mm", size=8)
         left += across + (_GAPS[column] if column < len(_GAPS) else 0.0)
     return figure
+
+
+def _about(accuracy: GeometryAccuracy) -> str:
+    """Return how many positions there are, and what the errors at poses that were left out are."""
+    norm = accuracy.axes[-1]
+    return (
+        f"{counted(len(accuracy.row), 'position')}, each at a pose that was left out of its fit:"
+        f" {mm(norm.registration.mean)} mean error before, {mm(norm.chosen.mean)} after"
+        f" ({mm(norm.registration.max)} and {mm(norm.chosen.max)} at most)"
+    )
 
 
 def _scale(error: FloatArray) -> Normalize:

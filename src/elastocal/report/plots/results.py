@@ -26,7 +26,7 @@ from elastocal.report.plots.spring_figures import recertification_figure, spring
 from elastocal.report.plots.style import literal, new_figure, open_frame, variant_styles
 from elastocal.report.plots.timeline_figure import timeline_figure
 from elastocal.results import brief_repr
-from elastocal.wording import counted, phrase
+from elastocal.wording import counted, mm, phrase, springs_and_parameters
 
 _P = ParamSpec("_P")
 _MM = 1e3
@@ -221,7 +221,20 @@ def _draw(result: object) -> Figure:
 
 @_draw.register
 def _calibration(result: CalibrateResult) -> Figure:
-    return spring_figure(spring_bars(result.calibrated))
+    calibrated, figures = result.calibrated, result.calibration
+    count = springs_and_parameters(len(result.springs), len(result.compliance))
+    about = "how it was calibrated is not known"
+    if figures is not None:
+        held = figures.held_out
+        readings, poses = counted(figures.readings, "reading"), counted(figures.poses, "pose")
+        about = (
+            f"{readings} at {poses}, deflection {mm(figures.deflection.mean)} mean; error at"
+            f" left-out poses {mm(held.mean)} mean, {mm(held.max)} max"
+            f" ({counted(held.folds, 'refit')})"
+        )
+    settings = None if figures is None else figures.settings
+    bars = spring_bars(calibrated, settings)
+    return spring_figure(bars, f"{result.robot.name}: {count}", about)
 
 
 @_draw.register
@@ -238,7 +251,8 @@ def _readings(dataset: Dataset) -> Figure:
     rows = [poses.index(pose) for pose in readings.pose]
     columns = [cases.index(case) for case in readings.load_case]
     size[rows, columns] = _MM * np.linalg.norm(readings.deflection, axis=1)
-    return pose_grid([("Measured deflection, norm in mm", size)], poses, cases)
+    title = f"Measured deflection, norm in mm: {counted(len(rows), 'usable reading')}"
+    return pose_grid([(title, size)], poses, cases)
 
 
 @_draw.register
@@ -267,7 +281,7 @@ def _plan(plan: PlanResult) -> Figure:
     # One scale for both views, at most as tall as a page.
     scale = float(min((_WIDTH - 1.0) / spans[0], 7.5 / (spans[1] + spans[2])))
     across, *heights = scale * spans
-    figure = new_figure(_WIDTH, sum(heights) + 1.55)
+    figure = new_figure(_WIDTH, sum(heights) + 1.7)
     for axis, bottom in ((1, heights[1] + 1.1), (2, 0.6)):
         axes = figure.add_panel(0.8, bottom, across, heights[axis - 1])
         _draw_tour(axes, position[:, [0, axis]], [pose.id for pose in plan.poses])
@@ -279,7 +293,8 @@ def _plan(plan: PlanResult) -> Figure:
         f"{plan.cell.name}: {len(plan.poses)} poses by {search.name} in visiting order,"
         f" covering radius {_MM * search.covering_radius:.0f} mm"
     )
-    figure.add_title(title, 0.8, 9.5, 0.12)
+    about = f"chosen from {counted(plan.pool.valid, 'candidate')} that pass every check"
+    figure.add_title(title, 0.8, 9.5, 0.12, about)
     return figure
 
 
@@ -298,27 +313,29 @@ def _draw_tour(axes: Axes, place: FloatArray, numbers: Sequence[int]) -> None:
 
 @_draw.register
 def _prediction(prediction: Prediction) -> Figure:
-    """Return each component of the deflection by row, with its 95 % interval."""
+    """Return each component of the deflection by row, with both 95 % intervals."""
     figure = new_figure(_WIDTH, 5.2)
     row = np.arange(1, len(prediction.deflection) + 1)
     marker = "o" if len(row) <= 60 else None
     panels = figure.subplots(3, 1, sharex=True)
     for number, (axis, axes) in enumerate(zip("xyz", panels, strict=True)):
-        low, value, high = (
-            _MM * each[:, number]
-            for each in (prediction.low, prediction.deflection, prediction.high)
-        )
-        axes.fill_between(row, low, high, color=style.BLUE, alpha=0.3, lw=0)
+        for low, high, alpha in (
+            (prediction.measured_low, prediction.measured_high, 0.15),
+            (prediction.low, prediction.high, 0.35),
+        ):
+            ends = _MM * low[:, number], _MM * high[:, number]
+            axes.fill_between(row, *ends, color=style.BLUE, alpha=alpha, lw=0)
+        value = _MM * prediction.deflection[:, number]
         axes.plot(row, value, color=style.BLUE, lw=1.1, marker=marker, ms=3.0)
         axes.axhline(0.0, color=style.FAINT, lw=0.7, zorder=0)
         axes.set_ylabel(f"along {axis} in mm")
         axes.margins(x=0.01)
         open_frame(axes)
-    axes.set_xlabel("row; band: 95 % interval of the fit")
+    axes.set_xlabel("row; bands: 95 % intervals, dark of the fit, light of a measurement")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.suptitle(
-        "Predicted deflection of the tool centre point in base", x=0.1, y=0.98, ha="left",
-        fontsize=9.5, weight="bold",
+    figure.add_title(
+        f"Predicted deflection of the tool centre point in base, {counted(len(row), 'row')}",
+        0.1 * _WIDTH, 9.5, 0.12,
     )  # fmt: skip
     figure.align_ylabels()
     figure.subplots_adjust(left=0.1, right=0.98, bottom=0.1, top=0.92, hspace=0.12)
@@ -337,6 +354,7 @@ def _correction(found: CorrectionFigures) -> Figure:
         [(name, _MM * each.mean, _MM * each.max, colour) for name, each, colour in lines],
         f"Deviation predicted over {found.rows} rows",
         decades=True,
+        about="by the model that corrects; nothing was measured along the path",
     )
 
 
@@ -361,9 +379,9 @@ _Bar = tuple[str, float, float, str]
 """Name, mean and largest in mm, colour."""
 
 
-def _mean_to_largest(bars: list[_Bar], title: str, decades: bool) -> Figure:
+def _mean_to_largest(bars: list[_Bar], title: str, decades: bool, about: str = "") -> Figure:
     """Return a line from mean to largest for each name, with both numbers beside it."""
-    height = 0.34 * len(bars) + 1.15
+    height = 0.34 * len(bars) + (1.3 if about else 1.15)
     figure = new_figure(_WIDTH, height)
     longest = max(len(name) for name, *_ in bars)
     left = min(0.5, 0.05 + 0.009 * longest)
@@ -389,5 +407,5 @@ def _mean_to_largest(bars: list[_Bar], title: str, decades: bool) -> Figure:
     axes.set_xlabel("mm; dot: mean, diamond: largest")
     axes.tick_params(axis="y", length=0)
     open_frame(axes, grid="x", colour="#e6e6e2", also="left")
-    figure.add_title(title, 0.02 * _WIDTH, 9.5, 0.12)
+    figure.add_title(title, 0.02 * _WIDTH, 9.5, 0.12, about)
     return figure

@@ -29,6 +29,8 @@ _BAR, _BAR_FOOT = 0.23, 0.75
 _WIDTH, _LEFT, _MIDDLE, _RIGHT = 7.5, 2.75, 0.25, 0.2
 _HEAD, _ROW, _BETWEEN, _ROWS, _FOOT = 1.0, 0.21, 0.7, 2.0, 1.0
 """In inches; `_ROW` is a spring, `_ROWS` the height of the change along the rows."""
+_TITLE = 0.62
+"""Room for a title and what is said below it, in inches."""
 _SHARE = 0.6
 """Part of the width beside the names that the compliances take."""
 _PER_MICRO, _MM = 1e6, 1e3
@@ -81,20 +83,23 @@ def spring_bars(model: CalibratedModel, settings: FitSettings | None = None) -> 
     return bars
 
 
-def spring_figure(springs: Sequence[SpringBar]) -> Figure:
+def spring_figure(springs: Sequence[SpringBar], title: str = "", about: str = "") -> Figure:
     """Return the figure: a panel for each unit, springs downwards.
 
     Parameters
     ----------
     springs : sequence of SpringBar
         From `spring_bars`; not empty.
+    title, about : str, optional
+        Written above, where no page says it.
     """
     # The unit of most springs comes first, so that a rail does not stand above the joints.
     counts = Counter(bar.unit for bar in springs).most_common()
-    height = _BAR * len(springs) + _BAR_FOOT * len(counts)
     left = max(1.26, 0.3 + 0.068 * max(len(bar.name) for bar in springs))
-    figure = style.new_figure(9.0, height)
-    bottom = height
+    bottom = _BAR * len(springs) + _BAR_FOOT * len(counts)
+    figure = style.new_figure(9.0, bottom + (_TITLE if title else 0.0))
+    if title:
+        figure.add_title(title, 0.15, about=about)
     for unit, count in counts:
         bottom -= _BAR * count + _BAR_FOOT
         axes = figure.add_panel(left, bottom + _BAR_FOOT - 0.1, 8.82 - left, _BAR * count)

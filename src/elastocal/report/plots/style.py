@@ -162,12 +162,19 @@ class Page(Figure):
         across, tall = self.get_size_inches()
         return self.add_axes((left / across, bottom / tall, width / across, height / tall))
 
-    def add_title(self, text: str, left: float, size: float = 11.5, top: float = 0.1) -> None:
-        """Write the title, ``top`` below the upper edge."""
+    def add_title(
+        self, text: str, left: float, size: float = 11.5, top: float = 0.1, about: str = ""
+    ) -> None:
+        """Write the title, ``top`` below the upper edge; below it what the figure is of."""
         across, tall = self.get_size_inches()
         self.text(
             left / across, 1.0 - top / tall, literal(text), va="top", fontsize=size, weight="bold"
         )
+        if about:
+            self.text(
+                left / across, 1.0 - (top + 0.022 * size) / tall, literal(about), va="top",
+                fontsize=0.85 * size, color=MUTED, linespacing=1.35,
+            )  # fmt: skip
 
     def add_caption(self, text: str, left: float, size: float = 7.8, spacing: float = 1.35) -> None:
         """Write how to read the figure at its foot."""
