@@ -51,8 +51,9 @@ def _provenance(evidence: Evidence) -> Iterator[blocks.Block]:
 
 def _of_plan(evidence: Evidence, key: str, value: str) -> str:
     """Return a setting, or what the planner put in its place."""
-    planned = key == "search.technique" and evidence.plan is not None
-    return phrase("{name}, by the plan", name=evidence.plan.search.name) if planned else value
+    if key == "search.technique" and evidence.plan is not None:
+        return phrase("{name}, by the plan", name=evidence.plan.search.name)
+    return value
 
 
 def _times(evidence: Evidence) -> Iterator[blocks.Row]:
