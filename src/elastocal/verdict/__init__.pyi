@@ -13,6 +13,10 @@ from .evidence import (
     ModelEvidence as ModelEvidence,
     Seal as Seal,
     UsedFile as UsedFile,
+    check_codec as check_codec,
+    check_model as check_model,
+    check_process as check_process,
+    check_tool as check_tool,
     find_doubts as find_doubts,
 )
 from .findings import (
@@ -27,14 +31,7 @@ from .findings import (
     reading_findings as reading_findings,
     recertification_findings as recertification_findings,
 )
-from .gather import (
-    EvidenceOptions as EvidenceOptions,
-    check_codec as check_codec,
-    check_model as check_model,
-    check_process as check_process,
-    check_tool as check_tool,
-    gather_evidence as gather_evidence,
-)
+from .gather import EvidenceOptions as EvidenceOptions, gather_evidence as gather_evidence
 from .judgement import (
     Light as Light,
     Verdict as Verdict,

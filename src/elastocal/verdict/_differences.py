@@ -1,34 +1,40 @@
-"""How readings and summaries of a run differ from those made again from its streams, in words."""
+"""How a dataset or a summary that was made again differs from the one that is stated."""
 
 import numpy as np
 
 from elastocal.dataset import Dataset, content_sha256
-from elastocal.wording import phrase
 
 _SAME = 1e-4
 """Difference, by the largest number of its kind, below which two derivations are one: versions and
 machines round differently, and what is smaller changes no verdict."""
 
 
-def other_texts(stated: Dataset, found: Dataset) -> str:
+def changed_text(stated: Dataset, found: Dataset) -> str:
     """Return which text of a dataset is not that of the one made again; empty where none is."""
     told = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
     for name in told:
         if stated.attributes.get(name) != found.attributes.get(name):
-            return phrase("its attribute {name} is another", name=name)
+            return f"its attribute {name} is another"
     return ""
 
 
-def difference_of(stated: Dataset, found: Dataset, old: bool) -> str:
+def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> str:
     """Return how readings differ from those made again; empty where they do not.
 
-    What a dataset of before does not have at all is no difference.
+    Parameters
+    ----------
+    stated, found : Dataset
+        As it stands, and made again.
+    old : bool
+        What a dataset of before does not have at all is no difference.
+    source : str
+        What it was made again from: streams, logs.
     """
     if content_sha256(stated) == content_sha256(found):
         return ""
     for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
         if getattr(stated, name) != getattr(found, name):
-            return phrase("its {names} are others", names=name.replace("_", " "))
+            return f"its {name.replace('_', ' ')} are others"
     mine, again = stated.to_labelled(), found.to_labelled()
     for name, array in again.variables.items():
         if array.values.dtype.kind not in "iuf" or (name not in mine and old):
@@ -36,13 +42,15 @@ def difference_of(stated: Dataset, found: Dataset, old: bool) -> str:
         if name not in mine:
             return f"it has no {name}"
         unit = str(array.attributes.get("units", ""))
-        if text := _largest_difference(stated, mine[name].values, array.values, unit):
-            return phrase("{name} {difference}", name=name, difference=text)
+        if text := _largest_difference(stated, mine[name].values, array.values, unit, source):
+            return f"{name} {text}"
     added = sorted(mine.variables.keys() - again.variables.keys())
-    return phrase("it has {name}, which the streams do not give", name=added[0]) if added else ""
+    return f"it has {added[0]}, which the {source} do not give" if added else ""
 
 
-def _largest_difference(dataset: Dataset, stated: np.ndarray, found: np.ndarray, unit: str) -> str:
+def _largest_difference(
+    dataset: Dataset, stated: np.ndarray, found: np.ndarray, unit: str, source: str
+) -> str:
     """Return the place where two arrays differ most, with both numbers; empty where they agree."""
     a, b = np.asarray(stated, dtype=float), np.asarray(found, dtype=float)
     size = float(np.nanmax(np.abs(b), initial=0.0))
@@ -51,14 +59,9 @@ def _largest_difference(dataset: Dataset, stated: np.ndarray, found: np.ndarray,
     if not np.any(gap > _SAME * size):
         return ""
     place = np.unravel_index(int(np.argmax(gap)), gap.shape)
+    pose = f"of pose {dataset.poses[place[0]]}" if place else ""
     case = f" {dataset.load_cases[place[1]]}" if dataset.status.shape == gap.shape[:2] else ""
-    return phrase(
-        "of pose {pose} is {stated} {unit}, the streams give {found} {unit}",
-        pose=f"{dataset.poses[place[0]]}{case}",
-        stated=f"{a[place]:.6g}",
-        unit=unit,
-        found=f"{b[place]:.6g}",
-    )
+    return f"{pose}{case} is {a[place]:.6g} {unit}, the {source} give {b[place]:.6g} {unit}"
 
 
 def changed_place(stated: object, found: object, place: str = "") -> str:

@@ -21,9 +21,8 @@ from elastocal.files import read_text
 from elastocal.procedure import JOURNAL, RunFolder, file_sha256
 from elastocal.records import SEAL, arrays_sha256, json_sha256, read_arrays, read_json_data
 from elastocal.verdict.evidence import MissingPart, Seal, UsedFile
-from elastocal.wording import phrase, phrases
 
-BYTES, CONTENT = phrases("bytes", "content without times and folders")
+BYTES, CONTENT = "bytes", "content without times and folders"
 _LEFT_OUT = (
     "provenance", "started", "source", "sha256", "file", "findings", "model", "model_sha256",
     "tool", "tool_sha256", "plan", "streams_sha256", SEAL,
@@ -163,9 +162,7 @@ class PartReader:
         path = given or self.folders.default(default)
         if path is None:
             if not optional:
-                self.note_missing(
-                    name, phrase("there is no {path}; {hint}", path=default, hint=hint)
-                )
+                self.note_missing(name, f"there is no {default}; {hint}")
             return None
         return self.read(name, path, lambda: read(path), named=given is not None)
 

@@ -1,8 +1,9 @@
 """The chain from the raw streams to the verdict, each link held against the one before it.
 
 Streams, cell and plan are held against the hashes of the journal. Dataset and summary are made
-again from the streams: a hash beside them could be renewed by whoever edits them. Model, codec
-and process state by hash what they were made from, and the hash of what they say themselves.
+again from the streams, an imported dataset from its logs: a hash beside them could be renewed by
+whoever edits them. Model, codec and process state by hash what they were made from, and the hash
+of what they say themselves.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -15,22 +16,27 @@ from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.dataset import Dataset, content_sha256, read_made_from
 from elastocal.errors import ElastocalError, SchemaError
 from elastocal.files import read_text, sha256
+from elastocal.logs import import_streams, log_sha256, read_map, site
 from elastocal.procedure import (
     JOURNAL,
-    DerivedRun,
     RunFolder,
     RunRecord,
+    RunSummary,
     derive_run,
     file_sha256,
     read_copies,
 )
 from elastocal.procedure.record import check_stream
+from elastocal.progress import silent
 from elastocal.records import record, to_data
 from elastocal.results import counted_alike
-from elastocal.verdict._differences import changed_place, difference_of, other_texts
+from elastocal.verdict._differences import changed_place, changed_reading, changed_text
 from elastocal.verdict.evidence import Evidence, Seal
 from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
-from elastocal.wording import Phrase, counted, phrase, sentences
+from elastocal.wording import counted
+
+_OLD = "made before files stated it"
+_ADVICE = "; `elastocal {command}` makes it again"
 
 
 class LinkState(Enum):
@@ -83,6 +89,10 @@ def verify_chain(evidence: Evidence, files: ChainFiles) -> tuple[Link, ...]:
         links += [_signed(files.run, evidence.run_record, files), *_recorded(evidence, files)]
         broken = {link.text for link in links}
         links += _derived(evidence, files, broken)
+    if evidence.logs:
+        logged = _logged(evidence)
+        links += [logged]
+        links += [] if logged.state is LinkState.BROKEN else _derived(evidence, files, ())
     if evidence.dataset is not None:
         dataset = content_sha256(evidence.dataset)
         links += [*_model(evidence, dataset), *_codecs(evidence, dataset)]
@@ -116,12 +126,8 @@ def _is_old(evidence: Evidence) -> bool:
 def _unstated(evidence: Evidence, name: str, text: str) -> Link:
     """Return a link without a statement, which only files from before hashes may lack."""
     if _is_old(evidence):
-        return Link(
-            name, LinkState.UNSTATED, phrase("{text} (made before files stated it)", text=text)
-        )
-    return _broken(
-        name, phrase("{text}, although other parts state theirs: make it again", text=text)
-    )
+        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD})")
+    return _broken(name, f"{text}, although other parts state theirs: make it again")
 
 
 def _seals(evidence: Evidence) -> Iterator[Link]:
@@ -130,22 +136,13 @@ def _seals(evidence: Evidence) -> Iterator[Link]:
         if file.seal is Seal.BROKEN:
             yield _broken(
                 file.name,
-                phrase(
-                    "{name} was changed after it was written: its content does not have the"
-                    " SHA-256 that it states",
-                    name=file.name,
-                ),
+                f"{file.name} was changed after it was written: its content does not have the"
+                " SHA-256 that it states",
             )
     if silent := [file.name for file in evidence.files if file.seal is Seal.ABSENT]:
-        text = (
-            phrase(
-                "{name} and {others} do not state the SHA-256 of their content",
-                name=silent[0],
-                others=counted(len(silent) - 1, "other file"),
-            )
-            if silent[1:]
-            else phrase("{name} does not state the SHA-256 of their content", name=silent[0])
-        )
+        more = f" and {counted(len(silent) - 1, 'other file')}" if silent[1:] else ""
+        verb = "do" if more else "does"
+        text = f"{silent[0]}{more} {verb} not state the SHA-256 of their content"
         yield _unstated(evidence, "content", text)
 
 
@@ -154,17 +151,15 @@ def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
     place, trusted = run.signature, files.signer or record.signer
     if not place.exists():
         if trusted is None:
-            text = phrase("the run is not signed: whoever edits its record can renew the hashes")
+            text = "the run is not signed: whoever edits its record can renew the hashes"
             return Link("signature", LinkState.UNSIGNED, text)
-        return _broken(
-            "signature", phrase("the run should be signed, and there is no {name}", name=place.name)
-        )
+        return _broken("signature", f"the run should be signed, and there is no {place.name}")
     try:
         found = read_signature(place)
         check_signature(found, OF_RUN, file_sha256(run.journal), trusted)
     except ElastocalError as error:
         return _broken("signature", files.plain(error))
-    return _whole("signature", phrase("the journal is signed by key {signer}", signer=found.signer))
+    return _whole("signature", f"the journal is signed by key {found.signer}")
 
 
 def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
@@ -177,11 +172,9 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         cell, _ = read_copies(run, record)
         # The fingerprint leaves out the tolerance, by which the light is given.
         if record.cell_sha256 in (None, sha256(read_text(cell.path))):
-            yield _whole("cell and plan", phrase("cell and plan are those that the run began with"))
+            yield _whole("cell and plan", "cell and plan are those that the run began with")
         else:
-            text = phrase(
-                "cell/{cell_file} was changed after the run began", cell_file=record.cell_file
-            )
+            text = f"cell/{record.cell_file} was changed after the run began"
             yield _broken("cell and plan", text)
     except ElastocalError as error:
         yield _broken("cell and plan", files.plain(error))
@@ -196,83 +189,78 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         yield from (_broken("streams", text) for text in counted_alike(wrong))
     else:
         found = counted(len(known), "recording")
-        yield _whole(
-            "streams",
-            phrase("{found}: those that the journal names, by their SHA-256", found=found),
-        )
+        yield _whole("streams", f"{found}: those that the journal names, by their SHA-256")
     stated = _made_from(evidence).get(JOURNAL)
     if evidence.dataset is None:
         return
     if stated is None:
-        text = phrase("the dataset does not state which journal it was derived from")
+        text = "the dataset does not state which journal it was derived from"
         yield _unstated(evidence, "journal", text)
     elif stated == file_sha256(run.journal):
-        yield _whole("journal", phrase("the journal is the one that the dataset was derived from"))
+        yield _whole("journal", "the journal is the one that the dataset was derived from")
     else:
-        yield _broken(
-            "journal",
-            phrase("{journal} was changed after the dataset was derived from it", journal=JOURNAL),
-        )
+        yield _broken("journal", f"{JOURNAL} was changed after the dataset was derived from it")
+
+
+def _logged(evidence: Evidence) -> Link:
+    """Return whether map and logs are those that an imported dataset was made from."""
+    for path, (name, stated) in zip(evidence.logs, _made_from(evidence).items(), strict=True):
+        if not path.exists():
+            return _broken("logs", f"{name}, which the dataset was made from, is not here")
+        if log_sha256(path) != stated:
+            return _broken("logs", f"{name} was changed after the dataset was made from it")
+    found = counted(len(evidence.logs) - 1, "log")
+    return _whole("logs", f"{found} and their map: those that the dataset names, by their SHA-256")
 
 
 def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> Iterator[Link]:
-    """Yield dataset and summary, made again from the streams; what was told is not told again."""
+    """Yield dataset and summary, made again from streams or logs; what was told is not again."""
     dataset, summary = evidence.dataset, evidence.summary
     if dataset is None:
         return
-    old = _is_old(evidence)
+    old, source = _is_old(evidence), "logs" if evidence.logs else "streams"
+    advice = _ADVICE.format(command="import" if evidence.logs else "derive")
     try:
-        again = _derive(evidence, dataset, files)
+        again, again_summary = _derive(evidence, dataset, files)
     except ElastocalError as error:
-        text, reason = (
-            phrase("the dataset cannot be made again from the streams"),
-            files.plain(error),
-        )
-        again_told = Link("dataset", LinkState.UNSTATED, phrase("{text}, see above", text=text))
-        yield again_told if reason in told else _broken("dataset", sentences((text, reason), ": "))
+        text, reason = f"the dataset cannot be made again from the {source}", files.plain(error)
+        again_told = Link("dataset", LinkState.UNSTATED, f"{text}, see above")
+        yield again_told if reason in told else _broken("dataset", f"{text}: {reason}")
         return
-    text = phrase("the dataset is not what the streams give")
-    if difference := difference_of(dataset, again.dataset, old):
-        yield _broken("dataset", _with_advice(sentences((text, difference), ": ")))
-    elif difference := other_texts(dataset, again.dataset):
-        yield _unlike(old, "dataset", sentences((text, difference), ": "))
+    text = f"the dataset is not what the {source} give"
+    if difference := changed_reading(dataset, again, old, source):
+        yield _broken("dataset", f"{text}: {difference}{advice}")
+    elif difference := changed_text(dataset, again):
+        yield _unlike(old, "dataset", f"{text}: {difference}", advice)
     else:
-        yield _whole(
-            "dataset", phrase("the dataset is what the streams give, made again from them")
-        )
+        yield _whole("dataset", f"the dataset is what the {source} give, made again from them")
     if summary is None:
         return
-    if place := changed_place(to_data(summary), to_data(again.summary)):
-        text = phrase(
-            "the summary of the run is not what the streams give: {place} differs", place=place
-        )
-        yield _unlike(old, "summary", text)
+    if place := changed_place(to_data(summary), to_data(again_summary)):
+        text = f"the summary of the run is not what the streams give: {place} differs"
+        yield _unlike(old, "summary", text, advice)
     else:
-        yield _whole("summary", phrase("the summary of the run is what the streams give"))
+        yield _whole("summary", "the summary of the run is what the streams give")
 
 
-def _unlike(old: bool, name: str, text: str) -> Link:
+def _unlike(old: bool, name: str, text: str, advice: str) -> Link:
     """Return what differs beside the readings: an earlier version said other things about them."""
     if old:
-        return Link(
-            name,
-            LinkState.UNSTATED,
-            phrase(
-                "{text} (made before files stated it, by another version); `elastocal derive`"
-                " makes it again",
-                text=text,
-            ),
-        )
-    return _broken(name, _with_advice(text))
+        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD}, by another version){advice}")
+    return _broken(name, f"{text}{advice}")
 
 
-def _with_advice(text: str) -> Phrase:
-    return phrase("{text}; `elastocal derive` makes it again", text=text)
-
-
-def _derive(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> DerivedRun:
+def _derive(
+    evidence: Evidence, dataset: Dataset, files: ChainFiles
+) -> tuple[Dataset, RunSummary | None]:
+    """Return dataset and summary, made again from the streams of a run or from logs."""
+    if evidence.logs:
+        path, *logs = evidence.logs
+        log_map = read_map(path)
+        return import_streams(log_map, site(path, log_map), logs, silent).dataset, None
     assert files.run is not None
-    return derive_run(files.run.path, _sensor(evidence, dataset, files))
+    again = derive_run(files.run.path, _sensor(evidence, dataset, files))
+    return again.dataset, again.summary
 
 
 def _sensor(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> SensorLoad | None:
@@ -293,13 +281,10 @@ def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:
         return
     stated = evidence.calibrated.made_from
     if len(stated) > 1 and dataset in stated.values():
-        others = phrase(
-            "the model was made from {stated} datasets, of which only one is here",
-            stated=len(stated),
-        )
+        others = f"the model was made from {len(stated)} datasets, of which only one is here"
         yield Link("model", LinkState.UNSTATED, others)
     else:
-        yield _made_of(evidence, dataset, "model", phrase("the model"), stated)
+        yield _made_of(evidence, dataset, "model", "the model", stated)
 
 
 def _codecs(evidence: Evidence, dataset: str) -> Iterator[Link]:
@@ -312,17 +297,11 @@ def _made_of(
 ) -> Link:
     """Return whether a part was made from the dataset of this hash."""
     if not stated:
-        return _unstated(
-            evidence, name, phrase("{what} does not state which dataset it is made from", what=what)
-        )
+        return _unstated(evidence, name, f"{what} does not state which dataset it is made from")
     if dataset not in stated.values():
-        text = phrase(
-            "{what} was made from another dataset ({stated}) than this one",
-            what=what,
-            stated=", ".join(stated),
-        )
+        text = f"{what} was made from another dataset ({', '.join(stated)}) than this one"
         return _broken(name, text)
-    return _whole(name, phrase("{what} was made from this dataset", what=what))
+    return _whole(name, f"{what} was made from this dataset")
 
 
 def _process(evidence: Evidence) -> Iterator[Link]:
@@ -332,23 +311,19 @@ def _process(evidence: Evidence) -> Iterator[Link]:
     own = [run for run in runs if run.model_sha256 == evidence.calibrated.sha256]
     tools = {run.tool_sha256 for run in own}
     if not own:
-        text = phrase("the process was run with another model than the one of this report")
+        text = "the process was run with another model than the one of this report"
         yield _broken("process", text)
     elif tools - {None} and evidence.tool_sha256 is None:
-        yield _broken("process", phrase("the process was run with a tool file that is not here"))
+        yield _broken("process", "the process was run with a tool file that is not here")
     elif evidence.tool_sha256 not in tools:
-        text = phrase("the process was run with another tool file than the one of this report")
+        text = "the process was run with another tool file than the one of this report"
         yield _broken("process", text)
     else:
-        yield _whole("process", phrase("the process was run with this model and this tool file"))
+        yield _whole("process", "the process was run with this model and this tool file")
     record = evidence.run_record
     if own and evidence.simulated and record and record.seed not in {run.seed for run in own}:
         yield _broken(
             "process",
-            phrase(
-                "the process was run on the simulated cell of seed {seed}, the run on that of seed"
-                " {other}",
-                seed=own[0].seed,
-                other=record.seed,
-            ),
+            f"the process was run on the simulated cell of seed {own[0].seed}, the run on that of"
+            f" seed {record.seed}",
         )

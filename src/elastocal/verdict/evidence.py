@@ -9,13 +9,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from elastocal.cell import SIMULATED, Cell, CertificateEntry, certificate_of, fingerprint
 from elastocal.codec import ALL_LOADS, CodecData, Saturation, Variant, Verdicts
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.compensation.process import SimulatedProcess
 from elastocal.dataset import Dataset
+from elastocal.errors import CodecError, CompensationError, IdentificationError
 from elastocal.identification import (
     CalibratedModel,
     CalibrationSummary,
@@ -29,7 +33,7 @@ from elastocal.planning import PlanResult, PoolData
 from elastocal.planning.surface import Surface
 from elastocal.procedure import Entry, RunRecord, RunSummary, commits
 from elastocal.results import brief_repr
-from elastocal.wording import phrase
+from elastocal.robot import parse_urdf
 
 if TYPE_CHECKING:
     from elastocal.verdict.chain import Link
@@ -125,6 +129,8 @@ class Evidence:
     plan: PlanResult | None = None
     pool: PoolData | None = None
     journal: tuple[Entry, ...] | None = None
+    logs: tuple[Path, ...] = ()
+    """Of imported readings: their map, then the logs; none of those of a run."""
     dataset: Dataset | None = None
     summary: RunSummary | None = None
     """The summary of the run."""
@@ -162,7 +168,7 @@ class Evidence:
     def simulated(self) -> bool:
         """Whether the devices of the cell are simulated ones."""
         choices = () if self.cell is None else self.cell.file.devices.by_kind.values()
-        return any(choice.driver == SIMULATED for choice in choices)
+        return not self.logs and any(choice.driver == SIMULATED for choice in choices)
 
     @property
     def run_record(self) -> RunRecord | None:
@@ -201,8 +207,7 @@ class Evidence:
         process = None if self.cell is None else self.cell.process
         if process is None or self.calibrated is None:
             return None
-        model = self.calibrated.model
-        return model.doubt(process.joint_position, process.force, process.moment)
+        return self.calibrated.model.doubt(process.joint_position, process.force, process.moment)
 
     @property
     def saturation(self) -> Saturation | None:
@@ -237,6 +242,90 @@ class Evidence:
         return variant.load_cases == ALL_LOADS and variant.springs in taken
 
 
+_SAME_PLACE = 20e-3
+"""Largest distance of contact points, loaded and unloaded, that are one pose, in m."""
+
+
+def check_model(model: CalibratedModel, dataset: Dataset | None, path: Path) -> None:
+    """Refuse a model whose robot has other joints than the dataset.
+
+    Raises
+    ------
+    IdentificationError
+        By the names of the joints.
+    """
+    names = model.model.robot.joint_names
+    if dataset is not None and sorted(names) != sorted(dataset.joint_names):
+        raise IdentificationError(
+            f"{path} is a model of {model.model.robot.name} with joints {', '.join(names)}; the"
+            f" dataset has {', '.join(dataset.joint_names)}"
+        )
+
+
+def check_tool(record: ToolResult, evidence: Evidence, path: Path) -> ToolResult:
+    """Return a tool file, or refuse one whose flange the robot does not have.
+
+    Raises
+    ------
+    CompensationError
+        By the name of the link.
+    """
+    if evidence.cell is not None:
+        robot = evidence.cell.robot
+        links = [str(link.get("name")) for link in parse_urdf(robot.urdf).findall("link")]
+        if record.flange not in links:
+            raise CompensationError(
+                f"{path}: flange {record.flange!r} is no link of {robot.name}: it is the tool of"
+                " another robot"
+            )
+    return record
+
+
+def check_codec(data: CodecData, evidence: Evidence, path: Path) -> CodecData:
+    """Return a codec, or refuse one of another robot or of other poses.
+
+    Raises
+    ------
+    CodecError
+        By the robot or the number of poses.
+    """
+    if evidence.robot and data.robot and data.robot != evidence.robot:
+        raise CodecError(f"{path} is a codec of {data.robot}, not of {evidence.robot}")
+    if evidence.dataset is None:
+        return data
+    known = set(evidence.dataset.poses)
+    foreign = [label for group in data.pose_labels for label in group if label not in known]
+    if foreign:
+        raise CodecError(f"{path} has pose {foreign[0]}, which the dataset does not have")
+    if not _same_places(data, evidence.dataset):
+        raise CodecError(f"{path} has its poses at other places than the dataset")
+    return data
+
+
+def _same_places(data: CodecData, dataset: Dataset) -> bool:
+    if dataset.tcp_position is None:
+        return True
+    place = dict(zip(dataset.poses, dataset.tcp_position, strict=True))
+    found = np.array([place[group[0]] for group in data.pose_labels])
+    gap = np.linalg.norm(found - data.contact, axis=1)
+    return bool(np.all(~(gap > _SAME_PLACE)))
+
+
+def check_process(record: SimulatedProcess, evidence: Evidence, path: Path) -> SimulatedProcess:
+    """Return a process, or refuse one of another cell.
+
+    Raises
+    ------
+    CompensationError
+        By the names of the cells.
+    """
+    if evidence.cell is not None and record.table.cell != evidence.cell.name:
+        raise CompensationError(
+            f"{path} is of cell {record.table.cell!r}, the run of cell {evidence.cell.name!r}"
+        )
+    return record
+
+
 def find_doubts(evidence: Evidence) -> tuple[str, ...]:
     """Return what does not fit together although each part by itself is sound."""
     return tuple(_doubts(evidence))
@@ -245,46 +334,35 @@ def find_doubts(evidence: Evidence) -> tuple[str, ...]:
 def _doubts(evidence: Evidence) -> Iterator[str]:
     cell, plan, dataset = evidence.cell, evidence.plan, evidence.dataset
     if cell is not None and plan is not None and fingerprint(cell) != plan.cell.fingerprint:
-        yield phrase(
-            "the plan was made for another state of the cell file: its fingerprint differs"
-        )
+        yield "the plan was made for another state of the cell file: its fingerprint differs"
     if evidence.reproduction is not None and not evidence.reproduction.same:
-        yield phrase(
-            "the calibration made again from the dataset does not give the figures of the"
-            " model file: {reason}",
-            reason=_why_not_reproduced(evidence),
+        yield (
+            "the calibration made again from the dataset does not give the figures of the model"
+            f" file: {_why_not_reproduced(evidence)}"
         )
     # The origins that the files state tell which part is of another run than the others.
     for doubts in (_dataset, _summary, _codecs):
         yield from doubts(evidence)
     if plan is not None and dataset is not None:
-        planned = {pose.id for pose in plan.poses}
-        foreign = sorted(set(dataset.poses) - planned)
+        foreign = sorted(set(dataset.poses) - {pose.id for pose in plan.poses})
         if foreign:
-            yield phrase(
-                "the dataset has pose {pose}, which the plan does not have", pose=foreign[0]
-            )
+            yield f"the dataset has pose {foreign[0]}, which the plan does not have"
 
 
 def _why_not_reproduced(evidence: Evidence) -> str:
     """Return why a calibration that was made again has other figures, as far as files tell."""
     figures, dataset = evidence.figures, evidence.dataset
     if figures is None or figures.spring_count is not None:
-        return phrase(
+        return (
             "the model is of other data or other settings, or was made by an earlier version of"
             " elastocal"
         )
     # What every calibration of today says is missing; whether it is of these data is another thing.
     alike = dataset is not None and figures.readings == len(dataset.readings(dataset.joint_names))
+    also = "" if alike else " from other readings"
     return (
-        phrase(
-            "the model was made by an earlier version of elastocal; calibrate again with this one"
-        )
-        if alike
-        else phrase(
-            "the model was made by an earlier version of elastocal from other readings; calibrate"
-            " again with this one"
-        )
+        f"the model was made by an earlier version of elastocal{also}; calibrate again with this"
+        " one"
     )
 
 
@@ -293,13 +371,10 @@ def _dataset(evidence: Evidence) -> Iterator[str]:
         return
     record = evidence.run_record
     if record is not None and record.origin not in evidence.dataset.provenance:
-        yield phrase("the dataset does not say that it is of the run that the journal tells of")
+        yield "the dataset does not say that it is of the run that the journal tells of"
     unknown = sorted(set(evidence.dataset.poses) - {log.pose for log in commits(evidence.journal)})
     if unknown:
-        yield phrase(
-            "the dataset has pose {pose}, of which the journal tells no measurement",
-            pose=unknown[0],
-        )
+        yield f"the dataset has pose {unknown[0]}, of which the journal tells no measurement"
 
 
 def _summary(evidence: Evidence) -> Iterator[str]:
@@ -307,23 +382,19 @@ def _summary(evidence: Evidence) -> Iterator[str]:
         return
     record = evidence.run_record
     if record is not None and evidence.summary.times.started not in (None, record.started):
-        yield phrase(
-            "the summary is of a run that began at another time than the one of the journal"
-        )
+        yield "the summary is of a run that began at another time than the one of the journal"
     if evidence.dataset is None:
         return
     usable = int(evidence.dataset.usable.sum())
     stated = evidence.summary.readings.counts.get("ok", 0)
     if usable != stated:
-        yield phrase(
-            "the dataset has {usable} usable readings, the summary of the run tells of"
-            " {stated}: one of them was changed after the run",
-            usable=usable,
-            stated=stated,
+        yield (
+            f"the dataset has {usable} usable readings, the summary of the run tells of {stated}:"
+            " one of them was changed after the run"
         )
 
 
 def _codecs(evidence: Evidence) -> Iterator[str]:
     origin = "" if evidence.dataset is None else evidence.dataset.provenance
     if not all(origin in codec.data.provenance for codec in evidence.codecs):
-        yield phrase("a codec does not say that it is of the readings of this report")
+        yield "a codec does not say that it is of the readings of this report"

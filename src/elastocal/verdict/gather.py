@@ -10,19 +10,18 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from elastocal import dataset as datasets
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
-from elastocal.codec import ARRAYS, VERDICTS, CodecData, judge, read_codec
+from elastocal.codec import ARRAYS, VERDICTS, judge, read_codec
 from elastocal.compensation.conditioning import ToolResult, read_tool
 from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
-from elastocal.dataset import Dataset
-from elastocal.errors import CodecError, CompensationError, ElastocalError, IdentificationError
+from elastocal.dataset import Dataset, read_made_from
+from elastocal.errors import CodecError, ElastocalError
 from elastocal.files import read_text
-from elastocal.identification import CalibratedModel, CalibrateResult, reproduce_calibration
+from elastocal.identification import CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
+from elastocal.logs import IMPORTED, read_map
 from elastocal.planning import (
     PLAN,
     POOL,
@@ -43,7 +42,6 @@ from elastocal.procedure import (
 )
 from elastocal.records import read_json
 from elastocal.results import brief_repr
-from elastocal.robot import parse_urdf
 from elastocal.verdict._files import (
     CODEC,
     MODEL,
@@ -60,9 +58,18 @@ from elastocal.verdict.evidence import (
     CodecEvidence,
     Evidence,
     ModelEvidence,
+    check_codec,
+    check_model,
+    check_process,
+    check_tool,
     find_doubts,
 )
 from elastocal.wording import phrase
+
+_UNKNOWN = "nothing is known of how the readings came about"
+_NO_RUN = f"no folder of a run was given: {_UNKNOWN}"
+_CELL = "cell.yaml"
+"""Default name of a cell file beside a model."""
 
 
 @brief_repr
@@ -103,7 +110,11 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
         If there is nothing to report on, or a part that is named cannot be used.
     """
     reader = PartReader(find_folders(options.run))
-    evidence = _with_run(Evidence(made=made, stated=options.stated), reader)
+    evidence = Evidence(made=made, stated=options.stated)
+    if reader.folders.run is None:
+        evidence = _with_readings(evidence, reader, options)
+    else:
+        evidence = _with_run(evidence, reader, reader.folders.run)
     evidence = _with_model(evidence, reader, options)
     evidence = replace(evidence, limits=_limits(evidence.cell, options))
     evidence = _with_rest(evidence, reader, options)
@@ -120,29 +131,73 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
     )
 
 
-def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
-    """Return the evidence with the parts that a run folder holds."""
-    run = reader.folders.run
-    if run is None:
-        reason = phrase(
-            "no folder of a run was given: nothing is known of how the readings came about"
-        )
-        reader.note_missing(phrase("run"), reason)
+def _with_readings(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
+    """Return the evidence with the readings that a model states, where no run of ours took them.
+
+    They lie beside it; so does the cell, or where the map of their logs says.
+    """
+    model = options.model or reader.folders.model or reader.folders.default(MODEL)
+    names = [] if model is None else _stated_datasets(model)
+    path = reader.folders.default(names[0]) if len(names) == 1 else None
+    if path is None:
+        reader.note_missing("run", _NO_RUN)
         return evidence
-    journal = reader.read(phrase("journal"), run.journal, lambda: read_journal(run.journal))
+    data = reader.read("dataset", path, lambda: datasets.read(path))
+    evidence = replace(evidence, dataset=data)
+    stated = {} if data is None else read_made_from(data.attributes)
+    if data is None or not stated or not data.provenance.startswith(IMPORTED):
+        reader.note_missing("run", f"the readings state no run, and no logs: {_UNKNOWN}")
+        return _with_cell(evidence, reader, reader.folders.default(_CELL))
+    logs = tuple(path.parent / name for name in stated)
+    evidence = replace(evidence, logs=logs)
+    for log in logs:
+        if log.exists():
+            reader.use(log)
+    return _with_cell(evidence, reader, _mapped_cell(logs) or reader.folders.default(_CELL))
+
+
+def _stated_datasets(model: Path) -> list[str]:
+    """Return the names of the datasets that a model states; none of one that cannot be read."""
+    try:
+        return [Path(name).name for name in read_json(model, CalibrateResult).made_from]
+    except ElastocalError:
+        return []
+
+
+def _mapped_cell(logs: tuple[Path, ...]) -> Path | None:
+    """Return the cell file that the map of some logs names."""
+    try:
+        cell = read_map(logs[0]).cell if logs else None
+    except ElastocalError:
+        return None
+    return None if cell is None else logs[0].parent / cell
+
+
+def _with_cell(evidence: Evidence, reader: PartReader, path: Path | None) -> Evidence:
+    """Return the evidence with a cell and its surface, if it is that of the readings."""
+    if path is None:
+        return evidence
+    cell = reader.read("cell", path, lambda: load_cell(path))
+    if cell is None:
+        return evidence
+    measured = "" if evidence.dataset is None else evidence.dataset.robot_name
+    if measured and measured != cell.robot.name:
+        reason = f"{reader.folders.shown(path)} is of {cell.robot.name}, the readings of {measured}"
+        reader.note_missing("cell", reason)
+        return evidence
+    surface = reader.read("surface", cell.path, lambda: cell_surface(cell))
+    return replace(evidence, cell=cell, surface=surface, cell_text=read_text(cell.path))
+
+
+def _with_run(evidence: Evidence, reader: PartReader, run: RunFolder) -> Evidence:
+    """Return the evidence with the parts that a run folder holds."""
+    journal = reader.read("journal", run.journal, lambda: read_journal(run.journal))
     evidence = replace(evidence, journal=journal)
     record = evidence.run_record
     path = run.cell / (record.cell_file if record else "cell.yaml")
-    cell = reader.read(phrase("cell"), path, lambda: load_cell(path))
-    evidence = replace(evidence, cell=cell)
-    if cell is not None:
-        surface = reader.read(phrase("surface"), cell.path, lambda: cell_surface(cell))
-        evidence = replace(evidence, surface=surface, cell_text=read_text(cell.path))
-    evidence = _with_plan(evidence, reader, run)
-    summary = _derived(reader, phrase("summary of the run"), run.summary, read_summary)
-    evidence = replace(
-        evidence, dataset=_derived(reader, phrase("dataset"), run.dataset, datasets.read)
-    )
+    evidence = _with_plan(_with_cell(evidence, reader, path), reader, run)
+    summary = _derived(reader, "summary of the run", run.summary, read_summary)
+    evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
     for file in run_files(run):
         reader.use(file)
     return replace(evidence, summary=summary)
@@ -159,7 +214,7 @@ def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Eviden
             check_plan_robot(plan, cell)
         return plan
 
-    plan = reader.read(phrase("plan"), run.plan / PLAN, plan_of_cell)
+    plan = reader.read("plan", run.plan / PLAN, plan_of_cell)
     if plan is None:
         return evidence
 
@@ -169,11 +224,9 @@ def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Eviden
         return pool
 
     if not (run.plan / POOL).exists():
-        reader.note_missing(
-            phrase("pool"), phrase("there is no {path}", path=reader.folders.shown(run.plan / POOL))
-        )
+        reader.note_missing("pool", f"there is no {reader.folders.shown(run.plan / POOL)}")
         return replace(evidence, plan=plan)
-    pool = reader.read(phrase("pool"), run.plan / POOL, pool_of_plan)
+    pool = reader.read("pool", run.plan / POOL, pool_of_plan)
     return replace(evidence, plan=plan, pool=pool)
 
 
@@ -181,9 +234,7 @@ def _derived(
     reader: PartReader, name: str, path: Path, read: Callable[[Path], Part]
 ) -> Part | None:
     if not path.is_file():
-        reason = phrase(
-            "there is no {path}; `elastocal derive` makes it", path=reader.folders.shown(path)
-        )
+        reason = f"there is no {reader.folders.shown(path)}; `elastocal derive` makes it"
         reader.note_missing(name, reason)
         return None
     return reader.read(name, path, lambda: read(path))
@@ -192,8 +243,8 @@ def _derived(
 def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
     given = options.model or reader.folders.model
     calibrated = reader.find(
-        phrase("calibrated model"), given, MODEL, lambda path: _calibrated(path, evidence.dataset),
-        phrase("`elastocal calibrate` makes one"),
+        "calibrated model", given, MODEL, lambda path: _calibrated(path, evidence.dataset),
+        "`elastocal calibrate` makes one",
     )  # fmt: skip
     evidence = replace(evidence, calibrated=calibrated)
     if calibrated is None or evidence.dataset is None:
@@ -202,7 +253,7 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
         reproduction = reproduce_calibration(calibrated.model, calibrated.figures, evidence.dataset)
     except ElastocalError as error:
         reason = " ".join(str(error).split())
-        reader.note_missing(phrase("calibration made again"), reason, damaged=True)
+        reader.note_missing("calibration made again", reason, damaged=True)
         return evidence
     return replace(evidence, reproduction=reproduction)
 
@@ -223,17 +274,16 @@ def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions)
         return check_process(read_process(folder), evidence, folder / TABLE)
 
     place = options.tool or reader.folders.default(TOOL)
-    found = reader.find(
-        phrase("tool file"), options.tool, TOOL, tool, phrase("`elastocal tool` makes one")
-    )
+    found = reader.find("tool file", options.tool, TOOL, tool, "`elastocal tool` makes one")
     return replace(
         evidence,
         tool=found,
         tool_sha256=file_sha256(place) if found is not None and place is not None else None,
         codecs=_codecs(evidence, reader, options.codec),
         process=reader.find(
-            phrase("process"), options.process, PROCESS, process,
-            phrase("`elastocal simulate-process` makes one for a simulated cell"),
+            "process", options.process, PROCESS, process,
+            "`elastocal simulate-process` makes one for a simulated cell",
+            optional=bool(evidence.logs),
         ),
     )  # fmt: skip
 
@@ -252,12 +302,11 @@ def _codecs(
     root = given or reader.folders.default(CODEC)
     inner = sorted(path.parent for path in root.glob(f"*/{ARRAYS}")) if root else []
     if root is None or not inner or (root / ARRAYS).exists():
-        hint = phrase("`elastocal codec` makes one")
-        found = reader.find(phrase("codec"), given, CODEC, codec, hint)
+        hint = "`elastocal codec` makes one"
+        found = reader.find("codec", given, CODEC, codec, hint)
         return () if found is None else (found,)
     read = (
-        reader.read(phrase("codec"), path, partial(codec, path), named=given is not None)
-        for path in inner
+        reader.read("codec", path, partial(codec, path), named=given is not None) for path in inner
     )
     return tuple(each for each in read if each is not None)
 
@@ -267,14 +316,14 @@ def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) 
     old = options.old
     new = options.model or reader.folders.model or reader.folders.default(MODEL)
     if old is None:
-        reason = phrase(
+        reason = (
             "no earlier calibration was given to compare with, so nothing is known of any change"
         )
-        reader.note_missing(phrase("earlier calibration"), reason)
+        reader.note_missing("earlier calibration", reason)
         return evidence
     if new is None or evidence.calibrated is None:
-        reason = phrase("there is no calibrated model to compare it with")
-        reader.note_missing(phrase("comparison with the earlier calibration"), reason)
+        reason = "there is no calibrated model to compare it with"
+        reader.note_missing("comparison with the earlier calibration", reason)
         return evidence
     q, force = _rows_that_matter(evidence)
     found = recertify_files(old, new, q, force, limit=evidence.limits.drift)
@@ -300,87 +349,3 @@ def _limits(cell: Cell | None, options: EvidenceOptions) -> AcceptanceLimits:
     if stated is not None and stated.tolerance is not None:
         return AcceptanceLimits(stated.tolerance, drift, phrase("set in the cell file"))
     return AcceptanceLimits(None, drift)
-
-
-_SAME_PLACE = 20e-3
-"""Largest distance of contact points, loaded and unloaded, that are one pose, in m."""
-
-
-def check_model(model: CalibratedModel, dataset: Dataset | None, path: Path) -> None:
-    """Refuse a model whose robot has other joints than the dataset.
-
-    Raises
-    ------
-    IdentificationError
-        By the names of the joints.
-    """
-    names = model.model.robot.joint_names
-    if dataset is not None and sorted(names) != sorted(dataset.joint_names):
-        raise IdentificationError(
-            f"{path} is a model of {model.model.robot.name} with joints {', '.join(names)}; the"
-            f" dataset has {', '.join(dataset.joint_names)}"
-        )
-
-
-def check_tool(record: ToolResult, evidence: Evidence, path: Path) -> ToolResult:
-    """Return a tool file, or refuse one whose flange the robot does not have.
-
-    Raises
-    ------
-    CompensationError
-        By the name of the link.
-    """
-    if evidence.cell is not None:
-        robot = evidence.cell.robot
-        links = [str(link.get("name")) for link in parse_urdf(robot.urdf).findall("link")]
-        if record.flange not in links:
-            raise CompensationError(
-                f"{path}: flange {record.flange!r} is no link of {robot.name}: it is the tool of"
-                " another robot"
-            )
-    return record
-
-
-def check_codec(data: CodecData, evidence: Evidence, path: Path) -> CodecData:
-    """Return a codec, or refuse one of another robot or of other poses.
-
-    Raises
-    ------
-    CodecError
-        By the robot or the number of poses.
-    """
-    if evidence.robot and data.robot and data.robot != evidence.robot:
-        raise CodecError(f"{path} is a codec of {data.robot}, not of {evidence.robot}")
-    if evidence.dataset is None:
-        return data
-    known = set(evidence.dataset.poses)
-    foreign = [label for group in data.pose_labels for label in group if label not in known]
-    if foreign:
-        raise CodecError(f"{path} has pose {foreign[0]}, which the dataset does not have")
-    if not _same_places(data, evidence.dataset):
-        raise CodecError(f"{path} has its poses at other places than the dataset")
-    return data
-
-
-def _same_places(data: CodecData, dataset: Dataset) -> bool:
-    if dataset.tcp_position is None:
-        return True
-    place = dict(zip(dataset.poses, dataset.tcp_position, strict=True))
-    found = np.array([place[group[0]] for group in data.pose_labels])
-    gap = np.linalg.norm(found - data.contact, axis=1)
-    return bool(np.all(~(gap > _SAME_PLACE)))
-
-
-def check_process(record: SimulatedProcess, evidence: Evidence, path: Path) -> SimulatedProcess:
-    """Return a process, or refuse one of another cell.
-
-    Raises
-    ------
-    CompensationError
-        By the names of the cells.
-    """
-    if evidence.cell is not None and record.table.cell != evidence.cell.name:
-        raise CompensationError(
-            f"{path} is of cell {record.table.cell!r}, the run of cell {evidence.cell.name!r}"
-        )
-    return record

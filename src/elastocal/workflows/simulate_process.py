@@ -337,7 +337,10 @@ def _notes(
     notes: list[str] = []
     if seeds == 1:
         notes.append(
-            phrase("a single seed: the figures have no interval, and another seed has others")
+            phrase(
+                "one simulated run only: another seed would give other figures; there is no"
+                " interval"
+            )
         )
     if settings.path is not None:
         sizes = [np.linalg.norm(course.force, axis=1) for course in courses]

@@ -31,7 +31,15 @@ from elastocal.report.plots import (
     plan_view,
     weakest_margins,
 )
-from elastocal.wording import counted, duration, millimetres, phrase, phrases, readable, um
+from elastocal.wording import (
+    counted,
+    duration,
+    millimetres,
+    mm,
+    phrase,
+    phrases,
+    readable,
+)
 
 
 def write_plan_page(
@@ -118,7 +126,7 @@ class ExpectedTable:
 
 def expected_table(plan: PlanResult, production: ProductionRecord) -> ExpectedTable:
     """Return the error to expect from some numbers of poses, as texts of a table."""
-    sigma, is_known = um(production.sigma), production.floor is not None
+    sigma, is_known = mm(production.sigma), production.floor is not None
     return ExpectedTable(
         phrase(
             "Error to expect on production, root mean square of the deviation, from readings that"
@@ -140,8 +148,8 @@ def expected_table(plan: PlanResult, production: ProductionRecord) -> ExpectedTa
         tuple(
             (
                 str(each.poses),
-                um(each.noise),
-                *((um(each.error),) if is_known else ()),
+                mm(each.noise),
+                *((mm(each.error),) if is_known else ()),
                 f"{plan.time_of(each.poses) / 60.0:.0f} min",
             )
             for each in production.some_expected()
@@ -165,16 +173,19 @@ def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
             phrase("Points with a posture"),
             phrase("{rank} of {all}", rank=pool.valid, all=pool.sampled),
         ),
-        (phrase("Check that refused most"), phrase(pool.bottleneck or "none")),
+        (phrase("Most frequent reason to refuse a point"), phrase(pool.bottleneck or "none")),
         *(_covered(plan.production) if plan.production is not None else ()),
     )
 
 
 def _covered(production: ProductionRecord) -> tuple[tuple[str, str], ...]:
     found = production.expected_of(production.poses)
-    error = (
-        ((phrase("Expected error on production"), um(found.error)),) if found is not None else ()
+    label = (
+        phrase("Error on production from noise alone")
+        if production.floor is None
+        else phrase("Expected error on production")
     )
+    error = ((label, mm(found.error)),) if found is not None else ()
     return ((phrase("Production covered"), f"{production.coverage.covered:.0%}"), *error)
 
 

@@ -38,8 +38,8 @@ def _pictures(evidence: Evidence, plan: PlanResult) -> Iterator[blocks.Block]:
         partial(plan_figure, surface, plan, pool),
         _alt(plan),
         phrase(
-            "The surface laid flat, as in the paper's Fig. 3; colour is the distance of each"
-            " candidate from its nearest chosen pose."
+            "The surface and its candidates as the note in the picture says; colour is the distance"
+            " of each candidate from its nearest chosen pose."
         ),
     )
     yield blocks.PlanScene(plan_view(cell, surface, plan, pool), plan, pool)
@@ -69,7 +69,11 @@ def _spreads(plan: PlanResult) -> blocks.Block:
     return blocks.Table(
         phrase("How the poses lie in the pool"),
         phrases(
-            "Technique", "Covering radius", "To the edge, mean", "To the next pose, mean", "O1"
+            "Technique",
+            "Covering radius",
+            "To the edge, mean",
+            "To the next pose, mean",
+            "Observability O1",
         ),
         tuple(
             (
