@@ -79,7 +79,7 @@ def texts_of(page):
     return reader.found
 
 
-_ENGLISH = re.compile(r"\b(?:and|are|by|from|has|is|not|of|that|the|to|were|with)\b")
+_ENGLISH = re.compile(r"\b(?:are|by|from|has|is|not|of|that|the|to|were|with)\b")
 """Small words that neither German nor a name has."""
 
 

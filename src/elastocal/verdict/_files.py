@@ -21,8 +21,9 @@ from elastocal.files import read_text
 from elastocal.procedure import JOURNAL, RunFolder, file_sha256
 from elastocal.records import SEAL, arrays_sha256, json_sha256, read_arrays, read_json_data
 from elastocal.verdict.evidence import MissingPart, Seal, UsedFile
+from elastocal.wording import phrases
 
-BYTES, CONTENT = "bytes", "content without times and folders"
+BYTES, CONTENT = phrases("bytes", "content without times and folders")
 _LEFT_OUT = (
     "provenance", "started", "source", "sha256", "file", "findings", "model", "model_sha256",
     "tool", "tool_sha256", "plan", "streams_sha256", SEAL,
