@@ -4,25 +4,33 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# Neighbours stay together, so that what a file prepares is seldom prepared twice.
-SHARED_OUT := -n auto --dist worksteal
+# One more than processors: some tests wait for sockets, browsers and other processes. Neighbours
+# stay together, so that what a file prepares is seldom prepared twice.
+WORKERS ?= $(shell expr $$(nproc 2>/dev/null || echo 2) + 1)
+SHARED_OUT := -n $(WORKERS) --dist worksteal
+# What is compiled is kept, whatever the shell says: commands that tests start need it at once.
+export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test checks lint units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
+.PHONY: demo test checks lint tests units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
 
-test: checks units end-to-end browser fuzz-lines
+test: checks tests
 
-# Type checker and site keep one processor busy each.
-checks: $(VENV)/installed-dev
-	$(MAKE) --no-print-directory -j2 lint docs-strict
+# Type checker and site keep one processor busy each; what fuzzes has its time beside them.
+checks: $(VENV)/installed-fuzz
+	$(MAKE) --no-print-directory -j3 lint docs-strict fuzz-lines
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# All at once: every process collects the suite once, and where a browser is waited for others work.
+tests: $(VENV)/installed-dev
+	$(BIN)/pytest $(SHARED_OUT)
 
 units: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m 'not slow and not end_to_end and not browser'
@@ -134,19 +142,25 @@ clean:
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
+comma := ,
+# uv takes a third of pip's time; where it cannot be had, pip does it.
+PIP := $(BIN)/pip install --quiet --disable-pip-version-check
+install = { $(PIP) uv && $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python \
+	-e $(1); } 2>/dev/null || $(PIP) -e $(1)
+
 $(VENV)/installed: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/pip install --quiet --disable-pip-version-check -e .
+	$(call install,.)
 	touch $@
 
 $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev,docs]'
+	$(call install,'.[dev$(comma)docs]')
 	touch $@ $(VENV)/installed
 
 # Where it cannot be had nothing is fuzzed, and that is said.
 $(VENV)/installed-fuzz: $(VENV)/installed-dev
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[fuzz]' || true
+	$(call install,'.[fuzz]') || true
 	touch $@
 
 $(VENV)/installed-nightly: $(VENV)/installed-dev
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[nightly]'
+	$(call install,'.[nightly]')
 	touch $@

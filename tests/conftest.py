@@ -1,4 +1,4 @@
-"""The stages of the suite: units first, then whole commands and pages, then the browser."""
+"""Parts of the suite that can be run alone: units, whole commands and pages, the browser."""
 
 from pathlib import Path
 

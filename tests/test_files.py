@@ -17,7 +17,7 @@ from elastocal.files import (
     sha256,
     write_text,
 )
-from support.cli import elastocal
+from support.cli import PATIENCE, elastocal
 
 
 def test_text_comes_back_as_it_was_written(tmp_path):
@@ -238,7 +238,7 @@ with replacing(where / "a.json") as temporary, filling(where / "plan", "plan.jso
 class TestWhatAKilledWriterLeaves:
     @pytest.fixture
     def where(self, tmp_path):
-        subprocess.run([sys.executable, "-c", KILLED, tmp_path], check=False, timeout=60)
+        subprocess.run([sys.executable, "-c", KILLED, tmp_path], check=False, timeout=PATIENCE)
         assert len(list(tmp_path.iterdir())) == 2
         return tmp_path
 

@@ -20,6 +20,7 @@ from elastocal.parallel import (
     process_count,
     process_pool,
 )
+from support.cli import PATIENCE
 from support.tasks import blas_threads, die, here, nothing, square, threads
 
 
@@ -154,7 +155,7 @@ def test_workers_end_when_their_parent_is_killed(tmp_path):
         "list(map_in_processes(told, range(4), 2))\n"
         "os.kill(os.getpid(), signal.SIGKILL)\n"
     )
-    subprocess.run([sys.executable, "-c", code, tmp_path], check=False, timeout=120)
+    subprocess.run([sys.executable, "-c", code, tmp_path], check=False, timeout=PATIENCE)
     workers = [int(each.name) for each in tmp_path.iterdir()]
     assert workers
     for _ in range(100):

@@ -67,6 +67,13 @@ def test_short_campaigns_on_typical_are_no_worse_than_the_papers_way_and_take_8_
         assert short <= 1.1 * mean["cover 30", "bearing"]
 
 
+def test_every_example_cell_stands_on_every_truth_with_all_seeds(tables):
+    rows = [row.strip("| ").split(" | ") for row in tables.demos("all").splitlines()[2:]]
+    measured = {(row[0], row[1]): row[-1] for row in rows if row[1] != "paper"}
+    names = {demo.name for demo in tables.DEMOS.values()}
+    assert measured == {(name, truth): "5" for name in names for truth in tables.TRUTHS}
+
+
 @pytest.mark.parametrize("kind", ["afp", "machining"])
 def test_campaigns_are_held_against_one_another_on_the_same_seeds(tables, kind):
     rows = tables.campaigns(kind).splitlines()[2:]

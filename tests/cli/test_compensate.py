@@ -51,13 +51,13 @@ def test_it_says_what_was_left_and_what_was_assumed(folder):
     words = " ".join(result.err.split())
     for text in (
         "12 rows corrected",
-        "deviation as programmed: 2.0",
-        "left by one first-order step: 0.003",
+        "deviation as programmed:",
+        "left by one first-order step:",
         "left by this correction:",
-        "posture nearest to zero",
+        "posture nearest to those that were calibrated",
     ):
         assert text in words
-    assert "nearest to zero" not in run(folder, "--start", start_text()).err
+    assert "nearest to" not in run(folder, "--start", start_text()).err
 
 
 def test_a_model_that_does_not_know_what_it_predicts_is_said_to_do_harm(folder):
@@ -139,7 +139,7 @@ def test_a_path_is_written_as_a_robot_program_too(folder):
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (("--limit", "1 mm"), "row 2: a deflection of 2.0"),
+        (("--limit", "1 mm"), "row 2: a deflection of 1.1"),
         (("--limit", "-1 mm"), "--limit '-1 mm' must be above 0"),
         (("--start", "0 deg"), "has 1 values"),
         (("--start", ", ".join(["200 deg"] * 6)), "joint_1 at 200 deg is outside its limits"),

@@ -1,6 +1,7 @@
 """`elastocal new`: a cell file that `check` passes, by options or by answers; and its preview."""
 
 import io
+import json
 import sys
 from pathlib import Path
 from unittest import mock
@@ -46,6 +47,75 @@ def test_a_foreign_urdf_is_taken_by_its_flange_and_metres_by_their_size(tmp_path
     assert file.load_cases.fz == 800.0
 
 
+@pytest.fixture
+def staeubli(tmp_path) -> Path:
+    """An RX160 with the frames of ROS-Industrial: x out of `flange`, z out of `tool0`."""
+    urdf = catalogue.urdf("RX160").replace('"flange"', '"tool0"')
+    twin = '<link name="flange"/><joint name="beside" type="fixed"><parent link="link_6"/>'
+    path = tmp_path / "rx160.urdf"
+    path.write_text(urdf.replace("</robot>", f'{twin}<child link="flange"/></joint></robot>'))
+    return path
+
+
+def test_of_two_flanges_the_one_whose_z_points_out_of_the_arm_carries_the_tool(
+    tmp_path, dome, staeubli
+):
+    cell = tmp_path / "cell.yaml"
+    facts = json.loads(elastocal("check", staeubli, "--json").out)
+    assert facts["tcp"] == "tool0"
+    assert facts["z_of_tcp"] == "out of the arm, along joint_6"
+    assert elastocal("new", "--robot", staeubli, "--mesh", dome, "-o", cell).code == 0
+    assert load_cell(cell).file.robot.flange == "tool0"
+    known = ("new", "--robot", staeubli, "--mesh", dome, "-o", cell, "--force")
+    asked = elastocal(*known, "--flange", "flange").err
+    assert "points 90 deg off" in asked
+    assert "robot.flange is 'tool0'" in asked
+
+
+def test_a_mesh_that_the_arm_can_only_work_on_in_inches_is_in_inches(tmp_path):
+    small, cell = block_mesh() * 0.5 / 25.4, tmp_path / "cell.yaml"
+    (tmp_path / "block.stl").write_bytes(binary_stl(small))
+    begun = elastocal("new", "--robot", "UR20", "--mesh", tmp_path / "block.stl", "-o", cell)
+    assert begun.code == 0, begun.err
+    assert load_cell(cell).file.surface.unit == "in"
+
+
+def test_what_run_would_refuse_of_the_forces_is_found_by_check(tmp_path, dome):
+    cell = tmp_path / "made on the way" / "cell.yaml"
+    begun = elastocal("new", "--robot", "UR20", "--mesh", dome, "-o", cell, "--press", "40 N")
+    assert begun.code == 0, begun.err
+    assert "no run can begin" not in begun.err
+    cell.write_text(cell.read_text().replace('contact_force: "10 N"', 'contact_force: "60 N"'))
+    *_, found = json.loads(elastocal("check", cell, "--json").out)["findings"]
+    assert found.startswith("no run can begin: procedure.contact_force must be below 18 N")
+
+
+def test_presses_that_the_joints_do_not_bear_are_said_with_those_that_they_do(tmp_path, dome):
+    cell = tmp_path / "cell.yaml"
+    known = ("new", "--robot", "RX160", "--mesh", dome, "--tracker", "none", "-o", cell)
+    begun = elastocal(*known, "--press", "3 kN")
+    assert "the joints bear the load cases at 0 of" in begun.err
+    fits = begun.err.partition("they bear a press of ")[2].partition(" N")[0]
+    assert 100.0 < float(fits) < 1500.0
+    assert "the joints bear" not in elastocal(*known, "--force", "--press", f"{fits} N").err
+
+
+def test_presses_follow_the_process_and_poses_are_chosen_for_it(tmp_path, dome):
+    cell, path = tmp_path / "cell.yaml", tmp_path / "path.csv"
+    path.write_text(
+        "x[mm],y[mm],z[mm],a[deg],b[deg],c[deg],force_tcp_x[N],force_tcp_y[N],force_tcp_z[N]\n"
+        "700,0,400,0,0,180,15,0,-60\n"
+    )
+    begun = elastocal(
+        *("new", "--robot", "UR20", "--mesh", dome, "-o", cell, "--process", path),
+        *("--tolerance", "0.2 mm"),
+    )
+    assert begun.code == 0, begun.err
+    known = load_cell(cell)
+    assert (known.technique, known.file.load_cases.fz) == ("i_optimal", 63.0)
+    assert known.file.acceptance.tolerance == 0.2e-3
+
+
 def test_no_file_is_replaced_and_none_is_left_behind_by_a_refusal(tmp_path, dome):
     cell = tmp_path / "cell.yaml"
     cell.write_text("mine")
@@ -67,7 +137,7 @@ def test_what_is_missing_is_named(tmp_path, dome):
 
 def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
     cell = tmp_path / "cell.yaml"
-    answers = ["UR 2", "UR20", "none.stl", str(dome), *[""] * 5, "80 kg", "80 N", "none", "", ""]
+    answers = ["UR 2", "UR20", "none.stl", str(dome), *[""] * 6, "80 kg", "80 N", "none", *[""] * 3]
     with mock.patch.object(sys, "stdin", io.StringIO("\n".join([*answers, ""]))):
         begun = elastocal("new", "-o", cell, "--ask")
     assert begun.code == 0, begun.err

@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.cell.examples import write_example
 from elastocal.cli import main
-from support.cli import default_signals, elastocal
+from support.cli import PATIENCE, default_signals, elastocal
 
 COMMAND = (sys.executable, "-c", "from elastocal.cli.main import run; run()")
 
@@ -51,12 +51,12 @@ def test_sigterm_leaves_nothing_half_written(folder, tmp_path):
         [*COMMAND, "plan", folder / "cell.yaml", "--jobs", "1", "--out", tmp_path / "plan"],
         stderr=subprocess.DEVNULL,
     )
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while not list(tmp_path.iterdir()) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert [path.name[:6] for path in tmp_path.iterdir()] == [".plan."]
     process.send_signal(signal.SIGTERM)
-    assert process.wait(60) == 143
+    assert process.wait(PATIENCE) == 143
     assert not list(tmp_path.iterdir())
 
 
@@ -105,7 +105,7 @@ ENDS = [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)]
 def ended(script):
     result = subprocess.run(
         [sys.executable, "-c", script],
-        capture_output=True, text=True, check=False, timeout=60, preexec_fn=default_signals,
+        capture_output=True, text=True, check=False, timeout=PATIENCE, preexec_fn=default_signals,
     )  # fmt: skip
     assert "went on" not in result.stdout
     return result.returncode
@@ -127,7 +127,11 @@ def test_what_nohup_ignores_is_ignored():
         DROPPED.format(name="SIGHUP").replace("10.0", "0.2")
     )
     result = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE,
     )
     assert "went on" in result.stdout
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from support.cli import default_signals
+from support.cli import PATIENCE, default_signals
 
 LATE = """
 import importlib.abc, os, signal, sys
@@ -38,7 +38,7 @@ def _ended(code, *words):
     command = [sys.executable, "-c", code, *words]
     return subprocess.run(
         command,
-        capture_output=True, text=True, timeout=60, check=False, preexec_fn=default_signals,
+        capture_output=True, text=True, timeout=PATIENCE, check=False, preexec_fn=default_signals,
     )  # fmt: skip
 
 

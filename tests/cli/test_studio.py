@@ -15,7 +15,7 @@ import pytest
 from elastocal import workflows
 from elastocal.cell import write_example
 from elastocal.procedure import Event, read_journal
-from support.cli import default_signals, elastocal
+from support.cli import PATIENCE, default_signals, elastocal
 from support.run_cells import planned_cell
 
 
@@ -34,12 +34,12 @@ def test_the_first_line_is_the_address_and_ctrl_c_ends_it(cell):
             line = process.stdout.readline()
             found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)(/[\w-]{32,}/)\n", line)
             assert found, line
-            asked = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=60)
+            asked = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=PATIENCE)
             asked.request("GET", found[2])
             assert asked.getresponse().status == 200
             asked.close()
             process.send_signal(signal.SIGINT)
-            assert process.wait(60) == 0
+            assert process.wait(PATIENCE) == 0
         finally:
             process.kill()
 
@@ -84,7 +84,7 @@ def test_a_run_outlives_no_studio_and_leaves_the_surface_first(tmp_path, number)
     journal = planned.cell.with_name("run") / "journal.jsonl"
 
     def wait_for(text):
-        until = time.monotonic() + 120.0
+        until = time.monotonic() + PATIENCE
         while not (journal.is_file() and text in journal.read_text()):
             assert time.monotonic() < until, text
             time.sleep(0.1)
@@ -94,7 +94,7 @@ def test_a_run_outlives_no_studio_and_leaves_the_surface_first(tmp_path, number)
     ) as process:
         try:
             _, _, place, token, _ = process.stdout.readline().split("/")
-            asked = http.client.HTTPConnection(place, timeout=60)
+            asked = http.client.HTTPConnection(place, timeout=PATIENCE)
             message = json.dumps({"plan": "plan", "folder": "run", "rate": 2.0})
             asked.request("POST", f"/{token}/run", message, {"Content-Type": "application/json"})
             assert asked.getresponse().status == 200
@@ -102,7 +102,7 @@ def test_a_run_outlives_no_studio_and_leaves_the_surface_first(tmp_path, number)
             wait_for('"action":"hold"')
             process.send_signal(number)
             wait_for('"event":"finish"')
-            process.wait(60)
+            process.wait(PATIENCE)
         finally:
             process.kill()
     last = read_journal(journal)[-1]

@@ -30,9 +30,8 @@ _FILES = ("urdf", "cell_text")
 
 
 def _public_dataclasses() -> list[type]:
-    measured = house.measure(ROOT / "src")
     found = {}
-    for names in house.find_faces(measured.modules).values():
+    for names in house.find_faces(house.find_modules(ROOT / "src")).values():
         for name, source in names.items():
             thing = getattr(importlib.import_module(source), name, None)
             if isinstance(thing, type) and dataclasses.is_dataclass(thing):
@@ -54,11 +53,9 @@ def _may_be_long(cls: type) -> list[str]:
     ]
 
 
-PUBLIC = _public_dataclasses()
-
-
 def test_no_public_dataclass_that_may_be_long_lists_its_fields():
-    long = {cls.__qualname__: _may_be_long(cls) for cls in PUBLIC if _lists_its_fields(cls)}
+    public = _public_dataclasses()
+    long = {cls.__qualname__: _may_be_long(cls) for cls in public if _lists_its_fields(cls)}
     assert not {name: fields for name, fields in long.items() if fields}, "mark it `brief_repr`"
 
 

@@ -11,6 +11,7 @@ from elastocal.drivers.line_stream import DRIVER
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.sim.wire import LineStreamServer, LiveCell, Told
 from elastocal.sim.workcell import SimClock
+from support.cli import PATIENCE
 from support.simulated import QUIET, example_cell
 from support.stations_on_wire import connect, read_until
 
@@ -191,7 +192,7 @@ def test_as_server_it_waits_for_the_adapter_and_answers_nobody_else(clock, opene
     opened.append(devices)
     port = devices.metrology.ports[0]
     with socket.create_connection(("127.0.0.1", port)) as stranger:
-        stranger.settimeout(10.0)
+        stranger.settimeout(PATIENCE)
         assert stranger.recv(10) == b""
     with socket.create_connection(("127.0.0.1", port), source_address=("127.0.0.2", 0)) as friend:
         friend.sendall(b"x[m],y[m],z[m]\n3,0,2\n")

@@ -17,6 +17,7 @@ import elastocal as ec
 from elastocal.dataset import read_dataset
 from elastocal.drivers import rtde
 from elastocal.sim.wire import PORTS
+from support.cli import PATIENCE
 from support.run_cells import planned_cell
 from support.ur_client import UrClient
 
@@ -73,7 +74,7 @@ def run_over_sockets(cell: Path, plan: Path, out: Path, drivers: set[str]):
         found = ec.run(cell, plan=plan, out=out, confirmed=True)
     finally:
         process.send_signal(signal.SIGINT)
-        told, _ = process.communicate(timeout=30)
+        told, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     served = json.loads(ports.read_text())["ports"]
     assert {line.split()[0] for line in told.decode().splitlines()} == set(served) == drivers

@@ -15,6 +15,7 @@ from elastocal.drivers.kuka_rsi import (
     connect_arm,
 )
 from elastocal.sim.wire import LiveCell, RsiContext, Told, rsi_server
+from support.cli import PATIENCE
 from support.simulated import QUIET, example_cell, places
 
 BOUNDS = Bounds(
@@ -28,7 +29,7 @@ class Nothing:
         return np.zeros(3)
 
 
-def until(holds, seconds=30.0):
+def until(holds, seconds=PATIENCE):
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end

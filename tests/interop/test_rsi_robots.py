@@ -23,6 +23,7 @@ from elastocal.drivers.kuka_rsi import (
     controller_files,
 )
 from elastocal.sim.wire._rsi_messages import EthernetConfig
+from support.cli import PATIENCE
 from support.simulated import example_cell
 
 WANTED = np.array([0.5e-3, -0.2e-3, 0.1e-3])
@@ -60,7 +61,7 @@ def linked():
         link.close()
 
 
-def until(holds, seconds=20.0):
+def until(holds, seconds=PATIENCE):
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end
@@ -71,7 +72,7 @@ def test_a_plain_robot_that_counts_by_one_loses_nothing(linked):
     link, source = linked("ImFree")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
         robot.bind(("127.0.0.1", 0))
-        robot.settimeout(5.0)
+        robot.settimeout(PATIENCE)
         corrected = np.zeros(3)
         for ipoc in range(60):
             x, y, z = np.array([1620.9, 0.0, 1909.9]) + corrected
@@ -86,7 +87,7 @@ def test_a_plain_robot_that_counts_by_one_loses_nothing(linked):
             assert f"<IPOC>{ipoc}</IPOC>" in answer
             corrected = np.array([float(v) for v in re.findall(r' [XYZ]="([-\d.]+)"', answer)])
     np.testing.assert_allclose(corrected, 1e3 * WANTED, atol=1e-4)
-    patience = time.monotonic() + 5.0
+    patience = time.monotonic() + PATIENCE
     while (counts := link.statistics()).answered < 60 and time.monotonic() < patience:
         time.sleep(0.01)  # an answer is counted when it has been sent
     assert (counts.answered, counts.lost, counts.jumps, counts.malformed) == (60, 0, 0, 0)

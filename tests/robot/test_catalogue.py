@@ -61,7 +61,9 @@ class TestNames:
             catalogue.load("KR 120 R2700 extra")
         assert "\n" not in str(refusal.value)
         assert sum(name in str(refusal.value) for name in ALL) <= 4
-        assert str(refusal.value).endswith("(`elastocal robots` lists them)")
+        assert str(refusal.value).endswith(
+            "(`elastocal robots` lists them; any other robot is given as a URDF file)"
+        )
 
     @pytest.mark.parametrize(
         ("name", "meant"),
@@ -70,6 +72,8 @@ class TestNames:
             ("kr500", ["KR 500 R2800-2"]),
             ("R3330", ["KR 240 R3330"]),
             ("universal robots", ["UR10e", "UR20"]),
+            ("staubli", ["RX160"]),
+            ("TX2-90", ["RX160"]),
         ],
     )
     def test_part_of_a_name_or_a_maker_suggests_all_that_it_may_mean(self, name, meant):
@@ -82,7 +86,8 @@ class TestNames:
         with pytest.raises(RobotError) as refusal:
             catalogue.load("KR 999")
         assert str(refusal.value) == (
-            "no robot 'KR 999' in the catalogue (`elastocal robots` lists them)"
+            "no robot 'KR 999' in the catalogue (`elastocal robots` lists them; any other robot"
+            " is given as a URDF file)"
         )
 
     def test_unknown_tip_is_refused_with_the_links(self):

@@ -8,6 +8,7 @@ import pytest
 
 from elastocal.errors import DeviceError, PlanningError
 from elastocal.studio import MOST_BYTES, StudioServer
+from support.cli import PATIENCE
 
 
 def news(number, _patience):
@@ -32,7 +33,7 @@ def ask(server):
     """Ask for a path behind the token; headers that are None are left out."""
 
     def ask(path="", body=None, method=None, token=None, **headers):
-        line = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+        line = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
         given = {"Host": f"127.0.0.1:{server.port}"}
         if body is not None:
             given |= {"Content-Type": "application/json", "Content-Length": str(len(body))}

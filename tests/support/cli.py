@@ -9,6 +9,10 @@ from unittest import mock
 
 from elastocal.cli.main import run
 
+PATIENCE = 300.0
+"""How long is waited for what must come of another process, in s: on a machine at work two seconds
+of a processor may take a minute, and what hangs hangs for ever."""
+
 
 @dataclass(frozen=True)
 class Result:

@@ -64,14 +64,15 @@ def _k_centre(folder: Path) -> dict[str, str]:
 
 def _draw_k_centre(points: np.ndarray, found: dict[str, tuple[np.ndarray, float]]) -> Figure:
     figure = new_figure(9.0, 3.6)
-    panels = figure.subplots(1, 2)
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes, (name, (chosen, radius)) in zip(panels, found.items(), strict=True):
         axes.scatter(*points.T, s=18, c=style.SKY, lw=0)
         axes.scatter(*points[chosen].T, s=45, c=style.INK, lw=0, zorder=3)
         for centre in points[chosen]:
             axes.add_patch(Circle(centre, radius, fill=False, color=style.VERMILLION, lw=1.0))
+            axes.update_datalim([centre - radius, centre + radius])
         axes.set_title(f"{name}: largest distance {radius:.3f}")
-        axes.set(xlim=(-0.35, 1.75), ylim=(-0.3, 1.3))
+        axes.autoscale_view()
         axes.set_aspect("equal")
         axes.set_axis_off()
     figure.subplots_adjust(left=0.01, right=0.99, top=0.9, bottom=0.01, wspace=0.02)
@@ -184,12 +185,16 @@ def _draw_streams(cell: Cell, streams: Streams, commit: PoseLog) -> Figure:
         middle = 0.5 * (window.start + window.end) - start
         for axes in (upper, lower):
             axes.axvspan(window.start - start, window.end - start, color="#f3e3c3", lw=0)
-        upper.text(middle, 520.0, window.load_case or "unloaded", ha="center", fontsize=8)
+        label = window.load_case or "unloaded"
+        above = upper.get_xaxis_transform()
+        upper.text(middle, 1.02, label, transform=above, rotation=35, fontsize=8)
     upper.set(ylim=(-1250, 650), ylabel="force on the sensor in N")
-    lower.set(ylim=(-0.2, 5.5), ylabel="marker displacement in mm")
+    pressed = [(arm.time >= w.start) & (arm.time <= w.end) for w in commit.windows]
+    highest = max(float(told[some].max()) for some in pressed)
+    lower.set(ylim=(-0.2, 1.1 * highest), ylabel="marker displacement in mm")
     lower.set(xlabel="time since the pose was begun in s", xlim=(0.0, arm.time[-1] - start))
-    for axes, place_ in ((upper, "lower left"), (lower, "lower right")):
+    for axes, corner in ((upper, "lower left"), (lower, "lower right")):
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(loc=place_, fontsize=8, framealpha=1.0)
-    figure.subplots_adjust(left=0.08, right=0.99, top=0.97, bottom=0.1, hspace=0.08)
+        axes.legend(loc=corner, fontsize=8, framealpha=1.0)
+    figure.subplots_adjust(left=0.09, right=0.97, top=0.86, bottom=0.1, hspace=0.08)
     return figure

@@ -129,6 +129,7 @@ from .procedure import (
 from .production import (
     ProcessFile as ProcessFile,
     ProductionPath as ProductionPath,
+    process_forces as process_forces,
     read_production as read_production,
 )
 from .rig import (

@@ -115,6 +115,31 @@ def read_production(
         return ProductionPath(q, *rows.wrench_in_base(T), names)
 
 
+def process_forces(path: Path, robot: Robot) -> FloatArray:
+    """Return the forces of a production path on the robot in the tcp frame, shape (row, 3), in N.
+
+    Parameters
+    ----------
+    path : Path
+        The CSV file.
+    robot : Robot
+        With its tool.
+
+    Raises
+    ------
+    PathError
+        If the file is not of the contract; by its line.
+    FileAccessError
+        If the file cannot be read.
+    """
+    with in_file(path):
+        table = PathTable.open(path, lambda header: find_columns(header, robot))
+        rows = table.rows(_MOST, "keep every tenth of them")
+        T = robot.forward(rows.joints) if rows.T_base_tcp is None else rows.T_base_tcp
+        force: FloatArray = np.einsum("rji,rj->ri", T[:, :3, :3], rows.wrench_in_base(T)[0])
+        return force
+
+
 def _courses(names: Sequence[str], count: int) -> Iterator[tuple[str, slice]]:
     if not names:
         yield "path", slice(0, count)

@@ -37,13 +37,15 @@ from elastocal.planning.surface import (
     unit_findings,
 )
 from elastocal.results import brief_repr
-from elastocal.robot import Robot, collision_model
+from elastocal.robot import Robot, collision_model, tool_link
 from elastocal.robot.inverse import inverse_for
 from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere, solid_of
 
 _NO_MASSES = (
     "torques are not judged: the links of robot {name!r} have no masses (<inertial> in its URDF)"
 )
+_TILTED = np.radians(60.0)
+"""Angle in rad between tool and last axis from which on a user is asked about it."""
 _NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
 
@@ -253,6 +255,7 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
             found += size_findings(path, mesh.metres, key, arm_reach(cell.robot))
     if not cell.robot.has_masses and np.isfinite(cell.torque_limits).any():
         found.append(Finding("masses", _NO_MASSES.format(name=cell.robot.name)))
+    found += _tilted_findings(cell)
     found += mesh_findings(surface) + placement_findings(
         surface,
         first_joint_positions(cell.robot, external),
@@ -264,6 +267,17 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
         if finding.fatal:
             raise PlanningError(finding.message)
     return tuple(found)
+
+
+def _tilted_findings(cell: Cell) -> tuple[Finding, ...]:
+    """Ask about a tool that points aside because its flange does; an angled tool is meant."""
+    urdf, flange, tcp = cell.robot.urdf, cell.file.robot.flange, cell.robot.chain
+    if not (tcp.tip_tilt > _TILTED and Robot.from_urdf(urdf, flange).chain.tip_tilt > _TILTED):
+        return ()
+    other = tool_link(urdf)  # the flange is none of the candidates: the tcp hangs on it
+    advice = "tcp.abc turns it" if other == tcp.tip else f"robot.flange is {other!r}"
+    text = f"z of the tcp, and of link {flange!r}, points {tcp.tip_direction}"
+    return (Finding("tilted", f"{text}: if the tool points out of the arm, {advice}"),)
 
 
 def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:

@@ -46,6 +46,7 @@ from .run import (
     home_route as home_route,
     itinerary as itinerary,
     last_known as last_known,
+    refusal_of_forces as refusal_of_forces,
     registration_warnings as registration_warnings,
     run_record as run_record,
     run_settings as run_settings,

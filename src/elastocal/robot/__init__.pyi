@@ -67,4 +67,5 @@ from .urdf import (
     root_link as root_link,
     serial_urdf as serial_urdf,
     tip_links as tip_links,
+    tool_link as tool_link,
 )

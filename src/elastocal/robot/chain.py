@@ -4,6 +4,7 @@ Both the rigid robot and the elastic one are the same chain; the elastic one has
 inserted as additional joints, before or after the joint they belong to.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,11 @@ import pinocchio as pin
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.results import brief_repr
+
+_STRAIGHT = 0.02
+"""Largest tilt in rad of a tip that is taken to point out of the arm."""
+_NEAR = 1e-4
+"""Distance in m along the last axis below which nothing tells which way is out of the arm."""
 
 
 @brief_repr
@@ -52,6 +58,37 @@ class SerialChain:
 
     def __repr__(self) -> str:
         return f"{len(self.joints)} joints from {self.base!r} to {self.tip!r}"
+
+    @property
+    def tip_tilt(self) -> float:
+        """Angle in rad between the tip's z axis and the way out of the arm along the last axis.
+
+        0 is a tip from which a tool points straight on; π/2 one whose z axis lies across, as that
+        of ROS-Industrial's ``flange``, whose x axis points out. NaN if the last joint slides.
+        """
+        last = self.joints[-1]
+        if not last.revolute:
+            return math.nan
+        before = -last.placement[:3, :3].T @ last.placement[:3, 3]
+        along = last.axis @ (self.T_last_tip[:3, 3] - before)
+        cosine = float(self.T_last_tip[:3, 2] @ last.axis)
+        straight = abs(cosine) if abs(along) < _NEAR else cosine * math.copysign(1.0, along)
+        return math.acos(min(1.0, max(-1.0, straight)))
+
+    @property
+    def points_out(self) -> bool:
+        """Whether the tip's z axis points straight out of the arm."""
+        return self.tip_tilt < _STRAIGHT
+
+    @property
+    def tip_direction(self) -> str:
+        """Where the tip's z axis points, in words."""
+        tilt, last = self.tip_tilt, self.joints[-1].name
+        if math.isnan(tilt):
+            return f"behind {last}, which slides"
+        if self.points_out:
+            return f"out of the arm, along {last}"
+        return f"{math.degrees(tilt):.0f} deg off the way out of the arm along {last}"
 
     @property
     def weight_gap(self) -> str:

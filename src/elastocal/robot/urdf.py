@@ -38,6 +38,8 @@ from elastocal.wording import listed
 _ENCODING = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([\w.-]+)")
 _BEFORE_ROOT = re.compile(r"\A(?:\ufeff|\s|<!--.*?-->)*(?:<\?xml\b.*?\?>)?", re.S)
 """What authors put before the XML declaration, where XML allows nothing; and the declaration."""
+_TOOL_LINKS = ("flange", "tool0", "tool_0")
+"""Links that carry the tool in URDFs as they are published."""
 _NO_INERTIA = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
 _ANY_LIMIT = dict.fromkeys(("lower", "upper", "effort", "velocity"), "0")
 """Pinocchio wants limits; `_joint_of` takes them from where they were written."""
@@ -219,6 +221,26 @@ def tip_links(root: ElementTree.Element) -> dict[str, int]:
     if not tips:
         raise refusal
     return tips
+
+
+def tool_link(text: str) -> str:
+    """Return the link of a URDF that a tool is mounted on, as far as names and axes tell.
+
+    That is ``flange``, ``tool0``, or else the leaf behind the most joints; of several behind as
+    many joints, one whose z axis points out of the arm. ROS-Industrial's ``flange`` has its x axis
+    there, its ``tool0`` the z axis.
+
+    Raises
+    ------
+    RobotError
+        If no serial chain moves a leaf link, or the URDF is damaged.
+    """
+    tips = tip_links(parse_urdf(text))
+    known = [name for name in _TOOL_LINKS if name in tips]
+    first = known[0] if known else max(tips, key=lambda tip: tips[tip])
+    alike = [tip for tip in dict.fromkeys((first, *known, *tips)) if tips[tip] == tips[first]]
+    straight = (tip for tip in alike if read_chain(text, tip).points_out)
+    return next(straight, first)
 
 
 def assumptions(root: ElementTree.Element) -> tuple[Assumption, ...]:

@@ -119,13 +119,12 @@ from .measure_delay import (
     measure_delay as measure_delay,
 )
 from .new import (
-    NONE as NONE,
     NewResult as NewResult,
-    NewSettings as NewSettings,
-    filled as filled,
     new as new,
-    offered as offered,
-    parse_answer as parse_answer,
+)
+from .new_settings import (
+    NONE as NONE,
+    NewSettings as NewSettings,
 )
 from .plan import (
     POSITION_PLAN as POSITION_PLAN,

@@ -22,7 +22,6 @@ from elastocal.codec import (
 from elastocal.compensation import read_settings
 from elastocal.compensation.conditioning import read_tool
 from elastocal.compensation.process import TABLE, read_process, read_table
-from elastocal.dataset import require_joint_names
 from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
@@ -30,16 +29,7 @@ from elastocal.geometry import PositionPlan, read_geometry
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
-from elastocal.records import read_json, read_yaml_data, schema_of
-from elastocal.robot import (
-    Robot,
-    catalogue,
-    leaf_links,
-    parse_urdf,
-    read_urdf,
-    refusals_naming,
-    tip_links,
-)
+from elastocal.records import read_json, schema_of
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._table_kinds import dataset_file
 
@@ -67,6 +57,8 @@ def cell_file(path: Path) -> FileDescription:
     findings = planning.surface_findings(cell, surface, np.random.default_rng(search.seed))
     planning.require_loads_possible_anywhere(cell, surface)
     require_free_home(cell.home, mover_for(cell, planning.collision_scene(cell, surface)))
+    unrunnable = procedure.refusal_of_forces(cell)
+    refused = [] if unrunnable is None else [f"no run can begin: {unrunnable}"]
     return "cell file", {
         "schema": "elastocal.cell/1",
         "cell": cell.name,
@@ -75,7 +67,7 @@ def cell_file(path: Path) -> FileDescription:
         "trackers": [tracker.name for tracker in cell.file.trackers],
         "technique": cell.technique,
         "faces": len(surface.mesh.faces),
-        "findings": [finding.message for finding in findings],
+        "findings": [finding.message for finding in findings] + refused,
     }
 
 
@@ -151,41 +143,11 @@ def summary_file(path: Path) -> FileDescription:
     return "summary of a run", {"schema": schema_of(procedure.RunSummary)} | found
 
 
-def robot_file(path: Path, tcp: str | None = None) -> FileDescription:
-    """Describe a robot description, up to a link: by default to the tip with the most joints."""
-    text = read_urdf(path)
-    with refusals_naming(path):
-        root = parse_urdf(text)
-        tips = tip_links(root)
-        robot = Robot.from_urdf(text, tcp or max(tips, key=lambda tip: tips[tip]))
-        require_joint_names(robot.joint_names)
-        beside = [leaf for leaf in leaf_links(root) if leaf not in tips]
-    return "robot description", {
-        "robot": robot.name,
-        "tips": list(tips),
-        "other_leaves": beside,
-        "tcp": robot.tip,
-        "joints": list(robot.joint_names),
-        "external_axes": list(robot.joint_names[: robot.external_axes]),
-        "masses": not robot.chain.weight_gap,
-        "assumptions": [f"{a.field}: {a.reason}" for a in robot.assumptions],
-    }
-
-
 def springs_file(path: Path) -> FileDescription:
     """Describe a file of springs."""
     file = read_springs(path)
     schema = {"schema": "elastocal.springs/1"}
     return "spring file", schema | {"include": file.include, "springs": len(file.springs)}
-
-
-def catalogue_file(path: Path) -> FileDescription:
-    """Describe a catalogue of robots; the URDF of each is made and loaded."""
-    robots = catalogue.read_table(read_yaml_data(path), str(path))
-    with refusals_naming(path):
-        for entry in robots.values():
-            Robot.from_urdf(catalogue.urdf_of(entry), "flange")
-    return "catalogue of robots", {"schema": catalogue.SCHEMA, "robots": list(robots)}
 
 
 def log_map_file(path: Path) -> FileDescription:

@@ -39,6 +39,7 @@ from elastocal.robot import (
     same_joints,
     tcp_gap,
     tip_links,
+    tool_link,
     with_tool,
 )
 from elastocal.units import parse_point, parse_quantity
@@ -315,7 +316,11 @@ def _robot_at(urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None) -> Robo
     if not tcp:
         tips = list(tip_links(parse_urdf(urdf)))
         if len(tips) != 1:
-            raise RobotError(f"name the tool centre point with --tcp: {listed(tips)}")
+            straight = Robot.from_urdf(urdf, tool_link(urdf)).chain
+            raise RobotError(
+                f"name the tool centre point with --tcp: {listed(tips)}; z of {straight.tip!r}"
+                f" points {straight.tip_direction}"
+            )
         tcp = tips[0]
     if T_tcp_tool is not None:
         urdf, tcp = with_tool(urdf, tcp, _TOOL_LINK, T_tcp_tool), _TOOL_LINK

@@ -15,12 +15,24 @@ from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
 from elastocal.compensation.online import LIVE_LOG_SCHEMA, is_live_log, read_live_log_facts
 from elastocal.compensation.process import TABLE
+from elastocal.dataset import require_joint_names
 from elastocal.errors import DatasetError, RobotError, SchemaError, nearest
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.records import read_arrays, read_json, read_json_data, read_yaml_data
 from elastocal.results import Result, brief
+from elastocal.robot import (
+    Robot,
+    catalogue,
+    find_meshes,
+    leaf_links,
+    parse_urdf,
+    read_urdf,
+    refusals_naming,
+    tip_links,
+    tool_link,
+)
 from elastocal.wording import plainly
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
@@ -47,6 +59,41 @@ def _live_record(path: Path) -> FileDescription:
     facts = {name: getattr(found, name) for name in names}
     schema = {"schema": "elastocal.live/1"}
     return "record of a live compensation", schema | facts | {"line": found.line.sentence()}
+
+
+def _robot(path: Path, tcp: str | None = None) -> FileDescription:
+    """Describe a robot description, up to a link: by default to the one that carries the tool."""
+    text = read_urdf(path)
+    with refusals_naming(path):
+        root = parse_urdf(text)
+        tips = tip_links(root)
+        robot = Robot.from_urdf(text, tcp or tool_link(text))
+        require_joint_names(robot.joint_names)
+        beside = [leaf for leaf in leaf_links(root) if leaf not in tips]
+        meshes = find_meshes(text, path.parent)
+    missing = [str(file) for _, file in meshes if not file.is_file()]
+    return "robot description", {
+        "robot": robot.name,
+        "tips": list(tips),
+        "other_leaves": beside,
+        "tcp": robot.tip,
+        "z_of_tcp": robot.chain.tip_direction,
+        "joints": list(robot.joint_names),
+        "external_axes": list(robot.joint_names[: robot.external_axes]),
+        "masses": not robot.chain.weight_gap,
+        "collision_meshes": f"{len(meshes) - len(missing)} of {len(meshes)} found",
+        **({"missing": missing} if missing else {}),
+        "assumptions": [f"{a.field}: {a.reason}" for a in robot.assumptions],
+    }
+
+
+def _catalogue(path: Path) -> FileDescription:
+    """Describe a catalogue of robots; the URDF of each is made and loaded."""
+    robots = catalogue.read_table(read_yaml_data(path), str(path))
+    with refusals_naming(path):
+        for entry in robots.values():
+            Robot.from_urdf(catalogue.urdf_of(entry), "flange")
+    return "catalogue of robots", {"schema": catalogue.SCHEMA, "robots": list(robots)}
 
 
 _JSON_KINDS: dict[str, _Describe] = {
@@ -88,7 +135,7 @@ _YAML_KINDS: dict[str, _Describe] = {
     "elastocal.compensator": kinds.compensator_file,
     "elastocal.springs": kinds.springs_file,
     "elastocal.log-map": kinds.log_map_file,
-    "elastocal.catalogue": kinds.catalogue_file,
+    "elastocal.catalogue": _catalogue,
 }
 """YAML files likewise."""
 
@@ -184,7 +231,7 @@ def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: 
     if settings.tcp is None:
         kind, holds = describe_file(path)
     elif path.suffix.lower() in ROBOT_SUFFIXES:
-        kind, holds = kinds.robot_file(path, settings.tcp)
+        kind, holds = _robot(path, settings.tcp)
     else:
         raise RobotError(f"{path} is no robot description: a tcp is a link of one")
     if settings.preview is not None:
@@ -280,7 +327,7 @@ _BY_SUFFIX: dict[str, _Describe] = {
     ".nc": _netcdf,
     ".csv": table_file,
     ".json": _json,
-    **dict.fromkeys(ROBOT_SUFFIXES, kinds.robot_file),
+    **dict.fromkeys(ROBOT_SUFFIXES, _robot),
     ".jsonl": kinds.journal_file,
     ".mcap": _recording,
     ".yaml": _settings,

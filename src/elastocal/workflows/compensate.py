@@ -4,6 +4,9 @@ from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
+from elastocal.arrays import FloatArray
 from elastocal.compensation.offline import (
     LARGEST_DEFLECTION,
     CorrectionFigures,
@@ -20,7 +23,7 @@ from elastocal.compensation.programs import (
     compensate_program,
 )
 from elastocal.errors import FileAccessError, PlanningError
-from elastocal.identification import PredictionDoubt, ProductionCoverage
+from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -36,6 +39,8 @@ from elastocal.workflows._inputs import (
 )
 from elastocal.workflows._workflow import workflow
 
+_MOST_POSTURES = 500
+"""Calibrated postures that are compared with one another."""
 _PROGRAM_MARKS = ("NOT TRIED ON A ROBOT", "DECL E6AXIS XBEFORE=")
 """How robot programs of ours are known: by their head, KRL's positions by the first."""
 
@@ -141,6 +146,8 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     calibrated = settings.read_model(Path(settings.model))
     robot = calibrated.model.robot
     start = parse_posture(robot, settings.start)
+    usual = None if is_program or start is not None else _usual_posture(calibrated)
+    start = start if usual is None else usual
     controller, unloaded = settings.unloaded(robot)
     how = CorrectionSettings(start, settings.largest, unloaded, controller)
     if is_program:
@@ -154,7 +161,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         program, reason = _program_of(settings, robot)
         hear = None if program is None else program.add
         summary = compensate_path(calibrated, path, settings.out, how, progress, hear)
-        notes = (*_path_notes(summary, robot, settings.start), *reason)
+        notes = (*_path_notes(summary, robot, settings.start, usual is not None), *reason)
     figures = summary.figures()
     further = (*_force_notes(summary), *_covered(summary))
     return CompensateResult(
@@ -186,7 +193,23 @@ def _written(program: PathProgram, settings: CompensateSettings) -> tuple[str, .
     return tuple(str(each) for each in program.write(settings.out.parent, fact, robot))
 
 
-def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> tuple[str, ...]:
+def _usual_posture(calibrated: CalibratedModel) -> FloatArray | None:
+    """Return the calibrated posture that the others are nearest to, shape (joint,).
+
+    None where the model does not say where it was calibrated, or the arm has external axes, which
+    nobody places for a path.
+    """
+    domain = calibrated.domain
+    if domain is None or calibrated.model.robot.external_axes or not len(domain.joint_position):
+        return None
+    q = domain.joint_position[:_MOST_POSTURES]
+    apart = np.abs(q[:, None] - q[None]).max(axis=-1)
+    return np.asarray(q[int(np.argmin(apart.sum(axis=1)))])
+
+
+def _path_notes(
+    summary: CorrectionSummary, robot: Robot, start: str | None, by_calibration: bool
+) -> tuple[str, ...]:
     notes = []
     if summary.jumps:
         rows = "row" if summary.jumps == 1 else "rows"
@@ -196,7 +219,8 @@ def _path_notes(summary: CorrectionSummary, robot: Robot, start: str | None) -> 
         )
     if summary.start and start is None:
         notes.append(
-            "the first row is taken to be reached in the posture nearest to zero:"
+            "the first row is taken to be reached in the posture nearest to"
+            f" {'those that were calibrated' if by_calibration else 'zero'}:"
             f" {write_posture(robot, summary.start)}; another"
             " posture deflects otherwise, give --start if it is another"
         )

@@ -6,7 +6,6 @@ import os
 import re
 from dataclasses import dataclass, replace
 from itertools import product
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -14,29 +13,21 @@ import numpy as np
 from elastocal import planning
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
-from elastocal.errors import ElastocalError, FileAccessError, PlanningError, RobotError, SchemaError
+from elastocal.errors import ElastocalError, PlanningError, SchemaError
 from elastocal.files import replacing
-from elastocal.meshes import load_triangles
+from elastocal.planning.checks import TorqueCheck
 from elastocal.planning.motion import Mover, mover_for
-from elastocal.planning.surface import Surface, arm_reach, sample_uniform
+from elastocal.planning.surface import Surface, SurfaceError, sample_uniform
 from elastocal.progress import Progress
 from elastocal.results import Result
-from elastocal.robot import Robot, catalogue, parse_urdf, read_urdf, refusals_naming, tip_links
 from elastocal.robot.inverse import inverse_for
 from elastocal.templating import templates
-from elastocal.units import parse_point, parse_quantity
+from elastocal.units import parse_quantity
 from elastocal.workflows._file_kinds import cell_file
-from elastocal.workflows._inputs import ROBOT_SUFFIXES, parse_frame
+from elastocal.workflows._inputs import parse_frame
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.new_settings import NONE, NewSettings
 
-NONE = "none"
-"""What leaves sensor or tracker out."""
-_FLANGES = ("flange", "tool0", "tool_0")
-"""Links that carry the tool in URDFs as they are published."""
-_MOST_METRES = 25.0
-"""Largest extent that a mesh is taken for metres up to; beyond, for millimetres."""
-_SIZES = ((1.4, 100.0, 3.0, 15.0), (2.2, 300.0, 10.0, 15.0), (math.inf, 1000.0, 40.0, 20.0))
-"""Press in N, mass of the tool in kg and radius of the contact in mm of arms up to a reach in m."""
 _AHEAD, _ABOVE = (0.55, 0.65, 0.45, 0.75), (0.15, 0.3, 0.0, 0.45)
 """Where a surface is tried, in reaches of the arm: its middle ahead of the base, its lowest point
 above it."""
@@ -50,47 +41,6 @@ _REMARK, _COLUMN = re.compile(r"(?m)^(?=[^#\n]*\S)(.*?\S) +(# .*)$"), 38
 """A line with a remark behind it, and where remarks begin."""
 
 
-@dataclass(frozen=True)
-class NewSettings:
-    """What is known of a cell; quantities are texts with their units, and what is None is guessed.
-
-    `filled` says what is guessed.
-    """
-
-    out: str | PathLike[str]
-    """Cell file to write."""
-    robot: str | None = None
-    """Name in the catalogue, or a URDF file."""
-    mesh: str | PathLike[str] | None = None
-    """Surface that the tool presses on: STL, OBJ or PLY."""
-    flange: str | None = None
-    """Link that carries the tool."""
-    unit: str | None = None
-    """Unit of the mesh's numbers."""
-    place: str | None = None
-    """Frame of the mesh in base, ``"x, y, z, a, b, c"``."""
-    tcp: str | None = None
-    """Tool centre point in the flange, ``"x, y, z, a, b, c"``, z out of the tool."""
-    tool_mass: str | None = None
-    """Mass of all that hangs on the flange."""
-    tool_centre: str | None = None
-    """Its centre in the flange, ``"x, y, z"``."""
-    press: str | None = None
-    """Largest force onto the surface; a third of it is pressed aside."""
-    force_range: str | None = None
-    """Largest forces of the sensor along its axes, ``"fx, fy, fz"``, or ``none``: no sensor."""
-    moment_range: str | None = None
-    """Its largest moments, likewise."""
-    tracker: str | None = None
-    """Place of the tracker in base, ``"x, y, z"``, or ``none``: no tracker."""
-    marker_place: str | None = None
-    """Marker in the tcp frame, ``"x, y, z"``."""
-    poses: int = 15
-    """Number of poses."""
-    force: bool = False
-    """Replace a file that is there."""
-
-
 @dataclass(frozen=True, repr=False)
 class NewResult(Result):
     """A cell file that was begun."""
@@ -99,50 +49,6 @@ class NewResult(Result):
     robot: str
     findings: tuple[str, ...]
     """What ``check`` says of it."""
-
-
-def filled(settings: NewSettings) -> NewSettings:
-    """Return settings with a guess for all that is None, by the robot and the mesh.
-
-    Raises
-    ------
-    RobotError
-        If no robot is named, or there is none of that name.
-    SchemaError
-        If no mesh is named.
-    FileAccessError
-        If a file cannot be read.
-    """
-    if settings.robot is None:
-        raise RobotError("--robot is missing: a name of `elastocal robots`, or a URDF file")
-    flange = settings.flange or _flange(settings.robot)
-    reach = arm_reach(_arm(settings.robot, flange))
-    if settings.mesh is None:
-        raise SchemaError("--mesh is missing: the surface that the tool presses on (.stl)")
-    bounds = np.array(load_triangles(Path(settings.mesh)).bounds, dtype=float)
-    unit = settings.unit or ("m" if np.ptp(bounds, axis=0).max() <= _MOST_METRES else "mm")
-    _, press, mass, _ = _sizes(reach)
-    done = replace(
-        settings,
-        flange=flange,
-        unit=unit,
-        tcp=settings.tcp or "0 mm, 0 mm, 200 mm, 0 deg, 0 deg, 0 deg",
-        tool_mass=settings.tool_mass or f"{mass:g} kg",
-        press=settings.press or f"{press:g} N",
-        place=settings.place or _place(bounds, unit, reach, _AHEAD[0], _ABOVE[0]),
-        marker_place=settings.marker_place or "70 mm, 0 mm, -110 mm",
-    )
-    tip, force = parse_frame(done.tcp or "")[:3, 3], parse_quantity(done.press, "force")
-    centre = settings.tool_centre or ", ".join(f"{500.0 * x:.0f} mm" for x in tip)
-    moment = _rounded_up(2.0 * force * (float(np.linalg.norm(tip)) + 0.1))
-    x, _, z = parse_frame(done.place or "")[:3, 3]
-    return replace(
-        done,
-        tool_centre=centre,
-        force_range=settings.force_range or _thrice(_rounded_up(2.0 * force), "N"),
-        moment_range=settings.moment_range or _thrice(moment, "N*m"),
-        tracker=settings.tracker or f"{x:.1f} m, {-max(2.0, 1.2 * reach):.1f} m, {z + 1.0:.1f} m",
-    )
 
 
 @workflow(NewSettings)
@@ -166,62 +72,86 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001
     FileAccessError
         If the file is there already, or a file cannot be read or written.
     """
-    out = Path(settings.out)
-    if out.exists() and not settings.force:
-        raise FileAccessError(f"{out} is there already: give --force to replace it")
-    known = filled(settings)
+    settings.require_free()
+    out, known = Path(settings.out), settings.filled()
     refused: ElastocalError | None = None
     with replacing(out) as temporary:
         for place, flip in _tries(settings, known):
             trial = replace(known, place=place)
+            cell = _begun(temporary, out, trial, flip)
             try:
-                findings = _write(temporary, out, trial, flip)
-            except ElastocalError as error:
+                surface, home = _prepared(cell)
+            except (PlanningError, SurfaceError) as error:  # of the place; the rest it cannot mend
                 refused = refused or error
                 continue
-            return NewResult(out, str(known.robot), findings)
+            text = _text(out, trial, home, flip)
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+            try:
+                return NewResult(out, str(known.robot), _findings(temporary, cell, surface))
+            except ElastocalError as error:
+                refused = error
+                break
         reason = str(refused).replace(str(temporary), str(out))
-        raise SchemaError(f"no cell that check passes: {reason}") from refused
+        size = f"(the surface is {known.extent}; --unit takes another)"
+        raise SchemaError(f"no cell that check passes: {reason} {size}") from refused
 
 
 def _tries(settings: NewSettings, known: NewSettings) -> list[tuple[str, bool]]:
     """Return where the surface is tried, and whether its normals are turned round."""
     if settings.place is not None:
         return [(settings.place, False), (settings.place, True)]
-    bounds = np.array(load_triangles(Path(str(known.mesh))).bounds, dtype=float)
-    reach = arm_reach(_arm(str(known.robot), str(known.flange)))
-    return [
-        (_place(bounds, str(known.unit), reach, ahead, above), flip)
-        for above, ahead, flip in product(_ABOVE, _AHEAD, (False, True))
-    ]
+    tries = product(_ABOVE, _AHEAD, (False, True))
+    return [(known.place_before(ahead, above), flip) for above, ahead, flip in tries]
 
 
-def _write(temporary: Path, out: Path, settings: NewSettings, flip: bool) -> tuple[str, ...]:
-    """Write the cell file, and return what ``check`` finds; it raises what ``check`` refuses."""
-    robot = _arm(str(settings.robot), str(settings.flange))
-    middle = 0.5 * (robot.limits.lower + robot.limits.upper)
-    temporary.write_text(_text(out, settings, robot, middle, flip), encoding="utf-8")
-    cell = load_cell(temporary)
+def _begun(temporary: Path, out: Path, settings: NewSettings, flip: bool) -> Cell:
+    """Return the cell with HOME amid the limits of the joints."""
+    limits = settings.arm.limits
+    text = _text(out, settings, 0.5 * (limits.lower + limits.upper), flip)
+    temporary.write_text(text, encoding="utf-8")
+    return load_cell(temporary)
+
+
+def _prepared(cell: Cell) -> tuple[Surface, FloatArray]:
+    """Return the surface, which the arm comes to, and a HOME before it."""
     surface = planning.cell_surface(cell)
-    rng = np.random.default_rng(cell.file.search.seed)
-    planning.surface_findings(cell, surface, rng)
+    planning.surface_findings(cell, surface, np.random.default_rng(cell.file.search.seed))
     home = _home(cell, surface, mover_for(cell, planning.collision_scene(cell, surface)))
-    temporary.write_text(_text(out, settings, robot, home, flip), encoding="utf-8", newline="\n")
-    findings = cell_file(temporary)[1]["findings"]
-    assert isinstance(findings, list)
-    return tuple(findings)
+    return surface, home
+
+
+def _findings(path: Path, cell: Cell, surface: Surface) -> tuple[str, ...]:
+    """Return what ``check`` finds in the file, and what the joints do not bear; or refuse it."""
+    found = cell_file(path)[1]["findings"]
+    assert isinstance(found, list)
+    return (*found, *_unbearable(cell, surface))
+
+
+def _unbearable(cell: Cell, surface: Surface) -> tuple[str, ...]:
+    """Return a finding if the joints do not bear the presses at half of the points tried."""
+    check = TorqueCheck.of(cell, surface)
+    if check is None or not cell.robot.has_masses:
+        return ()
+    T = _places(surface, 0.0)
+    q = inverse_for(cell.robot).solve_many(T.reshape(-1, 4, 4)).q
+    point, turn, branch = np.nonzero(np.isfinite(q.reshape(*T.shape[:2], -1, q.shape[-1])).all(-1))
+    q = q.reshape(*T.shape[:2], -1, q.shape[-1])[point, turn, branch]
+    at = T[point, turn]
+    borne = check.bearable(planning.Postures(at, -at[:, :3, 2], q, q, point))
+    best = np.array([borne[point == each].max() for each in np.unique(point)])
+    if not np.median(best) < 1.0:
+        return ()
+    fits = float(f"{max(0.0, float(np.median(best))) * cell.file.load_cases.fz:.2g}")
+    return (
+        f"the joints bear the load cases at {int(np.sum(best >= 1.0))} of {len(best)} points of"
+        f" the surface that were tried; at half of them they bear a press of {fits:g} N",
+    )
 
 
 def _home(cell: Cell, surface: Surface, mover: Mover) -> FloatArray:
     """Return a posture before the surface that is far from its limits and free of collisions."""
-    points = sample_uniform(surface, _TRIED, np.random.default_rng(0))
-    places = [
-        _before(point, normal, retreat, turn)
-        for retreat in _RETREATS
-        for point, normal in zip(points.position, points.normal, strict=True)
-        for turn in np.arange(_TURNS) * 2.0 * np.pi / _TURNS
-    ]
-    found = inverse_for(cell.robot).solve_many(np.array(places)).q
+    places = np.concatenate([_places(surface, retreat) for retreat in _RETREATS])
+    found = inverse_for(cell.robot).solve_many(places.reshape(-1, 4, 4)).q
     q = np.degrees(found[np.isfinite(found).all(axis=-1)])
     q = np.radians(np.round(q, 1))
     if not len(q):
@@ -232,6 +162,14 @@ def _home(cell: Cell, surface: Surface, mover: Mover) -> FloatArray:
         if mover.sweep.free(posture[None], posture[None])[0]:
             return np.asarray(posture)
     raise PlanningError("no posture before the surface is free of collisions and within the limits")
+
+
+def _places(surface: Surface, retreat: float) -> FloatArray:
+    """Return tcp frames before some points of the surface, shape (point, turn, 4, 4)."""
+    points = sample_uniform(surface, _TRIED, np.random.default_rng(0))
+    turns = np.arange(_TURNS) * 2.0 * np.pi / _TURNS
+    both = zip(points.position, points.normal, strict=True)
+    return np.array([[_before(at, normal, retreat, turn) for turn in turns] for at, normal in both])
 
 
 def _before(point: FloatArray, normal: FloatArray, retreat: float, turn: float) -> FloatArray:
@@ -246,22 +184,25 @@ def _before(point: FloatArray, normal: FloatArray, retreat: float, turn: float) 
     return T
 
 
-def _text(out: Path, settings: NewSettings, robot: Robot, home: FloatArray, flip: bool) -> str:
+def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str:
     """Return the text of the cell file; paths in it are relative to the file."""
-    is_file = _is_urdf(str(settings.robot))
-    tip = parse_frame(str(settings.tcp))[:3, 3]
-    side = parse_quantity(settings.press, "force") / 3.0
+    robot = settings.arm
     shown = zip(robot.joint_names, np.degrees(home) + 0.0, strict=True)
     slow = not np.isfinite(robot.limits.velocity).all()
+    effort = np.where(np.isfinite(robot.limits.effort), robot.limits.effort, 100.0)
+    torques = zip(robot.joint_names, effort, strict=True)
+    low, high = settings.bounds
+    process, tolerance = str(settings.process), str(settings.tolerance)
+    press = parse_quantity(settings.press, "force")
     text = templates("elastocal.cell").get_template("new.yaml").render(
         name=_quoted(out.stem if out.stem.isidentifier() else "cell"),
-        urdf=_quoted(_relative(str(settings.robot), out)) if is_file else "",
+        urdf=_quoted(_relative(str(settings.robot), out)) if settings.is_urdf else "",
         robot=_quoted(robot.name),
         flange=_quoted(settings.flange),
         tcp=_frame(str(settings.tcp)),
         tool_mass=_quoted(settings.tool_mass),
         tool_centre=_listed(str(settings.tool_centre)),
-        shape=_shape(tip, arm_reach(robot)),
+        shape=_shape(settings.tip, 2.0 * settings.disk_radius),
         force_range="" if settings.force_range == NONE else _listed(str(settings.force_range)),
         moment_range=_listed(str(settings.moment_range)),
         tracker="" if settings.tracker == NONE else _listed(str(settings.tracker)),
@@ -269,80 +210,47 @@ def _text(out: Path, settings: NewSettings, robot: Robot, home: FloatArray, flip
         mesh=_quoted(_relative(str(settings.mesh), out)),
         unit=settings.unit,
         place=_frame(str(settings.place)),
+        low=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in low)),
+        high=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in high)),
         flip=flip,
-        floor=f"{1e3 * min(0.0, _lowest(settings)) - 100.0:.0f} mm",
-        side=_quoted(f"{side:.3g} N"),
+        floor=f"{1e3 * min(0.0, settings.lowest) - 100.0:.0f} mm",
+        side=_quoted(f"{press / 3.0:.2g} N"),
         press=_quoted(settings.press),
-        disk=_quoted(f"{_sizes(arm_reach(robot))[3]:g} mm"),
+        contact=_quoted(f"{min(60.0, max(10.0, 0.2 * press)):.2g} N"),
+        ramp=_quoted(f"{min(400.0, max(20.0, 0.4 * press)):.2g} N/s"),
+        disk=_quoted(f"{settings.disk_radius:g} mm"),
+        payload=_quoted(f"{2.0 * parse_quantity(settings.tool_mass, 'mass'):g} kg"),
+        torques=", ".join(f'{_quoted(name)}: "{value:g} N*m"' for name, value in torques),
         home=", ".join(f'{_quoted(name)}: "{value:.1f} deg"' for name, value in shown),
         speed=", ".join(f'{_quoted(n)}: "90 deg/s"' for n in robot.joint_names) if slow else "",
         poses=settings.poses,
+        process="" if process == NONE else _quoted(_relative(process, out)),
+        tolerance="" if tolerance == NONE else _quoted(tolerance),
     )  # fmt: skip
     return _REMARK.sub(lambda found: f"{found[1]:<{_COLUMN - 3}}   {found[2]}", text)
 
 
-def _shape(tip: FloatArray, reach: float) -> str:
-    """Return a solid for the tool: a rod along z, or a ball half way to a tip elsewhere."""
+def _shape(tip: FloatArray, radius: float) -> str:
+    """Return a solid for the tool: a rod towards the tip, or a ball if that is at the flange.
+
+    Parameters
+    ----------
+    tip : ndarray, shape (3,)
+        In the flange, in m.
+    radius : float
+        In mm.
+    """
     length = 1e3 * float(np.linalg.norm(tip))
-    radius = 30.0 if reach < _SIZES[0][0] else 50.0
-    if length > 1.0 and tip[2] > 0.999 * np.linalg.norm(tip):
-        middle = f'["0 mm", "0 mm", "{0.42 * length:.0f} mm"]'
-        rod = f'{{radius: "{radius:.0f} mm", length: "{0.8 * length:.0f} mm"}}'
-        return f"{{name: tool, cylinder: {rod}, pose: {{xyz: {middle}}}}}"
-    middle = ", ".join(f'"{500.0 * x:.0f} mm"' for x in tip)
-    return f'{{name: tool, sphere: {{radius: "{radius:.0f} mm"}}, pose: {{xyz: [{middle}]}}}}'
-
-
-def _place(bounds: FloatArray, unit: str, reach: float, ahead: float, above: float) -> str:
-    """Return a frame of the mesh: its middle ahead of the base, its lowest point at a height."""
-    low, high = bounds * parse_quantity(f"1 {unit}", "length")
-    middle = 0.5 * (low + high)
-    x, y, z = np.round([ahead * reach - middle[0], -middle[1], above * reach - low[2]], 2) + 0.0
-    return f"{x:.2f} m, {y:.2f} m, {z:.2f} m, 0 deg, 0 deg, 0 deg"
-
-
-def _lowest(settings: NewSettings) -> float:
-    """Return the height of the lowest corner of the box about the mesh, in base in m."""
-    bounds = np.array(load_triangles(Path(str(settings.mesh))).bounds, dtype=float)
-    corners = np.array(list(product(*bounds.T))) * parse_quantity(f"1 {settings.unit}", "length")
-    T = parse_frame(str(settings.place))
-    return float((corners @ T[2, :3] + T[2, 3]).min())
-
-
-def _arm(robot: str, flange: str) -> Robot:
-    """Return the robot up to its flange."""
-    if not _is_urdf(robot):
-        return catalogue.load(robot, flange)
-    with refusals_naming(Path(robot)):
-        return Robot.from_urdf(read_urdf(Path(robot)), flange)
-
-
-def _flange(robot: str) -> str:
-    """Return the link that carries the tool, as far as names tell; else the longest chain's end."""
-    if not _is_urdf(robot):
-        return "flange"
-    with refusals_naming(Path(robot)):
-        tips = tip_links(parse_urdf(read_urdf(Path(robot))))
-        known = next((name for name in _FLANGES if name in tips), None)
-        return known or max(tips, key=lambda tip: tips[tip])
-
-
-def _is_urdf(robot: str) -> bool:
-    return Path(robot).suffix.lower() in ROBOT_SUFFIXES
-
-
-def _sizes(reach: float) -> tuple[float, float, float, float]:
-    return next(each for each in _SIZES if reach <= each[0])
-
-
-def _rounded_up(value: float) -> float:
-    """Return a value rounded up to its second digit."""
-    step = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return math.ceil(value / step - 1e-9) * step
-
-
-def _thrice(value: float, unit: str) -> str:
-    return ", ".join([f"{value:g} {unit}"] * 3)
+    if length < 1.0:
+        return f'{{name: tool, sphere: {{radius: "{radius:.0f} mm"}}}}'
+    middle = ", ".join(f'"{420.0 * x:.0f} mm"' for x in tip)
+    rod = f'{{radius: "{radius:.0f} mm", length: "{0.8 * length:.0f} mm"}}'
+    aside = math.hypot(tip[0], tip[1])
+    a, b = np.degrees(
+        [math.atan2(tip[1], tip[0]) if aside > 1e-6 else 0.0, math.atan2(aside, tip[2])]
+    )
+    turn = "" if b < 0.5 else f', abc: ["{a:.1f} deg", "{b:.1f} deg", "0 deg"]'
+    return f"{{name: tool, cylinder: {rod}, pose: {{xyz: [{middle}]{turn}}}}}"
 
 
 def _relative(file: str, out: Path) -> str:
@@ -366,34 +274,3 @@ def _frame(text: str) -> str:
     parse_frame(text)
     parts = [part.strip() for part in text.split(",")]
     return f"{{xyz: {_listed(','.join(parts[:3]))}, abc: {_listed(','.join(parts[3:]))}}}"
-
-
-def offered(settings: NewSettings, name: str) -> str:
-    """Return what is guessed for a field of settings with robot and mesh."""
-    if name == "flange":
-        return settings.flange or _flange(str(settings.robot))
-    return str(getattr(filled(settings), name))
-
-
-def parse_answer(name: str, text: str) -> None:
-    """Refuse an answer to a question of the wizard that is no value of its field.
-
-    Raises
-    ------
-    ElastocalError
-        Which says what is allowed.
-    """
-    if name == "robot":
-        _flange(text)
-        if not _is_urdf(text):
-            catalogue.entry(text)
-    elif name == "mesh":
-        load_triangles(Path(text))
-    elif name in ("place", "tcp"):
-        parse_frame(text)
-    elif name in ("tool_centre", "marker_place") or (name == "tracker" and text != NONE):
-        parse_point(text)
-    elif name in ("tool_mass", "press"):
-        parse_quantity(text, "mass" if name == "tool_mass" else "force")
-    elif name == "unit":
-        parse_quantity(f"1 {text}", "length")

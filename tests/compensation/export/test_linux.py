@@ -12,6 +12,7 @@ from elastocal import workflows
 from elastocal.cell import load_cell
 from elastocal.compensation.export import LinuxTarget
 from elastocal.errors import CompensationError
+from support.cli import PATIENCE
 from support.exported import SANITIZED, needs_gcc
 from support.live_on_wire import LiveFiles, served
 
@@ -81,7 +82,7 @@ def test_over_loopback_it_corrects_holds_fades_and_ends_at_zero(program):
             box.box.lose = 0
             wait(lambda: robot.statistics.answered > here + 130)
             process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=20.0)
+            out, err = process.communicate(timeout=PATIENCE)
         finally:
             process.kill()
         stops = robot.statistics.stops
@@ -101,7 +102,7 @@ def test_over_loopback_it_corrects_holds_fades_and_ends_at_zero(program):
     assert not offset.any()
 
 
-def wait(holds, seconds=30.0):
+def wait(holds, seconds=PATIENCE):
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end

@@ -14,6 +14,7 @@ from elastocal.drivers.kuka_rsi import (
     SenMessage,
 )
 from elastocal.errors import DeviceError
+from support.cli import PATIENCE
 
 ROBOT = "127.0.0.1"
 CONTROLLER = (ROBOT, 50_000)
@@ -150,7 +151,7 @@ def test_over_loopback_the_answer_goes_to_where_the_datagram_came_from():
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
             robot.bind((ROBOT, 0))
-            robot.settimeout(10.0)
+            robot.settimeout(PATIENCE)
             for ipoc in (4, 8):
                 robot.sendto(rob(ipoc), (ROBOT, link.port))
                 answer, sender = robot.recvfrom(4096)

@@ -10,6 +10,7 @@ from elastocal.cell.examples import write_example
 from elastocal.drivers.rtde import RtdeDriver, RtdeSettings
 from elastocal.errors import DeviceError
 from elastocal.sim.wire import PORTS, LiveCell, RtdeServer
+from support.cli import PATIENCE
 from support.ur_client import UrClient
 
 RATE = 4.0
@@ -45,7 +46,7 @@ def rig(cell):
     server.close()
 
 
-def wait(arm, *motions, patience=60.0):
+def wait(arm, *motions, patience=PATIENCE):
     """Wait until the arm is so, in s of the wall; return its state."""
     end = time.monotonic() + patience
     while (state := arm.state()).motion not in motions:
@@ -54,7 +55,7 @@ def wait(arm, *motions, patience=60.0):
     return state
 
 
-def until(holds, patience=60.0):
+def until(holds, patience=PATIENCE):
     """Wait until something holds, in s of the wall."""
     end = time.monotonic() + patience
     while not holds():

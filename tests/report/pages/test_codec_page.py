@@ -18,6 +18,7 @@ from elastocal.report.pages import (
 from elastocal.report.plots import (
     write_figure,
 )
+from support.cli import PATIENCE
 from support.codecs import judged, renamed, without_errors
 from support.pages import Page, with_script
 
@@ -192,7 +193,7 @@ def test_page_draws_in_a_browser_and_tells_what_the_slider_asks(tmp_path, text):
          "--enable-unsafe-swiftshader", "--disable-background-networking", "--no-first-run",
          f"--user-data-dir={tmp_path}", "--virtual-time-budget=8000", "--window-size=600,600",
          "--enable-logging=stderr", "--dump-dom", page.as_uri()],
-        capture_output=True, text=True, timeout=120, check=True,
+        capture_output=True, text=True, timeout=PATIENCE, check=True,
     )  # fmt: skip
     said = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
     assert not [line for line in said if re.search("Error|Refused|violates|Uncaught", line)]

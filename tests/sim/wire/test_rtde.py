@@ -15,6 +15,7 @@ from elastocal.cell import WallClock, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.errors import DeviceError
 from elastocal.sim.wire import PORTS, LiveCell, RtdeServer
+from support.cli import PATIENCE
 from support.simulated import example_cell
 from support.ur_client import RtdeClient
 
@@ -160,7 +161,7 @@ def test_ur_rtde_moves_and_presses_in_force_mode(folder, tmp_path):
             script = textwrap.dedent(PRESS)
             done = subprocess.run(
                 [sys.executable, "-c", script, address],
-                capture_output=True, text=True, timeout=120, check=False,
+                capture_output=True, text=True, timeout=PATIENCE, check=False,
             )  # fmt: skip
             assert done.returncode == 0, done.stderr
         finally:

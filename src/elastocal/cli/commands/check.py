@@ -44,3 +44,5 @@ def _check(
     output.console().print(f"{output.green('ok')} {result.file} is a {result.kind}")
     for name, text in result.lines():
         output.console().print(f"   {name}: {text}", soft_wrap=True)
+    if preview is not None:
+        output.console().print(f"preview: {preview}", soft_wrap=True)

@@ -16,18 +16,20 @@ if TYPE_CHECKING:
 
 _QUESTIONS = {
     "robot": "Robot: name of the catalogue, or a URDF file",
-    "flange": "Link that carries the tool",
+    "flange": "Link that carries the tool, its z axis out of the arm",
     "mesh": "Surface that the tool presses on (.stl, .obj, .ply)",
     "unit": "Unit of its numbers (mm, m, in)",
     "place": "Its frame in the robot's base: x, y, z, a, b, c",
     "tcp": "Tool tip in the flange, z out of the tool: x, y, z, a, b, c",
     "tool_mass": "Mass of all that hangs on the flange",
     "tool_centre": "Its centre in the flange: x, y, z",
+    "process": "Production path (.csv) that poses and presses are chosen for, or none",
     "press": "Largest force onto the surface",
     "force_range": "Force sensor, its largest forces: fx, fy, fz, or none",
     "moment_range": "Its largest moments: mx, my, mz",
     "tracker": "Laser tracker, its place in the robot's base: x, y, z, or none",
     "marker_place": "Marker from the tool tip: x, y, z",
+    "tolerance": "Largest error of a predicted deflection that the report lets pass, or none",
 }
 """What is asked, in this order; the key is the field and the option."""
 
@@ -56,6 +58,12 @@ def _new(  # noqa: PLR0913 - one parameter an option
     tool_centre: Annotated[
         str | None, typer.Option(help="Its centre in the flange: 'x, y, z' with units.")
     ] = None,
+    process: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATH.csv", help="Production path: poses and presses are chosen for it."
+        ),
+    ] = None,
     press: Annotated[
         str | None, typer.Option(help="Largest force onto the surface, '1 kN'.")
     ] = None,
@@ -71,6 +79,9 @@ def _new(  # noqa: PLR0913 - one parameter an option
     marker: Annotated[
         str | None, typer.Option(help="From the tool tip: 'x, y, z' with units.")
     ] = None,
+    tolerance: Annotated[
+        str | None, typer.Option(help="Largest error that the report lets pass, '0.1 mm'.")
+    ] = None,
     poses: Annotated[int, typer.Option(min=1, max=100_000, help="Number of poses.")] = 15,
     ask: Annotated[
         bool | None,
@@ -84,9 +95,10 @@ def _new(  # noqa: PLR0913 - one parameter an option
 ) -> None:
     """Begin a cell file: answer questions, or give options; every question has a default."""
     settings = workflows.NewSettings(
-        out, robot, mesh, flange, unit, place, tcp, tool_mass, tool_centre, press,
-        force_range, moment_range, tracker, marker, poses, force,
+        out, robot, mesh, flange, unit, place, tcp, tool_mass, tool_centre, process, press,
+        force_range, moment_range, tracker, marker, tolerance, poses, force,
     )  # fmt: skip
+    settings.require_free()
     people = sys.stdin.isatty() and not as_json
     if ask if ask is not None else people:
         settings = _asked(settings)
@@ -99,11 +111,13 @@ def _new(  # noqa: PLR0913 - one parameter an option
     output.print_remarks(screen, "note", result.findings)
     page = out.with_suffix(".html")
     hint = f"elastocal check {out} --preview {page}"
+    plan = f"elastocal plan {out} --out {out.with_name('plan')}"
     if not (browser and people):
         screen.print(f"to see it: `{hint}`", soft_wrap=True)
+        screen.print(f"then: `{plan}`", soft_wrap=True)
         return
     workflows.check(out, preview=page, force=force)
-    screen.print(f"preview: {page}", soft_wrap=True)
+    screen.print(f"preview: {page}; then: `{plan}`", soft_wrap=True)
     webbrowser.open(page.resolve().as_uri())
 
 
@@ -133,7 +147,7 @@ def _answer(settings: "NewSettings", name: str, question: str) -> str:
     """Return a valid answer to one question; one that is not is refused, and asked again."""
     from elastocal.errors import ElastocalError, ProcedureError
 
-    offered = None if name in ("robot", "mesh") else workflows.offered(settings, name)
+    offered = None if name in ("robot", "mesh") else settings.offered(name)
     while True:
         try:
             text: str = typer.prompt(question, default=offered, err=True)
@@ -145,7 +159,7 @@ def _answer(settings: "NewSettings", name: str, question: str) -> str:
                 "nobody answers: standard input has ended; give options instead"
             ) from end
         try:
-            workflows.parse_answer(name, text.strip())
+            settings.require_answer(name, text.strip())
         except ElastocalError as error:
             output.console().print(f"   {error}", soft_wrap=True)
         else:

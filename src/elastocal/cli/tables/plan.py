@@ -11,10 +11,14 @@ from rich.table import Table
 
 from elastocal.cli.output import bold, dim, green, print_remarks, visible, yellow
 from elastocal.planning import PlanResult, ProductionRecord, SpreadRecord
+from elastocal.procedure import RunSummary
 from elastocal.records import record
 from elastocal.robot import catalogue
 from elastocal.wording import um
 from elastocal.workflows import DryRunResult, InitResult, PlanFigures, RunResult
+
+_LOST_SHOWN = 5
+"""Readings that are not ok of which the reason is printed."""
 
 
 def show_example(console: Console, result: InitResult) -> None:
@@ -185,11 +189,22 @@ def show_run(console: Console, result: RunResult) -> None:
         console.print(visible(line.sentence()), soft_wrap=True)
     if found.dataset:
         print_remarks(console, "warning", found.warnings)
+        _show_lost(console, result.summary)
         console.print(
             f"wrote {bold(found.dataset)} and summary.json:"
             f" `elastocal calibrate {found.dataset} --out model.json`",
             soft_wrap=True,
         )
+
+
+def _show_lost(console: Console, summary: RunSummary | None) -> None:
+    """Print the first readings that are not ok, with why."""
+    lost = () if summary is None else summary.readings.not_ok
+    for each in lost[:_LOST_SHOWN]:
+        line = f"   pose {each.pose}, {each.load_case}: {each.status.value}, {each.note}"
+        console.print(visible(line), soft_wrap=True)
+    if len(lost) > _LOST_SHOWN:
+        console.print(f"   and {len(lost) - _LOST_SHOWN} more: summary.json, readings.not_ok")
 
 
 @record()

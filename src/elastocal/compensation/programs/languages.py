@@ -68,7 +68,10 @@ def choose_writer(robot: Robot, language: str | None = None) -> tuple[ProgramWri
             f" --language {'|'.join(PROGRAM_WRITERS)}"
         )
     if maker not in _LANGUAGES:
-        return None, f"no program: none is written for robots of {maker}"
+        return None, (
+            f"no program: none is written for robots of {maker}; the table (.csv) has every point,"
+            f" and --language {'|'.join(PROGRAM_WRITERS)} writes another maker's"
+        )
     writer = PROGRAM_WRITERS[_LANGUAGES[maker]]
     try:
         writer.require_robot(robot)

@@ -17,6 +17,9 @@ from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot
 
+_NO_LOAD = 1e-9
+"""Torque in N·m below which a load case does not load a joint."""
+
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
@@ -134,6 +137,18 @@ class TorqueCheck(PostureCheck):
         torques = [self.torques(postures), unloaded.torques(postures), unloaded.torques(away)]
         used = np.abs(np.concatenate(torques)[..., known]) / self.torque_limits[known]
         return np.asarray(1.0 - used.max(axis=(0, 2)))
+
+    def bearable(self, postures: Postures) -> FloatArray:
+        """Return by what the load cases may be multiplied, shape (pose,), until a joint gives in.
+
+        0 or less where the weight of arm and tool alone is too much.
+        """
+        known = np.isfinite(self.torque_limits)
+        resting = replace(self, force_tcp=np.zeros((1, 3))).torques(postures)[..., known]
+        load = self.torques(postures)[..., known] - resting
+        room = self.torque_limits[known] - np.sign(load) * resting
+        share = room / np.maximum(np.abs(load), _NO_LOAD)
+        return np.asarray(share.min(axis=(0, 2), initial=np.inf))
 
 
 @brief_repr

@@ -42,7 +42,7 @@ class Finding:
 
     kind: str
     """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``duplicate``, ``far``, ``huge``,
-    ``tiny``, ``inches``, ``inverted`` or ``masses``."""
+    ``tiny``, ``inches``, ``inverted``, ``masses`` or ``tilted``."""
     message: str
     """One line."""
     fatal: bool = False

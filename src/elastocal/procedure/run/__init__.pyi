@@ -24,6 +24,7 @@ from .session import (
 from .settings import (
     RunSettings as RunSettings,
     check_compatible as check_compatible,
+    refusal_of_forces as refusal_of_forces,
     registration_warnings as registration_warnings,
     run_settings as run_settings,
 )

@@ -118,6 +118,22 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
     )
 
 
+def refusal_of_forces(cell: Cell) -> str | None:
+    """Return why no run of the cell can begin, as far as its forces tell before a plan is made.
+
+    None: nothing speaks against it, or it has no force sensor and is for planning alone.
+    """
+    if (T_sensor_tcp := cell.T_sensor_tcp) is None:
+        return None
+    loads = tuple((name, np.array(force)) for name, force in cell.file.presses.items())
+    try:
+        _check_contact_force(cell, loads)
+        _force_limit(cell, loads, T_sensor_tcp[:3, :3], _force_tolerance(cell, loads))
+    except ProcedureError as error:
+        return str(error).removeprefix(f"{cell.path}: ")
+    return None
+
+
 def _check_contact_force(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> None:
     """Refuse a guarded approach that would press more than a load case does."""
     pressed = ((name, -float(f[2])) for name, f in loads if name != LIGHT_CONTACT)

@@ -66,7 +66,7 @@ def entry(name: str) -> CatalogueEntry:
     if known is None:
         raise RobotError(
             f"no robot {name!r} in the catalogue{_suggestion(name, table)} (`elastocal robots`"
-            " lists them)"
+            " lists them; any other robot is given as a URDF file)"
         )
     return table[known]
 
@@ -186,6 +186,9 @@ def _suggestion(name: str, table: Mapping[str, CatalogueEntry]) -> str:
     if not family:
         family = [known for known, robot in table.items() if _key(robot.maker) == key]
     if not family:
-        keys = difflib.get_close_matches(key, list(by_key), n=_SUGGESTED, cutoff=_ALIKE)
-        family = [by_key[key] for key in keys]
+        maker = next((maker for maker, how in _MAKERS.items() if how.search(name)), None)
+        known = [each for each in by_key if maker in (None, table[by_key[each]].maker)]
+        keys = difflib.get_close_matches(key, known, n=_SUGGESTED, cutoff=_ALIKE)
+        few = known if maker and len(known) <= _SUGGESTED else ()
+        family = [by_key[each] for each in keys or few]
     return f"; did you mean {', '.join(map(repr, family))}?" if family else ""
