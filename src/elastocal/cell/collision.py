@@ -71,13 +71,13 @@ class CollisionWatch:
         change = float(np.linalg.norm(rest - self._rest[0][1]))
         if change > self._limit:
             return (
-                f"collision: the force changed by {change:.0f} N within {1e3 * self._window:.0f} ms"
+                f"the force changed by {change:.0f} N within {1e3 * self._window:.0f} ms"
                 f" while moving freely, limit {self._limit:.0f} N"
             )
         grown = float(np.linalg.norm(rest - self._first))
         if grown > self._largest:
             return (
-                f"collision: the force is {grown:.0f} N off the tool's weight while moving freely,"
+                f"the force is {grown:.0f} N off the tool's weight while moving freely,"
                 f" limit {self._largest:.0f} N"
             )
         return None

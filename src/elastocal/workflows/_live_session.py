@@ -120,7 +120,7 @@ class Prepared:
 class LiveEnd:
     """What a live compensation has come to."""
 
-    why: str
+    ended: str
     problem: str | None
     seconds: float
     bias: tuple[float, ...] | None
@@ -231,10 +231,10 @@ class LiveSession:
                 ready.cell, ready.rig.path_arm()[1], replace(context, feed=sensor.feed), loop
             )
             opened.callback(arm.close)
-            why, problem, seconds = self._watch(arm, loop)
+            ended, problem, seconds = self._watch(arm, loop)
             line = arm.statistics()
         return LiveEnd(
-            why=why,
+            ended=ended,
             problem=problem or loop.refusal or None,
             seconds=seconds,
             bias=None if tare is None else tare.bias,
@@ -243,7 +243,7 @@ class LiveSession:
             loop=loop.counts(),
             logged=0 if self._log is None else self._log.written,
             dropped=0 if self._log is None else self._log.dropped,
-            notes=tuple(self._found(tare)),
+            notes=(*ready.notes, *self._found(tare)),
         )
 
     def _facts(self, started: str) -> dict[str, str]:

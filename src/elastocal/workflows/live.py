@@ -181,19 +181,10 @@ def _result(settings: LiveSettings, ready: Prepared, end: LiveEnd, started: str)
         model=str(settings.model),
         robot=ready.cell.robot.name,
         started=started,
-        seconds=end.seconds,
-        ended=end.why,
-        problem=end.problem,
         limits=ready.limits,
         filter_delay=float(np.asarray(ready.numbers.filters.delay())),
         tool=ready.calibrated.tool_name,
-        bias=end.bias,
-        scheduling=end.scheduling,
-        line=end.line,
-        loop=end.loop,
-        logged=end.logged,
-        dropped=end.dropped,
-        notes=(*ready.notes, *end.notes),
+        **vars(end),
     )
 
 

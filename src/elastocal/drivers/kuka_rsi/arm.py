@@ -315,7 +315,7 @@ class KukaArm:
             R_base_sensor = cycle.T_base_tcp[:3, :3] @ self._reader.R_tcp_sensor
             hit = self._watch.look(cycle.time, self._reader.raw, R_base_sensor)
             if hit is not None:
-                self._break_down(hit)
+                self._break_down(f"collision: {hit}")
 
     def _message(self, step: Step) -> SenMessage:
         target = step.target or MoveTarget(self._number)

@@ -164,7 +164,7 @@ class Watchdog:
         for i in range(0, len(block), 1 + len(block) // _MOST_LOOKED_AT):
             hit = self.collisions.look(float(block.time[i]), block.force[i], R_base_sensor)
             if hit is not None:
-                raise FaultError(Fault.COLLISION, hit.removeprefix("collision: "))
+                raise FaultError(Fault.COLLISION, hit)
 
     def _check_beam(self, block: PointBlock, now: float) -> bool:
         if block.beam is BeamState.LOCKED:
