@@ -354,6 +354,11 @@ def _uncertainty(statement: UncertaintyStatement | None) -> Phrase:
 
 
 def _run_signature(evidence: Evidence) -> Phrase:
+    if evidence.logs:
+        return phrase(
+            "The readings were imported from logs, which carry no signature of their own; this"
+            " report names them by their SHA-256."
+        )
     states = {link.state for link in evidence.chain if link.name == "signature"}
     if LinkState.WHOLE in states:
         return phrase("The record of the run is signed, and the signature holds.")
