@@ -109,10 +109,12 @@ docs: $(VENV)/installed-dev
 	$(BIN)/mkdocs serve
 
 # The documentation of this version on the branch gh-pages, beside those of others: `latest` of them.
-# Nothing is pushed. `$(BIN)/mike serve -F mkdocs-versions.yml` shows them.
+# Nothing is pushed. `$(BIN)/mike serve -F mkdocs-versions.yml` shows them. mike looks for mkdocs in
+# the PATH.
 docs-version: $(VENV)/installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[versions]'
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mike deploy -F mkdocs-versions.yml --update-aliases \
+	PATH="$(CURDIR)/$(BIN):$$PATH" NO_MKDOCS_2_WARNING=1 \
+		$(BIN)/mike deploy -F mkdocs-versions.yml --update-aliases \
 		"$$($(BIN)/python -c 'import elastocal; print(".".join(elastocal.__version__.split(".")[:2]))')" latest
 	$(BIN)/mike set-default -F mkdocs-versions.yml latest
 

@@ -85,9 +85,10 @@ class OutputRule:
             )
         inside = any(_same(above, self.folder) for above in path.parents)
         if not self.force and not inside and path.is_file() and not self._is_ours(path):
+            known = ", and no former output of this command" if self.marks else ""
             raise FileAccessError(
-                f"cannot write {path}: it is there already, and no former output of this command;"
-                " name another file, or give --force to replace it"
+                f"cannot write {path}: it is there already{known}; name another file, or give"
+                " --force to replace it"
             )
 
     def _is_ours(self, path: Path) -> bool:

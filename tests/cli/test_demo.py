@@ -92,7 +92,7 @@ def test_the_machining_demo_is_yellow_for_the_one_reason_that_the_page_gives():
     found = (finished_demo("machining") / "report.html").read_text(encoding="utf-8")
     assert "Within, with open points" in found
     assert reason in found
-    assert "is beyond 0.500 mm" not in found
+    assert "wrong by more than 0.500 mm" not in found
 
 
 @pytest.mark.parametrize("kind", ["afp", "machining"])

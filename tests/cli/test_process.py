@@ -100,6 +100,22 @@ except BaseException:
     pass
 """
 ENDS = [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)]
+OUT_OF_TIME = """
+import resource, sys
+from pathlib import Path
+from elastocal.cli import main
+from elastocal.files import filling
+
+def work():
+    with filling(Path({folder!r}) / "out", "last") as place:
+        (place / "half").write_text("half")
+        while True:
+            pass
+
+resource.setrlimit(resource.RLIMIT_CPU, ({seconds}, {seconds}))
+main.app = work
+main.run()
+"""
 
 
 def ended(script):
@@ -120,6 +136,12 @@ def test_a_signal_that_arrives_in_a_finaliser_still_ends_the_command(name, code)
 def test_a_signal_that_arrives_in_an_import_that_catches_everything_ends_it(tmp_path, name, code):
     (tmp_path / "catches_everything.py").write_text(CATCHES_EVERYTHING.format(name=name))
     assert ended(CAUGHT.format(folder=str(tmp_path))) == code
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGXCPU"), reason="no limit of time")
+def test_a_process_that_has_used_its_time_leaves_nothing_half_written(tmp_path):
+    assert ended(OUT_OF_TIME.format(folder=str(tmp_path), seconds=2)) == 152
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_nohup_ignores_is_ignored():

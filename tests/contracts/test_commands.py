@@ -12,7 +12,7 @@ import typer
 
 from elastocal.cell.examples import EXAMPLES
 from elastocal.cli import options
-from elastocal.cli.main import _GROUPS, COMMANDS, app
+from elastocal.cli.main import _GROUPS, COMMANDS, app, run
 from elastocal.compensation.process import PROCESSES
 from elastocal.compensation.programs import PROGRAM_WRITERS
 from elastocal.elastic import LAYOUTS
@@ -44,6 +44,21 @@ class TestEveryCommand:
             name.rstrip("_").replace("_", "-") for group in _GROUPS.values() for name in group
         ]
         assert members.count(command) == 1
+
+    @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="/dev/full is Linux's")
+    def test_begins_nothing_where_its_output_is_full(self, command, monkeypatch, capfd, tmp_path):
+        monkeypatch.chdir(tmp_path)
+        # Any words do: an output that takes nothing is known before they are looked at.
+        for words in ((command,), (command, "--help")):
+            with Path("/dev/full").open("w", encoding="utf-8") as full:
+                monkeypatch.setattr(sys, "argv", ["elastocal", *words])
+                monkeypatch.setattr(sys, "stdout", full)
+                with pytest.raises(SystemExit) as stop:
+                    run()
+            assert stop.value.code == 1
+            message = "elastocal: cannot write output: No space left on device\n"
+            assert capfd.readouterr().err == message
+        assert not list(tmp_path.iterdir())
 
     def test_prints_json(self, command):
         assert ["--json"] in options_of(command).values()

@@ -17,7 +17,7 @@ from elastocal.verdict import (
 )
 from support import reported
 
-KEPT = {"made", "name", "limits", "files", "missing", "doubts", "stated"}
+KEPT = {"made", "name", "limits", "files", "missing", "doubts", "stated", "logs"}
 EMPTY = {field.name: field.default for field in fields(Evidence) if field.name not in KEPT}
 NAMES = list(EMPTY)
 VOID = {"br", "img", "input", "path", "circle", "meta", "hr", "stop", "rect"}

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import elastocal as ec
-from elastocal.dataset import read_dataset
+from elastocal.dataset import read_dataset, write
 from elastocal.errors import LogError
 from support import reported
 from support.cli import elastocal
@@ -231,6 +232,124 @@ def test_the_figures_are_one_json_object(imported, rows, tmp_path):
     figures = json.loads(result.out)
     assert figures["readings"] == imported.figures.readings
     assert (tmp_path / "data.png").exists()
+
+
+def test_the_units_of_a_sensor_box_and_the_pose_of_an_abb_are_guessed(tmp_path):
+    """What stands above the header, quaternions from Q1 on, axes that share their prefix."""
+    box = tmp_path / "ati.csv"
+    box.write_text(
+        "Start Time: 11/20/2026\nForce Units: lbf\nCounts per Unit Force: 1000000.0\n"
+        "Torque Units: lbf-in\nCounts per Unit Torque: 2000000.0\n"
+        "Status (hex),Fx,Fy,Fz,Tx,Ty,Tz,Time\n"
+        + "".join(f"0x0,1,2,{k}000000,4,5,6,09:14:0{k}.000\n" for k in range(9)),
+        encoding="utf-8",
+    )
+    axes, turn = [f"R1 J{n}" for n in range(1, 7)], [f"R1 Q{n}" for n in range(1, 5)]
+    arm = tmp_path / "arm.csv"
+    arm.write_text(
+        ";".join(["Time [s]", *axes, "R1 X", "R1 Y", "R1 Z", *turn])
+        + "\n"
+        + "".join(f"{k};10;20;30;40;50;60;1500;0;900;1;0;0;0\n" for k in range(9)),
+        encoding="utf-8",
+    )
+    sensor, controller = ec.guess_map([box, arm]).logs
+    force = next(each for each in sensor.columns if each.key == "force")
+    assert (force.unit, force.counts) == ("N", pytest.approx(1e6 / 4.4482216))
+    moment = next(each for each in sensor.columns if each.key == "moment")
+    assert (moment.unit, moment.counts) == ("N*m", pytest.approx(2e6 / 0.11298483))
+    found = {each.key: each.columns for each in controller.columns}
+    assert found["joints"] == tuple(axes)
+    assert found["pose.quaternion"] == tuple(turn)
+
+
+BOXED = (
+    MAP.replace("unit: kN", "unit: N, counts: 1000")
+    .replace("unit: N*mm", "unit: N*mm, counts: 1000000")
+    .replace(", angles: {{columns: [A, B, C], unit: deg}}", "")
+)
+
+
+def test_a_sensor_that_is_mapped_wrongly_is_told_by_press_and_weight(rows, tmp_path):
+    """Counts of a box; a pose whose angles nobody mapped; the sensor 40 deg round, and reversed."""
+    a, b = np.cos(np.radians(40.0)), np.sin(np.radians(40.0))
+    R = -1e6 * np.array([[a, -b, 0.0], [b, a, 0.0], [0.0, 0.0, 1.0]])
+    files = write_logs(replace(rows, force=rows.force @ R, moment=rows.moment @ R), tmp_path)
+    path = write_map(tmp_path, reported.finished() / "cell" / "cell.yaml", BOXED)
+    found = ec.import_logs(files, map=path)
+    sense, turn = found.figures.warnings[:2]
+    assert sense.startswith("the loads pull at the tool (+11")
+    assert re.search(
+        r"abc in the flange is (39|40|41), -?[01], -?[01] deg \(with (59\.\d|60) kg", turn
+    )
+
+
+@pytest.mark.slow
+def test_loads_near_none_of_the_map_are_refused_with_what_they_are(rows, tmp_path):
+    files = write_logs(replace(rows, force=-rows.force, moment=-rows.moment), tmp_path)
+    named = MAP + "load_cases: {{up: ['0 N','0 N','-1100 N']}}\n"
+    path = write_map(tmp_path, reported.finished() / "cell" / "cell.yaml", named)
+    with pytest.raises(LogError, match=r"no load is near .* \(-?\d+, -?\d+, 1[01]\d\d\) N"):
+        ec.import_logs(files, map=path)
+
+
+@pytest.fixture(scope="module")
+def campaign(imported):
+    """An imported dataset with its logs, and a model made from it; do not write into it."""
+    folder = Path(imported.figures.dataset).parent
+    ec.calibrate(folder / "data.nc", springs="actuated", draws=40, out=folder / "model.json")
+    return folder
+
+
+@pytest.mark.slow
+def test_a_campaign_of_logs_is_reported_and_verified_from_them(campaign):
+    reported_ = elastocal(
+        "report", campaign, "--out", campaign / "report.html", "--tolerance", "9 mm"
+    )
+    assert "could not be made again" not in reported_.err
+    assert "simulated" not in reported_.err, "whatever the devices of the cell file are"
+    found = elastocal("verify", campaign / "report.html")
+    assert found.code == 0, found.reason
+    for link in ("logs", "dataset", "model"):
+        assert re.search(rf"whole +{link}:", found.err)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        ("force.csv", "# a box", "# my box", "force.csv was changed after"),
+        pytest.param(
+            *("map.yaml", "unit: kN", "unit: kN ", "map.yaml was changed after"),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            *("tracker.txt", "", None, "tracker.txt, which the dataset was made from, is not here"),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_logs_that_are_not_those_of_the_dataset_are_named(
+    campaign, tmp_path, name, old, new, message
+):
+    copied = tmp_path / "copy"
+    shutil.copytree(campaign, copied)
+    if new is None:
+        (copied / name).unlink()
+    else:
+        text = (copied / name).read_text(encoding="utf-8")
+        (copied / name).write_text(text.replace(old, new, 1), encoding="utf-8")
+    found = elastocal("verify", copied)
+    assert (found.code, message in found.err) == (1, True), found.err
+
+
+@pytest.mark.slow
+def test_readings_that_the_logs_do_not_give_are_named(campaign, tmp_path):
+    copied = tmp_path / "copy"
+    shutil.copytree(campaign, copied)
+    dataset = read_dataset(copied / "data.nc")
+    write(replace(dataset, force=1.01 * dataset.force), copied / "data.nc")
+    found = elastocal("verify", copied)
+    assert found.code == 1
+    assert "the dataset is not what the logs give: force" in found.err
 
 
 def _short(rows: Rows) -> Rows:

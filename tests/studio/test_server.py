@@ -1,8 +1,12 @@
 """Who is let in by the server of the studio, and how much may be said to it."""
 
+import contextlib
 import http.client
 import json
+import random
+import resource
 import socket
+import threading
 
 import pytest
 
@@ -172,3 +176,89 @@ def test_a_port_that_is_taken_and_a_host_that_is_none_are_refused(server):
         StudioServer({}, news, port=server.port)
     with pytest.raises(DeviceError, match="--host 'here': must be an address in numbers"):
         StudioServer({}, news, host="here")
+
+
+@contextlib.contextmanager
+def connected(server, *sent):
+    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as line:
+        for each in sent:
+            line.sendall(each)
+        yield line
+
+
+def heard(line):
+    """Return what a connection says until it ends."""
+    with contextlib.suppress(ConnectionError):
+        return b"".join(iter(lambda: line.recv(65536), b""))
+    return b""
+
+
+def test_a_message_that_is_cut_off_is_not_taken(server):
+    told = f"POST /{server.token}/echo HTTP/1.1\r\nHost: localhost:{server.port}\r\n"
+    told += "Content-Type: application/json\r\nContent-Length: 3\r\n\r\n12"
+    with connected(server, told.encode()) as line:
+        line.shutdown(socket.SHUT_WR)
+        assert b"the message is cut off" in heard(line)
+
+
+def test_two_lengths_are_none(server):
+    told = f"POST /{server.token}/echo HTTP/1.1\r\nHost: localhost:{server.port}\r\n"
+    told += "Content-Type: application/json\r\nContent-Length: 2\r\nContent-Length: 3\r\n\r\n{} "
+    with connected(server, told.encode()) as line:
+        assert heard(line).startswith(b"HTTP/1.1 411")
+
+
+def test_who_shows_the_token_gets_in_whoever_waits(server, ask):
+    with contextlib.ExitStack() as waiting:
+        lines = [waiting.enter_context(connected(server, b"GET / HT")) for _ in range(40)]
+        for _ in range(3):
+            assert ask("echo", b"1")[0].status == 200
+        assert heard(lines[0]) == b""
+
+
+_ODD = (b"", b"\0", b"\xff" * 9, b"9" * 500, b"-1", b"+2", b"0x2", b"2, 2", b"\xd9\xa2", b"[::1")
+_NAMES = (b"Upgrade", b"Connection", b"Expect", b"Range", b"Transfer-Encoding", b"Origin", b"\xff")
+_VALUES = (b"websocket", b"Upgrade", b"100-continue", b"bytes=0-", b"chunked", b"close", *_ODD)
+_PATHS = (b"", b"//[", b"%00", b"..", b"\xff", b"a" * 70_000)
+_PAGES = (b"", b"echo", b"news", b"refuse", b"studio.js", b"../server.py", b"?#")
+_METHODS = (b"GET", b"POST", b"POST", b"PUT", b"HEAD", b"", b"\x16\x03\x01", b"PRI")
+_VERSIONS = (b"HTTP/1.1", b"HTTP/1.1", b"HTTP/1.0", b"HTTP/2.0", b"HTTP/1.x", b"", b"\0")
+_ENDS = (b"\r\n", b"\r\n", b"\n", b"\r", b"\r\n ")
+_BODIES = (b"{}", b"", b"[" * 5000, b"{", b"\x81\x85" + b"\0" * 20, b"0\r\n\r\n", b"1e999")
+
+
+def hostile(server, rng):
+    """Return a request that no browser sends."""
+    path = b"/".join([b"", rng.choice([server.token.encode(), *_PATHS]), rng.choice(_PAGES)])
+    lines = [b" ".join([rng.choice(_METHODS), path, rng.choice(_VERSIONS)])]
+    good = {b"Host": b"127.0.0.1:%d" % server.port, b"Content-Type": b"application/json"}
+    for name, value in (good | {b"Content-Length": b"2"}).items():
+        told = rng.choice(_ODD) if rng.random() < 0.2 else value
+        lines += [name + b": " + told] * rng.choice([0, 1, 1, 1, 1, 1, 2])
+    for _ in range(rng.choice([0, 0, 1, 2, 150])):
+        lines.append(rng.choice(_NAMES) + b": " + rng.choice(_VALUES) * rng.choice([1, 1, 1, 3000]))
+    end = rng.choice(_ENDS)
+    whole = end.join([*lines, b"", rng.choice(_BODIES)])
+    return whole[: rng.randrange(len(whole) + 1)] if rng.random() < 0.3 else whole
+
+
+def bombard(server, seeds):
+    """Send what no browser sends, and hang up or wait for an answer."""
+    for seed in seeds:
+        rng = random.Random(seed)
+        with contextlib.suppress(OSError), connected(server, hostile(server, rng)) as line:
+            line.shutdown(socket.SHUT_WR)
+            if rng.random() < 0.5:
+                assert b"Traceback" not in line.recv(65536)
+
+
+@pytest.mark.parametrize("requests", [150, pytest.param(20_000, marks=pytest.mark.slow)])
+def test_what_no_browser_sends_is_answered_or_dropped(server, ask, capfd, monkeypatch, requests):
+    fallen = []
+    monkeypatch.setattr(threading, "excepthook", fallen.append)
+    threads, memory = threading.active_count(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    bombard(server, range(requests))
+    assert ask("echo", b'{"q": 1}')[0].status == 200
+    assert threading.active_count() <= threads + 33
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - memory < 100_000
+    assert (fallen, *capfd.readouterr()) == ([], "", "")

@@ -42,9 +42,9 @@ def heard_again() -> None:
 def ended_cleanly() -> Iterator[None]:
     """Turn signals that end a program into exceptions that arrive.
 
-    SIGINT raises KeyboardInterrupt, SIGTERM and SIGHUP raise SystemExit with 128 and their
-    number, so that whoever writes a folder cleans it up. What ignores a signal already, as
-    ``nohup`` does, goes on ignoring it.
+    SIGINT raises KeyboardInterrupt, SIGTERM, SIGHUP and SIGXCPU (``ulimit -t``) raise SystemExit
+    with 128 and their number, so that whoever writes a folder cleans it up. What ignores a signal
+    already, as ``nohup`` does, goes on ignoring it.
 
     Python loses such an exception in two places, and a command would go on as if nothing had
     happened: in finalisers and callbacks of weak references, where it is dropped, and in libraries
@@ -59,8 +59,9 @@ def ended_cleanly() -> Iterator[None]:
         yield
         return
     handlers: dict[int, _Handler] = {signal.SIGINT: _interrupt, signal.SIGTERM: _leave}
-    if hasattr(signal, "SIGHUP"):
-        handlers[signal.SIGHUP] = _leave
+    for name in ("SIGHUP", "SIGXCPU"):
+        if hasattr(signal, name):
+            handlers[getattr(signal, name)] = _leave
     heeded = {n: h for n, h in handlers.items() if signal.getsignal(n) is not signal.SIG_IGN}
     before = {number: signal.signal(number, handler) for number, handler in heeded.items()}
     reported = sys.unraisablehook
@@ -75,7 +76,8 @@ def ended_cleanly() -> Iterator[None]:
 
     sys.unraisablehook = again
     try:
-        yield
+        with _warned_of_its_time():
+            yield
     finally:
         sys.unraisablehook = reported
         for number, handler in before.items():
@@ -83,6 +85,25 @@ def ended_cleanly() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL if at_once else handler)
         if _waiting:
             sys.exit(128 + _waiting.pop())
+
+
+@contextlib.contextmanager
+def _warned_of_its_time() -> Iterator[None]:
+    """Let the system say that the time of this process is used up a second before it kills it."""
+    if not hasattr(signal, "SIGXCPU"):
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    if soft != hard or hard in (0, 1, resource.RLIM_INFINITY):
+        yield
+        return
+    resource.setrlimit(resource.RLIMIT_CPU, (hard - 1, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

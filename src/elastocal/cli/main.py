@@ -176,10 +176,13 @@ def run() -> None:
 def _check_output() -> None:
     """Refuse to begin when the result could not be handed over at the end.
 
-    Python has no standard output where it was closed (``>&-``).
+    Python has no standard output where it was closed (``>&-``); a device that is full says so
+    before anything is written to it.
     """
     if sys.stdout is None and "--json" in sys.argv[1:]:
         raise FileAccessError("cannot write output: standard output is closed")
+    with contextlib.suppress(AttributeError, ValueError):  # in a test it may be no file
+        os.write(sys.stdout.fileno(), b"")
 
 
 def _drop_output() -> None:

@@ -27,7 +27,12 @@ from .map import (
     read_map as read_map,
     site as site,
 )
-from .merge import ImportedLogs as ImportedLogs, import_streams as import_streams
+from .merge import (
+    IMPORTED as IMPORTED,
+    ImportedLogs as ImportedLogs,
+    import_streams as import_streams,
+    log_sha256 as log_sha256,
+)
 from .plateaus import (
     Plateau as Plateau,
     averaged_part as averaged_part,

@@ -15,6 +15,7 @@ Where the logs hold a handshake, its words say which times belong together, and 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from itertools import groupby
 
 import numpy as np
@@ -56,6 +57,8 @@ _SEARCHED = 0.6
 """How far from the common offset that of a stretch is looked for, in s."""
 _LEAST_STRETCHES = 5
 """Stretches from which on a drift is estimated."""
+_HOUR, _DAY = 3600.0, 86400.0
+"""In s."""
 _LONGEST = 1_000_000
 """Samples of the longest activity; longer recordings are looked at in larger steps."""
 
@@ -102,10 +105,15 @@ class ClockFit:
         if self.offset_sigma is None:
             return f"{self.clock}: by the handshake"
         drift = "" if self.drift_sigma is None else f", drift {1e6 * self.drift:+.0f} ppm"
-        return (
-            f"{self.clock}: {self.offset:+.3f} s ± {1e3 * 2.0 * self.offset_sigma:.0f} ms{drift}"
-            f" to {self.reference} (correlation {self.correlation:.2f})"
-        )
+        known = f"± {1e3 * 2.0 * self.offset_sigma:.0f} ms{drift}"
+        seen = f"(correlation {self.correlation:.2f})"
+        zero = -self.offset
+        if not (zero > _DAY or (zero > _HOUR and abs(zero - self.first) < _HOUR)):
+            return f"{self.clock}: {self.offset:+.3f} s {known} to {self.reference} {seen}"
+        # Dates and times of day beside seconds: a difference of years says nothing to a person.
+        date, clock = datetime.fromtimestamp(zero, UTC).isoformat(" ", "milliseconds")[:23].split()
+        moment = clock if zero < _DAY else f"{date} {clock}"
+        return f"{self.clock}: its {moment} is 0 s of {self.reference}, {known} {seen}"
 
 
 def align(

@@ -17,13 +17,22 @@ from elastocal.results import brief_repr
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$|_(mm|m|um|deg|rad|N|kN|Nm|s|ms)$")
 _TIME = re.compile(r"(?i)(time|zeit|t|timestamp|stamp|date ?time|ms|ipoc|uhrzeit)")
-_AXIS = re.compile(r"(?i)(?:.*[._ ])?(?:joint|achse|axis|ax|a|j|q|theta)[_ ]?a?(\d)")
+_AXIS = re.compile(r"(?i)((?:.*[._ ])?(?:joint|achse|axis|ax|a|j|q|theta)[_ ]?a?)(\d)")
 _EXTERNAL = re.compile(r"(?i)(?:.*[._ ])?(?:e1|rail|linear|track)")
 _FORCE = re.compile(r"(?i)(.*?)(?:f|force)[._ ]?([xyz])")
 _MOMENT = re.compile(r"(?i)(.*?)(?:t|m|torque|moment)[._ ]?([xyz])")
 _SIGMA = re.compile(r"(?i)(.*?)(?:u95|u|sigma|unc)[._ ]?([xyz])|()([xyz])[._ ]?(?:u95|unc)")
 _POINT = re.compile(r"(?i)(.*?)([xyz])")
 _ANGLE = re.compile(r"(?i)(.*?)([abc])")
+_QUATERNION = re.compile(r"(?i)(.*?q[._ ]?)([wxyz]|[1-4])")
+_COUNTS = re.compile(r"(?i)counts per unit (force|torque)\W+([\d.]+(?:e[+-]?\d+)?)")
+_BOX_UNIT = re.compile(r"(?i)(force|torque) units?\W+([\w-]+)")
+_OF_BOXES = {
+    "n": ("N", 1.0), "kn": ("kN", 1.0), "lbf": ("N", 4.4482216), "nm": ("N*m", 1.0),
+    "n-m": ("N*m", 1.0), "nmm": ("N*mm", 1.0), "n-mm": ("N*mm", 1.0),
+    "lbf-in": ("N*m", 0.11298483), "lbf-ft": ("N*m", 1.3558179),
+}  # fmt: skip
+"""Units of the boxes of sensors: ours, and how many of ours one of theirs is."""
 _STEP = re.compile(r"(?i)(step|reading|handshake|plateau|messpunkt)")
 _PLAIN_UNITS = {"°": "deg", "degrees": "deg", "nm": "N*m", "nmm": "N*mm", "sec": "s"}
 _LEAST_AXES = 5
@@ -36,6 +45,8 @@ _SURELY_PLACED = 0.2
 """A place below this many units says nothing: the instruments stand farther away in any unit."""
 _SURELY_NEWTONS = 20.0
 """A press of more than this many units is not in kN."""
+_LARGEST_FORCE = 100e3
+"""No press is larger, in N: what is has been counted, not converted."""
 _LONGEST_LEVER = 5.0
 """Of a force about its sensor, in m: a moment beyond is in N mm."""
 
@@ -51,6 +62,8 @@ class GuessedColumns:
     unit: str | None
     """``?`` where a person must say; None for dates and words."""
     why: str
+    counts: float = 1.0
+    """How many of its numbers are one unit."""
 
     @property
     def yaml(self) -> str:
@@ -58,10 +71,13 @@ class GuessedColumns:
         names = ", ".join(_quoted(name) for name in self.columns)
         if self.key == "handshake":
             return names
+        if self.key == "pose.quaternion":
+            return f"[{names}]"
         unit = "" if self.unit is None else f", unit: {_quoted(self.unit)}"
         if self.key == "time":
             return f"{{column: {names}{unit}}}"
-        return f"{{columns: [{names}]{unit}}}"
+        counts = "" if self.counts == 1.0 else f", counts: {self.counts:.9g}"
+        return f"{{columns: [{names}]{unit}{counts}}}"
 
 
 @brief_repr
@@ -174,11 +190,15 @@ def _when(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
 
 def _joints(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
     """Return the columns of joints, a rail before the axes of the arm."""
-    axes = sorted((m[1], n) for n, bare in names.items() if (m := _AXIS.fullmatch(bare)))
+    by_word: dict[str, list[tuple[str, str]]] = {}
+    for name, bare in names.items():
+        if match := _AXIS.fullmatch(bare):
+            by_word.setdefault(match[1].lower(), []).append((match[2], name))
+    axes = max(by_word.values(), key=len, default=[])
     if len(axes) < _LEAST_AXES:
         return []
     rail = tuple(name for name, bare in names.items() if _EXTERNAL.fullmatch(bare))
-    arm = tuple(name for _, name in axes)
+    arm = tuple(name for _, name in sorted(axes))
     return [
         GuessedColumns("joints", group, *_unit(table, group, kind))
         for group, kind in ((rail, "length"), (arm, "angle"))
@@ -191,6 +211,9 @@ def _force(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
     forces, moments = _triples(_FORCE, names), _triples(_MOMENT, names)
     if not forces:
         return []
+    boxed = _boxed(table, "force", forces[0]), _boxed(table, "moment", *moments[:1])
+    if boxed[0] is not None:
+        return [each for each in boxed if each is not None]
     unit, why = _unit(table, forces[0], "force")
     found = [GuessedColumns("force", forces[0], unit, why)]
     if moments:
@@ -199,19 +222,40 @@ def _force(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
     return found
 
 
+def _boxed(table: LogTable, key: str, columns: tuple[str, ...] = ()) -> GuessedColumns | None:
+    """Return columns with the unit and the counts that a sensor's box wrote above them."""
+    word = {"force": "force", "moment": "torque"}[key]
+    counts = {kind.lower(): float(number) for kind, number in _COUNTS.findall(table.above)}
+    units = {kind.lower(): unit.lower() for kind, unit in _BOX_UNIT.findall(table.above)}
+    unit, size = _OF_BOXES.get(units.get(word, ""), ("", 1.0))
+    if not (columns and unit and counts.get(word, 0.0) > 0.0):
+        return None
+    return GuessedColumns(key, columns, unit, "the lines above", counts[word] / size)
+
+
 def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[GuessedColumns]:
     """Return the columns of the tool's frame beside joints, elsewhere those of markers."""
     sigmas = {name for columns in _triples(_SIGMA, names) for name in columns}
     places = _triples(_POINT, {n: bare for n, bare in names.items() if n not in sigmas})
     if not of_tool:
         return [GuessedColumns("markers", each, *_unit(table, each, "length")) for each in places]
-    angles = _triples(_ANGLE, names)
-    if not places or not angles:
+    if not places:
         return []
-    return [
-        GuessedColumns("pose.position", places[0], *_unit(table, places[0], "length")),
-        GuessedColumns("pose.angles", angles[0], *_unit(table, angles[0], "angle")),
-    ]
+    found = [GuessedColumns("pose.position", places[0], *_unit(table, places[0], "length"))]
+    if angles := _triples(_ANGLE, names):
+        found.append(GuessedColumns("pose.angles", angles[0], *_unit(table, angles[0], "angle")))
+    elif turns := _quaternion(names):
+        found.append(GuessedColumns("pose.quaternion", turns, None, "w, x, y, z"))
+    return found
+
+
+def _quaternion(names: dict[str, str]) -> tuple[str, ...]:
+    """Return the columns of a quaternion, w first: by their letters, or numbered as by ABB."""
+    found = {m[2].lower(): n for n, bare in names.items() if (m := _QUATERNION.fullmatch(bare))}
+    for order in ("wxyz", "1234"):
+        if all(axis in found for axis in order):
+            return tuple(found[axis] for axis in order)
+    return ()
 
 
 def _without_names(table: LogTable) -> tuple[GuessedColumns, ...]:
@@ -307,6 +351,8 @@ def _unit(table: LogTable, columns: Sequence[str], kind: str) -> tuple[str, str]
         return ("deg" if largest > _SURELY_DEGREES else "rad" if largest <= 3.5 else UNKNOWN), why
     if kind == "length":
         return ("mm" if largest > _SURELY_MM else "m" if largest > _SURELY_PLACED else UNKNOWN), why
+    if largest > _LARGEST_FORCE:
+        return UNKNOWN, f"{why}: counts? Write how many are a unit, counts: 1000000"
     return ("N" if largest > _SURELY_NEWTONS else UNKNOWN), why
 
 

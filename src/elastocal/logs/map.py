@@ -80,10 +80,12 @@ class TimeColumn(StrictModel):
 
 
 class Vector(StrictModel):
-    """_Three columns of one unit."""
+    """Three columns of one unit."""
 
     columns: _Three
     unit: str
+    counts: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
+    """How many of the log's numbers are one unit, as a sensor's box states them."""
 
     def check(self, dimension: str) -> None:
         """Refuse another unit than of this dimension."""
@@ -117,13 +119,18 @@ class ToolPose(StrictModel):
 
     position: Vector
     """x, y, z in base."""
-    angles: Vector
+    angles: Vector | None = None
     """a, b, c: turns about z, the new y, the new x (KUKA Z-Y'-X'')."""
+    quaternion: tuple[_ColumnName, _ColumnName, _ColumnName, _ColumnName] | None = None
+    """w, x, y, z. With neither this nor angles, the joints say how the tool is turned."""
 
     @model_validator(mode="after")
     def _known_units(self) -> "ToolPose":
         self.position.check("length")
-        self.angles.check("angle")
+        if self.angles is not None:
+            self.angles.check("angle")
+        if self.angles is not None and self.quaternion is not None:
+            raise ValueError("angles and quaternion say the same: give one of them")
         return self
 
 
@@ -237,6 +244,8 @@ class Site:
     gravity: tuple[float, float, float] | None
     """In base, in m/s²; None: the base stands upright."""
     sensor: SensorLoad
+    T_flange_sensor: FloatArray
+    """Measuring frame of the sensor, shape (4, 4), in m."""
     marker: FloatArray
     """In the tcp, shape (3,), in m."""
 
@@ -309,4 +318,4 @@ def _site(
         gravity=gravity,
     )
     named = None if upright else (float(gravity[0]), float(gravity[1]), float(gravity[2]))
-    return Site(robot, urdf, named, load, np.array(marker))
+    return Site(robot, urdf, named, load, T_flange_sensor, np.array(marker))

@@ -16,6 +16,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import LogError
+from elastocal.files import sha256
+from elastocal.logs._frames import sensor_doubts
 from elastocal.logs.clocks import ClockFit, align, handshake_spans
 from elastocal.logs.map import LogMap, Site
 from elastocal.logs.plateaus import (
@@ -32,7 +34,7 @@ from elastocal.logs.streams import (
     read_streams_of,
     stream_rows,
 )
-from elastocal.procedure import PoseLog, PoseReadings
+from elastocal.procedure import PoseLog, PoseReadings, file_sha256
 from elastocal.procedure.derive import (
     LEAST_SAMPLES,
     LoadRow,
@@ -57,6 +59,8 @@ from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.wording import counted
 
+IMPORTED = "elastocal import"
+"""How the provenance of a dataset from logs begins."""
 _LEAST_POSES = 2
 """Poses that a dataset is worth."""
 
@@ -119,8 +123,25 @@ def import_streams(
     rows = load_rows(poses, registration, site.sensor, conditioned=False, metrology=seen_at_all)
     dataset = _dataset(poses, rows, log_map, site, registration, files)
     progress("readings", 4, 4)
-    warnings = _warnings(plateaus, rows, registration, log_map)
+    loads = np.array([each.force_tcp for each in plateaus if each.pose >= 0 and each.load])
+    doubts = sensor_doubts(poses, loads.reshape(-1, 3), site)
+    warnings = (*doubts, *_warnings(plateaus, rows, registration, log_map))
     return ImportedLogs(dataset, streams, tuple(plateaus), clocks, registration, warnings)
+
+
+def log_sha256(path: Path) -> str:
+    """Return the hexadecimal SHA-256 of a log; of a folder that of the names and hashes in it.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be read.
+    """
+    if not path.is_dir():
+        return file_sha256(path)
+    files = sorted(each for each in path.rglob("*") if each.is_file())
+    names = (f"{file_sha256(each)} {each.relative_to(path).as_posix()}\n" for each in files)
+    return sha256("".join(names))
 
 
 def _merged(logs: Sequence[LogStreams], site: Site) -> Streams:
@@ -207,6 +228,13 @@ def _readings(streams: Streams, plateaus: Sequence[Plateau], least: int) -> list
         loads = tuple(each for each in readings[1:] if each.window.load_case is not None)
         after = [each for each in readings[1:] if each.window.load_case is None]
         found.append(PoseReadings(log, readings[0], loads, after[-1] if after else None))
+    foreign = [each.force_tcp for each in plateaus if each.load == ""]
+    if not found and foreign:
+        forces = dict.fromkeys(f"({x:.0f}, {y:.0f}, {z:.0f}) N" for x, y, z in foreign)
+        raise LogError(
+            f"no load is near a load case of the map: on the robot, in the tcp, they are"
+            f" {', '.join([*forces][:3])} …; is the sense right (acts_on), are the axes?"
+        )
     if len(found) < _LEAST_POSES:
         raise LogError(
             f"only {counted(len(found), 'pose')} of {len(plateaus)} plateaus has an unloaded"
@@ -253,7 +281,7 @@ def _dataset(
     arm = MeasuredArm(site.robot, site.urdf, site.gravity, check=log_map.check)
     names = ", ".join(path.name for path in files)
     return dataset_of(
-        poses, rows, cases, arm, registration.lever_arm, site.sensor, f"elastocal import {names}"
+        poses, rows, cases, arm, registration.lever_arm, site.sensor, f"{IMPORTED} {names}"
     )
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, UnitError
-from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns, Vector
+from elastocal.logs._frames import ROWS_AT_A_TIME, stated_poses, vectors
+from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns
 from elastocal.logs.recordings import is_recording, read_recording, read_workbook
 from elastocal.logs.table import LogTable, read_text_log
 from elastocal.procedure.record import ArmStream, PointStream, WrenchStream
@@ -22,12 +22,8 @@ from elastocal.units import factor
 _WORKBOOKS = (".xlsx", ".xlsm")
 _NO_READING = ("", "0", "nan", "none", "false")
 """Words of a handshake column between readings."""
-_LARGEST_GAP = (20e-3, np.radians(2.0))
-"""Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
-that is not calibrated is off by some millimetres, another frame by more."""
 _BEYOND_LIMITS = 0.2
 """Share of a joint's travel by which a log may be outside its limits."""
-_ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
 _K = 2.0
 """Coverage factor of a 95 % uncertainty."""
 
@@ -225,10 +221,10 @@ def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> Ar
         raise LogError(f"{table.name}: no column is mapped to joint {', '.join(missing)}")
     _require_within_limits(table.name, q, robot)
     if entry.pose is not None:
-        return ArmStream(time, q, _stated_poses(entry, table, q, robot))
+        return ArmStream(time, q, stated_poses(entry, table, q, robot))
     T: FloatArray = np.empty((len(q), 4, 4))
-    for start in range(0, len(q), _ROWS_AT_A_TIME):
-        rows = slice(start, start + _ROWS_AT_A_TIME)
+    for start in range(0, len(q), ROWS_AT_A_TIME):
+        rows = slice(start, start + ROWS_AT_A_TIME)
         T[rows] = robot.forward(q[rows])
     return ArmStream(time, q, T)
 
@@ -283,55 +279,20 @@ def _require_within_limits(name: str, q: FloatArray, robot: Robot) -> None:
         )
 
 
-def _stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) -> FloatArray:
-    """Return the tool frames that a log states, shape (row, 4, 4), if they are of the tcp.
-
-    Raises
-    ------
-    LogError
-        If they are too far from those of its joints.
-    """
-    assert entry.pose is not None
-    position = _vectors(table, entry.pose.position, "length")
-    angles = _vectors(table, entry.pose.angles, "angle")
-    known = np.asarray(np.isfinite(position).all(axis=1) & np.isfinite(angles).all(axis=1))
-    if not known.any():
-        raise LogError(f"{table.name}: no row states the whole tool frame")
-    T: FloatArray = np.full((len(table), 4, 4), np.nan)
-    gap, turn = np.empty(len(table)), np.full(len(table), np.nan)
-    for start in range(0, len(table), _ROWS_AT_A_TIME):
-        rows = slice(start, start + _ROWS_AT_A_TIME)
-        T_joints, whole = robot.forward(q[rows]), np.flatnonzero(known[rows]) + start
-        T[whole, 3] = (0.0, 0.0, 0.0, 1.0)
-        T[whole, :3, :3] = Rotation.from_euler("ZYX", angles[whole]).as_matrix()
-        T[rows, :3, 3] = position[rows]
-        gap[rows] = np.linalg.norm(position[rows] - T_joints[:, :3, 3], axis=1)
-        relative = np.swapaxes(T_joints[known[rows], :3, :3], 1, 2) @ T[whole, :3, :3]
-        turn[whole] = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
-    worst = float(np.nanmedian(gap)), float(np.median(turn[known]))
-    if not (worst[0] <= _LARGEST_GAP[0] and worst[1] <= _LARGEST_GAP[1]):
-        raise LogError(
-            f"{table.name}: the logged tool frame lies {1e3 * worst[0]:.4g} mm and"
-            f" {np.degrees(worst[1]):.3g} deg (median) from the tcp of the logged joints: its tool,"
-            " its base, or a joint's sign is another"
-        )
-    return T
-
-
 def _wrench(entry: LogEntry, table: LogTable, time: FloatArray) -> WrenchStream:
     assert entry.force is not None
     sign = 1.0 if entry.acts_on == "robot" else -1.0
-    force = sign * _vectors(table, entry.force, "force")
+    force = sign * vectors(table, entry.force, "force")
     moment = np.zeros_like(force)
     if entry.moment is not None:
-        moment = sign * _vectors(table, entry.moment, "moment")
+        moment = sign * vectors(table, entry.moment, "moment")
     ok = np.asarray(np.isfinite(np.hstack([force, moment])).all(axis=1))
     return WrenchStream(time, force, moment, np.full(len(time), np.nan), ok)
 
 
 def _points(entry: LogEntry, table: LogTable, time: FloatArray) -> PointStream:
     """Return the marker of a log; of several on one body its centre."""
-    position = np.stack([_vectors(table, each, "length") for each in entry.markers], axis=1)
+    position = np.stack([vectors(table, each, "length") for each in entry.markers], axis=1)
     sigma = np.stack([_marker_sigma(table, each) for each in entry.markers], axis=1)
     centre = position[:, 0] if len(entry.markers) == 1 else body_centre(position, table.name)
     with np.errstate(invalid="ignore"):
@@ -342,12 +303,7 @@ def _points(entry: LogEntry, table: LogTable, time: FloatArray) -> PointStream:
 def _marker_sigma(table: LogTable, marker: MarkerColumns) -> FloatArray:
     if marker.u95 is None:
         return np.full((len(table), 3), np.nan)
-    return _vectors(table, marker.u95, "length") / _K
-
-
-def _vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> FloatArray:
-    scale = factor(vector.unit, dimension)
-    return scale * np.column_stack([table.numbers(column) for column in vector.columns])
+    return vectors(table, marker.u95, "length") / _K
 
 
 def body_centre(position: FloatArray, name: str = "markers") -> FloatArray:

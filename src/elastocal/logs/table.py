@@ -62,6 +62,8 @@ class LogTable:
     """Cells of each column: texts, numbers, times."""
     decimal_comma: bool = False
     """Whether numbers in texts have one."""
+    above: str = ""
+    """The first lines that a program wrote above the header: units, scales."""
 
     @classmethod
     def from_rows(cls, name: str, rows: Sequence[Sequence[object]]) -> "LogTable":
@@ -212,12 +214,10 @@ def read_text_log(path: Path) -> LogTable:
         )
     # Lines of another program stand above the header, which stands right above the data.
     header = _header(body.above, width) or _named([""] * width)
-    comma = delimiter != "," and any(
-        _DECIMAL_COMMA.fullmatch(cell.strip())
-        for column in body.columns
-        for cell in islice(column, _LOOKED_AT)
-    )
-    return LogTable(str(path), header, body.columns, comma)
+    first = chain.from_iterable(islice(column, _LOOKED_AT) for column in body.columns)
+    comma = delimiter != "," and any(_DECIMAL_COMMA.fullmatch(cell.strip()) for cell in first)
+    above = some[: max(body.start or 0, 1) - 1]
+    return LogTable(str(path), header, body.columns, comma, "\n".join(above))
 
 
 @dataclass

@@ -24,7 +24,10 @@ from elastocal.records._codec import from_data, parser_reason, require_shallow
 class StrictModel(BaseModel):
     """Base of every model that is read from a file: frozen, no unknown keys, no yes for a 1."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    # Of pydantic's own names, older versions keep all that begin with model_.
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, protected_namespaces=()
+    )
 
     @field_validator("*", mode="before")
     @classmethod

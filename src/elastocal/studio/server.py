@@ -7,6 +7,7 @@ can be made to lead here (DNS rebinding); and by ``Origin`` and ``Sec-Fetch-Site
 states truly. The page itself may load nothing but its own files and run no other script.
 """
 
+import contextlib
 import hmac
 import ipaddress
 import json
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
-from socket import socket
+from socket import SHUT_RDWR, socket
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -27,7 +28,9 @@ from elastocal.errors import DeviceError, ElastocalError, SchemaError
 MOST_BYTES = 1_000_000
 """Of a message to the server."""
 _CONNECTIONS = 32
-"""Answered at a time; more are turned away."""
+"""Answered at a time; for more, those that have not shown the token yet are hung up."""
+_HANGING_UP = 1.0
+"""Longest time that it takes until one is gone, in s."""
 _PATIENCE = 30.0
 """Longest silence of a browser within a message, in s."""
 _HEARTBEAT = 10.0
@@ -93,7 +96,10 @@ class _Door:
             raise _RefusedError(HTTPStatus.FORBIDDEN, "a page of another origin")
         if headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
             raise _RefusedError(HTTPStatus.FORBIDDEN, "a page of another site")
-        _, token, name = [*urlsplit(path).path.split("/", 2), "", "?"][:3]
+        try:
+            _, token, name = [*urlsplit(path).path.split("/", 2), "", "?"][:3]
+        except ValueError as error:
+            raise _RefusedError(HTTPStatus.BAD_REQUEST, "not an address") from error
         if not hmac.compare_digest(token.encode(), self.token.encode()):
             raise _RefusedError(HTTPStatus.FORBIDDEN, "the address needs its token")
         return name
@@ -186,20 +192,34 @@ class _Listener(ThreadingHTTPServer):
 
     def __init__(self, *arguments: Any) -> None:
         self._free = threading.BoundedSemaphore(_CONNECTIONS)
+        self._strangers: dict[socket, None] = {}
+        """Connections on which no token has come yet, the oldest first."""
         super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Answer in a thread, or hang up where all are busy."""
+        """Answer in a thread; where all are busy, instead of the oldest that says nothing."""
         if not self._free.acquire(blocking=False):
-            self.shutdown_request(request)
-            return
+            oldest = next(iter([*self._strangers]), None)
+            if oldest is not None:
+                self.let_in(oldest)
+                with contextlib.suppress(OSError):
+                    oldest.shutdown(SHUT_RDWR)
+            if oldest is None or not self._free.acquire(timeout=_HANGING_UP):
+                self.shutdown_request(request)
+                return
+        self._strangers[request] = None
         super().process_request(request, client_address)
+
+    def let_in(self, request: socket) -> None:
+        """Keep a connection, whoever comes; it has shown the token."""
+        self._strangers.pop(request, None)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """Answer, and let the next one in."""
         try:
             super().process_request_thread(request, client_address)
         finally:
+            self.let_in(request)
             self._free.release()
 
     def handle_error(self, request: socket | tuple[bytes, socket], client_address: Any) -> None:
@@ -227,7 +247,9 @@ class _Request(BaseHTTPRequestHandler):
 
     def _answer(self, work: Callable[[str], None]) -> None:
         try:
-            work(self.server.door.require(self.headers, self.path))
+            name = self.server.door.require(self.headers, self.path)
+            self.server.let_in(self.connection)
+            work(name)
         except _RefusedError as error:
             self.close_connection = True
             self._send(error.status, f"{error}\n".encode(), "text/plain; charset=utf-8")
@@ -260,13 +282,17 @@ class _Request(BaseHTTPRequestHandler):
         if self.headers.get("Content-Type", "").partition(";")[0].strip() != _JSON:
             # Forms of other pages can send no JSON without asking first, which is not answered.
             raise _RefusedError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "messages are JSON")
-        length = self.headers.get("Content-Length", "")
-        if "Transfer-Encoding" in self.headers or not (length.isascii() and length.isdigit()):
+        length, *others = self.headers.get_all("Content-Length") or [""]
+        known = length.isascii() and length.isdigit() and not others
+        if "Transfer-Encoding" in self.headers or not known:
             raise _RefusedError(HTTPStatus.LENGTH_REQUIRED, "messages state their length")
         if len(length) > 12 or int(length) > MOST_BYTES:
             raise _RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the message is too long")
+        text = self.rfile.read(int(length))
+        if len(text) < int(length):
+            raise _RefusedError(HTTPStatus.BAD_REQUEST, "the message is cut off")
         try:
-            return json.loads(self.rfile.read(int(length)), parse_constant=_refuse_constant)
+            return json.loads(text, parse_constant=_refuse_constant)
         except (ValueError, RecursionError) as error:
             raise _RefusedError(HTTPStatus.BAD_REQUEST, "the message is no JSON") from error
 

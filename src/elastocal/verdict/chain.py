@@ -1,8 +1,9 @@
 """The chain from the raw streams to the verdict, each link held against the one before it.
 
 Streams, cell and plan are held against the hashes of the journal. Dataset and summary are made
-again from the streams: a hash beside them could be renewed by whoever edits them. Model, codec
-and process state by hash what they were made from, and the hash of what they say themselves.
+again from the streams, an imported dataset from its logs: a hash beside them could be renewed by
+whoever edits them. Model, codec and process state by hash what they were made from, and the hash
+of what they say themselves.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -10,34 +11,32 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-import numpy as np
-
 from elastocal.cell import SENSOR_CORRECTED, SensorLoad
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.dataset import Dataset, content_sha256, read_made_from
 from elastocal.errors import ElastocalError, SchemaError
 from elastocal.files import read_text, sha256
+from elastocal.logs import import_streams, log_sha256, read_map, site
 from elastocal.procedure import (
     JOURNAL,
-    DerivedRun,
     RunFolder,
     RunRecord,
+    RunSummary,
     derive_run,
     file_sha256,
     read_copies,
 )
 from elastocal.procedure.record import check_stream
+from elastocal.progress import silent
 from elastocal.records import record, to_data
 from elastocal.results import counted_alike
+from elastocal.verdict._differences import changed_place, changed_reading, changed_text
 from elastocal.verdict.evidence import Evidence, Seal
 from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
 from elastocal.wording import counted
 
-_SAME = 1e-4
-"""Difference, by the largest number of its kind, below which two derivations are one: versions and
-machines round differently, and what is smaller changes no verdict."""
 _OLD = "made before files stated it"
-_ADVICE = "; `elastocal derive` makes it again"
+_ADVICE = "; `elastocal {command}` makes it again"
 
 
 class LinkState(Enum):
@@ -90,6 +89,10 @@ def verify_chain(evidence: Evidence, files: ChainFiles) -> tuple[Link, ...]:
         links += [_signed(files.run, evidence.run_record, files), *_recorded(evidence, files)]
         broken = {link.text for link in links}
         links += _derived(evidence, files, broken)
+    if evidence.logs:
+        logged = _logged(evidence)
+        links += [logged]
+        links += [] if logged.state is LinkState.BROKEN else _derived(evidence, files, ())
     if evidence.dataset is not None:
         dataset = content_sha256(evidence.dataset)
         links += [*_model(evidence, dataset), *_codecs(evidence, dataset)]
@@ -199,45 +202,65 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         yield _broken("journal", f"{JOURNAL} was changed after the dataset was derived from it")
 
 
+def _logged(evidence: Evidence) -> Link:
+    """Return whether map and logs are those that an imported dataset was made from."""
+    for path, (name, stated) in zip(evidence.logs, _made_from(evidence).items(), strict=True):
+        if not path.exists():
+            return _broken("logs", f"{name}, which the dataset was made from, is not here")
+        if log_sha256(path) != stated:
+            return _broken("logs", f"{name} was changed after the dataset was made from it")
+    found = counted(len(evidence.logs) - 1, "log")
+    return _whole("logs", f"{found} and their map: those that the dataset names, by their SHA-256")
+
+
 def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> Iterator[Link]:
-    """Yield dataset and summary, made again from the streams; what was told is not told again."""
+    """Yield dataset and summary, made again from streams or logs; what was told is not again."""
     dataset, summary = evidence.dataset, evidence.summary
     if dataset is None:
         return
-    old = _is_old(evidence)
+    old, source = _is_old(evidence), "logs" if evidence.logs else "streams"
+    advice = _ADVICE.format(command="import" if evidence.logs else "derive")
     try:
-        again = _derive(evidence, dataset, files)
+        again, again_summary = _derive(evidence, dataset, files)
     except ElastocalError as error:
-        text, reason = "the dataset cannot be made again from the streams", files.plain(error)
+        text, reason = f"the dataset cannot be made again from the {source}", files.plain(error)
         again_told = Link("dataset", LinkState.UNSTATED, f"{text}, see above")
         yield again_told if reason in told else _broken("dataset", f"{text}: {reason}")
         return
-    text = "the dataset is not what the streams give"
-    if difference := _difference(dataset, again.dataset, old):
-        yield _broken("dataset", f"{text}: {difference}{_ADVICE}")
-    elif difference := _other_texts(dataset, again.dataset):
-        yield _unlike(old, "dataset", f"{text}: {difference}")
+    text = f"the dataset is not what the {source} give"
+    if difference := changed_reading(dataset, again, old, source):
+        yield _broken("dataset", f"{text}: {difference}{advice}")
+    elif difference := changed_text(dataset, again):
+        yield _unlike(old, "dataset", f"{text}: {difference}", advice)
     else:
-        yield _whole("dataset", "the dataset is what the streams give, made again from them")
+        yield _whole("dataset", f"the dataset is what the {source} give, made again from them")
     if summary is None:
         return
-    if place := _changed_place(to_data(summary), to_data(again.summary)):
+    if place := changed_place(to_data(summary), to_data(again_summary)):
         text = f"the summary of the run is not what the streams give: {place} differs"
-        yield _unlike(old, "summary", text)
+        yield _unlike(old, "summary", text, advice)
     else:
         yield _whole("summary", "the summary of the run is what the streams give")
 
 
-def _unlike(old: bool, name: str, text: str) -> Link:
+def _unlike(old: bool, name: str, text: str, advice: str) -> Link:
     """Return what differs beside the readings: an earlier version said other things about them."""
     if old:
-        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD}, by another version){_ADVICE}")
-    return _broken(name, f"{text}{_ADVICE}")
+        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD}, by another version){advice}")
+    return _broken(name, f"{text}{advice}")
 
 
-def _derive(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> DerivedRun:
+def _derive(
+    evidence: Evidence, dataset: Dataset, files: ChainFiles
+) -> tuple[Dataset, RunSummary | None]:
+    """Return dataset and summary, made again from the streams of a run or from logs."""
+    if evidence.logs:
+        path, *logs = evidence.logs
+        log_map = read_map(path)
+        return import_streams(log_map, site(path, log_map), logs, silent).dataset, None
     assert files.run is not None
-    return derive_run(files.run.path, _sensor(evidence, dataset, files))
+    again = derive_run(files.run.path, _sensor(evidence, dataset, files))
+    return again.dataset, again.summary
 
 
 def _sensor(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> SensorLoad | None:
@@ -251,72 +274,6 @@ def _sensor(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> SensorLo
         raise SchemaError(f"it was derived with {name}, which is not here as it was then")
     assert evidence.cell is not None
     return read_sensor_load(files.tool, evidence.cell.robot)
-
-
-def _other_texts(stated: Dataset, found: Dataset) -> str:
-    """Return which text of a dataset is not that of the one made again; empty where none is."""
-    told = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
-    for name in told:
-        if stated.attributes.get(name) != found.attributes.get(name):
-            return f"its attribute {name} is another"
-    return ""
-
-
-def _difference(stated: Dataset, found: Dataset, old: bool) -> str:
-    """Return how readings differ from those made again; empty where they do not.
-
-    What a dataset of before does not have at all is no difference.
-    """
-    if content_sha256(stated) == content_sha256(found):
-        return ""
-    for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
-        if getattr(stated, name) != getattr(found, name):
-            return f"its {name.replace('_', ' ')} are others"
-    mine, again = stated.to_labelled(), found.to_labelled()
-    for name, array in again.variables.items():
-        if array.values.dtype.kind not in "iuf" or (name not in mine and old):
-            continue
-        if name not in mine:
-            return f"it has no {name}"
-        unit = str(array.attributes.get("units", ""))
-        if text := _largest_difference(stated, mine[name].values, array.values, unit):
-            return f"{name} {text}"
-    added = sorted(mine.variables.keys() - again.variables.keys())
-    return f"it has {added[0]}, which the streams do not give" if added else ""
-
-
-def _largest_difference(dataset: Dataset, stated: np.ndarray, found: np.ndarray, unit: str) -> str:
-    """Return the place where two arrays differ most, with both numbers; empty where they agree."""
-    a, b = np.asarray(stated, dtype=float), np.asarray(found, dtype=float)
-    size = float(np.nanmax(np.abs(b), initial=0.0))
-    gap = np.where(np.isnan(a) & np.isnan(b), 0.0, np.abs(a - b))
-    gap = np.where(np.isnan(gap), np.inf, gap)
-    if not np.any(gap > _SAME * size):
-        return ""
-    place = np.unravel_index(int(np.argmax(gap)), gap.shape)
-    pose = f"of pose {dataset.poses[place[0]]}" if place else ""
-    case = f" {dataset.load_cases[place[1]]}" if dataset.status.shape == gap.shape[:2] else ""
-    return f"{pose}{case} is {a[place]:.6g} {unit}, the streams give {b[place]:.6g} {unit}"
-
-
-def _changed_place(stated: object, found: object, place: str = "") -> str:
-    """Return the path of the first entry in which two JSON-ready records differ."""
-    if isinstance(stated, dict) and isinstance(found, dict) and stated.keys() == found.keys():
-        inner = [(f"{place}.{key}".lstrip("."), stated[key], found[key]) for key in stated]
-        # Which version derived it is no finding.
-        pairs = [each for each in inner if each[0] != "elastocal"]
-    elif isinstance(stated, list) and isinstance(found, list) and len(stated) == len(found):
-        pairs = [(f"{place}.{n}", a, b) for n, (a, b) in enumerate(zip(stated, found, strict=True))]
-    else:
-        return "" if stated == found or _is_close(stated, found) else place
-    return next((text for key, a, b in pairs if (text := _changed_place(a, b, key))), "")
-
-
-def _is_close(a: object, b: object) -> bool:
-    if not (isinstance(a, int | float) and isinstance(b, int | float)):
-        return False
-    # A thousandth: standard deviations of what is hardly determined round most.
-    return abs(a - b) <= max(10.0 * _SAME * abs(b), 1e-12)
 
 
 def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:

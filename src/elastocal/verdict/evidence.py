@@ -129,6 +129,8 @@ class Evidence:
     plan: PlanResult | None = None
     pool: PoolData | None = None
     journal: tuple[Entry, ...] | None = None
+    logs: tuple[Path, ...] = ()
+    """Of imported readings: their map, then the logs; none of those of a run."""
     dataset: Dataset | None = None
     summary: RunSummary | None = None
     """The summary of the run."""
@@ -166,7 +168,7 @@ class Evidence:
     def simulated(self) -> bool:
         """Whether the devices of the cell are simulated ones."""
         choices = () if self.cell is None else self.cell.file.devices.by_kind.values()
-        return any(choice.driver == SIMULATED for choice in choices)
+        return not self.logs and any(choice.driver == SIMULATED for choice in choices)
 
     @property
     def run_record(self) -> RunRecord | None:
@@ -205,8 +207,7 @@ class Evidence:
         process = None if self.cell is None else self.cell.process
         if process is None or self.calibrated is None:
             return None
-        model = self.calibrated.model
-        return model.doubt(process.joint_position, process.force, process.moment)
+        return self.calibrated.model.doubt(process.joint_position, process.force, process.moment)
 
     @property
     def saturation(self) -> Saturation | None:
@@ -343,8 +344,7 @@ def _doubts(evidence: Evidence) -> Iterator[str]:
     for doubts in (_dataset, _summary, _codecs):
         yield from doubts(evidence)
     if plan is not None and dataset is not None:
-        planned = {pose.id for pose in plan.poses}
-        foreign = sorted(set(dataset.poses) - planned)
+        foreign = sorted(set(dataset.poses) - {pose.id for pose in plan.poses})
         if foreign:
             yield f"the dataset has pose {foreign[0]}, which the plan does not have"
 

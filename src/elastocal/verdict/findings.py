@@ -274,14 +274,18 @@ def process_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield how far the correction brought the process path."""
     if evidence.process is None:
         return
-    line, tolerance = evidence.process.table.lines[-1], evidence.limits.tolerance
+    table, tolerance = evidence.process.table, evidence.limits.tolerance
+    line, space = table.lines[-1], table.spatial[-1]
     text = phrase(
-        "on the simulated process path the mean deviation fell by {share}, from {before} to"
-        " {after}; largest left {most}",
+        "on the simulated process path the mean deviation in the direction that counts (section 9)"
+        " fell by {share}, from {before} to {after}, largest left {most}; in space {mean_in_space}"
+        " are left on average, {most_in_space} at most",
         share=f"{line.reduction.mean:.1%}",
         before=mm(line.before.mean),
         after=mm(line.after.mean),
         most=mm(line.after.max),
+        mean_in_space=mm(space.after.mean),
+        most_in_space=mm(space.after.max),
     )
     if tolerance is not None and not line.after.max <= tolerance:
         beyond = phrase("beyond the tolerance of {tolerance}", tolerance=mm(tolerance))

@@ -16,11 +16,12 @@ from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, VERDICTS, judge, read_codec
 from elastocal.compensation.conditioning import ToolResult, read_tool
 from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
-from elastocal.dataset import Dataset
+from elastocal.dataset import Dataset, read_made_from
 from elastocal.errors import CodecError, ElastocalError
 from elastocal.files import read_text
 from elastocal.identification import CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
+from elastocal.logs import IMPORTED, read_map
 from elastocal.planning import (
     PLAN,
     POOL,
@@ -65,6 +66,11 @@ from elastocal.verdict.evidence import (
 )
 from elastocal.wording import phrase
 
+_UNKNOWN = "nothing is known of how the readings came about"
+_NO_RUN = f"no folder of a run was given: {_UNKNOWN}"
+_CELL = "cell.yaml"
+"""Default name of a cell file beside a model."""
+
 
 @brief_repr
 @dataclass(frozen=True)
@@ -104,7 +110,11 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
         If there is nothing to report on, or a part that is named cannot be used.
     """
     reader = PartReader(find_folders(options.run))
-    evidence = _with_run(Evidence(made=made, stated=options.stated), reader)
+    evidence = Evidence(made=made, stated=options.stated)
+    if reader.folders.run is None:
+        evidence = _with_readings(evidence, reader, options)
+    else:
+        evidence = _with_run(evidence, reader, reader.folders.run)
     evidence = _with_model(evidence, reader, options)
     evidence = replace(evidence, limits=_limits(evidence.cell, options))
     evidence = _with_rest(evidence, reader, options)
@@ -121,23 +131,71 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
     )
 
 
-def _with_run(evidence: Evidence, reader: PartReader) -> Evidence:
-    """Return the evidence with the parts that a run folder holds."""
-    run = reader.folders.run
-    if run is None:
-        reason = "no folder of a run was given: nothing is known of how the readings came about"
-        reader.note_missing("run", reason)
+def _with_readings(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:
+    """Return the evidence with the readings that a model states, where no run of ours took them.
+
+    They lie beside it; so does the cell, or where the map of their logs says.
+    """
+    model = options.model or reader.folders.model or reader.folders.default(MODEL)
+    names = [] if model is None else _stated_datasets(model)
+    path = reader.folders.default(names[0]) if len(names) == 1 else None
+    if path is None:
+        reader.note_missing("run", _NO_RUN)
         return evidence
+    data = reader.read("dataset", path, lambda: datasets.read(path))
+    evidence = replace(evidence, dataset=data)
+    stated = {} if data is None else read_made_from(data.attributes)
+    if data is None or not stated or not data.provenance.startswith(IMPORTED):
+        reader.note_missing("run", f"the readings state no run, and no logs: {_UNKNOWN}")
+        return _with_cell(evidence, reader, reader.folders.default(_CELL))
+    logs = tuple(path.parent / name for name in stated)
+    evidence = replace(evidence, logs=logs)
+    for log in logs:
+        if log.exists():
+            reader.use(log)
+    return _with_cell(evidence, reader, _mapped_cell(logs) or reader.folders.default(_CELL))
+
+
+def _stated_datasets(model: Path) -> list[str]:
+    """Return the names of the datasets that a model states; none of one that cannot be read."""
+    try:
+        return [Path(name).name for name in read_json(model, CalibrateResult).made_from]
+    except ElastocalError:
+        return []
+
+
+def _mapped_cell(logs: tuple[Path, ...]) -> Path | None:
+    """Return the cell file that the map of some logs names."""
+    try:
+        cell = read_map(logs[0]).cell if logs else None
+    except ElastocalError:
+        return None
+    return None if cell is None else logs[0].parent / cell
+
+
+def _with_cell(evidence: Evidence, reader: PartReader, path: Path | None) -> Evidence:
+    """Return the evidence with a cell and its surface, if it is that of the readings."""
+    if path is None:
+        return evidence
+    cell = reader.read("cell", path, lambda: load_cell(path))
+    if cell is None:
+        return evidence
+    measured = "" if evidence.dataset is None else evidence.dataset.robot_name
+    if measured and measured != cell.robot.name:
+        reason = f"{reader.folders.shown(path)} is of {cell.robot.name}, the readings of {measured}"
+        reader.note_missing("cell", reason)
+        return evidence
+    surface = reader.read("surface", cell.path, lambda: cell_surface(cell))
+    return replace(evidence, cell=cell, surface=surface, cell_text=read_text(cell.path))
+
+
+def _with_run(evidence: Evidence, reader: PartReader, run: RunFolder) -> Evidence:
+    """Return the evidence with the parts that a run folder holds."""
     journal = reader.read("journal", run.journal, lambda: read_journal(run.journal))
     evidence = replace(evidence, journal=journal)
     record = evidence.run_record
     path = run.cell / (record.cell_file if record else "cell.yaml")
-    cell = reader.read("cell", path, lambda: load_cell(path))
-    evidence = replace(evidence, cell=cell)
-    if cell is not None:
-        surface = reader.read("surface", cell.path, lambda: cell_surface(cell))
-        evidence = replace(evidence, surface=surface, cell_text=read_text(cell.path))
-    evidence = _with_plan(evidence, reader, run)
+    evidence = _with_plan(_with_cell(evidence, reader, path), reader, run)
     summary = _derived(reader, "summary of the run", run.summary, read_summary)
     evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
     for file in run_files(run):
@@ -225,6 +283,7 @@ def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions)
         process=reader.find(
             "process", options.process, PROCESS, process,
             "`elastocal simulate-process` makes one for a simulated cell",
+            optional=bool(evidence.logs),
         ),
     )  # fmt: skip
 

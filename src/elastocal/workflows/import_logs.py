@@ -1,15 +1,19 @@
 """``import``: from other people's logs to a dataset, and a first map of their columns."""
 
+import json
+import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from elastocal import logs as foreign
-from elastocal.dataset import Dataset, write
+from elastocal.dataset import MADE_FROM, Dataset, write
 from elastocal.errors import FileAccessError, LogError
 from elastocal.files import write_text
-from elastocal.logs import ClockFit, GuessedLog, ImportedLogs
+from elastocal.logs import ClockFit, GuessedLog, ImportedLogs, log_sha256
 from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -73,10 +77,16 @@ class ImportLogsResult(Result):
                 f"{counted(figures.readings, 'reading')} at {counted(figures.poses, 'pose')} in"
                 f" {counted(figures.plateaus, 'plateau')}",
             ),
-            ("load cases", ", ".join(figures.load_cases)),
+            ("load cases", ", ".join(map(self._load, figures.load_cases))),
             *(("clock", each.sentence) for each in figures.clocks),
             *(("warning", text) for text in figures.warnings),
         )
+
+    def _load(self, name: str) -> str:
+        """Return a load case with its mean force on the robot in the tcp."""
+        forces = [each.force_tcp for each in self.found.plateaus if each.load == name]
+        x, y, z = (np.round(np.array(forces).mean(axis=0)) + 0.0).tolist()
+        return f"{name} ({x:.0f}, {y:.0f}, {z:.0f} N)"
 
     def pictured(self) -> object:
         """Return the merged logs."""
@@ -114,6 +124,7 @@ def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsR
     found = foreign.import_streams(log_map, foreign.site(path, log_map), files, progress)
     picture = settings.picture
     if settings.out is not None:
+        found = replace(found, dataset=_stating(found.dataset, settings.out, (path, *files)))
         write(found.dataset, settings.out)
         picture = picture or settings.out.with_suffix(".png")
     if picture is not None:
@@ -131,6 +142,20 @@ def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsR
         warnings=found.warnings,
     )
     return ImportLogsResult(found, figures)
+
+
+def _stating(dataset: Dataset, out: Path, files: Sequence[Path]) -> Dataset:
+    """Return a dataset that states the hash of the map, the first, and of each log.
+
+    Their names are relative to the dataset: whoever gives away the folder gives away the proof.
+    """
+    folder = os.path.realpath(out.parent)
+    made_from = {
+        Path(os.path.relpath(os.path.realpath(file), folder)).as_posix(): log_sha256(file)
+        for file in files
+    }
+    attributes = {**dataset.attributes, MADE_FROM: json.dumps(made_from)}
+    return replace(dataset, attributes=attributes)
 
 
 @brief_repr

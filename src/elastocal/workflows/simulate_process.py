@@ -335,7 +335,9 @@ def _notes(
 ) -> tuple[str, ...]:
     notes = []
     if seeds == 1:
-        notes.append("a single seed: the figures have no interval, and another seed has others")
+        notes.append(
+            "one simulated run only: another seed would give other figures; there is no interval"
+        )
     if settings.path is not None:
         sizes = [np.linalg.norm(course.force, axis=1) for course in courses]
         sudden = [

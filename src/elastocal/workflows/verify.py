@@ -114,7 +114,9 @@ def _report(path: Path, run: Path | None, trusted: str | None) -> list[Link]:
     folders = tuple(dict.fromkeys((folder, folder.resolve().parent))) if run else (folder,)
     files = file_links(manifest, folders)
     links += files
-    if manifest.chain and _holds_run(folder):
+    if any(link.name == "logs" for link in manifest.chain) or (
+        manifest.chain and _holds_run(folder)
+    ):
         links += _run(folder, None)
     return links
 

@@ -190,7 +190,10 @@ def test_the_sensors_turn_is_counted_from_where_the_cell_file_has_it(parts, turn
     cell = SimpleNamespace(file=SimpleNamespace(sensor=sensor))
     tool = replace(parts.tool, R_flange_sensor=tuple(map(tuple, (mounted @ more).tolist())))
     told = _tool_file(tool, cell)
-    assert ("Sensor turned against the cell file's pose of it by", f"{turn:.2f}°") in told.rows
+    assert (
+        "Sensor rotation found, against the cell file's pose of it",
+        f"{turn:.2f}°",
+    ) in told.rows
     ((_, alone),) = [row for row in _tool_file(tool, None).rows if row[0].startswith("Sensor")]
     assert float(alone.rstrip("°")) > 177.0
 

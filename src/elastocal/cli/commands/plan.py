@@ -141,8 +141,8 @@ def _show_plan(
     if as_json:
         output.print_json(figures)
         return
+    if settings.dry_run:
+        output.print_lines(pose_lines(found))
     tables.show_plan(output.console(), found, figures)
     if free is not None:
         tables.show_position_plan(output.console(), free, out)
-    if settings.dry_run:
-        output.print_lines(pose_lines(found))

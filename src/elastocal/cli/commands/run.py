@@ -51,8 +51,8 @@ def _run(  # noqa: PLR0913 - one parameter an option
         if as_json:
             output.print_json(tables.dry_figures(rehearsed))
         else:
-            tables.show_itinerary(output.console(), rehearsed)
             output.print_lines(rehearsed.pose_lines())
+            tables.show_itinerary(output.console(), rehearsed)
         return
     finished = workflows.run(settings)
     if as_json and finished.end is RunEnd.DONE:

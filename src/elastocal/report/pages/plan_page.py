@@ -29,7 +29,7 @@ from elastocal.report.plots import (
     plan_view,
     weakest_margins,
 )
-from elastocal.wording import duration, millimetres, phrase, readable, um
+from elastocal.wording import duration, millimetres, mm, phrase, readable, um
 
 
 def write_plan_page(
@@ -101,16 +101,19 @@ def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
             phrase("Points with a posture"),
             phrase("{rank} of {all}", rank=pool.valid, all=pool.sampled),
         ),
-        (phrase("Check that refused most"), pool.bottleneck or phrase("none")),
+        (phrase("Most frequent reason to refuse a point"), pool.bottleneck or phrase("none")),
         *(_covered(plan.production) if plan.production is not None else ()),
     )
 
 
 def _covered(production: ProductionRecord) -> tuple[tuple[str, str], ...]:
     found = production.expected_of(production.poses)
-    error = (
-        ((phrase("Expected error on production"), um(found.error)),) if found is not None else ()
+    label = (
+        phrase("Error on production from noise alone")
+        if production.floor is None
+        else phrase("Expected error on production")
     )
+    error = ((label, mm(found.error)),) if found is not None else ()
     return ((phrase("Production covered"), f"{production.coverage.covered:.0%}"), *error)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path, PurePath
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.codec import CodecData, Saturation, Variant, Verdicts
@@ -162,9 +162,11 @@ def pose_count_figure(curves: Sequence[ErrorCurve], tolerance: float | None) -> 
             xycoords=("axes fraction", "data"), textcoords="offset points",
         )  # fmt: skip
     axes.set_yscale("log")
+    # Less than a decade would have one label.
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel(phrase("training poses"))
+    axes.set_xlabel(phrase("number of poses to fit"))
     axes.set_ylabel(phrase("mean error at held-out poses in mm"))
     style.open_frame(axes, grid="both")
     figure.legend(

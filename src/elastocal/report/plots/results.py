@@ -102,7 +102,10 @@ def displacement_figure(
 
 
 def pose_grid(
-    panels: Sequence[tuple[str, FloatArray]], poses: Sequence[int], cases: Sequence[str]
+    panels: Sequence[tuple[str, FloatArray]],
+    poses: Sequence[int],
+    cases: Sequence[str],
+    check: Sequence[str] = (),
 ) -> Figure:
     """Return the figure: a panel below the other, load cases downwards, poses across.
 
@@ -112,36 +115,38 @@ def pose_grid(
         Title, and values of shape (pose, load_case) in mm; NaN where there is none.
     poses : sequence of int
         Their labels.
-    cases : sequence of str
-        Names of the load cases.
+    cases, check : sequence of str
+        Names of the load cases, and of those among them that no fit sees.
     """
     each = _HEAD + _CELL * len(cases)
+    signs = {case: "–" if case in check else "×" for case in cases}
     height = each * len(panels) + _AXIS
     figure = new_figure(_READINGS_WIDTH, height)
     for number, (title, values) in enumerate(panels):
         bottom = height - each * (number + 1) + 0.05
         across = _READINGS_WIDTH - _LEFT - 0.1
         axes = figure.add_panel(_LEFT, bottom, across, _CELL * len(cases))
-        _draw_shades(axes, title, values, poses, cases)
+        _draw_shades(axes, title, values, poses, signs)
         if number == len(panels) - 1:
-            axes.set_xlabel(phrase("pose; a cross: no usable reading"))
+            axes.set_xlabel(phrase("pose; ×: no usable reading; –: kept back as a check"))
     return figure
 
 
 def _draw_shades(
-    axes: Axes, title: str, values: FloatArray, poses: Sequence[int], cases: Sequence[str]
+    axes: Axes, title: str, values: FloatArray, poses: Sequence[int], signs: dict[str, str]
 ) -> None:
     top = float(np.nanmax(values)) if np.any(np.isfinite(values)) else 1.0
     axes.imshow(values.T, cmap=style.SEQUENTIAL, vmin=0.0, vmax=top or 1.0, aspect="auto")
     axes.set_title(literal(title), loc="left", fontsize=9.0, weight="bold")
-    axes.set_yticks(range(len(cases)), [literal(case) for case in cases])
+    axes.set_yticks(range(len(signs)), [literal(case) for case in signs])
     step = max(1, len(poses) // 40 + (len(poses) > 40))
     axes.set_xticks(range(0, len(poses), step), [str(label) for label in poses[::step]])
     axes.tick_params(length=0, labelsize=7.5)
     axes.spines[:].set_visible(False)
     for (pose, case), value in np.ndenumerate(values):
         if not np.isfinite(value):
-            axes.text(pose, case, "×", ha="center", va="center", color=style.VERMILLION)
+            sign = list(signs.values())[case]
+            axes.text(pose, case, sign, ha="center", va="center", color=style.VERMILLION)
         elif len(poses) <= _MANY:
             ink = style.ON_BRIGHT if value > 0.55 * top else style.ON_DARK
             # In little room: 1.23, .041.

@@ -57,6 +57,11 @@ class SpringBar:
     at_bound: bool = False
     """Whether the fit ends at a bound of it."""
 
+    @property
+    def is_own(self) -> bool:
+        """Whether the readings tell it by itself, with an interval."""
+        return self.group is None and not self.too_weak
+
 
 def spring_bars(model: CalibratedModel, settings: FitSettings | None = None) -> list[SpringBar]:
     """Return the characteristics of a model, each with the first group that leaves it open.
@@ -90,44 +95,51 @@ def spring_figure(springs: Sequence[SpringBar], title: str = "", about: str = ""
     """
     # The unit of most springs comes first, so that a rail does not stand above the joints.
     counts = Counter(bar.unit for bar in springs).most_common()
+    left = max(1.26, 0.3 + 0.068 * max(len(bar.name) for bar in springs))
     bottom = _BAR * len(springs) + _BAR_FOOT * len(counts)
     figure = style.new_figure(9.0, bottom + (_TITLE if title else 0.0))
     if title:
         figure.add_title(title, 0.15, about=about)
     for unit, count in counts:
         bottom -= _BAR * count + _BAR_FOOT
-        axes = figure.add_panel(0.14 * 9.0, bottom + _BAR_FOOT - 0.1, 0.84 * 9.0, _BAR * count)
+        axes = figure.add_panel(left, bottom + _BAR_FOOT - 0.1, 8.82 - left, _BAR * count)
         _draw_bars(axes, unit.shown, [bar for bar in springs if bar.unit == unit])
     return figure
 
 
 def _draw_bars(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
     # A value that is not by itself has no interval that means anything.
-    highs = [bar.high if bar.group is None else bar.value for bar in bars]
-    lows = [bar.low if bar.group is None else bar.value for bar in bars]
+    highs = [bar.high if bar.is_own else bar.value for bar in bars]
+    lows = [bar.low if bar.is_own else bar.value for bar in bars]
     bottom, top = min(0.0, *lows), max(0.0, *highs)
     span = top - bottom or 1.0
-    own = [(k, bar) for k, bar in enumerate(bars) if bar.group is None]
+    own = [(k, bar) for k, bar in enumerate(bars) if bar.is_own]
     rows = [k for k, _ in own]
     low, value, high = ([getattr(bar, key) for _, bar in own] for key in ("low", "value", "high"))
     axes.hlines(rows, low, high, color=style.BLUE, lw=3.5, alpha=0.45)
     axes.scatter(value, rows, s=26, c=style.BLUE, zorder=3)
     for k, bar in enumerate(bars):
-        if bar.group is not None:
+        if not bar.is_own:
             axes.scatter(
                 bar.value, k, s=26, facecolors="none", edgecolors=style.REFUSED, marker="D"
             )
             left = bar.value > bottom + 0.75 * span
             axes.text(
                 bar.value + (-0.015 if left else 0.015) * span, k,
-                phrase("not by itself, group {group}", group=bar.group),
+                phrase("too weak to see")
+                if bar.group is None
+                else phrase("not by itself, group {group}", group=bar.group),
                 ha="right" if left else "left",
                 va="center", fontsize=7.5, color=style.MUTED, style="italic",
             )  # fmt: skip
     axes.set_yticks(range(len(bars)), [literal(bar.name) for bar in bars], fontsize=8)
     axes.set_ylim(len(bars) - 0.4, -0.6)
     axes.set_xlim(bottom - 0.02 * span, bottom + 1.05 * span)
-    axes.set_xlabel(phrase("compliance in {unit}; band: 95 % interval", unit=unit))
+    axes.set_xlabel(
+        phrase("lost motion in {unit}; band: 95 % interval", unit=unit)
+        if unit == "arcmin"
+        else phrase("compliance in {unit}; band: 95 % interval", unit=unit)
+    )
     style.open_frame(axes, grid="both", colour="#e6e6e2")
     axes.tick_params(length=0)
 

@@ -280,6 +280,15 @@ def _tool(tool: ToolSummary) -> Iterator[blocks.Block]:
         phrases("What", "Measured", "± (95 %)", "Cell file"),
         tuple(rows),
     )
+    yield blocks.Paragraph(
+        phrase(
+            "The table above is a check that the run makes: mass and centre of mass alone, in the"
+            " frame of the sensor. The tool file below is what the compensation uses: it also finds"
+            " bias and rotation of the sensor, so that its centre of mass is another. Section 3 has"
+            " the centre of mass in the frame of the flange."
+        ),
+        "sub",
+    )
     if tool.not_determined:
         yield blocks.Paragraph(
             phrase("Not determined by these poses: {names}.", names=", ".join(tool.not_determined))
@@ -305,7 +314,7 @@ def _tool_file(tool: ToolResult | None, cell: Cell | None) -> blocks.Block:
         (phrase("Centre of mass in the sensor's frame"), f"{point(tool.centre)} mm"),
         (phrase("Force bias"), f"{point(tool.force_bias, 1.0)} N"),
         (phrase("Moment bias"), f"{point(tool.moment_bias, 1.0, 2)} N·m"),
-        (phrase("Sensor turned against {other} by", other=other), f"{turned:.2f}°"),
+        (phrase("Sensor rotation found, against {other}", other=other), f"{turned:.2f}°"),
         (phrase("Static postures"), str(tool.postures)),
         (phrase("Not determined"), ", ".join(tool.undetermined) or phrase("nothing")),
     )

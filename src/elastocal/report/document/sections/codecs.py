@@ -1,14 +1,15 @@
 """Codecs: were there enough poses (paper Fig. 7, 9 and 10)."""
 
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from pathlib import PurePath
 
-from elastocal.codec import Saturation, Variant
+from elastocal.codec import PairedDifference, Saturation, Variant
 from elastocal.report.document import blocks
 from elastocal.report.plots import ErrorCurve, error_curves, pose_count_figure
 from elastocal.verdict import CodecEvidence, Evidence
-from elastocal.wording import Phrase, counted, mm, phrase, phrases
+from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
 
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -36,14 +37,13 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
             phrase(
                 "Median over the splits of the mean error at held-out poses; the band holds the"
                 " middle half of the splits. Diamonds: more poses no longer help from there on."
-                " All comparisons in one picture; the paper shows them apart (Fig. 7, 9 and 10)."
             ),
         )
     else:
         yield blocks.Paragraph(phrase("No variant has an error that could be drawn."))
     yield _saturation(evidence)
-    for codec in evidence.codecs:
-        yield from _words(codec)
+    lines = dict.fromkeys(line for codec in evidence.codecs for line in _words(codec))
+    yield blocks.Bullets(tuple(lines))
 
 
 def _curves(evidence: Evidence) -> list[ErrorCurve]:
@@ -72,9 +72,9 @@ def _saturation(evidence: Evidence) -> blocks.Block:
         pairs = zip(codec.data.variants, codec.verdicts.saturation, strict=True)
         for variant, found in pairs:
             rows.setdefault(_key(variant), _row(variant, found))
-    heads = phrases("Search", "Springs", "Load cases", "Saturated from", "95 % interval",
-                    "Error there", "Error with all", "Settled?")  # fmt: skip
-    caption = phrase("Saturation: training poses from which on more do not help")
+    heads = phrases("Search", "Springs", "Load cases", "Enough from", "95 % interval",
+                    "Error there", "Error with the most", "Certain?")  # fmt: skip
+    caption = phrase("Number of poses to fit from which on more do not lower the error")
     return blocks.Table(caption, heads, tuple(rows.values()), texts=3)
 
 
@@ -93,16 +93,63 @@ def _row(variant: Variant, found: Saturation) -> blocks.Row:
     )
 
 
-def _words(codec: CodecEvidence) -> Iterator[blocks.Block]:
-    """Yield what the comparison found, in its own words."""
-    lines = tuple(map(_micro, (*codec.verdicts.springs, *codec.verdicts.sentences)))
-    names = ", ".join(each.name for each in codec.data.variants)
-    yield blocks.Details(phrase("In words: {variants}", variants=names), (blocks.Bullets(lines),))
+def _words(codec: CodecEvidence) -> Iterator[Phrase]:
+    """Yield which variant is better, and which springs were chosen where the readings chose."""
+    yield from map(_pair, codec.verdicts.pairs)
+    data = codec.data
+    rows = zip(data.variants, data.layouts, data.split_layouts, strict=True)
+    for variant, layout, splits in rows:
+        if variant.springs == layout:
+            continue
+        chosen = Counter(each[-1] for each in splits).most_common()
+        yield phrase(
+            "Springs {springs}, search {search}, loads {loads}: the springs are chosen anew in each"
+            " split. With the most poses to fit these were chosen: {chosen}; all readings together"
+            " choose {layout}.",
+            springs=variant.springs,
+            search=variant.search,
+            loads=variant.load_cases,
+            chosen=sentences(
+                [
+                    phrase("{springs} in {splits}", springs=name, splits=counted(many, "split"))
+                    for name, many in chosen
+                ],
+                ", ",
+            ),
+            layout=layout,
+        )
 
 
-def _micro(sentence: str) -> str:
-    """Return a sentence with the sign that terminals may lack."""
-    return sentence.replace(" um", " µm")
+def _pair(pair: PairedDifference) -> Phrase:
+    judged = pair.judged
+    smaller, larger = (pair.a, pair.b) if judged.difference < 0.0 else (pair.b, pair.a)
+    named = {"a": smaller, "b": larger, "poses": counted(judged.n_train, "pose")}
+    size = mm(abs(judged.difference))
+    if judged.low is None or judged.high is None:
+        return phrase(
+            "{a} against {b}, fitted to {poses}: the error is smaller by {difference}; how sure"
+            " that is, is not known.",
+            difference=size,
+            **named,
+        )
+    low, high = judged.low, judged.high
+    if judged.difference < 0.0:
+        low, high = -high, -low
+    found = phrase("{value} ({low} to {high})", value=size, low=mm(low), high=mm(high))
+    return (
+        phrase(
+            "{a} against {b}, fitted to {poses}: no difference is shown; {a}'s error is smaller by"
+            " {difference}.",
+            difference=found,
+            **named,
+        )
+        if pair.better is None
+        else phrase(
+            "{a} is better than {b}, fitted to {poses}: its error is smaller by {difference}.",
+            difference=found,
+            **named,
+        )
+    )
 
 
 CODECS = blocks.Section(

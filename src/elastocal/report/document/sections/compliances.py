@@ -24,8 +24,8 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
         return
     settings = found.figures.settings if found.figures else None
     springs = spring_bars(found.model, settings)
-    observable = sum(each.group is None and not each.too_weak for each in springs)
-    yield _head(found, observable)
+    observable = sum(each.is_own for each in springs)
+    yield _head(found, observable, len(springs))
     yield from _ladder(found.figures)
     yield blocks.Picture(
         partial(spring_figure, springs),
@@ -36,13 +36,13 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
             open=len(springs) - observable,
         ),
         phrase(
-            "Filled: known by itself, with its 95 % interval. Hollow: not known by itself; the"
-            " number is the smallest one that explains the readings."
+            "Filled: told by the readings, with its 95 % interval, which may be wide. Hollow: not"
+            " told by itself; the number is the smallest one that explains the readings."
         ),
     )
     heads = phrases("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
     yield blocks.Table(phrase("Compliances"), heads, tuple(map(_row, springs)), texts=2)
-    yield from _not_told_apart(found)
+    yield from _not_told_apart(found, springs)
     yield from _budget(found.figures)
 
 
@@ -58,21 +58,29 @@ def _row(spring: SpringBar) -> blocks.Row:
         stiff = _NONE
     known = phrase("at its bound") if spring.at_bound else phrase("zero")
     if value != 0.0 and not spring.at_bound:
-        known = phrase("{share}", share=f"±{(spring.high - spring.low) / 2 / abs(value):.0%}")
+        half = (spring.high - spring.low) / 2 / abs(value)
+        known = (
+            phrase("{share}", share=f"±{half:.0%}")
+            if half <= 1.0
+            else phrase("hardly: ±{share}", share=f"{half:.0%}")
+        )
     span = phrase("{low} to {high}", low=f"{spring.low:.3f}", high=f"{spring.high:.3f}")
     return name, known, f"{value:.4f}", span, unit.shown, stiff
 
 
-def _head(found: ModelEvidence, observable: int) -> blocks.Block:
+def _head(found: ModelEvidence, observable: int, values: int) -> blocks.Block:
     seen, figures = found.model.observability, found.figures
     residual = mm(figures.residual.mean) if figures else phrase("not known")
     return blocks.Facts(
         (
             (phrase("Tool"), found.model.tool_name),
-            (phrase("Parameters of the springs"), seen.parameters),
-            (phrase("Known by themselves"), observable),
+            (phrase("Numbers that the fit found, friction included"), seen.parameters),
             (
-                phrase("Rank"),
+                phrase("Values with an interval of their own"),
+                phrase("{rank} of {all}", rank=observable, all=values),
+            ),
+            (
+                phrase("Combinations of them that the readings tell (rank)"),
                 phrase("{rank} of {all}", rank=seen.rank, all=seen.parameters),
             ),
             (phrase("Condition number"), f"{seen.condition:.0f}"),
@@ -140,10 +148,20 @@ def _budget(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
     )
 
 
-def _not_told_apart(found: ModelEvidence) -> Iterator[blocks.Block]:
+def _not_told_apart(found: ModelEvidence, springs: list[SpringBar]) -> Iterator[blocks.Block]:
     seen = found.model.observability
+    yield blocks.Paragraph(
+        phrase(
+            "{own} of {all} values have an interval of their own, {bound} of these lie at their"
+            " bound; {weak} are too weak to see. Do not use single values: what they predict"
+            " together was tested, and nothing else.",
+            own=sum(each.is_own for each in springs),
+            all=len(springs),
+            bound=sum(each.at_bound for each in springs if each.is_own),
+            weak=sum(each.too_weak for each in springs),
+        )
+    )
     if not seen.unobservable:
-        yield blocks.Paragraph(phrase("Every spring is observable by itself."))
         return
     attainable = found.figures.rank_attainable if found.figures else seen.rank
     missing = attainable - seen.rank

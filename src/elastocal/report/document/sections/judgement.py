@@ -8,10 +8,11 @@ from elastocal.verdict import (
     COVERAGE_FACTOR,
     Evidence,
     UncertaintySource,
+    find_everything,
     judge_evidence,
     state_uncertainty,
 )
-from elastocal.wording import Phrase, mm, phrase, phrases, um
+from elastocal.wording import Phrase, mm, phrase, phrases
 
 
 def _findings(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -54,10 +55,12 @@ def _unseen(unseen: UnseenErrors) -> Iterator[blocks.Block]:
     )
     yield blocks.Paragraph(
         phrase(
-            "Every pose was left out of the fit once ({folds} refits) and predicted by the others."
-            " Intervals: whole poses drawn with replacement. If one more pose were drawn like"
-            " these, the chance that its error is larger than the largest here is at most 1 in"
-            " {more}.",
+            "Every pose was left out of the fit once ({folds} refits) and predicted by a model of"
+            " the others. The model that is used was then fitted to all poses; if several were"
+            " compared, it was chosen by these same errors, which are therefore a little too small."
+            " Intervals: whole poses drawn with replacement. Were poses drawn at random, the next"
+            " one would have a larger error than the largest here with a chance of at most 1 in"
+            " {more}; but these were chosen, not drawn.",
             folds=unseen.folds,
             more=unseen.poses + 1,
         ),
@@ -79,9 +82,9 @@ def _uncertainty(evidence: Evidence) -> Iterator[blocks.Block]:
     else:
         yield blocks.Facts(
             (
-                (phrase("Combined standard uncertainty"), um(statement.standard)),
+                (phrase("Combined standard uncertainty"), mm(statement.standard)),
                 (phrase("Coverage factor"), f"k = {COVERAGE_FACTOR:g}"),
-                (phrase("Expanded uncertainty U, about 95 %"), um(statement.expanded)),
+                (phrase("Expanded uncertainty U, about 95 %"), mm(statement.expanded)),
                 (phrase("Degrees of freedom"), statement.degrees_of_freedom),
             )
         )
@@ -93,12 +96,45 @@ def _uncertainty(evidence: Evidence) -> Iterator[blocks.Block]:
     yield blocks.Heading(phrase("Traceability"))
     yield from _traceability(evidence)
     yield blocks.Heading(phrase("Decision rule"))
+    yield from _rule(evidence)
     yield blocks.Paragraph(_RULE)
     yield blocks.Paragraph(_NOT_ACCREDITED, "banner")
 
 
+def _rule(evidence: Evidence) -> Iterator[blocks.Block]:
+    """Yield the conditions of a green light, and which of them are met."""
+    unseen, tolerance = evidence.unseen, evidence.limits.tolerance
+    if unseen is None or tolerance is None:
+        return
+    open_points = sum(each.holds_back for each in find_everything(evidence))
+    limit = mm(tolerance)
+    tests = (
+        (
+            phrase("Upper end of the 95 % interval of the 95 % error"),
+            phrase("{value}, at most {limit}", value=mm(unseen.p95.high), limit=limit),
+            unseen.p95.high <= tolerance,
+        ),
+        (
+            phrase("Largest error of a reading"),
+            phrase("{value}, at most {limit}", value=mm(unseen.max), limit=limit),
+            unseen.max <= tolerance,
+        ),
+        (
+            phrase("Other open points (section 1)"),
+            phrase("{value}, at most {limit}", value=open_points, limit=0),
+            not open_points,
+        ),
+    )
+    yield blocks.Table(
+        phrase("Conditions of a green light"),
+        phrases("Condition", "Found", "Met?"),
+        tuple((what, found, phrase("yes") if met else phrase("no")) for what, found, met in tests),
+        texts=3,
+    )
+
+
 def _source(source: UncertaintySource) -> blocks.Row:
-    value = phrase("not known") if source.standard is None else um(source.standard)
+    value = phrase("not known") if source.standard is None else mm(source.standard)
     return source.name, source.kind, source.origin, value
 
 
@@ -111,12 +147,10 @@ _METHOD = phrase(
     " quadrature (JCGM 100:2008, GUM) and multiplied by the coverage factor."
 )
 _RULE = phrase(
-    "Within the tolerance: the upper end of the 95 % confidence interval of the 95 % error lies"
-    " within it, no reading at an unseen pose lies beyond it, and nothing essential is missing"
-    " (guarded acceptance). Beyond it: the lower end lies beyond. Otherwise the result is not"
-    " proved, with the reasons. The rule takes the errors as they were measured and assumes no"
-    " normal distribution; the uncertainty of the instruments' own calibrations is stated, and not"
-    " added to the errors."
+    "Green needs all of these (guarded acceptance). Red: even the lower end of the interval of the"
+    " 95 % error is beyond the tolerance. Otherwise yellow: not proved. The rule takes the errors"
+    " as they were measured and assumes no normal distribution; the uncertainty of the instruments'"
+    " own calibrations is stated, and not added to the errors."
 )
 _NOT_ACCREDITED = phrase(
     "This is a statement in the manner of ISO/IEC 17025, 7.8.4, made by a program from what it was"

@@ -8,7 +8,7 @@ from elastocal.report.document import blocks
 from elastocal.report.pages import key_figures
 from elastocal.report.plots import plan_figure, plan_view
 from elastocal.verdict import Evidence
-from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences, um
+from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
 
 def _body(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -37,8 +37,8 @@ def _pictures(evidence: Evidence, plan: PlanResult) -> Iterator[blocks.Block]:
         partial(plan_figure, surface, plan, pool),
         _alt(plan),
         phrase(
-            "The surface laid flat, as in the paper's Fig. 3; colour is the distance of each"
-            " candidate from its nearest chosen pose."
+            "The surface and its candidates as the note in the picture says; colour is the distance"
+            " of each candidate from its nearest chosen pose."
         ),
     )
     yield blocks.PlanScene(plan_view(cell, surface, plan, pool), plan, pool)
@@ -68,7 +68,11 @@ def _spreads(plan: PlanResult) -> blocks.Block:
     return blocks.Table(
         phrase("How the poses lie in the pool"),
         phrases(
-            "Technique", "Covering radius", "To the edge, mean", "To the next pose, mean", "O1"
+            "Technique",
+            "Covering radius",
+            "To the edge, mean",
+            "To the next pose, mean",
+            "Observability O1",
         ),
         tuple(
             (
@@ -89,17 +93,26 @@ def _spreads(plan: PlanResult) -> blocks.Block:
 
 def _expected(plan: PlanResult, production: ProductionRecord) -> blocks.Block:
     """Return the error to expect from some numbers of poses, and what they take."""
-    floor = production.floor
+    known = production.floor is not None
+    sigma = mm(production.sigma)
     return blocks.Table(
-        phrase(
-            "Error to expect on production, planned with sigma {sigma}", sigma=um(production.sigma)
+        phrase("Error to expect on production, planned with sigma {sigma}", sigma=sigma)
+        if known
+        else phrase(
+            "Part of the error on production that is from noise alone, planned with sigma {sigma};"
+            " how wrong the model was is in section 1",
+            sigma=sigma,
         ),
-        phrases("Poses", "From noise", "With the model's own", "In the cell"),
+        (
+            *phrases("Poses", "From noise"),
+            *(phrases("With the model's own") if known else ()),
+            phrase("In the cell"),
+        ),
         tuple(
             (
                 str(each.poses),
-                um(each.noise),
-                phrase("not known") if floor is None else um(each.error),
+                mm(each.noise),
+                *((mm(each.error),) if known else ()),
                 f"{plan.time_of(each.poses) / 60.0:.0f} min",
             )
             for each in production.some_expected()

@@ -130,17 +130,28 @@ def _table_1(record: SimulatedProcess) -> Iterator[blocks.Block]:
             (phrase("Paper, with correction in mm"), *(f"{value:.3f}" for value in paper.after)),
             (phrase("Paper, reduction"), *(f"{share:.2%}" for share in paper.reduction)),
         ]
-    yield blocks.Table(phrase("In the form of the paper's Table 1"), _HEADS, tuple(rows))
+    yield blocks.Table(_title(paper), _HEADS, tuple(rows))
     if len(table.runs) > 1 and table.means:
         yield _means(table.means)
     if paper is not None:
         yield blocks.Paragraph(sentences([_SIDE_BY_SIDE, paper.measures]), "sub")
     if table.posture is not None:
         yield blocks.Paragraph(
-            phrase("Posture (paper 4.3.1): {sentence}.", sentence=table.posture.sentence), "sub"
+            phrase("Posture: {sentence}.", sentence=table.posture.sentence), "sub"
         )
-    for note in (*_truth(table), *table.notes):
+    # How much of production is covered stands on the first page already.
+    notes = (note for note in table.notes if " lie within " not in note)
+    for note in (*_truth(table), *notes):
         yield blocks.Paragraph(note, "sub")
+
+
+def _title(paper: PublishedCase | None) -> Phrase:
+    if paper is None:
+        return phrase("Deviation from the path")
+    return phrase(
+        "Deviation from the path; “paper” is Table 1 of Monsarrat et al., Robotics and"
+        " Computer-Integrated Manufacturing, 2024"
+    )
 
 
 def _means(means: tuple[SeedMeans, ...]) -> blocks.Block:
@@ -192,7 +203,7 @@ def _truth(table: SimulateProcessResult) -> Iterator[Phrase]:
         else phrase("process forces are given, they do not react to the tool's shift")
     )
     yield phrase(
-        "Truth of the simulated cell: preset {preset}; {forces}.",
+        "How hard the simulated robot was to calibrate: preset “{preset}”; {forces}.",
         preset=table.preset,
         forces=forces,
     )
@@ -221,8 +232,7 @@ def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterato
         np.concatenate([getattr(t, key) for t in traces]) for key in ("before", "after")
     )
     text = phrase(
-        "Absolute deviation, mean {before} without and {after} with correction, over {courses}, as"
-        " in the paper's Fig. 11e, 11f and 13b, 13c.",
+        "Absolute deviation, mean {before} without and {after} with correction, over {courses}.",
         before=mm(float(np.abs(before).mean())),
         after=mm(float(np.abs(after).mean())),
         courses=counted(len(traces), "course"),
@@ -237,7 +247,7 @@ def _pictures(traces: list[CourseDeviation], tolerance: float | None) -> Iterato
             course=worst.course,
         ),
         phrase(
-            "The course with the largest deviation, {course}, as in the paper's Fig. 11g.",
+            "The course with the largest deviation, {course}.",
             course=worst.course,
         ),
     )

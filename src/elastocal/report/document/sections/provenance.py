@@ -12,8 +12,8 @@ from elastocal.verdict import BYTES, Evidence, LinkState
 from elastocal.wording import phrase, phrases
 
 _STATES = {
-    LinkState.WHOLE: phrase("whole"),
-    LinkState.BROKEN: phrase("broken"),
+    LinkState.WHOLE: phrase("unchanged"),
+    LinkState.BROKEN: phrase("changed or of something else"),
     LinkState.UNSTATED: phrase("not verifiable"),
     LinkState.UNSIGNED: phrase("not signed"),
 }
@@ -35,12 +35,25 @@ def _provenance(evidence: Evidence) -> Iterator[blocks.Block]:
             phrase("The cell file as it stands"), (blocks.Verbatim(evidence.cell_text),)
         )
     if evidence.cell is not None:
-        values = tuple(sorted(blocks.flattened(evidence.cell.file.model_dump(mode="json"))))
+        values = tuple(
+            (key, _of_plan(evidence, key, value))
+            for key, value in sorted(blocks.flattened(evidence.cell.file.model_dump(mode="json")))
+        )
         yield blocks.Details(
-            phrase("Every setting of the cell, defaults included, in SI units"),
+            phrase(
+                "Every setting as the program takes it, defaults included: numbers in m, rad, N,"
+                " kg, s; what the cell file sets stands above with its units"
+            ),
             (blocks.Table(phrase("Settings of the cell"), phrases("Key", "Value"), values, 2),),
             "long",
         )
+
+
+def _of_plan(evidence: Evidence, key: str, value: str) -> str:
+    """Return a setting, or what the planner put in its place."""
+    if key == "search.technique" and evidence.plan is not None:
+        return phrase("{name}, by the plan", name=evidence.plan.search.name)
+    return value
 
 
 def _times(evidence: Evidence) -> Iterator[blocks.Row]:
@@ -51,7 +64,14 @@ def _times(evidence: Evidence) -> Iterator[blocks.Row]:
     yield phrase("Run began"), blocks.Stamp(started) if started else phrase("not known")
     if times is not None and times.total is not None:
         minutes = f"{times.total / 60:.1f}"
-        yield phrase("Run took"), phrase("{minutes} min of the cell's clock", minutes=minutes)
+        yield (
+            phrase("Run took"),
+            (
+                phrase("{minutes} min of simulated time", minutes=minutes)
+                if evidence.simulated
+                else phrase("{minutes} min", minutes=minutes)
+            ),
+        )
     yield phrase("Report made"), blocks.Stamp(evidence.made)
 
 

@@ -37,12 +37,15 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
 
 def _counts(dataset: Dataset, summary: RunSummary | None) -> Iterator[blocks.Block]:
     readings = dataset.readings(dataset.joint_names)
+    check = dataset.readings(dataset.joint_names, check=True) if dataset.check_cases else ()
     size = np.linalg.norm(readings.deflection, axis=1)
+    kept = ((phrase("Usable readings kept back as a check"), len(check)),) if check else ()
     yield blocks.Facts(
         (
             (phrase("Poses"), len(dataset.poses)),
             (phrase("Load cases"), ", ".join(dataset.load_cases)),
-            (phrase("Usable readings"), len(readings)),
+            (phrase("Usable readings for the fit"), len(readings)),
+            *kept,
             (phrase("Deflection, mean"), mm(float(size.mean()))),
             (phrase("Deflection, largest"), mm(float(size.max()))),
         )
@@ -94,9 +97,9 @@ def _residuals(calibration: Calibration) -> blocks.Block:
     commanded = np.linalg.norm(readings.controller_displacement, axis=1)
     residual = np.linalg.norm(calibration.residual, axis=1)
     text = phrase(
-        "Commanded displacement {commanded} on average, {most} at most; residual of the fit {mean}"
-        " on average, {max} at most ({readings} that were fitted, so not held out), as in the"
-        " paper's Fig. 8g and 12b.",
+        "Commanded displacement (how far the controller says that the tool moved while it pressed,"
+        " into the surface too) {commanded} on average, {most} at most; residual of the fit {mean}"
+        " on average, {max} at most ({readings} that were fitted, so not held out).",
         commanded=mm(float(commanded.mean())),
         most=mm(float(commanded.max())),
         mean=mm(float(residual[used].mean())),
@@ -112,12 +115,13 @@ def _residuals(calibration: Calibration) -> blocks.Block:
 
 def _grids(dataset: Dataset, reproduction: Reproduction | None) -> Iterator[blocks.Block]:
     panels = [(phrase("Measured deflection, norm in mm"), _grid(dataset, _deflection(dataset)))]
+    check = dataset.check_cases
     if reproduction is not None:
         error = _grid(dataset, _errors(reproduction.unseen))
         title = phrase("Error where the pose was left out of the fit, norm in mm")
         panels.append((title, error))
     yield blocks.Picture(
-        partial(pose_grid, panels, dataset.poses, dataset.load_cases),
+        partial(pose_grid, panels, dataset.poses, dataset.load_cases, check),
         phrase("Shaded table of poses and load cases: measured deflection and error"),
         phrase("Each pose under each load case. Bright is large; the two scales differ."),
     )
@@ -127,7 +131,17 @@ def _grids(dataset: Dataset, reproduction: Reproduction | None) -> Iterator[bloc
 
 def _number_table(dataset: Dataset, title: str, values: FloatArray) -> blocks.Table:
     rows = tuple(
-        (str(label), *(phrase("none") if np.isnan(v) else f"{v:.3f}" for v in row))
+        (
+            str(label),
+            *(
+                f"{v:.3f}"
+                if not np.isnan(v)
+                else phrase("check")
+                if case in dataset.check_cases
+                else phrase("none")
+                for case, v in zip(dataset.load_cases, row, strict=True)
+            ),
+        )
         for label, row in zip(dataset.poses, values, strict=True)
     )
     return blocks.Table(title, (phrase("Pose"), *dataset.load_cases), rows)
@@ -165,7 +179,12 @@ def _suspicious(evidence: Evidence) -> Iterator[blocks.Block]:
     figures: CalibrationSummary | None = evidence.figures
     if figures is None or not figures.suspicious:
         yield blocks.Heading(phrase("Suspicious readings"))
-        yield blocks.Paragraph(phrase("No reading looks wrong."))
+        yield blocks.Paragraph(
+            phrase(
+                "No reading was set aside, and none looks wrong by itself. The largest errors stand"
+                " below."
+            )
+        )
         return
     rows = tuple(
         (

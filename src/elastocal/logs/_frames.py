@@ -1,0 +1,173 @@
+"""Frames of the map held against what the logs tell of them.
+
+The tool frame that a controller states must be that of its joints. The weight of the tool turns in
+the sensor as the arm turns it: it tells how the sensor is turned on the flange.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.errors import LogError
+from elastocal.logs.map import LogEntry, MarkerColumns, Site, ToolPose, Vector
+from elastocal.logs.table import LogTable
+from elastocal.procedure import PoseReadings
+from elastocal.robot import Robot, nearest_rotation, xyzabc_from_T
+from elastocal.units import factor
+
+_LARGEST_GAP = (20e-3, np.radians(2.0))
+"""Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
+that is not calibrated is off by some millimetres, another frame by more."""
+ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
+_UNIT_NORM = 1e-2
+"""Distance of a quaternion's norm from 1: four columns of few digits are nearer."""
+_PULL = 0.5
+"""Part of a load along z of the tcp from which on it is a press, or a pull."""
+_LEAST_POSES = 4
+"""Two differences tell a turn, a third checks it."""
+_LEAST_WEIGHT = 5.0
+"""Change of the unloaded force between poses, RMS in N, from which on it tells something."""
+_LEAST_TURN = np.radians(3.0)
+"""A sensor turned by less is mounted as people mount them."""
+_MOST_LEFT = 0.2
+"""Part of the change that another turn may leave and still be believed."""
+_LEAST_SPREAD = 0.05
+"""Second spread of the directions of gravity in the sensor, against which a turn is told."""
+
+
+def vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> FloatArray:
+    """Return three columns in SI units, shape (row, 3)."""
+    scale = factor(vector.unit, dimension) / getattr(vector, "counts", 1.0)
+    return scale * np.column_stack([table.numbers(column) for column in vector.columns])
+
+
+def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) -> FloatArray:
+    """Return the tool frames that a log states, shape (row, 4, 4), if they are of the tcp.
+
+    Raises
+    ------
+    LogError
+        If they are too far from those of its joints.
+    """
+    assert entry.pose is not None
+    position = vectors(table, entry.pose.position, "length")
+    stated = _stated_turns(table, entry.pose)
+    known = np.asarray(np.isfinite(position).all(axis=1) & np.isfinite(stated).all(axis=1))
+    if not known.any():
+        raise LogError(f"{table.name}: no row states the whole tool frame")
+    T: FloatArray = np.full((len(table), 4, 4), np.nan)
+    gap, turn = np.empty(len(table)), np.full(len(table), np.nan)
+    for start in range(0, len(table), ROWS_AT_A_TIME):
+        rows = slice(start, start + ROWS_AT_A_TIME)
+        T_joints, whole = robot.forward(q[rows]), np.flatnonzero(known[rows]) + start
+        R_joints = T_joints[known[rows], :3, :3]
+        T[whole, 3] = (0.0, 0.0, 0.0, 1.0)
+        T[whole, :3, :3] = _rotations(entry.pose, stated[whole], R_joints)
+        T[rows, :3, 3] = position[rows]
+        gap[rows] = np.linalg.norm(position[rows] - T_joints[:, :3, 3], axis=1)
+        relative = np.swapaxes(R_joints, 1, 2) @ T[whole, :3, :3]
+        turn[whole] = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
+    worst = float(np.nanmedian(gap)), float(np.median(turn[known]))
+    if not (worst[0] <= _LARGEST_GAP[0] and worst[1] <= _LARGEST_GAP[1]):
+        raise LogError(
+            f"{table.name}: the logged tool frame lies {1e3 * worst[0]:.4g} mm and"
+            f" {np.degrees(worst[1]):.3g} deg (median) from the tcp of the logged joints: its tool,"
+            " its base, or a joint's sign is another; without `pose` in the map the joints alone"
+            " count"
+        )
+    return T
+
+
+def _stated_turns(table: LogTable, pose: ToolPose) -> FloatArray:
+    """Return the numbers by which a log says how the tool is turned, shape (row, number)."""
+    if pose.angles is not None:
+        return vectors(table, pose.angles, "angle")
+    if pose.quaternion is None:
+        return np.empty((len(table), 0))
+    w, x, y, z = (table.numbers(name) for name in pose.quaternion)
+    stated = np.column_stack([x, y, z, w])
+    norm = np.linalg.norm(stated[np.isfinite(stated).all(axis=1)], axis=1)
+    if len(norm) and not abs(float(np.median(norm)) - 1.0) < _UNIT_NORM:
+        raise LogError(
+            f"{table.name}: the quaternion has norm {float(np.median(norm)):.4g}: is one of its"
+            " columns another quantity?"
+        )
+    stated[~(np.linalg.norm(stated, axis=1) > 0.0)] = np.nan
+    return stated
+
+
+def _rotations(pose: ToolPose, stated: FloatArray, R_joints: FloatArray) -> FloatArray:
+    """Return how the tool is turned, shape (row, 3, 3): as stated, else as the joints say."""
+    if not len(stated) or (pose.angles is None and pose.quaternion is None):
+        return R_joints
+    if pose.angles is not None:
+        return np.asarray(Rotation.from_euler("ZYX", stated).as_matrix())
+    return np.asarray(Rotation.from_quat(stated).as_matrix())
+
+
+def sensor_doubts(poses: Sequence[PoseReadings], loads: FloatArray, site: Site) -> tuple[str, ...]:
+    """Return why the sensor cannot be as the map says, by the sense of the loads and the weight.
+
+    Unloaded, its force is a constant and the weight of the tool. Without the means over the poses,
+    it is that of gravity in the sensor times the tool's mass, turned by as much as the sensor is
+    turned otherwise than the map says (Kabsch, Acta Crystallographica A32, 1976).
+
+    Parameters
+    ----------
+    poses : sequence of PoseReadings
+        Readings of each pose.
+    loads : ndarray, shape (load, 3)
+        Force on the robot in the tcp, as the map has it, in N.
+    site : Site
+        What the map says.
+    """
+    along = float(np.median(loads[:, 2])) if len(loads) else 0.0
+    sense, found = 1.0, []
+    if along > 0.0 and along > _PULL * float(np.linalg.norm(loads, axis=1).mean()):
+        sense = -1.0
+        found.append(
+            f"the loads pull at the tool ({along:+.0f} N along z of the tcp; a press is negative):"
+            " does the sensor show the force on the tooling (acts_on: environment), does z of the"
+            " tcp point into the tool?"
+        )
+    return (*found, *_turned_sensor(poses, sense, site))
+
+
+def _turned_sensor(poses: Sequence[PoseReadings], sense: float, site: Site) -> Iterator[str]:
+    """Yield how the sensor seems to be turned; nothing where weight and poses do not tell it."""
+    at_rest = [each.reference.tool for each in poses if each.reference is not None]
+    tools = [tool for tool in at_rest if tool is not None]
+    if len(tools) < _LEAST_POSES:
+        return
+    load = site.sensor
+    R_base_sensor = np.stack([t.T_base_tcp[:3, :3] @ load.T_tcp_sensor[:3, :3] for t in tools])
+    gravity = np.einsum("nji,j->ni", R_base_sensor, load.gravity)
+    force = sense * np.stack([tool.force.value for tool in tools])
+    gravity, force = gravity - gravity.mean(axis=0), force - force.mean(axis=0)
+    spread = np.linalg.svd(gravity / np.linalg.norm(load.gravity), compute_uv=False)
+    size = float(np.sqrt((force**2).sum(axis=1).mean()))
+    if size < _LEAST_WEIGHT or spread[1] < _LEAST_SPREAD * np.sqrt(len(tools)):
+        return
+    Q = nearest_rotation(force.T @ gravity)
+    mass = float((force * (gravity @ Q.T)).sum() / (gravity**2).sum())
+    left = float(np.sqrt(((force - mass * gravity @ Q.T) ** 2).sum(axis=1).mean()))
+    turn = float(Rotation.from_matrix(Q).magnitude())
+    if left < _MOST_LEFT * size and turn > _LEAST_TURN:
+        yield _turned(site, Q, mass)
+
+
+def _turned(site: Site, Q: FloatArray, mass: float) -> str:
+    """Return the sentence about a sensor that is turned by Q^T more than the map says."""
+    T = site.T_flange_sensor.copy()
+    T[:3, :3] = T[:3, :3] @ Q.T
+    said, found = (
+        ", ".join(f"{angle + 0.0:.0f}" for angle in np.round(np.degrees(xyzabc_from_T(each)[3:])))
+        for each in (site.T_flange_sensor, T)
+    )
+    return (
+        f"the weight of the tool turns in the sensor as in one whose abc in the flange is {found}"
+        f" deg (with {mass:.3g} kg behind it), not {said} deg as the map says: every force is"
+        " turned by as much"
+    )

@@ -1,0 +1,28 @@
+"""From the files of a foreign cell to a signed certificate, by the commands of the how-to page."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "first_use.py"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arm", ["irb6700", "tx2_90"])
+def test_the_planted_compliances_lie_within_the_certificate(arm, tmp_path):
+    """With masses in the URDF, since the arm's sag is in what the tracker saw."""
+    figures = tmp_path / "figures.json"
+    words = [arm, "--masses", "--folder", str(tmp_path), "--json", str(figures)]
+    subprocess.run([sys.executable, str(BENCHMARK), *words], check=True)
+    found = json.loads(figures.read_text(encoding="utf-8"))[arm]
+    known = [each for each in found["springs"] if each["is_known"]]
+    assert len(known) >= 5, "joint 6 turns about the tool: no press tells it"
+    for each in known:
+        assert each["low"] <= each["planted"] <= each["high"], each
+    report, verified = (step["said"] for step in found["steps"][-2:])
+    assert report.startswith("Within"), report
+    for link in ("page", "signature", "files", "logs", "dataset", "model", "codec"):
+        assert f"whole          {link}: " in verified, verified
