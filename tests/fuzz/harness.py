@@ -48,8 +48,8 @@ _PATIENCE = 60 * LONGEST
 """In s, until a child that says nothing and does nothing is taken for one that waits for ever."""
 MOST_MEMORY = 1 << 30
 """In bytes, beside what this process has before."""
-_BATCH = 500
-"""Cases of one child: what each command imports and prepares first, it does once."""
+_BATCH = 250
+"""Cases of one child."""
 _NOISE = re.compile(
     r"^(\S+:\d+: )?\w*Warning: |^(Error|Warning): |HDF5-DIAG|^\s+at line \d+ in ", re.M
 )

@@ -175,15 +175,19 @@ def main(names: list[str]) -> None:
     """Run notebooks by Jupyter, each in a fresh kernel and an empty folder; stop at an error."""
     import nbclient
     import nbformat
+    from jupyter_client import AsyncKernelManager
 
     chosen = [path for path in paths() if not names or path.stem in names]
     for path in chosen:
         begin = perf_counter()
         notebook = nbformat.reads(ipynb(cells_of(path)), as_version=4)
         nbformat.validate(notebook)
-        with tempfile.TemporaryDirectory() as empty:
+        with tempfile.TemporaryDirectory() as empty, tempfile.TemporaryDirectory() as pipes:
+            # Kernel and client talk through pipes of the system: nothing listens on any port.
+            kernel = AsyncKernelManager(transport="ipc", ip=f"{pipes}/kernel")
             where = {"metadata": {"path": empty}}
-            nbclient.NotebookClient(notebook, timeout=_SECONDS, resources=where).execute()
+            client = nbclient.NotebookClient(notebook, kernel, timeout=_SECONDS, resources=where)
+            client.execute(cleanup_kc=True)
         sys.stdout.write(f"{path.stem}: {perf_counter() - begin:.1f} s in a fresh kernel\n")
         sys.stdout.flush()
     sys.stdout.write(f"{len(chosen)} passed, 0 failed\n")

@@ -103,7 +103,7 @@ class Certificate:
         long = [each for each in self.reasons if len(each) > _LONG_REASON]
         parts = [part for _, parts in self.identity for part in parts if isinstance(part, str)]
         names = [part for part in parts if len(part) > _LONG_NAME]
-        return len(long) > 1 or len(names) > 1
+        return len(long) > 1 or len(self.reasons) > 2 or len(names) > 1
 
 
 def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = "") -> Certificate:
