@@ -131,7 +131,7 @@ def test_a_model_alone_is_reported(finished, tmp_path):
     figures = json.loads(result.out)
     assert "run" in figures["missing"]
     assert figures["unseen"] is None
-    assert "could not be made again" in figures["verdict"]
+    assert "could not be reproduced" in figures["verdict"]
 
 
 def test_a_damaged_part_is_told_and_one_that_is_named_is_refused(copied, tmp_path):

@@ -46,10 +46,13 @@ def test_yellow_when_a_single_reading_is_beyond(parts):
     assert verdict.light is Light.YELLOW
     (reason,) = verdict.reasons
     assert reason == (
-        "1 of 20 readings was predicted wrong by more than 0.300 mm: by 0.400 mm, at pose 19 normal"
+        "1 of 20 readings was predicted wrong by more than 0.300 mm: by 0.400 mm, at pose 19, load"
+        " case normal (1100 N pressing)"
     )
     assert verdict.meaning == (
-        "Not proved that the predictions keep within 0.300 mm. Do not release for production."
+        "1 of 20 readings predicted wrong by more than 0.300 mm: not proved that the predictions"
+        " keep within it. A simulation releases nothing; a real cell with this result"
+        " would not be released for production."
     )
 
 
@@ -77,10 +80,35 @@ def test_files_that_were_changed_are_told_before_every_figure(parts):
     findings = (Finding("a warning"), Finding("model.json was changed", breaks_trust=True))
     verdict = judged(parts, worst=0.4, low=0.1, high=0.2, findings=findings)
     assert verdict.reasons[0] == "model.json was changed"
-    assert "cannot be relied on. Do not release" in verdict.meaning
+    assert "cannot be relied on. A simulation releases nothing" in verdict.meaning
     again = replace(parts.reproduction, same=False)
     verdict = judge(replace(parts, reproduction=again), findings)
     assert verdict.word == "Not to be relied on"
+
+
+def test_a_real_cell_that_is_not_proved_is_not_to_be_released(parts):
+    again = replace(parts.reproduction, unseen=errors(worst=0.29, low=0.1, high=0.31))
+    real = replace(parts, reproduction=again, cell=None)
+    assert judge(real, ()).meaning == (
+        "Not proved that the predictions keep within 0.300 mm. Do not release for production."
+    )
+
+
+def test_errors_beyond_the_tolerance_are_not_lost_behind_files_that_were_changed(parts):
+    findings = [Finding(f"file {number} was changed", breaks_trust=True) for number in range(4)]
+    verdict = judged(parts, worst=0.9, low=0.31, high=0.5, findings=findings)
+    assert verdict.reasons[0] == "file 0 was changed"
+    assert "the whole interval is beyond" in verdict.reasons[1]
+    assert len(verdict.reasons) == 6
+
+
+def test_the_largest_errors_at_one_pose_are_told_together():
+    many = errors(0.4, 0.1, 0.2)
+    assert many.at_one_pose() is None
+    several = replace(many, pose=np.repeat(np.arange(5), 4), error=np.linspace(1e-4, 2.9e-4, 20))
+    assert several.at_one_pose() == (
+        "The 4 largest errors are all at pose 4; at the other poses none exceeds 0.250 mm."
+    )
 
 
 def test_a_note_alone_leaves_it_green(parts):
@@ -113,7 +141,7 @@ def test_errors_that_could_not_be_made_again_give_no_green(parts):
         verdict = judge(replace(parts, reproduction=again), ())
         assert verdict.light is Light.YELLOW
         assert "no interval" in verdict.reasons[0]
-        assert "could not be made again" in verdict.sentence
+        assert "could not be reproduced here: do not use them" in verdict.sentence
 
 
 @pytest.mark.parametrize("light", list(Light))
@@ -157,7 +185,7 @@ def test_scatter_of_the_stops_is_not_laid_at_the_trackers_door(parts):
 def test_advice_names_the_pose_of_the_largest_error_when_it_stands_out(parts):
     again = replace(parts.reproduction, unseen=errors(worst=0.5, low=0.1, high=0.2))
     found = " ".join(advise(replace(parts, reproduction=again)))
-    assert "Look at pose 19 normal first" in found
+    assert "Look at pose 19, load case normal (1100 N pressing) first" in found
     assert "0.500 mm" in found
 
 

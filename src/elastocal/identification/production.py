@@ -120,14 +120,14 @@ class ProductionCoverage:
         }
         within = (
             phrase(
-                "{share} of {rows} lie within {angle} deg in each joint, and the loads of a"
-                " calibrated posture",
+                "{share} of {rows} lie within {angle} deg in each joint but the last, and the loads"
+                " of a calibrated posture",
                 **values,
             )
             if self.rail is None
             else phrase(
-                "{share} of {rows} lie within {angle} deg in each joint, {rail} m of rail and"
-                " the loads of a calibrated posture",
+                "{share} of {rows} lie within {angle} deg in each joint but the last, {rail} m of"
+                " rail and the loads of a calibrated posture",
                 **values,
                 rail=f"{RAIL_REACH:g}",
             )

@@ -20,9 +20,12 @@ from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
 from elastocal.identification.recertification import Estimate
 from elastocal.identification.uncertainty import interval
 from elastocal.results import brief_repr
+from elastocal.wording import Phrase, mm, phrase
 
 _DRAWS = 1000
 """Draws of whole poses, for the intervals of the errors."""
+_MOST_ALONE = 3
+"""Number of largest errors at one pose from which on that is said."""
 _SAME = 1e-4
 """Relative difference below which two results are of one computation, be it on other machines."""
 
@@ -55,6 +58,21 @@ class UnseenErrors:
     def beyond(self, tolerance: float) -> int:
         """Return how many readings have a larger error."""
         return int(np.count_nonzero(~(self.error <= tolerance)))
+
+    def at_one_pose(self) -> Phrase | None:
+        """Return that the largest errors are all at one pose; None where fewer than three are."""
+        order = np.argsort(-self.error, kind="stable")
+        pose = int(self.pose[order[0]])
+        others = np.flatnonzero(self.pose[order] != pose)
+        if not others.size or others[0] < _MOST_ALONE:
+            return None
+        return phrase(
+            "The {count} largest errors are all at pose {pose}; at the other poses none exceeds"
+            " {rest}.",
+            count=int(others[0]),
+            pose=pose,
+            rest=mm(float(self.error[order[others[0]]])),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ from .findings import (
     find_everything as find_everything,
     instrument_findings as instrument_findings,
     missing_findings as missing_findings,
+    place_of_reading as place_of_reading,
     process_findings as process_findings,
     reading_findings as reading_findings,
     recertification_findings as recertification_findings,
@@ -66,4 +67,5 @@ from .uncertainty import (
     UncertaintySource as UncertaintySource,
     UncertaintyStatement as UncertaintyStatement,
     state_uncertainty as state_uncertainty,
+    why_not_stated as why_not_stated,
 )

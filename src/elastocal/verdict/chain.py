@@ -284,7 +284,10 @@ def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:
         others = f"the model was made from {len(stated)} datasets, of which only one is here"
         yield Link("model", LinkState.UNSTATED, others)
     else:
-        yield _made_of(evidence, dataset, "model", "the model", stated)
+        yield _made_of(evidence, dataset, "model", _MODEL, stated)
+
+
+_MODEL = "the model"
 
 
 def _codecs(evidence: Evidence, dataset: str) -> Iterator[Link]:
@@ -301,7 +304,20 @@ def _made_of(
     if dataset not in stated.values():
         text = f"{what} was made from another dataset ({', '.join(stated)}) than this one"
         return _broken(name, text)
+    if _is_broken(evidence, what):
+        text = f"{what} names this dataset; its content is not confirmed, see above"
+        return Link(name, LinkState.UNSTATED, text)
     return _whole(name, f"{what} was made from this dataset")
+
+
+def _is_broken(evidence: Evidence, what: str) -> bool:
+    """Return whether the file of the model, or one of a codec's, does not say what it said."""
+    model = None if evidence.calibrated is None else evidence.calibrated.sha256
+    return any(
+        each.bytes_sha256 == model if what == _MODEL else each.name.startswith(what)
+        for each in evidence.files
+        if each.seal is Seal.BROKEN
+    )
 
 
 def _process(evidence: Evidence) -> Iterator[Link]:

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from elastocal.codec import Saturation
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
@@ -36,6 +38,21 @@ class Finding:
 def find_everything(evidence: Evidence) -> tuple[Finding, ...]:
     """Return the findings of all parts, in the order of the report's sections."""
     return tuple(finding for findings in FINDINGS for finding in findings(evidence))
+
+
+def place_of_reading(evidence: Evidence, pose: int, load_case: str) -> Phrase:
+    """Return a reading's pose and load case, with the force where the cell tells it."""
+    name = phrase("pose {pose}, load case {load_case}", pose=pose, load_case=load_case)
+    presses = {} if evidence.cell is None else evidence.cell.file.presses
+    if load_case not in presses:
+        return name
+    x, y, z = presses[load_case]
+    press, aside = f"{abs(z):.0f}", f"{np.hypot(x, y):.0f}"
+    if aside == "0":
+        return phrase("{name} ({press} N pressing)", name=name, press=press)
+    return phrase(
+        "{name} ({press} N pressing, {aside} N sideways)", name=name, press=press, aside=aside
+    )
 
 
 def reading_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -259,8 +276,8 @@ def _saturation(best: Saturation, poses: int) -> Finding:
     if not best.settled:
         return Finding(
             phrase(
-                "it is not shown that there were enough poses: in a check that fitted up to {last}"
-                " of the {poses}, the error may still have been falling",
+                "whether more poses would help is not known: fits to up to {last} of the {poses} do"
+                " not show that the error has levelled off",
                 **check,
             ),
             advice=phrase("Measure some more poses to see that the error no longer falls."),

@@ -12,8 +12,8 @@ from enum import Enum
 
 from elastocal.identification import MOST_UNEXPLAINED, UnseenErrors
 from elastocal.results import brief_repr
-from elastocal.verdict.evidence import Evidence
-from elastocal.verdict.findings import Finding, find_everything
+from elastocal.verdict.evidence import AcceptanceLimits, Evidence
+from elastocal.verdict.findings import Finding, find_everything, place_of_reading
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
 _LOUD = 0.3
@@ -92,10 +92,11 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     return Verdict(
         light,
         word,
-        _UNTRUSTED if broken and light else _meaning(evidence, light, bool(own), useless),
+        _untrusted(evidence) if broken and light else _meaning(evidence, light, bool(own), useless),
         _sentence(evidence, unseen),
-        # Nothing else counts as long as the files are not what they were made as.
-        tuple(dict.fromkeys((*broken, *own, *held))),
+        # Nothing else counts as long as the files are not what they were made as; but that the
+        # errors themselves make the light red is not to be lost behind more such files.
+        tuple(dict.fromkeys((*broken[:1], *own[: light is Light.RED], *broken, *own, *held))),
         tuple(notes),
         tuple(all_advice),
     )
@@ -127,19 +128,35 @@ def _light(
             return Light.YELLOW, own
         # To take the dataset away must not lift a red light.
         return Light.RED, [
-            phrase("the model file itself states errors of up to {error}", error=mm(stated)),
+            phrase(
+                "the model file itself states errors of up to {error}, beyond the tolerance of"
+                " {tolerance}",
+                error=mm(stated),
+                tolerance=mm(tolerance),
+            ),
             *own,
         ]
-    own = list(_against(unseen, tolerance))
+    own = list(_against(evidence, unseen, tolerance))
     if not unseen.p95.low <= tolerance:
         return Light.RED, own
     return (Light.YELLOW if own or held else Light.GREEN), own
 
 
-_UNTRUSTED = phrase(
-    "Files were changed or contradict one another, so the figures cannot be relied on. Do not"
-    " release for production."
-)
+def _untrusted(evidence: Evidence) -> Phrase:
+    untrusted = phrase(
+        "Files were changed or contradict one another, so the figures cannot be relied on."
+    )
+    return sentences([untrusted, _not_released(evidence)])
+
+
+def _not_released(evidence: Evidence) -> Phrase:
+    """Return what follows where something is not proved."""
+    if evidence.simulated:
+        return phrase(
+            "A simulation releases nothing; a real cell with this result would not be released for"
+            " production."
+        )
+    return phrase("Do not release for production.")
 
 
 def _meaning(evidence: Evidence, light: Light | None, by_the_errors: bool, useless: bool) -> Phrase:
@@ -170,30 +187,49 @@ def _meaning(evidence: Evidence, light: Light | None, by_the_errors: bool, usele
         )
         return sentences([shown, use])
     if evidence.unseen is None:
-        return phrase(
+        unchecked = phrase(
             "Nothing is proved: the errors of this model could not be checked against its readings."
-            " Do not release it for production."
         )
+        return sentences([unchecked, _not_released(evidence)])
     if light is Light.RED:
-        return phrase(
-            "The predictions err by more than {tolerance} too often. Do not release for"
-            " production.",
-            tolerance=tolerance,
+        too_often = phrase(
+            "The predictions err by more than {tolerance} too often.", tolerance=tolerance
         )
+        return sentences([too_often, _not_released(evidence)])
     if by_the_errors:
-        return phrase(
-            "Not proved that the predictions keep within {tolerance}. Do not release for"
-            " production.",
-            tolerance=tolerance,
-        )
-    return phrase(
-        "The errors found are within {tolerance}, but not everything is proved. Do not release for"
-        " production before the open points are settled.",
+        return sentences([_not_proved(evidence.unseen, evidence.limits), _not_released(evidence)])
+    found = phrase(
+        "The errors found are within {tolerance}, but not everything is proved.",
         tolerance=tolerance,
+    )
+    before = (
+        phrase(
+            "A simulation releases nothing; a real cell with this result would not be released for"
+            " production before the open points are settled."
+        )
+        if evidence.simulated
+        else phrase("Do not release for production before the open points are settled.")
+    )
+    return sentences([found, before])
+
+
+def _not_proved(unseen: UnseenErrors, limits: AcceptanceLimits) -> Phrase:
+    """Return what is not proved, with the readings that are against it."""
+    tolerance = limits.tolerance or 0.0
+    beyond, limit = unseen.beyond(tolerance), mm(tolerance)
+    readings = counted(len(unseen.error), "reading")
+    if not beyond:
+        return phrase("Not proved that the predictions keep within {tolerance}.", tolerance=limit)
+    return phrase(
+        "{beyond} of {readings} predicted wrong by more than {tolerance}: not proved that the"
+        " predictions keep within it.",
+        beyond=beyond,
+        readings=readings,
+        tolerance=limit,
     )
 
 
-def _against(unseen: UnseenErrors, tolerance: float) -> Iterator[Phrase]:
+def _against(evidence: Evidence, unseen: UnseenErrors, tolerance: float) -> Iterator[Phrase]:
     p95 = unseen.p95
     values = {
         "value": mm(p95.value),
@@ -218,19 +254,18 @@ def _against(unseen: UnseenErrors, tolerance: float) -> Iterator[Phrase]:
             "readings": counted(len(unseen.error), "reading"),
             "tolerance": mm(tolerance),
             "most": mm(unseen.max),
-            "pose": unseen.pose[worst],
-            "load_case": unseen.load_case[worst],
+            "place": place_of_reading(evidence, int(unseen.pose[worst]), unseen.load_case[worst]),
         }
         yield (
             phrase(
-                "1 of {readings} was predicted wrong by more than {tolerance}: by {most}, at pose"
-                " {pose} {load_case}",
+                "1 of {readings} was predicted wrong by more than {tolerance}: by {most}, at"
+                " {place}",
                 **found,
             )
             if beyond == 1
             else phrase(
                 "{beyond} of {readings} were predicted wrong by more than {tolerance}, the worst by"
-                " {most}, at pose {pose} {load_case}",
+                " {most}, at {place}",
                 beyond=beyond,
                 **found,
             )
@@ -272,7 +307,8 @@ def _sentence(evidence: Evidence, unseen: UnseenErrors | None) -> Phrase:
         p95=mm(unseen.p95.value),
         max=mm(unseen.max),
     )
-    return sentences([left_out, accuracy, against])
+    alone = unseen.at_one_pose()
+    return sentences([left_out, accuracy, *([alone] if alone else []), against])
 
 
 def _stated(evidence: Evidence) -> Phrase:
@@ -281,7 +317,7 @@ def _stated(evidence: Evidence) -> Phrase:
         return phrase("The model file tells no error at poses left out of the fit.")
     return phrase(
         "The model file states errors of {mean} on average and {max} at most, each at a pose left"
-        " out of the fit; this could not be made again here.",
+        " out of the fit; these figures could not be reproduced here: do not use them.",
         mean=mm(held_out.mean),
         max=mm(held_out.max),
     )
@@ -299,7 +335,7 @@ def advise(evidence: Evidence) -> Iterator[str]:
     if unseen is None:
         return
     yield from _noise(evidence, unseen)
-    yield from _largest(unseen)
+    yield from _largest(evidence, unseen)
     yield from _spare_poses(evidence)
 
 
@@ -331,21 +367,20 @@ def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
             )
         )
     rest = phrase(
-        "Most of the error is what springs cannot express, such as play, friction in the gears and"
-        " links that bend."
+        "The tracker's noise does not explain most of the error: play, friction in the gears,"
+        " links that bend or too few poses near the worst one may."
     )
     yield sentences([*said, rest])
 
 
-def _largest(unseen: UnseenErrors) -> Iterator[str]:
+def _largest(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
     """Name the pose at which the model errs most when it stands out."""
     k = int(unseen.error.argmax())
     if unseen.max > 2.0 * unseen.mean.value:
         yield phrase(
-            "Look at pose {pose} {load_case} first (contact, stand, line of sight): it has the"
-            " largest error, {error}.",
-            pose=unseen.pose[k],
-            load_case=unseen.load_case[k],
+            "Look at {place} first (contact, stand, line of sight): it has the largest error,"
+            " {error}.",
+            place=place_of_reading(evidence, int(unseen.pose[k]), unseen.load_case[k]),
             error=mm(unseen.max),
         )
 

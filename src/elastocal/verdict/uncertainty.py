@@ -1,20 +1,26 @@
-"""The uncertainty of a predicted deflection, stated in the manner of ISO/IEC 17025.
+"""The uncertainty of a predicted deflection, stated in the form of ISO/IEC 17025.
 
 The evaluation follows the GUM (JCGM 100:2008): standard uncertainties of type A from readings at
 poses that were left out of the fit, of type B from what calibration certificates state, added in
-quadrature; the expanded uncertainty has the coverage factor k = 2 (about 95 %). It is of the
-deflection along any one direction, at poses and under forces like those of the run.
+quadrature; the expanded uncertainty has Student's coverage factor of the effective degrees of
+freedom (JCGM 100, G.4: Welch-Satterthwaite) for the 95.45 % that k = 2 covers of a normal
+distribution. It is of the deflection along any one axis, at poses and under forces like those of
+the run.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.wording import Phrase, counted, phrase
 
 COVERAGE_FACTOR = 2.0
+"""Of the uncertainties that the instruments' certificates state."""
+_COVERED = 0.9545
+"""Probability that k = 2 covers of a normal distribution."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +52,21 @@ class UncertaintyStatement:
         return float(np.sqrt(np.sum(np.square(known))))
 
     @property
+    def effective_degrees(self) -> float:
+        """Effective degrees of freedom: those of type A, more where type B adds to it."""
+        of_type_a = sum((each.standard or 0.0) ** 4 for each in self.sources if each.kind == "A")
+        part = of_type_a / self.standard**4 if self.standard > 0.0 else 1.0
+        return max(self.degrees_of_freedom, 1) / part
+
+    @property
+    def factor(self) -> float:
+        """Coverage factor k, by Student's distribution."""
+        return float(stdtrit(np.floor(self.effective_degrees), 0.5 * (1.0 + _COVERED)))
+
+    @property
     def expanded(self) -> float:
-        """Expanded uncertainty in m, k = `COVERAGE_FACTOR`."""
-        return COVERAGE_FACTOR * self.standard
+        """Expanded uncertainty in m, `factor` times the standard one."""
+        return self.factor * self.standard
 
     @property
     def is_complete(self) -> bool:
@@ -78,6 +96,13 @@ def state_uncertainty(evidence: Evidence) -> UncertaintyStatement | None:
         _sensor(evidence),
     ]
     return UncertaintyStatement(tuple(sources), unseen.poses - 1)
+
+
+def why_not_stated(evidence: Evidence) -> Phrase:
+    """Return why there is no uncertainty to state."""
+    if evidence.figures is None:
+        return phrase("Not stated: no error at poses left out of the fit is known.")
+    return phrase("Not stated: the errors that the model file states could not be confirmed.")
 
 
 def _tracker(evidence: Evidence) -> UncertaintySource:

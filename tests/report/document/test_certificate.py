@@ -75,8 +75,15 @@ class TestUncertainty:
     def test_it_is_the_error_along_one_direction_where_nothing_is_stated(self, parts):
         found = state_uncertainty(parts)
         assert found.standard == pytest.approx(np.sqrt(np.mean(parts.unseen.error**2) / 3.0))
-        assert found.expanded == pytest.approx(2.0 * found.standard)
+        assert found.expanded == pytest.approx(found.factor * found.standard)
         assert not found.is_complete
+
+    @pytest.mark.parametrize(("poses", "factor"), [(2, 13.97), (15, 2.20), (31, 2.09), (500, 2.00)])
+    def test_the_factor_is_students_so_that_few_poses_say_less(self, parts, poses, factor):
+        found = replace(state_uncertainty(parts), degrees_of_freedom=poses - 1)
+        assert found.factor == pytest.approx(factor, abs=0.006)
+        known = replace(found.sources[0], kind="B")
+        assert replace(found, sources=(*found.sources, known)).factor < found.factor
 
     def test_what_certificates_state_is_added_in_quadrature(self, parts):
         alone = state_uncertainty(parts).standard

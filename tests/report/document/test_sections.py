@@ -281,8 +281,8 @@ def saturated(parts, n_train, high, last=20):
     ("n_train", "high", "told", "holds_back"),
     [
         (20, 20, "the error was still falling", True),
-        (12, 20, "it is not shown that", True),
-        (12, None, "it is not shown that", True),
+        (12, 20, "fits to up to 20 of", True),
+        (12, None, "fits to up to 20 of", True),
         (12, 14, "no longer fell from 12 on", False),
     ],
 )

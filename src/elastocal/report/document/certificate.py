@@ -11,10 +11,12 @@ from elastocal.report.document.blocks import Stamp
 from elastocal.results import brief_repr
 from elastocal.verdict import (
     Evidence,
+    Light,
     LinkState,
     UncertaintyStatement,
     Verdict,
     state_uncertainty,
+    why_not_stated,
 )
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
@@ -91,7 +93,7 @@ class Certificate:
     bar: ToleranceBar | None
     picture: BeforeAfter | None
     reasons: tuple[str, ...]
-    more_reasons: int
+    more_reasons: Phrase | None
     coverage: Phrase
     uncertainty: Phrase
     signature: Phrase
@@ -125,9 +127,9 @@ def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = 
         _bar(evidence),
         _before_after(evidence),
         reasons,
-        len(verdict.reasons) - len(reasons),
-        _coverage(evidence.coverage),
-        _uncertainty(state_uncertainty(evidence)),
+        _more(len(verdict.reasons) - len(reasons)),
+        _coverage(evidence.coverage, verdict.light is Light.RED),
+        _uncertainty(evidence, state_uncertainty(evidence)),
         phrase(
             "This report carries an ed25519 signature, key {key}…; elastocal verify checks it.",
             key=signer[:16],
@@ -140,6 +142,14 @@ def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = 
 
 def _short(reason: str) -> str:
     return reason if len(reason) <= _LONGEST else f"{reason[: _LONGEST - 1].rstrip()}…"
+
+
+def _more(reasons: int) -> Phrase | None:
+    """Return where the reasons are that found no place."""
+    if reasons <= 0:
+        return None
+    many = counted(reasons, "more reason")
+    return phrase("{reasons} in section 1 of the appendix.", reasons=many)
 
 
 _Row = tuple[Phrase, tuple[str | Stamp, ...]]
@@ -219,31 +229,36 @@ def _tested_with(evidence: Evidence) -> Phrase | None:
     )
 
 
-def _coverage(found: ProductionCoverage | None) -> Phrase:
+def _coverage(found: ProductionCoverage | None, red: bool) -> Phrase:
     if found is None:
         return phrase("Not known: the cell file names no production path (process.file).")
-    reach = phrase(
-        "every joint but the last within {angle}°", angle=f"{np.degrees(JOINT_REACH):.0f}"
-    )
+    reach = phrase("{angle}° in each joint but the last", angle=f"{np.degrees(JOINT_REACH):.0f}")
     if found.rail is not None:
-        rail = phrase("rail within {rail}", rail=mm(RAIL_REACH, 0))
-        reach = sentences([reach, rail], ", ")
+        reach = phrase("{reach} and {rail} of rail", reach=reach, rail=mm(RAIL_REACH, 0))
     points = counted(found.rows, "point")
-    if found.covered >= 1.0:
-        return phrase(
-            "All {points} of the production path are near a tested posture ({reach}) and within"
-            " the forces tested there.",
+    near = (
+        phrase(
+            "All {points} of the production path lie within {reach} of a tested posture, under"
+            " forces within those tested there.",
             points=points,
             reach=reach,
         )
-    return phrase(
-        "{share} of {points} of the production path are near a tested posture ({reach}) and within"
-        " the forces tested there.",
-        # Not rounded up: less than all must not look like all.
-        share=f"{np.floor(1e3 * found.covered) / 10.0:g}%",
-        points=points,
-        reach=reach,
+        if found.covered >= 1.0
+        else phrase(
+            "{share} of {points} of the production path lie within {reach} of a tested posture,"
+            " under forces within those tested there.",
+            # Not rounded up: less than all must not look like all.
+            share=f"{np.floor(1e3 * found.covered) / 10.0:g}%",
+            points=points,
+            reach=reach,
+        )
     )
+    caution = (
+        phrase("This does not show that the predictions are right there.")
+        if red
+        else phrase("The accuracy at these points was not measured.")
+    )
+    return sentences([near, caution])
 
 
 def _bar(evidence: Evidence) -> ToleranceBar | None:
@@ -305,7 +320,7 @@ def _before_after(evidence: Evidence) -> BeforeAfter | None:
         _HIGH * (1.0 - 1e3 * unseen.max / end),
         phrase(
             "On average the arm gave way by {before}, and the prediction was wrong by {after}."
-            " Nothing was corrected here.",
+            " The arm pressed and was measured; no correction was switched on.",
             before=mm(float(size.mean())),
             after=mm(unseen.mean.value),
         ),
@@ -333,24 +348,27 @@ def _digits(step: float) -> int:
     return next(n for n in range(9) if abs(round(step, n) - step) < 1e-9 * step)
 
 
-def _uncertainty(statement: UncertaintyStatement | None) -> Phrase:
+def _uncertainty(evidence: Evidence, statement: UncertaintyStatement | None) -> Phrase:
     if statement is None:
-        return phrase("Not stated: no error at poses left out of the fit is known.")
-    expanded = mm(statement.expanded)
+        return why_not_stated(evidence)
+    named = {"expanded": mm(statement.expanded), "factor": f"{statement.factor:.2f}"}
+    compare = phrase("Compare the tolerance with the errors above, which are lengths in space.")
     if statement.is_complete:
-        return phrase(
-            "A predicted deflection is known to ±{expanded} in any one direction (U, k = 2, about"
-            " 95 %). The errors above are lengths in space.",
-            expanded=expanded,
+        known = phrase(
+            "Along any one axis a predicted deflection is known to ±{expanded} (U, k = {factor},"
+            " about 95 % if the errors are normally distributed).",
+            **named,
         )
+        return sentences([known, compare])
     names = [each.name for each in statement.sources if each.standard is None]
-    return phrase(
-        "A predicted deflection is known to ±{expanded} at best in any one direction (U, k = 2,"
-        " about 95 %). Not known, and so not in it: {names}. The errors above are lengths in"
-        " space.",
-        expanded=expanded,
+    known = phrase(
+        "Along any one axis a predicted deflection is known to ±{expanded} at best (U, k ="
+        " {factor}, about 95 % if the errors are normally distributed). Not known, and so not in"
+        " it: {names}.",
         names=sentences(names, ", "),
+        **named,
     )
+    return sentences([known, compare])
 
 
 def _run_signature(evidence: Evidence) -> Phrase:
@@ -364,4 +382,4 @@ def _run_signature(evidence: Evidence) -> Phrase:
         return phrase("The record of the run is signed, and the signature holds.")
     if LinkState.BROKEN in states:
         return phrase("The signature of the record of the run does not hold.")
-    return phrase("The record of the run is not signed: whoever edits it can hide that.")
+    return phrase("The record of the run is not signed: it could be altered unnoticed.")

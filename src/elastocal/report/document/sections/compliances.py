@@ -57,7 +57,9 @@ def _row(spring: SpringBar) -> blocks.Row:
     if not unit.stiffness or value < 0.0:
         stiff = _NONE
     known = phrase("at its bound") if spring.at_bound else phrase("zero")
-    if value != 0.0 and not spring.at_bound:
+    if not (spring.low <= value <= spring.high or spring.at_bound):
+        known = phrase("outside its interval: do not use, the file may have been changed")
+    elif value != 0.0 and not spring.at_bound:
         half = (spring.high - spring.low) / 2 / abs(value)
         known = (
             phrase("{share}", share=f"±{half:.0%}")

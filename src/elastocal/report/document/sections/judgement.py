@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from elastocal.identification import UnseenErrors
 from elastocal.report.document import blocks
 from elastocal.verdict import (
-    COVERAGE_FACTOR,
     Evidence,
     UncertaintySource,
     find_everything,
     judge_evidence,
     state_uncertainty,
+    why_not_stated,
 )
 from elastocal.wording import Phrase, mm, phrase, phrases
 
@@ -76,16 +76,14 @@ FINDINGS = blocks.Section(
 def _uncertainty(evidence: Evidence) -> Iterator[blocks.Block]:
     statement = state_uncertainty(evidence)
     if statement is None:
-        yield blocks.Paragraph(
-            phrase("Not stated: no error at poses left out of the fit is known.")
-        )
+        yield blocks.Paragraph(why_not_stated(evidence))
     else:
         yield blocks.Facts(
             (
                 (phrase("Combined standard uncertainty"), mm(statement.standard)),
-                (phrase("Coverage factor"), f"k = {COVERAGE_FACTOR:g}"),
+                (phrase("Effective degrees of freedom"), f"{statement.effective_degrees:.0f}"),
+                (phrase("Coverage factor"), f"k = {statement.factor:.2f}"),
                 (phrase("Expanded uncertainty U, about 95 %"), mm(statement.expanded)),
-                (phrase("Degrees of freedom"), statement.degrees_of_freedom),
             )
         )
         heads = phrases("Source", "Type", "How it was found", "Standard uncertainty")
@@ -144,17 +142,25 @@ _METHOD = phrase(
     " of the fit once and predicted by the others, so that what the springs cannot express, the"
     " repeatability of the arm, the noise of sensor and tracker and the registration are in it."
     " Type B: what the calibration certificates of the instruments state. Both are added in"
-    " quadrature (JCGM 100:2008, GUM) and multiplied by the coverage factor."
+    " quadrature (JCGM 100:2008, GUM) and multiplied by the coverage factor: Student's, for 95.45 %"
+    " (k = 2 with many poses), with the poses less one as degrees of freedom of type A. It covers"
+    " about 95 % if the errors are normally distributed."
 )
 _RULE = phrase(
-    "Green needs all of these (guarded acceptance). Red: even the lower end of the interval of the"
-    " 95 % error is beyond the tolerance. Otherwise yellow: not proved. The rule takes the errors"
-    " as they were measured and assumes no normal distribution; the uncertainty of the instruments'"
-    " own calibrations is stated, and not added to the errors."
+    "Green needs all of these. Red: even the lower end of the interval of the 95 % error is beyond"
+    " the tolerance, or the model leaves more than half of the deflection unexplained, or its"
+    " errors cannot be confirmed and its file itself states one beyond the tolerance. Otherwise"
+    " yellow: not proved. Files that were changed or contradict one another are open points: they"
+    " never let it be green. The errors are held against the tolerance as they were measured"
+    " (simple acceptance, in the words of ILAC-G8): U is stated beside them and is no guard band,"
+    " so that an error just below the tolerance may truly be beyond it. Only the 95 % error has a"
+    " margin, its interval from the poses drawn. No normal distribution is assumed."
 )
 _NOT_ACCREDITED = phrase(
-    "This is a statement in the manner of ISO/IEC 17025, 7.8.4, made by a program from what it was"
-    " given. It is not an accredited certificate, and no accreditation body stands behind it."
+    "This follows the form of ISO/IEC 17025:2017: uncertainty as on a calibration certificate"
+    " (7.8.4), conformity with the decision rule applied (7.8.6), which laboratory and customer are"
+    " to agree on (7.1.3). A program made it from what it was given: it is not an accredited"
+    " certificate, and no accreditation body stands behind it."
 )
 
 
