@@ -36,9 +36,7 @@ def gathered(folder):
 def judged(evidence):
     """Return the verdict but for the codec, which at seven poses has not saturated."""
     saturation = list(codec_findings(evidence))[-1:] if evidence.saturation else []
-    return judge(
-        evidence, [each for each in find_everything(evidence) if each not in saturation]
-    )
+    return judge(evidence, [each for each in find_everything(evidence) if each not in saturation])
 
 
 def edit(path, change):
