@@ -17,6 +17,7 @@ from elastocal import workflows
 from elastocal.errors import FileAccessError
 from elastocal.procedure import Event, read_journal
 from elastocal.report.document import find_browser, open_tab
+from support import live_bench
 from support.browser import PROBE, Look, complaints_of, emulate, requests_of
 from support.run_cells import planned_cell
 
@@ -100,14 +101,15 @@ def told(cell):
     def while_open(found):
         with open_tab(browser) as tab:
             page = Page(tab, found.figures.address)
-            for part in (look_at_it, drag_it, edit_it, plan_it, run_it):
+            for part in (look_at_it, drag_it, edit_it, survey_it, compare_it, plan_it, run_it):
                 part(page, cell, told)
             told["complaints"] = complaints_of(tab.events)
             told["foreign"] = [
                 url for url in requests_of(tab.events) if not url.startswith(page.address)
             ]
 
-    workflows.studio(cell, while_open=while_open)
+    model = live_bench.write_model_of(cell, cell.with_name("model.json"))
+    workflows.studio(cell, model=model, while_open=while_open)
     return told
 
 
@@ -117,6 +119,7 @@ def look_at_it(page, cell, told):
         told[look] = page.get(PROBE)
         page.keep(f"{look.width}-{look.scheme}")
     told["name"] = page.text("name")
+    told["springs"] = (page.text("springs"), page.text("cases"))
     told["drawn"] = page.get(
         """(() => {
           const canvas = document.getElementById("view"), gl = canvas.getContext("webgl2");
@@ -166,8 +169,29 @@ def edit_it(page, cell, told):
     page.keep("cell")
 
 
+def survey_it(page, cell, told):
+    # From the keyboard, as tabs are gone through.
+    page.get('document.getElementById("tab-cell").focus()')
+    for kind in ("keyDown", "keyUp"):
+        page.tab.call("Input.dispatchKeyEvent", type=kind, key="ArrowRight", code="ArrowRight")
+    page.wait("document.getElementById('plan').hidden === false")
+    page.click("#survey")
+    page.wait("document.getElementById('survey-text').textContent !== ''")
+    told["survey"] = (page.text("survey-text"), page.text("survey-legend"))
+    page.keep("survey")
+
+
+def compare_it(page, cell, told):
+    page.click("#compare")
+    page.wait("document.getElementById('techniques').hidden === false")
+    told["techniques"] = page.get(
+        "[...document.getElementById('techniques').tBodies[0].rows]"
+        ".map((row) => [...row.cells].map((cell) => cell.textContent))"
+    )
+    page.keep("compared")
+
+
 def plan_it(page, cell, told):
-    page.click("#tab-plan")
     page.get("document.getElementById('plan-form').elements.folder.value = 'planned'")
     page.click("#plan-form button")
     page.wait("document.documentElement.dataset.work === 'plan busy'")
@@ -233,6 +257,22 @@ def test_an_edit_is_in_the_file_with_its_comments_and_a_wrong_one_is_not(told):
     message, text = told["refused"]
     assert "fz" in message
     assert text == told["edited"]
+
+
+def test_the_springs_are_those_of_the_model_that_was_given(told):
+    source, cases = told["springs"]
+    assert "model.json" in source
+    assert "rule of thumb" not in source
+    assert "mm" in cases
+
+
+def test_points_are_tried_and_techniques_compared(told):
+    summary, legend = told["survey"]
+    assert re.match(r"40 of \d+ points can be pressed on", summary)
+    assert "a pose can be had (40)" in legend
+    rows = {row[0].removesuffix(" (the cell's)"): row[1:] for row in told["techniques"]}
+    assert {"cover", "ioops"} <= rows.keys()
+    assert all(poses == "3" and radius.endswith("mm") for poses, radius, *_ in rows.values())
 
 
 def test_a_plan_is_made_and_its_poses_are_shown(told):

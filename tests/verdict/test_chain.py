@@ -17,6 +17,7 @@ from elastocal.verdict import (
     Light,
     LinkState,
     Seal,
+    codec_findings,
     find_everything,
     gather_evidence,
     judge,
@@ -34,10 +35,8 @@ def gathered(folder):
 
 def judged(evidence):
     """Return the verdict but for the codec, which at seven poses has not saturated."""
-    findings = [
-        each for each in find_everything(evidence) if "more poses would help" not in each.text
-    ]
-    return judge(evidence, findings)
+    saturation = list(codec_findings(evidence))[-1:] if evidence.saturation else []
+    return judge(evidence, [each for each in find_everything(evidence) if each not in saturation])
 
 
 def edit(path, change):
@@ -231,7 +230,7 @@ def test_to_take_the_dataset_away_does_not_lift_a_red_light(parts):
     far = replace(parts, reproduction=None, limits=replace(parts.limits, tolerance=1e-6))
     verdict = judge(far, ())
     assert verdict.light is Light.RED
-    assert "the model file itself states errors of up to" in verdict.reasons[0]
+    assert "states errors of up to" in verdict.reasons[0]
 
 
 def test_every_damaged_part_holds_back(parts):

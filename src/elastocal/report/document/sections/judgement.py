@@ -198,8 +198,9 @@ UNCERTAINTY = blocks.Section(
 
 
 _ALWAYS = phrases(
-    "Geometric calibration and the sag under the arm's own weight: only deflection under a force"
-    " is modelled, and both must be corrected before it.",
+    "Absolute errors of the arm, by its geometry and by its sag under its own weight: predicted is"
+    " the deflection under a force (how the sag changes with it is allowed for). `elastocal"
+    " geometry` calibrates both.",
     "Absolute accuracy: deflections are differences to the unloaded reading at the same pose.",
     "Temperature: nothing corrects for a warm arm.",
     "Payloads and tools other than the one of this run.",
