@@ -25,6 +25,7 @@ from .findings import (
     codec_findings as codec_findings,
     compliance_findings as compliance_findings,
     find_everything as find_everything,
+    has_own_process as has_own_process,
     instrument_findings as instrument_findings,
     missing_findings as missing_findings,
     place_of_reading as place_of_reading,

@@ -136,8 +136,8 @@ def _seals(evidence: Evidence) -> Iterator[Link]:
         if file.seal is Seal.BROKEN:
             yield _broken(
                 file.name,
-                f"{file.name} was changed after it was written: its content does not have the"
-                " SHA-256 that it states",
+                f"{file.name} was changed after it was written: its checksum does not match its"
+                " content",
             )
     if silent := [file.name for file in evidence.files if file.seal is Seal.ABSENT]:
         more = f" and {counted(len(silent) - 1, 'other file')}" if silent[1:] else ""

@@ -295,6 +295,12 @@ def _saturation(best: Saturation, poses: int) -> Finding:
     )
 
 
+def has_own_process(evidence: Evidence) -> bool:
+    """Return whether no link says that the process is of another model, tool or run."""
+    process = (link.state for link in evidence.chain if link.name == "process")
+    return LinkState.BROKEN not in process
+
+
 def process_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield how far the correction brought the process path."""
     if evidence.process is None:
@@ -302,9 +308,10 @@ def process_findings(evidence: Evidence) -> Iterator[Finding]:
     table, tolerance = evidence.process.table, evidence.limits.tolerance
     line, space = table.lines[-1], table.spatial[-1]
     text = phrase(
-        "on the simulated process path the mean deviation in the direction that counts (section 9)"
-        " fell by {share}, from {before} to {after}, largest left {most}; in space {mean_in_space}"
-        " are left on average, {most_in_space} at most",
+        "in simulation, which is no evidence for a real cell, the mean deviation on the process"
+        " path in the direction that counts (section 9) fell by {share}, from {before} to {after},"
+        " largest left {most}; in space {mean_in_space} are left on average, {most_in_space} at"
+        " most",
         share=f"{line.reduction.mean:.1%}",
         before=mm(line.before.mean),
         after=mm(line.after.mean),
@@ -312,6 +319,8 @@ def process_findings(evidence: Evidence) -> Iterator[Finding]:
         mean_in_space=mm(space.after.mean),
         most_in_space=mm(space.after.max),
     )
+    if not has_own_process(evidence):
+        text = phrase("not valid for this report: {text}", text=text)
     if tolerance is not None and not line.after.max <= tolerance:
         beyond = phrase("beyond the tolerance of {tolerance}", tolerance=mm(tolerance))
         yield Finding(sentences([text, beyond], ", "))

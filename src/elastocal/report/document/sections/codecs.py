@@ -42,6 +42,8 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     else:
         yield blocks.Paragraph(phrase("No variant has an error that could be drawn."))
     yield _saturation(evidence)
+    if best := evidence.saturation:
+        yield blocks.Paragraph(_in_a_sentence(best))
     lines = dict.fromkeys(line for codec in evidence.codecs for line in _words(codec))
     yield blocks.Bullets(tuple(lines))
 
@@ -78,12 +80,26 @@ def _saturation(evidence: Evidence) -> blocks.Block:
     return blocks.Table(caption, heads, tuple(rows.values()), texts=3)
 
 
+def _in_a_sentence(best: Saturation) -> Phrase:
+    """Return what the row that counts for the verdict comes to."""
+    if not best.explains or best.low is None or best.high is None:
+        return phrase("How many poses are enough is not proved.")
+    values = {"enough": counted(best.n_train, "pose"), "low": best.low, "high": best.high}
+    if best.settled:
+        return phrase("Enough for the verdict: {enough} (95 % interval {low} to {high}).", **values)
+    return phrase(
+        "Best estimate for the verdict: {enough}, but it could be anything from {low} to {high}:"
+        " not proved.",
+        **values,
+    )
+
+
 def _row(variant: Variant, found: Saturation) -> blocks.Row:
     return (
         variant.search,
         PurePath(variant.springs).name,
         variant.load_cases,
-        str(found.n_train) if found.explains else phrase("never"),
+        _enough(found),
         phrase("not known")
         if found.low is None
         else phrase("{low} to {high}", low=found.low, high=found.high),
@@ -93,9 +109,18 @@ def _row(variant: Variant, found: Saturation) -> blocks.Row:
     )
 
 
+def _enough(found: Saturation) -> str:
+    if not found.explains:
+        return phrase("never")
+    no_trend = found.n_train == 1 and not found.settled
+    return phrase("no trend found") if no_trend else str(found.n_train)
+
+
 def _words(codec: CodecEvidence) -> Iterator[Phrase]:
     """Yield which variant is better, and which springs were chosen where the readings chose."""
-    yield from map(_pair, codec.verdicts.pairs)
+    largest = max((each.last_error for each in codec.verdicts.saturation), default=0.0)
+    for pair in codec.verdicts.pairs:
+        yield _pair(pair, _MOST_APART * largest)
     data = codec.data
     rows = zip(data.variants, data.layouts, data.split_layouts, strict=True)
     for variant, layout, splits in rows:
@@ -120,7 +145,7 @@ def _words(codec: CodecEvidence) -> Iterator[Phrase]:
         )
 
 
-def _pair(pair: PairedDifference) -> Phrase:
+def _pair(pair: PairedDifference, most: float) -> Phrase:
     judged = pair.judged
     smaller, larger = (pair.a, pair.b) if judged.difference < 0.0 else (pair.b, pair.a)
     named = {"a": smaller, "b": larger, "poses": counted(judged.n_train, "pose")}
@@ -133,6 +158,12 @@ def _pair(pair: PairedDifference) -> Phrase:
             **named,
         )
     low, high = judged.low, judged.high
+    if pair.better is None and high - low > most:
+        return phrase(
+            "{a} against {b}, fitted to {poses}: they cannot be compared, some of these fits break"
+            " down.",
+            **named,
+        )
     if judged.difference < 0.0:
         low, high = -high, -low
     found = phrase("{value} ({low} to {high})", value=size, low=mm(low), high=mm(high))
@@ -151,6 +182,9 @@ def _pair(pair: PairedDifference) -> Phrase:
         )
     )
 
+
+_MOST_APART = 10.0
+"""Width of an interval by the largest error that is left, from which on some fits broke down."""
 
 CODECS = blocks.Section(
     "codecs", phrase("Number of poses"), phrase("Were there enough poses?"), 60, _body

@@ -65,6 +65,8 @@ def _row(spring: SpringBar) -> blocks.Row:
             phrase("{share}", share=f"±{half:.0%}")
             if half <= 1.0
             else phrase("hardly: ±{share}", share=f"{half:.0%}")
+            if half <= _MOST_SAID
+            else phrase("hardly: more than ±{share}", share=f"{_MOST_SAID:.0%}")
         )
     span = phrase("{low} to {high}", low=f"{spring.low:.3f}", high=f"{spring.high:.3f}")
     return name, known, f"{value:.4f}", span, unit.shown, stiff
@@ -85,7 +87,10 @@ def _head(found: ModelEvidence, observable: int, values: int) -> blocks.Block:
                 phrase("Combinations of them that the readings tell (rank)"),
                 phrase("{rank} of {all}", rank=seen.rank, all=seen.parameters),
             ),
-            (phrase("Condition number"), f"{seen.condition:.0f}"),
+            (
+                phrase("Condition number (large: single springs are hardly told apart)"),
+                f"{seen.condition:.0f}",
+            ),
             (phrase("Bootstrap draws"), len(found.model.draws)),
             (phrase("Residual at the poses fitted, mean"), residual),
         )
@@ -119,6 +124,14 @@ def _ladder(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
             )
             for rung in figures.ladder
         ),
+    )
+    yield blocks.Paragraph(
+        phrase(
+            "By how much one is worse is the mean over poses of paired differences; poses far from"
+            " all others do not count, and the low load is left out with each pose. So it is not"
+            " the difference of the errors beside it."
+        ),
+        "sub",
     )
 
 
@@ -187,6 +200,8 @@ def _not_told_apart(found: ModelEvidence, springs: list[SpringBar]) -> Iterator[
 
 
 _NONE = phrase("none")
+_MOST_SAID = 10.0
+"""Half an interval by its value, from which on its size says nothing more."""
 COMPLIANCES = blocks.Section(
     "compliances",
     phrase("Compliances"),

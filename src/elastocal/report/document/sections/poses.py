@@ -27,6 +27,16 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
         blocks.Paragraph(phrase("Without cell, mesh and pool there is no picture.")),
     )
     yield from _notes(plan)
+    if plan.search.name == _BY_PRODUCTION and plan.comparison is not None:
+        yield blocks.Paragraph(
+            phrase(
+                "{search} seeks the least error on the production path; a small covering radius"
+                " is not its aim. {other} stands beside it to compare.",
+                search=plan.search.name,
+                other=plan.comparison.name,
+            ),
+            "sub",
+        )
     yield _poses(plan, buttons=bool(pictures))
 
 
@@ -73,7 +83,7 @@ def _spreads(plan: PlanResult) -> blocks.Block:
             "Covering radius",
             "To the edge, mean",
             "To the next pose, mean",
-            "Observability O1",
+            "Observability O1 (more is better)",
         ),
         tuple(
             (
@@ -110,6 +120,8 @@ def _notes(plan: PlanResult) -> Iterator[blocks.Block]:
     notes = tuple(text.replace(f"{folder}/", "") if folder else text for text in plan.findings)
     yield blocks.Details(phrase("Notes of the planner"), (blocks.Bullets(notes),))
 
+
+_BY_PRODUCTION = "i_optimal"
 
 POSES = blocks.Section(
     "poses", phrase("Surface and poses"), phrase("Where was measured?"), 20, _body

@@ -17,7 +17,7 @@ from elastocal.compensation.process import (
 )
 from elastocal.report.document import blocks
 from elastocal.report.plots import course_figure, process_maps
-from elastocal.verdict import Evidence
+from elastocal.verdict import Evidence, has_own_process
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
 
@@ -74,11 +74,17 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
         return
     yield blocks.Paragraph(
         phrase(
-            "Simulated: the simulated robot followed the path under process forces, once as"
-            " programmed and once with the online compensator of a calibrated model."
+            "Simulated, and no evidence for a real cell: the simulated robot followed the path"
+            " under process forces, once as programmed and once with the online compensator of a"
+            " calibrated model."
         ),
         "banner",
     )
+    if not has_own_process(evidence):
+        yield blocks.Paragraph(
+            phrase("Not valid for this report: the process is of another model, tool or run."),
+            "banner",
+        )
     yield from _table_1(record)
     seed = record.courses[0].seed
     yield from _pictures(

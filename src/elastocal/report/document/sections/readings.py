@@ -13,7 +13,7 @@ from elastocal.procedure.derive import RunSummary
 from elastocal.report.document import blocks
 from elastocal.report.plots import displacement_figure, pose_grid
 from elastocal.verdict import Evidence
-from elastocal.wording import Phrase, counted, mm, phrase, phrases
+from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
 _PoseValues = dict[tuple[int, str], float]
 """Values in m by pose and load case."""
@@ -186,12 +186,11 @@ def _suspicious(evidence: Evidence) -> Iterator[blocks.Block]:
     figures: CalibrationSummary | None = evidence.figures
     if figures is None or not figures.suspicious:
         yield blocks.Heading(phrase("Suspicious readings"))
-        yield blocks.Paragraph(
-            phrase(
-                "No reading was set aside, and none looks wrong by itself. The largest errors stand"
-                " below."
-            )
-        )
+        alone = None if evidence.unseen is None else evidence.unseen.at_one_pose()
+        nothing = phrase("No reading was set aside, and none looks wrong by itself.")
+        below = phrase("The largest errors stand below.")
+        look = [alone, phrase("Look at that pose.")] if alone else []
+        yield blocks.Paragraph(sentences([nothing, *look, below]))
         return
     rows = tuple(
         (
