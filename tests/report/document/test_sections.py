@@ -9,20 +9,29 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.cell import Limits
+from elastocal.elastic import unit_of
 from elastocal.identification import CalibrationSummary, describe
 from elastocal.procedure import Event, RunSummary
 from elastocal.records import from_data, to_data
 from elastocal.report.document import SECTIONS
 from elastocal.report.document.sections import PAPER
 from elastocal.report.document.sections.cell import _LIMITS, _tool_file
+from elastocal.report.document.sections.compliances import _row
+from elastocal.report.plots import SpringBar
 from elastocal.verdict import (
+    ChainFiles,
+    Link,
+    LinkState,
     MissingPart,
+    Seal,
+    UsedFile,
     codec_findings,
     compliance_findings,
     instrument_findings,
     missing_findings,
     process_findings,
     reading_findings,
+    verify_chain,
 )
 
 (
@@ -328,9 +337,32 @@ def test_provenance_has_versions_hashes_seeds_and_every_setting(parts):
     assert parts.journal[0].run.cell in text
 
 
+def test_a_spring_outside_its_own_interval_is_not_shown_as_known():
+    spring = SpringBar("a1.axial", unit_of("rad/(N*m)"), 1.1, 0.2, 0.4, None)
+    assert "outside its interval: do not use" in _row(spring)[1]
+    assert _row(replace(spring, value=0.3))[1] == "±33%"
+    assert _row(replace(spring, value=0.01, low=0.0))[1] == "hardly: more than ±1000%"
+
+
+def test_a_process_of_another_model_is_not_evidence_for_this_one(parts):
+    broken = Link("process", LinkState.BROKEN, "the process was run with another model")
+    (finding,) = process_findings(replace(parts, chain=(broken,)))
+    assert finding.text.startswith("not valid for this report: in simulation, which is no evidence")
+    (finding,) = process_findings(parts)
+    assert finding.text.startswith("in simulation, which is no evidence")
+
+
+def test_a_model_that_was_changed_is_not_confirmed_by_the_dataset_that_it_names(parts):
+    changed = UsedFile("model.json", "", "", parts.calibrated.sha256, Seal.BROKEN)
+    links = verify_chain(replace(parts, files=(changed,)), ChainFiles(None, None, str))
+    state = {link.name: link.state for link in links}
+    assert state["model"] is LinkState.UNSTATED
+    assert state["codec"] is LinkState.WHOLE
+
+
 def test_what_was_not_verified_is_never_empty(parts):
     text = words(not_verified, parts)
-    for told in ("Geometric calibration", "Temperature", "safety function", "A real robot"):
+    for told in ("Absolute errors of the arm", "Temperature", "safety function", "A real robot"):
         assert told in text
     assert "Earlier calibration: no earlier calibration was given" in text
 
