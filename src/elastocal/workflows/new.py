@@ -192,7 +192,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
     effort = np.where(np.isfinite(robot.limits.effort), robot.limits.effort, 100.0)
     torques = zip(robot.joint_names, effort, strict=True)
     low, high = settings.bounds
-    process, tolerance = str(settings.process), str(settings.tolerance)
+    process, tolerance = str(settings.process), str(settings.accepted)
     press = parse_quantity(settings.press, "force")
     text = templates("elastocal.cell").get_template("new.yaml").render(
         name=_quoted(out.stem if out.stem.isidentifier() else "cell"),

@@ -58,7 +58,7 @@ class NewSettings:
     """Mass of all that hangs on the flange."""
     tool_centre: str | None = None
     """Its centre in the flange, ``"x, y, z"``."""
-    process: str | None = None
+    process: str | PathLike[str] | None = None
     """Production path (.csv) that poses and presses are chosen for, or ``none``."""
     press: str | None = None
     """Largest force onto the surface; a third of it is pressed aside."""
@@ -70,7 +70,7 @@ class NewSettings:
     """Place of the tracker in base, ``"x, y, z"``, or ``none``: no tracker."""
     marker_place: str | None = None
     """Marker in the tcp frame, ``"x, y, z"``."""
-    tolerance: str | None = None
+    accepted: str | None = None
     """Largest error of a predicted deflection that the report lets pass, or ``none``."""
     poses: int = 15
     """Number of poses."""
@@ -117,7 +117,7 @@ class NewSettings:
             tool_mass=self.tool_mass or f"{arm._size[2]:g} kg",
             marker_place=self.marker_place or "70 mm, 0 mm, -110 mm",
             process=self.process or NONE,
-            tolerance=self.tolerance or NONE,
+            accepted=self.accepted or NONE,
         )
         done = replace(
             done,
@@ -156,7 +156,7 @@ class NewSettings:
         ElastocalError
             Which says what is allowed.
         """
-        if text == NONE and name in ("force_range", "tracker", "process", "tolerance"):
+        if text == NONE and name in ("force_range", "tracker", "process", "accepted"):
             return
         if name in ("robot", "flange"):
             _ = replace(self, **{name: text}).arm  # type: ignore[arg-type]
