@@ -75,7 +75,7 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001
     settings.require_free()
     out, known = Path(settings.out), settings.filled()
     refused: ElastocalError | None = None
-    with replacing(out) as temporary:
+    with settings.in_its_folder(), replacing(out) as temporary:
         for place, flip in _tries(settings, known):
             trial = replace(known, place=place)
             cell = _begun(temporary, out, trial, flip)
