@@ -167,14 +167,13 @@ def messages() -> list[str]:
     for path in (ROOT / "src").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             parts = node.values if isinstance(node, ast.JoinedStr) else [node]
-            found.append(
-                "".join(
-                    part.value
-                    if isinstance(part, ast.Constant) and isinstance(part.value, str)
-                    else "…"
-                    for part in parts
-                )
+            text = "".join(
+                part.value
+                if isinstance(part, ast.Constant) and isinstance(part.value, str)
+                else "…"
+                for part in parts
             )
+            found += [text, re.sub(r"\{\w+\}", "…", text)]  # of f-strings, and of phrases
     return found
 
 

@@ -100,6 +100,12 @@ def test_presses_that_the_joints_do_not_bear_are_said_with_those_that_they_do(tm
     assert "the joints bear" not in elastocal(*known, "--force", "--press", f"{fits} N").err
 
 
+def test_a_refusal_leaves_no_folder(tmp_path, dome):
+    out = tmp_path / "a" / "b" / "cell.yaml"
+    assert "--robot is missing" in elastocal("new", "--mesh", dome, "-o", out, "--no-ask").reason
+    assert not (tmp_path / "a").exists()
+
+
 def test_presses_follow_the_process_and_poses_are_chosen_for_it(tmp_path, dome):
     cell, path = tmp_path / "cell.yaml", tmp_path / "path.csv"
     path.write_text(

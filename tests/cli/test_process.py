@@ -36,6 +36,19 @@ def test_output_that_is_closed_or_full_is_one_line_and_exit_code_1(folder, to):
     assert result.stderr.startswith("elastocal: cannot write output: ")
 
 
+@pytest.mark.parametrize("end", ["<&-", "</dev/null"])
+def test_where_nobody_can_answer_a_question_is_a_line(tmp_path, end):
+    result = subprocess.run(
+        ["sh", "-c", f'"$@" {end}', "sh", *COMMAND, "new", "--ask", "-o", tmp_path / "cell.yaml"],
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1].startswith("elastocal: nobody answers: ")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_closed_output_is_known_before_the_long_work(folder, tmp_path):
     subprocess.run(
         ["sh", "-c", '"$@" >&-', "sh", *COMMAND, "plan", folder / "cell.yaml", "--json", "--out",

@@ -142,7 +142,7 @@ def test_a_path_of_ones_own_deviates_as_the_built_in_process_that_it_repeats(fol
         ("3-D", -1.0),
     ]  # fmt: skip
     assert table["means"][0]["mean_reduction"]["low"] is None
-    assert "a single seed" in table["notes"][0]
+    assert "one simulated run" in table["notes"][0]
 
 
 def test_the_3d_deviation_is_never_below_its_component(folder):

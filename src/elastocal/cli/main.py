@@ -152,6 +152,9 @@ def run() -> None:
     warnings.simplefilter("ignore", append=True)
     # Figures go into files; Matplotlib would refuse a name here that it does not know.
     os.environ["MPLBACKEND"] = "agg"
+    if sys.stdin is None:
+        # Closed by `<&-`: nobody answers, which is said where something is asked.
+        sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: PTH123, SIM115 - to the end
     try:
         _check_output()
         with ended_cleanly():

@@ -75,7 +75,7 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001
     settings.require_free()
     out, known = Path(settings.out), settings.filled()
     refused: ElastocalError | None = None
-    with replacing(out) as temporary:
+    with settings.in_its_folder(), replacing(out) as temporary:
         for place, flip in _tries(settings, known):
             trial = replace(known, place=place)
             cell = _begun(temporary, out, trial, flip)
@@ -192,7 +192,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
     effort = np.where(np.isfinite(robot.limits.effort), robot.limits.effort, 100.0)
     torques = zip(robot.joint_names, effort, strict=True)
     low, high = settings.bounds
-    process, tolerance = str(settings.process), str(settings.tolerance)
+    process, tolerance = str(settings.process), str(settings.accepted)
     press = parse_quantity(settings.press, "force")
     text = templates("elastocal.cell").get_template("new.yaml").render(
         name=_quoted(out.stem if out.stem.isidentifier() else "cell"),

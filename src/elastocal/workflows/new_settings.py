@@ -1,6 +1,8 @@
 """What a person says of a new cell, and what is guessed of the rest by the robot and the mesh."""
 
+import contextlib
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -58,7 +60,7 @@ class NewSettings:
     """Mass of all that hangs on the flange."""
     tool_centre: str | None = None
     """Its centre in the flange, ``"x, y, z"``."""
-    process: str | None = None
+    process: str | PathLike[str] | None = None
     """Production path (.csv) that poses and presses are chosen for, or ``none``."""
     press: str | None = None
     """Largest force onto the surface; a third of it is pressed aside."""
@@ -70,7 +72,7 @@ class NewSettings:
     """Place of the tracker in base, ``"x, y, z"``, or ``none``: no tracker."""
     marker_place: str | None = None
     """Marker in the tcp frame, ``"x, y, z"``."""
-    tolerance: str | None = None
+    accepted: str | None = None
     """Largest error of a predicted deflection that the report lets pass, or ``none``."""
     poses: int = 15
     """Number of poses."""
@@ -78,20 +80,41 @@ class NewSettings:
     """Replace a file that is there."""
 
     def require_free(self) -> None:
-        """Require that no file is in the way, and make the folder of the cell file.
+        """Require that a file can be written there, where no folder need be yet.
 
         Raises
         ------
         FileAccessError
-            If the file is there and may not be replaced, or the folder cannot be made.
+            If the file is there and may not be replaced, or its folder cannot be made.
         """
         out = Path(self.out)
         if out.exists() and not self.force:
             raise FileAccessError(f"{out} is there already: give --force to replace it")
+        with self.in_its_folder():
+            pass
+
+    @contextlib.contextmanager
+    def in_its_folder(self) -> Iterator[None]:
+        """Make the folder of the cell file; what was made goes where no file comes into it.
+
+        Raises
+        ------
+        FileAccessError
+            If the folder cannot be made.
+        """
+        folder = Path(self.out).parent
+        made = [each for each in (folder, *folder.parents) if not each.exists()]
         try:
-            out.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise FileAccessError(f"cannot write {out}: {error.strerror or error}") from error
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                reason = error.strerror or error
+                raise FileAccessError(f"cannot write {self.out}: {reason}") from error
+            yield
+        finally:
+            for each in made:
+                if each.is_dir() and not any(each.iterdir()):
+                    each.rmdir()
 
     def filled(self) -> "NewSettings":
         """Return settings with a guess for all that is None, by the robot and the mesh.
@@ -117,7 +140,7 @@ class NewSettings:
             tool_mass=self.tool_mass or f"{arm._size[2]:g} kg",
             marker_place=self.marker_place or "70 mm, 0 mm, -110 mm",
             process=self.process or NONE,
-            tolerance=self.tolerance or NONE,
+            accepted=self.accepted or NONE,
         )
         done = replace(
             done,
@@ -156,7 +179,7 @@ class NewSettings:
         ElastocalError
             Which says what is allowed.
         """
-        if text == NONE and name in ("force_range", "tracker", "process", "tolerance"):
+        if text == NONE and name in ("force_range", "tracker", "process", "accepted"):
             return
         if name in ("robot", "flange"):
             _ = replace(self, **{name: text}).arm  # type: ignore[arg-type]

@@ -336,12 +336,7 @@ def _notes(
 ) -> tuple[str, ...]:
     notes: list[str] = []
     if seeds == 1:
-        notes.append(
-            phrase(
-                "one simulated run only: another seed would give other figures; there is no"
-                " interval"
-            )
-        )
+        notes.append(phrase("one simulated run: another seed gives other figures; no interval"))
     if settings.path is not None:
         sizes = [np.linalg.norm(course.force, axis=1) for course in courses]
         sudden = [

@@ -29,9 +29,9 @@ _QUESTIONS = {
     "moment_range": "Its largest moments: mx, my, mz",
     "tracker": "Laser tracker, its place in the robot's base: x, y, z, or none",
     "marker_place": "Marker from the tool tip: x, y, z",
-    "tolerance": "Largest error of a predicted deflection that the report lets pass, or none",
+    "accepted": "Largest error of a predicted deflection that the report lets pass, or none",
 }
-"""What is asked, in this order; the key is the field and the option."""
+"""What is asked, in this order; the key is the field."""
 
 
 def _new(  # noqa: PLR0913 - one parameter an option
@@ -151,9 +151,9 @@ def _answer(settings: "NewSettings", name: str, question: str) -> str:
     while True:
         try:
             text: str = typer.prompt(question, default=offered, err=True)
-        except typer.Abort as end:
+        except (typer.Abort, OSError) as end:
             output.console().print()  # the question has no end of its line
-            if not isinstance(end.__context__, EOFError):
+            if isinstance(end, typer.Abort) and not isinstance(end.__context__, EOFError):
                 raise KeyboardInterrupt from end
             raise ProcedureError(
                 "nobody answers: standard input has ended; give options instead"

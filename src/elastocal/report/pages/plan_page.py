@@ -31,6 +31,7 @@ from elastocal.report.plots import (
     plan_view,
     weakest_margins,
 )
+from elastocal.results import brief_repr
 from elastocal.wording import (
     counted,
     duration,
@@ -115,6 +116,7 @@ def write_plan_page(
     return Path(path)
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ExpectedTable:
     """The error to expect on production from some numbers of poses, and what they take."""
