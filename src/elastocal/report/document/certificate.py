@@ -20,8 +20,8 @@ from elastocal.verdict import (
 )
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
-_MOST_REASONS, _LONGEST = 3, 170
-"""Reasons on the sheet, and letters of one: the rest stands in the appendix."""
+_MOST_REASONS = 3
+"""Reasons on the sheet, on paper of two or three lines each: the rest stands in the appendix."""
 _LONG_REASON, _LONG_NAME = 110, 60
 _WIDE, _HIGH = 600.0, 190.0
 """Inner size of the picture before and after, in its own units."""
@@ -118,7 +118,7 @@ def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = 
     signer : str
         Public key of who signs the report; empty where nobody does.
     """
-    reasons = tuple(map(_short, verdict.reasons[:_MOST_REASONS]))
+    reasons = tuple(verdict.reasons[:_MOST_REASONS])
     known, missing = _identity(evidence)
     return Certificate(
         evidence.certificate.number or "",
@@ -138,10 +138,6 @@ def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = 
         else phrase("This report carries no electronic signature."),
         _run_signature(evidence),
     )
-
-
-def _short(reason: str) -> str:
-    return reason if len(reason) <= _LONGEST else f"{reason[: _LONGEST - 1].rstrip()}…"
 
 
 def _more(reasons: int) -> Phrase | None:
