@@ -58,8 +58,12 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
         data = data.translate(_ASCII).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
         mesh: object = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
-    # What the readers of trimesh raise on bad contents is not documented; these were seen.
-    except (ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
+    # What the readers of trimesh raise on bad contents is not documented; these were seen, or their
+    # like.
+    except (
+        *(ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, RuntimeError),
+        *(TypeError, ValueError),
+    ) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise SchemaError(f"mesh {path} is not a readable {suffix[1:]}: {reason}") from error
     for name in ("vertices", "faces"):
