@@ -15,12 +15,14 @@ from elastocal.logs.map import LogEntry, MarkerColumns, Site, ToolPose, Vector
 from elastocal.logs.table import LogTable
 from elastocal.procedure import PoseReadings
 from elastocal.robot import Robot, nearest_rotation, xyzabc_from_T
-from elastocal.units import factor
+from elastocal.units import factor, largest
 
 _LARGEST_GAP = (20e-3, np.radians(2.0))
 """Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
 that is not calibrated is off by some millimetres, another frame by more."""
 ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
+_WRONG_UNIT = 1e3
+"""How much larger than anything of a cell a number may be until what contradicts it names the unit."""
 _UNIT_NORM = 1e-2
 """Distance of a quaternion's norm from 1: four columns of few digits are nearer."""
 _PULL = 0.5
@@ -38,9 +40,27 @@ _LEAST_SPREAD = 0.05
 
 
 def vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> FloatArray:
-    """Return three columns in SI units, shape (row, 3)."""
+    """Return three columns in SI units, shape (row, 3).
+
+    Raises
+    ------
+    LogError
+        If a number is larger than any of a robot cell.
+    """
     scale = factor(vector.unit, dimension) / getattr(vector, "counts", 1.0)
-    return scale * np.column_stack([table.numbers(column) for column in vector.columns])
+    most, name = largest(dimension)
+    with np.errstate(over="ignore"):
+        found: FloatArray = scale * np.column_stack(
+            [table.numbers(column) for column in vector.columns]
+        )
+    beyond = np.argwhere(np.abs(found) > _WRONG_UNIT * most)
+    if len(beyond):
+        row, axis = beyond[0].tolist()
+        raise LogError(
+            f"{table.name}: row {row + 1} of the data: {vector.columns[axis]!r} is"
+            f" {found[row, axis]:.3g} in SI units: the largest {dimension} is {name}"
+        )
+    return found
 
 
 def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) -> FloatArray:
