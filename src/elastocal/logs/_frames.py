@@ -22,7 +22,7 @@ _LARGEST_GAP = (20e-3, np.radians(2.0))
 that is not calibrated is off by some millimetres, another frame by more."""
 ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
 _WRONG_UNIT = 1e3
-"""How much larger than all in a cell a number may be: up to there, what contradicts it says more."""
+"""How much larger than all in a cell a number may be: up to there the arm contradicts its unit."""
 _UNIT_NORM = 1e-2
 """Distance of a quaternion's norm from 1: four columns of few digits are nearer."""
 _PULL = 0.5
