@@ -85,7 +85,12 @@ from .identity import (
     fingerprint as fingerprint,
     named_files as named_files,
 )
-from .line_counts import COUNTED as COUNTED, LineCounts as LineCounts, no_lines as no_lines
+from .line_counts import (
+    COUNTED as COUNTED,
+    LineCounts as LineCounts,
+    no_lines as no_lines,
+    refused_telegrams as refused_telegrams,
+)
 from .motion import (
     MotionEntry as MotionEntry,
     axis_speeds as axis_speeds,

@@ -43,11 +43,14 @@ class LineCounts:
     """What the device has said is wrong, by name."""
     answer: tuple[float, float, float] | None = None
     """Time of answers, median, 99 %, longest, in s; None where nothing is answered."""
+    refused: str = ""
+    """Why malformed messages were refused; empty where the driver does not say."""
 
     def sentence(self) -> str:
         """Return what was counted, in words; what did not happen is left out."""
         counts = [(name, getattr(self, key)) for key, name in COUNTED]
         wrong = [f"{count} {name}" for name, count in counts if count] + [*self.status]
+        wrong += [f"refused: {self.refused}"] if self.refused else []
         text = f"{self.device}: {self.received} received, {', '.join(wrong) or 'none lost'}"
         if self.answer is None:
             return text
@@ -64,8 +67,29 @@ class LineCounts:
             received=self.received + other.received,
             status=tuple(dict.fromkeys(self.status + other.status)),
             answer=(max(a), max(b), max(c)) if times else None,
+            refused=self.refused or other.refused,
             **sums,
         )
+
+
+def refused_telegrams(malformed: int, refused: str, foreign: int) -> str:
+    """Return in words what came on a line from which nothing could be read.
+
+    Parameters
+    ----------
+    malformed : int
+        Telegrams that were refused.
+    refused : str
+        Why.
+    foreign : int
+        Datagrams of others than the device.
+
+    >>> refused_telegrams(1600, "RIst.X is '1620,9999', no number: decimal comma", 0)
+    "1600 telegrams refused: RIst.X is '1620,9999', no number: decimal comma"
+    """
+    said = [f"{malformed} telegrams refused: {refused}"] if malformed else []
+    said += [f"{foreign} datagrams from elsewhere"] if foreign else []
+    return "; ".join(said) or "no datagram came"
 
 
 def no_lines() -> tuple[LineCounts, ...]:

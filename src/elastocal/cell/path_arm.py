@@ -87,6 +87,8 @@ class CycleStatistics:
     answer_longest: float | None
     jitter: float | None
     """Standard deviation of the time between messages, in s."""
+    refused: str = ""
+    """Why malformed messages were refused; empty: none was, or the driver does not say."""
 
     @property
     def late_share(self) -> float:
@@ -101,7 +103,7 @@ class CycleStatistics:
             f"{self.answered} of {self.received} answered in {shown} ms (median, 99 %, 99.9 %,"
             f" longest); {self.late} late, {self.lost} lost, {self.skipped} skipped,"
             f" {self.out_of_order} out of order, {self.jumps} jumps of the count, {self.malformed}"
-            f" malformed, {self.foreign} foreign"
+            f" malformed{f' ({self.refused})' if self.refused else ''}, {self.foreign} foreign"
         )
 
 

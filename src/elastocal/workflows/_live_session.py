@@ -21,6 +21,7 @@ from elastocal.cell import (
     PathLimits,
     RigContext,
     WallClock,
+    refused_telegrams,
 )
 from elastocal.compensation.online import (
     Compensator,
@@ -299,9 +300,11 @@ class LiveSession:
             if self._interrupted():
                 raise KeyboardInterrupt
             if time.monotonic() > end:
+                line = arm.statistics()
+                came = refused_telegrams(line.malformed, line.refused, line.foreign)
                 raise DeviceError(
-                    f"nothing from the controller for {_WAIT:g} s: start its program now, while"
-                    " elastocal listens"
+                    f"nothing from the controller for {_WAIT:g} s ({came}): start its program now,"
+                    " while elastocal listens"
                 )
         return time.monotonic()
 

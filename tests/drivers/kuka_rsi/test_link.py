@@ -126,6 +126,19 @@ def test_what_is_malformed_is_counted_and_not_answered():
     assert link.statistics().malformed == 1
 
 
+def test_a_refused_telegram_is_explained_once_where_the_reason_stays_the_same():
+    link, _ = make()
+    for x in ("1620,9999", "1621,0000"):
+        link.answer(f'<Rob><RIst X="{x}"/><IPOC>4</IPOC></Rob>'.encode(), CONTROLLER)
+    counts = link.statistics()
+    assert counts.refused == "RIst.X is '1620,9999', no number: decimal comma"
+    assert "2 malformed (RIst.X is '1620,9999'" in counts.sentence()
+    assert "refused: RIst.X is '1620,9999'" in counts.counts(0, "arm").sentence()
+    link.answer(b"<Rob><IPOC></IPOC></Rob>", CONTROLLER)
+    assert link.statistics().last_refused == "IPOC is '', must be a whole number"
+    assert link.statistics().refused.startswith("first RIst.X is '1620,9999'")
+
+
 def test_late_answers_and_the_controllers_own_count_are_kept():
     link, _ = make(step=0.0036)
     for number, ipoc in enumerate((4, 8, 12)):

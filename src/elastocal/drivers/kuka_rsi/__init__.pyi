@@ -44,9 +44,9 @@ from .force_control import (
 from .link import (
     Handler as Handler,
     LinkAddress as LinkAddress,
-    LinkStatistics as LinkStatistics,
     RsiLink as RsiLink,
 )
+from .link_statistics import LinkCounts as LinkCounts, LinkStatistics as LinkStatistics
 from .messages import (
     MOST_BYTES as MOST_BYTES,
     NO_CORRECTION as NO_CORRECTION,

@@ -259,4 +259,5 @@ class CorrectedKuka:
             answer_p999=times.quantile(0.999),
             answer_longest=times.longest if times.count else None,
             jitter=None if math.isnan(counts.jitter) else counts.jitter,
+            refused=counts.refused,
         )

@@ -14,6 +14,7 @@ from elastocal.cell import (
     PathSource,
     RigContext,
     WrenchFeed,
+    refused_telegrams,
 )
 from elastocal.drivers.kuka_rsi.arm import KukaArm
 from elastocal.drivers.kuka_rsi.corrections import CorrectedKuka
@@ -55,9 +56,9 @@ def connect_arm(
         link.close()
         raise DeviceError(
             f"kuka_rsi: nothing from {settings.robot} at {settings.address}:{link.port} for"
-            f" {settings.wait:g} s ({statistics.malformed} malformed datagrams,"
-            f" {statistics.foreign} from elsewhere): start the program on the controller now,"
-            " while elastocal listens"
+            f" {settings.wait:g} s ("
+            f"{refused_telegrams(statistics.malformed, statistics.refused, statistics.foreign)}):"
+            " start the program on the controller now, while elastocal listens"
         )
     # The first messages come before the program is in its loop.
     end = time.monotonic() + _TO_THE_LOOP

@@ -13,14 +13,12 @@ import struct
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
-from elastocal.cell import AnswerTimes, Clock, LineCounts
+from elastocal.cell import AnswerTimes, Clock
+from elastocal.drivers.kuka_rsi.link_statistics import LinkCounts, LinkStatistics
 from elastocal.drivers.kuka_rsi.messages import (
     MOST_BYTES,
     Arrival,
@@ -32,14 +30,11 @@ from elastocal.drivers.kuka_rsi.messages import (
     write_sen,
 )
 from elastocal.errors import DeviceError, ElastocalError
-from elastocal.records import record
 
 _PATIENCE = 0.1
 """How long the thread waits for a datagram before it looks whether it is to end, in s."""
 _LATE = 0.875
 """Part of the cycle after which an answer is likely to miss it: 3.5 ms of 4 ms."""
-_KEPT = 20_000
-"""Messages whose distances are kept for the statistics."""
 _SESSION = 0.5
 """Time after the last message at which a controller may come back from another port, in s."""
 _STAMP, _STAMPED = 35, struct.Struct("@qq")
@@ -59,69 +54,6 @@ class Handler(Protocol):
         """Return the answer to a message, at once; None where none is to be given."""
 
 
-@record()
-class LinkStatistics:
-    """Counts of a link since it was opened, and times of its answers."""
-
-    received: int
-    answered: int
-    lost: int
-    """Messages that never came, by the gaps of IPOC."""
-    skipped: int
-    """Messages that were not answered, because a newer one had come."""
-    out_of_order: int
-    jumps: int
-    late: int
-    """Answers that took longer than seven eighths of a cycle."""
-    malformed: int
-    foreign: int
-    """Datagrams of others than the controller; they are neither read nor answered."""
-    overtures: int
-    """Short first messages of RSI 2."""
-    controller_delay: int | None
-    """Largest Delay D that the controller has reported; None when it does not send it."""
-    answer_median: float
-    """From datagram in to datagram out, in s; NaN before the first."""
-    answer_p99: float
-    answer_longest: float
-    jitter: float
-    """Standard deviation of the time between messages, in s."""
-
-    def counts(self, saturated: int, device: str) -> LineCounts:
-        """Return the counts as the record of a run has them.
-
-        Parameters
-        ----------
-        saturated : int
-            Cycles in which the controller clamped.
-        device : str
-            Name with address.
-        """
-        times = (self.answer_median, self.answer_p99, self.answer_longest)
-        return LineCounts(
-            device=device,
-            received=self.received,
-            lost=self.lost + self.skipped,
-            late=self.late,
-            out_of_order=self.out_of_order,
-            jumps=self.jumps,
-            malformed=self.malformed,
-            foreign=self.foreign,
-            saturated=saturated,
-            answer=times if self.answered else None,
-        )
-
-    def sentence(self) -> str:
-        """Return the counts in words."""
-        times = f"{1e3 * self.answer_median:.2f} / {1e3 * self.answer_p99:.2f}"
-        return (
-            f"{self.answered} of {self.received} messages answered in {times} /"
-            f" {1e3 * self.answer_longest:.2f} ms (median, 99 %, longest); {self.lost} lost,"
-            f" {self.skipped} skipped, {self.late} late, {self.out_of_order} out of order,"
-            f" {self.jumps} IPOC jumps, {self.malformed} malformed, {self.foreign} foreign"
-        )
-
-
 @dataclass(frozen=True)
 class LinkAddress:
     """Where a link listens, and to whom."""
@@ -136,22 +68,6 @@ class LinkAddress:
     """In s."""
     answers: bool = True
     """False: measure only, the controller does not listen (``ONLYSEND``)."""
-
-
-@dataclass
-class _Counts:
-    received: int = 0
-    answered: int = 0
-    skipped: int = 0
-    out_of_order: int = 0
-    jumps: int = 0
-    late: int = 0
-    malformed: int = 0
-    foreign: int = 0
-    overtures: int = 0
-    controller_delay: int | None = None
-    took: AnswerTimes = field(default_factory=AnswerTimes)
-    between: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
 
 
 class RsiLink:
@@ -177,7 +93,7 @@ class RsiLink:
         timer: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._place, self._handler, self._clock, self._timer = place, handler, clock, timer
-        self._counts, self._ipoc = _Counts(), IpocWatch(place.cycle)
+        self._counts, self._ipoc = LinkCounts(), IpocWatch(place.cycle)
         self._socket: socket.socket | None = None
         self._thread: threading.Thread | None = None
         self._closing, self._heard = threading.Event(), threading.Event()
@@ -241,25 +157,7 @@ class RsiLink:
     def statistics(self) -> LinkStatistics:
         """Return the counts so far."""
         counts = self._counts
-        median, p99 = counts.took.quantile(0.5), counts.took.quantile(0.99)
-        between = list(counts.between)
-        return LinkStatistics(
-            received=counts.received,
-            answered=counts.answered,
-            lost=max(self._ipoc.lost - counts.skipped, 0),
-            skipped=counts.skipped,
-            out_of_order=counts.out_of_order,
-            jumps=counts.jumps,
-            late=counts.late,
-            malformed=counts.malformed,
-            foreign=counts.foreign,
-            overtures=counts.overtures,
-            controller_delay=counts.controller_delay,
-            answer_median=math.nan if median is None else median,
-            answer_p99=math.nan if p99 is None else p99,
-            answer_longest=counts.took.longest if counts.took.count else math.nan,
-            jitter=float(np.std(between)) if between else float("nan"),
-        )
+        return counts.statistics(lost=max(self._ipoc.lost - counts.skipped, 0))
 
     @property
     def times(self) -> AnswerTimes:
@@ -294,8 +192,8 @@ class RsiLink:
             return None
         try:
             message = read_rob(datagram)
-        except DeviceError:
-            counts.malformed += 1
+        except DeviceError as error:
+            counts.refuse(str(error).removeprefix("RSI datagram: "))
             return None
         reply = self._reply(message)
         if reply is None or not self._place.answers:

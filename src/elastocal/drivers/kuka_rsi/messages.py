@@ -10,7 +10,6 @@ none. Sources: ros-industrial/kuka_experimental and kroshu/kuka-external-control
 both messages). Verified against simulators and public layouts, not on hardware.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
@@ -34,6 +33,8 @@ _READ = {
     "krl": ("n", "state"),
 }
 """Elements that are read with their attributes, in small letters; all others are let pass."""
+_NAMES = dict(zip(_READ, ("RIst", "RSol", "AIPos", "EIPos", "Delay", "Krl"), strict=True))
+"""Their names as a controller writes them."""
 _OPTIONAL = frozenset({"eipos"})
 """Elements of which some attributes may be missing: a robot without external axes."""
 _LARGEST = 1e7
@@ -297,14 +298,24 @@ def _numbers(name: str, given: dict[str, str]) -> tuple[float, ...]:
 
 def _number(name: str, key: str, text: str | None) -> float:
     if text is None:
-        raise DeviceError(f"RSI datagram: {name} has no {key.upper()}")
+        raise DeviceError(f"RSI datagram: {_NAMES[name]} has no {key.upper()}")
+    what = f"RSI datagram: {_NAMES[name]}.{key.upper()} is {text!r:.30}"
     try:
         value = parse_number(text)
     except ValueError:
-        value = math.nan
+        comma = ": decimal comma" if _is_number(text.replace(",", ".", 1)) else ""
+        raise DeviceError(f"{what}, no number{comma}") from None
     if not abs(value) <= _LARGEST:
-        raise DeviceError(f"RSI datagram: {name}.{key.upper()} is {text!r:.30}, no number in range")
+        raise DeviceError(f"{what}, no number in range")
     return value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        parse_number(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _six(values: tuple[float, ...] | None) -> Six | None:
