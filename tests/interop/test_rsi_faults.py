@@ -25,7 +25,7 @@ CYCLES = 40
 
 
 class Nothing:
-    def correction(self, _message, _now, _begins):
+    def correction(self, _message, _now, _effect):
         return np.zeros(3)
 
 

@@ -31,7 +31,12 @@ class PathCycle(NamedTuple):
     q: Sequence[float]
     """Joint positions of the controller, in rad or m, in the order of the robot's joints."""
     begins: bool
-    """Whether no correction is in effect: the first cycle, or the program was started anew."""
+    """Whether the program begins, without correction: the first cycle, or it was started anew."""
+    effect: Shift | None = None
+    """Correction in effect, in m, that the answer goes on from; None: the last answer."""
+    holds: bool = False
+    """Whether the answer will be `effect`: the one before was lost, and what is lost must not add
+    up."""
 
 
 class PathSource(Protocol):
@@ -87,6 +92,11 @@ class CycleStatistics:
     answer_longest: float | None
     jitter: float | None
     """Standard deviation of the time between messages, in s."""
+    largest_step: float = 0.0
+    """Largest change of the correction from one answer to the next, in m; from zero where a program
+    begins."""
+    withheld: int = 0
+    """Cycles that were not answered, because nothing told which correction is in effect."""
     refused: str = ""
     """Why malformed messages were refused; empty: none was, or the driver does not say."""
 

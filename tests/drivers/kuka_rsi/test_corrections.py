@@ -89,7 +89,7 @@ def test_a_few_lost_answers_are_made_up_for_and_are_no_saturation():
 class Wants:
     wanted: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
-    def correction(self, _message, _now, _begins):
+    def correction(self, _message, _now, _effect):
         return self.wanted
 
 
@@ -110,21 +110,155 @@ def test_corrections_of_a_path_are_absolute_bounded_and_never_jump():
     assert not last.stop
 
 
+@dataclass
+class Controller:
+    """A controller that holds its last absolute correction, and its handler; x alone, in mm.
+
+    It follows a correction some cycles later, and counts answers that it misses.
+    """
+
+    handler: PathCorrections
+    follows: int = 2
+    tells: bool = True
+    time: float = 10.0
+    held: float = 0.0
+    missed: int = 0
+    largest: float = 0.0
+    """Largest change of what it holds, in one cycle."""
+
+    def __post_init__(self):
+        self.late = [0.0] * self.follows
+        self.first = Arrival.FIRST
+
+    def cycle(self, arrival=Arrival.NEXT, lost=False, unheard=False):
+        """Do a cycle whose answer, or whose message, may be lost; return what was answered."""
+        self.time += CYCLE
+        self.late.append(self.held)
+        seen = (self.late.pop(0), 0.0, 0.0, 0.0, 0.0, 0.0)
+        message = RobMessage(0, actual=seen, setpoint=(0.0,) * 6, delay=self.missed)
+        if not self.tells:
+            message = RobMessage(0)
+        arrival, self.first = self.first or arrival, None
+        answer = None if unheard else self.handler.step(message, arrival, self.time)
+        if lost or answer is None:
+            self.missed += 1
+        else:
+            x, self.missed = answer.correction[0], 0
+            self.largest, self.held = max(self.largest, abs(x - self.held)), x
+        return answer
+
+    def restart(self):
+        self.held, self.missed, self.late = 0.0, 0, [0.0] * self.follows
+
+
+def controlled(wanted=1e-3, cycles=20, delay=0.008, timeout=10, **facts):
+    wants = Wants(np.array([wanted, 0.0, 0.0]))
+    handler = PathCorrections(wants, BOUNDS, CYCLE, timeout=timeout, delay=delay)
+    far = Controller(handler, **facts)
+    for _ in range(cycles):
+        far.cycle()
+    return far, wants
+
+
+LIMIT = 0.2 * (1 + 1e-9)
+"""Largest step, in mm."""
+
+
 def test_a_program_that_was_started_anew_begins_without_correction():
-    handler = PathCorrections(Wants(np.array([1e-3, 0.0, 0.0])), BOUNDS, CYCLE)
-    for k in range(10):
-        handler.step(RobMessage(k), Arrival.NEXT, 0.0)
-    again = handler.step(RobMessage(90), Arrival.JUMPED, 0.0)
-    assert again.correction[0] == pytest.approx(0.2)
+    far, _ = controlled()
+    assert far.held == pytest.approx(1.0)
+    far.restart()
+    assert far.cycle(Arrival.JUMPED).correction[0] == pytest.approx(0.2)
+    assert far.largest <= LIMIT
 
 
-@pytest.mark.parametrize(("lost", "anew"), [(9, False), (11, True)])
-def test_who_was_without_an_answer_beyond_the_timeout_begins_without_correction(lost, anew):
-    handler = PathCorrections(Wants(np.array([1e-3, 0.0, 0.0])), BOUNDS, CYCLE, timeout=10)
-    for k in range(10):
-        handler.step(RobMessage(4 * k), Arrival.NEXT, 0.0)
-    after = handler.step(RobMessage(4 * (10 + lost)), Arrival.AFTER_LOSS, 0.0)
-    assert after.correction[0] == pytest.approx(0.2 if anew else 1.0)
+def test_a_jump_of_the_count_alone_takes_no_correction_back():
+    far, wants = controlled()
+    assert far.cycle(Arrival.JUMPED).correction[0] == pytest.approx(1.0)
+    wants.wanted = np.array([2e-3, 0.0, 0.0])
+    assert [far.cycle().correction[0] for _ in range(3)] == pytest.approx([1.0, 1.2, 1.4])
+    assert far.largest <= LIMIT
+
+
+def test_a_jump_on_the_way_is_not_answered_until_the_arm_shows_what_is_in_effect():
+    far, _ = controlled(cycles=3, follows=4, delay=0.016)
+    answers = [far.cycle(Arrival.JUMPED)] + [far.cycle() for _ in range(6)]
+    assert answers[0] is None
+    assert answers[-1] is not None
+    assert far.handler.withheld > 0
+    assert far.largest <= LIMIT
+    for _ in range(10):
+        far.cycle()
+    assert far.held == pytest.approx(1.0)
+    assert far.largest <= LIMIT
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+@pytest.mark.parametrize("lost", [9, 11, 20, 300])
+def test_after_a_silence_of_any_length_the_arm_shows_where_the_correction_goes_on(lost, restarts):
+    far, _ = controlled(timeout=10)
+    for _ in range(lost):
+        far.cycle(unheard=True)
+    if restarts and lost > 10:
+        far.restart()
+    far.cycle(Arrival.AFTER_LOSS)
+    for _ in range(20):
+        far.cycle()
+    assert far.largest <= LIMIT
+    assert far.held == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("lost", "anew"), [(9, False), (20, True)])
+def test_without_rist_and_rsol_a_silence_beyond_timeout_counts_as_a_stop(lost, anew):
+    far, _ = controlled(timeout=10, tells=False)
+    for _ in range(lost):
+        far.cycle(unheard=True)
+    again = far.cycle(Arrival.AFTER_LOSS).correction[0]
+    assert again == pytest.approx(0.2 if anew else 1.0)
+
+
+def test_without_rist_and_rsol_a_jump_within_timeout_goes_on():
+    far, _ = controlled(tells=False)
+    assert far.cycle(Arrival.JUMPED).correction[0] == pytest.approx(1.0)
+
+
+def test_lost_answers_do_not_add_up():
+    far, _ = controlled(cycles=3)
+    held = far.held
+    answers = [far.cycle(lost=True).correction[0] for _ in range(9)]
+    assert answers[1:] == pytest.approx([held] * 8)
+    again = [far.cycle().correction[0] for _ in range(4)]
+    assert again == pytest.approx([held, held, held + 0.2, held + 0.4])
+    assert far.largest <= LIMIT
+    assert far.handler.largest_step * 1e3 <= LIMIT
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_is_lost_the_controller_never_takes_more_than_a_step(seed):
+    rng = np.random.default_rng(seed)
+    far, wants = controlled(cycles=1, timeout=100, follows=int(rng.integers(1, 6)), delay=0.024)
+    for _ in range(1500):
+        if rng.random() < 0.05:
+            wants.wanted = rng.uniform(-2e-3, 2e-3) * np.array([1.0, 0.0, 0.0])
+        event = rng.choice(["none", "lost", "unheard", "jump", "restart"], p=[
+            0.85, 0.07, 0.05, 0.02, 0.01])  # fmt: skip
+        for _ in range(int(rng.integers(1, 12)) if event in ("lost", "unheard") else 0):
+            far.cycle(lost=event == "lost", unheard=event == "unheard")
+        if event == "restart":
+            far.restart()
+        jumped = event in ("jump", "restart")
+        unheard = Arrival.AFTER_LOSS if event == "unheard" else Arrival.NEXT
+        far.cycle(Arrival.JUMPED if jumped else unheard)
+        assert far.largest <= LIMIT, event
+
+
+def test_a_correction_that_is_not_of_this_program_is_refused():
+    handler = PathCorrections(Wants(), BOUNDS, CYCLE)
+    message = RobMessage(0, actual=(0.62, 0.0, 0.0, 0.0, 0.0, 0.0), setpoint=(0.0,) * 6)
+    with pytest.raises(DeviceError, match=r"RIst is 0\.62 mm from RSol before the first answer"):
+        handler.step(message, Arrival.FIRST, 0.0)
+    message = RobMessage(0, actual=(0.01, 0.0, 0.0, 0.0, 0.0, 0.0), setpoint=(0.0,) * 6)
+    assert handler.step(message, Arrival.NEXT, 0.0).correction[0] == 0.0
 
 
 def test_corrections_that_are_over_raise_stop_and_go_back_at_the_same_speed():
@@ -197,6 +331,7 @@ def test_a_kuka_on_its_path_gives_joints_and_takes_what_its_source_wants(correct
 
 def test_a_program_whose_tool_is_elsewhere_gets_no_answer(corrected):
     arm, source, message = corrected
+    assert arm._link.answer(message(4, shift=40.0), SENDER) is None
     with pytest.raises(DeviceError, match=r"RIst is 40\.0 mm .* check \$TOOL, \$BASE"):
-        arm._link.answer(message(4, shift=40.0), SENDER)
+        arm.require()
     assert not source.seen

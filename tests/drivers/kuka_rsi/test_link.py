@@ -25,12 +25,12 @@ class Echo:
 
     def __init__(self) -> None:
         self.heard: list[tuple[int, Arrival]] = []
-        self.fails = False
+        self.fails: Exception | None = None
 
     def step(self, message, arrival, _now):
         self.heard.append((message.ipoc, arrival))
-        if self.fails:
-            raise DeviceError("planted")
+        if self.fails is not None:
+            raise self.fails
         return SenMessage(order=Order.GUIDE)
 
 
@@ -80,6 +80,30 @@ def test_a_restart_that_counts_from_the_beginning_is_a_jump():
     assert [watch.classify(ipoc) for ipoc in (5_000_000, 40)] == [Arrival.FIRST, Arrival.JUMPED]
 
 
+def test_ipoc_begins_again_at_zero_after_32_bits():
+    watch = IpocWatch(0.004)
+    found = [watch.classify(ipoc) for ipoc in (2**32 - 4, 0, 8, 4)]
+    assert found == [Arrival.FIRST, Arrival.NEXT, Arrival.AFTER_LOSS, Arrival.OUT_OF_ORDER]
+    assert watch.lost == 1
+
+
+def test_a_count_that_goes_on_a_little_lower_is_a_program_that_was_started_anew():
+    watch = IpocWatch(0.004)
+    order = (5000, 5004, 4604, 4608, 4612, 4616)
+    assert [watch.classify(ipoc) for ipoc in order][2:] == [
+        Arrival.OUT_OF_ORDER, Arrival.OUT_OF_ORDER, Arrival.JUMPED, Arrival.NEXT
+    ]  # fmt: skip
+
+
+def test_old_messages_that_do_not_follow_one_another_stay_old():
+    watch = IpocWatch(0.004)
+    order = (5000, 5004, 4900, 5008, 4904, 5012, 4908, 4600, 4700)
+    found = [watch.classify(ipoc) for ipoc in order]
+    assert [each is Arrival.OUT_OF_ORDER for each in found] == [
+        False, False, True, False, True, False, True, True, True
+    ]  # fmt: skip
+
+
 def test_simulators_that_count_messages_by_one_are_followed():
     watch = IpocWatch(0.004)
     found = [watch.classify(ipoc) for ipoc in (7, 8, 9, 11, 10)]
@@ -107,7 +131,8 @@ def test_a_second_robot_at_the_same_address_is_not_heard_until_the_first_is_sile
     assert link.answer(rob(8), CONTROLLER) is not None
     assert link.statistics().foreign == 1
     link._timer.time += 0.6
-    assert link.answer(rob(900), second) is not None
+    assert link.answer(rob(4), second) is not None
+    assert link.statistics().jumps == 1
 
 
 def test_the_short_first_message_of_rsi_2_is_dropped_and_only_the_first():
@@ -186,18 +211,26 @@ def test_a_port_that_is_taken_is_refused_with_its_address():
         link.close()
 
 
-def test_what_the_thread_caught_is_raised_at_the_next_call():
+@pytest.mark.parametrize("planted", [DeviceError("planted"), ZeroDivisionError("planted")])
+def test_what_a_handler_raises_is_kept_and_does_not_end_the_thread(planted):
     link, echo = make()
-    echo.fails = True
+    echo.fails = planted
     link.require()
     link.start()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
-        robot.sendto(rob(4), (ROBOT, link.port))
-        assert link._thread is not None
-        link._thread.join(10.0)
-    with pytest.raises(DeviceError, match="the link broke: planted"):
-        link.require()
-    link.close()
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
+            robot.settimeout(0.2)
+            robot.sendto(rob(4), (ROBOT, link.port))
+            with pytest.raises(TimeoutError):
+                robot.recv(4096)
+            robot.settimeout(PATIENCE)
+            echo.fails = None
+            robot.sendto(rob(8), (ROBOT, link.port))
+            assert b"<IPOC>8</IPOC>" in robot.recv(4096)
+        with pytest.raises(DeviceError, match=r"kuka_rsi: no answer is given: .*planted"):
+            link.require()
+    finally:
+        link.close()
 
 
 def test_the_counts_of_a_run_are_those_of_the_link():

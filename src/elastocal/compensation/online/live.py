@@ -99,7 +99,8 @@ class LiveCounts:
     largest_correction: float
     """In m."""
     largest_step: float
-    """Largest change of the correction from one cycle to the next, restarts apart, in m."""
+    """Largest change of the correction from one answer to the next, in m; from zero where a
+    program begins."""
     largest_half_width: float
     """Half the widest 95 % interval of a predicted deflection, in m."""
 
@@ -235,9 +236,11 @@ class LiveLoop:
             self._begin()
             self._begin = None
         if cycle.begins:
-            # The controller has no correction in effect: here, too, it begins at zero.
             self._state = self._compensator.start()
             self._restarts += 1
+        if cycle.effect is not None:
+            # Answers get lost: the ramp goes on from what the controller holds.
+            self._state = self._state._replace(correction=cycle.effect)
         sample = self._read(cycle.q)
         if self.phase is LivePhase.OVER:
             return None
@@ -277,12 +280,12 @@ class LiveLoop:
 
     def _answer(self, cycle: PathCycle, sample: LiveSample | None) -> Triple:
         """Return the correction of the state, and note it."""
-        before = self._state.correction
+        here = self._state.correction
+        before = here if self.last is None or cycle.begins else self.last.correction
         self._state, answer = self._compensator.correct(self._state, cycle.q)
-        correction, status = answer.correction, answer.status
+        correction, status = here if cycle.holds else answer.correction, answer.status
         self._statuses[status] = self._statuses.get(status, 0) + 1
-        if not cycle.begins:
-            self._farthest = max(self._farthest, math.dist(before, correction))
+        self._farthest = max(self._farthest, math.dist(before, correction))
         self._longest = max(self._longest, math.hypot(*correction))
         self._widest = max(self._widest, answer.half_width)
         self.last = LiveCycle(

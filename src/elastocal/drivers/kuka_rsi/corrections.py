@@ -13,6 +13,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, Clock, CycleStatistics, PathCycle, PathSource, Shift
+from elastocal.drivers.kuka_rsi._held_correction import Effect, HeldCorrection
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
     NO_CORRECTION,
@@ -23,7 +24,7 @@ from elastocal.drivers.kuka_rsi.messages import (
     Six,
 )
 from elastocal.drivers.kuka_rsi.posture import PostureReader
-from elastocal.drivers.kuka_rsi.settings import FASTEST, Bounds, RsiSettings, bounds_of
+from elastocal.drivers.kuka_rsi.settings import FASTEST, LATE_DELAY, Bounds, RsiSettings, bounds_of
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
@@ -121,7 +122,7 @@ class CorrectionGuard:
 class CorrectionSource(Protocol):
     """Computes corrections of a path in the loop."""
 
-    def correction(self, message: RobMessage, now: float, begins: bool) -> Shift | None:
+    def correction(self, message: RobMessage, now: float, effect: Effect) -> Shift | None:
         """Return the whole correction in the axes of ``RefCorrSys``, in m, at once; None: no more.
 
         Parameters
@@ -130,8 +131,8 @@ class CorrectionSource(Protocol):
             Of this cycle.
         now : float
             When it came, in s of the clock.
-        begins : bool
-            Whether no correction is in effect.
+        effect : Effect
+            The correction that it goes on from.
         """
 
 
@@ -140,9 +141,9 @@ class CorrectionSource(Protocol):
 class PathCorrections:
     """Handler of a link that corrects a programmed path: absolute corrections, superposed on LIN.
 
-    What the source wants is clamped to the largest correction, and approached at the fastest speed;
-    what is not finite counts as the correction before. Fading when readings fail is the source's
-    part: see `elastocal.compensation.online`.
+    What the source wants is clamped to the largest correction, and approached at the fastest speed
+    from what the controller holds; what is not finite counts as that. Fading when readings fail is
+    the source's part: see `elastocal.compensation.online`.
     """
 
     source: CorrectionSource
@@ -150,30 +151,41 @@ class PathCorrections:
     cycle: float
     sentype: str = "elastocal"
     timeout: int = 10
-    """Of the controller's ETHERNET object: whoever was without an answer for more cycles begins
-    anew, without correction."""
+    """Of the controller's ETHERNET object: whoever was silent for more cycles may have stopped, and
+    begin anew without correction."""
+    delay: float = LATE_DELAY
+    """From a correction to its motion, at most, in s."""
     clamped: int = 0
     """Cycles in which the source wanted more than the largest correction."""
     held: int = 0
     """Cycles in which it wanted what is not finite."""
-    _sent: Shift | None = None
-    _ipoc: int = 0
+    withheld: int = 0
+    """Cycles without an answer, because nothing told which correction is in effect."""
+    largest_step: float = 0.0
+    """Largest change from one answer to the next, in m; from zero where a program begins."""
+
+    def __post_init__(self) -> None:
+        """Begin without correction."""
+        self._step, self._sent = self.bounds.speed * self.cycle, (0.0, 0.0, 0.0)
+        cycles = math.ceil(self.delay / self.cycle)
+        self._controller = HeldCorrection(self._step, self.timeout * self.cycle, cycles)
 
     def step(self, message: RobMessage, arrival: Arrival, now: float) -> SenMessage | None:
         """Return the answer; see `elastocal.drivers.kuka_rsi.Handler`."""
-        gap, self._ipoc = message.ipoc - self._ipoc, message.ipoc
-        before = self._sent
-        begins = arrival is Arrival.JUMPED or gap > 1e3 * self.timeout * self.cycle
-        if before is None or begins:
-            # A program that was started anew begins without correction.
-            before, begins = (0.0, 0.0, 0.0), True
-        wanted = self.source.correction(message, now, begins)
-        if wanted is None:
-            # Over: STOP rises, and what is left of the correction is taken back at the same speed.
-            self._sent = self._bounded((0.0, 0.0, 0.0), before)
-            return SenMessage(as_millimetres(self._sent), Order.HOLD, sentype=self.sentype)
-        self._sent = self._bounded(wanted, before)
-        return SenMessage(as_millimetres(self._sent), Order.GUIDE, sentype=self.sentype)
+        effect = self._controller.look(message, arrival, now)
+        if effect is None:
+            self.withheld += 1
+            return None
+        wanted = self.source.correction(message, now, effect)
+        # Over: STOP rises, and what is left of the correction is taken back at the same speed.
+        order = Order.HOLD if wanted is None else Order.GUIDE
+        shift = effect.shift
+        if effect.advances:
+            shift = self._bounded((0.0, 0.0, 0.0) if wanted is None else wanted, shift)
+        before, self._sent = effect.shift if effect.begins else self._sent, shift
+        self.largest_step = max(self.largest_step, math.dist(before, shift))
+        self._controller.note(shift)
+        return SenMessage(as_millimetres(shift), order, sentype=self.sentype)
 
     def _bounded(self, wanted: Shift, before: Shift) -> Shift:
         # Plain floats: arrays of three would take longer than the whole of it.
@@ -189,7 +201,7 @@ class PathCorrections:
             x, y, z = share * x, share * y, share * z
         x0, y0, z0 = before
         dx, dy, dz = x - x0, y - y0, z - z0
-        length, most = math.sqrt(dx * dx + dy * dy + dz * dz), self.bounds.speed * self.cycle
+        length, most = math.sqrt(dx * dx + dy * dy + dz * dz), self._step
         if length <= most:
             return x, y, z
         share = most / length
@@ -222,7 +234,12 @@ class CorrectedKuka:
         self._reader = PostureReader(cell.robot, settings.signs)
         bounds = bounds_of(cell, settings)
         self._corrections = PathCorrections(
-            self, bounds, settings.cycle, settings.sentype, settings.timeout
+            self,
+            bounds,
+            settings.cycle,
+            settings.sentype,
+            settings.timeout,
+            settings.motion_delay(cell),
         )
         place = LinkAddress(settings.address, settings.port, settings.robot, settings.cycle)
         self._link = RsiLink(place, self._corrections, clock)
@@ -231,13 +248,14 @@ class CorrectedKuka:
         self.port = self._link.port
         """The port that it listens at."""
 
-    def correction(self, message: RobMessage, now: float, begins: bool) -> Shift | None:
+    def correction(self, message: RobMessage, now: float, effect: Effect) -> Shift | None:
         """Return what the source wants; see `CorrectionSource`."""
-        if begins:
+        if effect.begins:
             # Once a program: tool, base and signs of the axes are those of the description.
             cycle = self._reader.read(message, now, "compensation")
             self._reader.require_model(cycle, self._settings.model_tolerance)
-        return self._source.correction(PathCycle(now, self._reader.joints(message), begins))
+        joints, (shift, begins, advances) = self._reader.joints(message), effect
+        return self._source.correction(PathCycle(now, joints, begins, shift, not advances))
 
     def statistics(self) -> CycleStatistics:
         """Return the counts so far."""
@@ -253,6 +271,8 @@ class CorrectedKuka:
             foreign=counts.foreign,
             late=counts.late,
             saturated=self._corrections.clamped,
+            withheld=self._corrections.withheld,
+            largest_step=self._corrections.largest_step,
             controller_delay=counts.controller_delay,
             answer_p50=times.quantile(0.5),
             answer_p99=times.quantile(0.99),

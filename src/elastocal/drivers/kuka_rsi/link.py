@@ -7,6 +7,7 @@ time happens elsewhere. A stock kernel keeps this most of the time, not always: 
 bounds the motion are the controller's own limits, not this thread.
 """
 
+import contextlib
 import math
 import socket
 import struct
@@ -41,6 +42,9 @@ _STAMP, _STAMPED = 35, struct.Struct("@qq")
 """SO_TIMESTAMPNS of Linux, which the module `socket` does not name, and what it gives."""
 _OLDEST = 1.0
 """A stamp of the kernel that is older, in s, is none: the clock of the wall was set meanwhile."""
+_NAME = "kuka_rsi: "
+_SURPRISES = (ElastocalError, ArithmeticError, LookupError, TypeError, ValueError, OSError)
+"""What a handler may raise; it costs an answer, and not the thread that answers."""
 _Arrived = tuple[bytes, tuple[str, int], float]
 """A datagram, its sender, and how long it had waited, in s."""
 _MOST_BACKLOG = 64
@@ -100,6 +104,7 @@ class RsiLink:
         self._failure: str | None = None
         self._came: float | None = None
         self._from, self._heard_at = 0, -math.inf
+        self._anew = False
         self.port = place.port
         """The port that it listens at."""
         self.source = f"kuka_rsi {place.robot}"
@@ -152,7 +157,7 @@ class RsiLink:
             With why.
         """
         if self._failure is not None:
-            raise DeviceError(f"kuka_rsi: {self._failure}")
+            raise DeviceError(f"{_NAME}{self._failure}")
 
     def statistics(self) -> LinkStatistics:
         """Return the counts so far."""
@@ -206,11 +211,13 @@ class RsiLink:
             return False
         if sender[1] != self._from and came - self._heard_at <= _SESSION:
             return False
+        self._anew |= self._from not in (0, sender[1])
         self._from, self._heard_at = sender[1], came
         return True
 
     def _reply(self, message: RobMessage) -> SenMessage | None:
-        counts, arrival = self._counts, self._ipoc.classify(message.ipoc)
+        counts, arrival = self._counts, self._ipoc.classify(message.ipoc, self._anew)
+        self._anew = False
         if message.delay is not None:
             counts.controller_delay = max(message.delay, counts.controller_delay or 0)
         if arrival is Arrival.OUT_OF_ORDER:
@@ -218,7 +225,14 @@ class RsiLink:
             counts.out_of_order += 1
             return None
         counts.jumps += arrival is Arrival.JUMPED
-        reply = self._handler.step(message, arrival, self._clock.now())
+        try:
+            reply = self._handler.step(message, arrival, self._clock.now())
+        except _SURPRISES as error:
+            # Without an answer the controller keeps an absolute correction, adds no relative one,
+            # and stops by its Timeout if it goes on so. The thread goes on.
+            why = str(error) if isinstance(error, ElastocalError) else repr(error)
+            self._failure = self._failure or f"no answer is given: {why.removeprefix(_NAME)}"
+            return None
         self._heard.set()
         return reply
 
@@ -236,7 +250,7 @@ class RsiLink:
         try:
             while not self._closing.is_set():
                 self._serve()
-        except (OSError, ElastocalError) as error:
+        except OSError as error:
             if not self._closing.is_set():
                 self._failure = f"the link broke: {error}"
         except BaseException as error:
@@ -253,7 +267,10 @@ class RsiLink:
         for datagram, sender, waited in self._newest(waiting):
             came = self._timer() - waited
             data = self._answer(datagram, sender, came)
-            if data is not None:
+            if data is None:
+                continue
+            # An answer that cannot be sent is a lost one: the controller says so.
+            with contextlib.suppress(OSError):
                 self._socket.sendto(data, sender)
                 self._note_time(came)
 

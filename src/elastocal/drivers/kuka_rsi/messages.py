@@ -42,6 +42,11 @@ _LARGEST = 1e7
 _MOST_DIGITS = 20
 _FAR = 250
 """Cycles by which an IPOC that is no jump may be off: a second at 4 ms."""
+_WRAP = 1 << 32
+"""IPOC counts up to here, and from zero again."""
+_IN_A_ROW = 3
+"""Old messages that follow one another after which they are the newer ones: a program was started
+anew whose count is a little lower."""
 _SHORT = 100
 """Controllers with RSI 2 begin with an empty message that is shorter than this, in bytes."""
 Six = tuple[float, float, float, float, float, float]
@@ -151,30 +156,52 @@ class Arrival(Enum):
 class IpocWatch:
     """Tells from IPOC how messages follow one another.
 
-    IPOC counts milliseconds: it grows by the cycle. Some simulators count messages, by 1.
+    IPOC counts milliseconds modulo 2**32: it grows by the cycle. Some simulators count messages, by
+    1.
     """
 
     def __init__(self, cycle: float) -> None:
         self._step = round(1e3 * cycle)
         self._last: int | None = None
+        self._old = self._in_a_row = 0
         self.lost = 0
 
-    def classify(self, ipoc: int) -> Arrival:
-        """Return how a message follows; one out of order does not count as the last."""
-        if self._last is None:
+    def classify(self, ipoc: int, anew: bool = False) -> Arrival:
+        """Return how a message follows; one out of order does not count as the last.
+
+        Parameters
+        ----------
+        ipoc : int
+            Of the message.
+        anew : bool
+            Whether something else tells that the sender was started anew.
+        """
+        last = self._last
+        if last is None:
             self._last = ipoc
             return Arrival.FIRST
-        change = ipoc - self._last
+        change = _signed(ipoc - last)
         if change == 1:
             self._step = 1
-        if -_FAR * self._step <= change <= 0:
+        if not anew and -_FAR * self._step <= change <= 0 and not self._is_a_row(ipoc):
             return Arrival.OUT_OF_ORDER
         steps, rest = divmod(change, self._step)
-        self._last = ipoc
-        if rest or not 0 < steps <= _FAR:
+        self._last, self._in_a_row = ipoc, 0
+        if anew or rest or not 0 < steps <= _FAR:
             return Arrival.JUMPED
         self.lost += steps - 1
         return Arrival.NEXT if steps == 1 else Arrival.AFTER_LOSS
+
+    def _is_a_row(self, ipoc: int) -> bool:
+        """Return whether an old message is one of a row of them."""
+        follows = self._in_a_row > 0 and _signed(ipoc - self._old) == self._step
+        self._old, self._in_a_row = ipoc, self._in_a_row + 1 if follows else 1
+        return self._in_a_row >= _IN_A_ROW
+
+
+def _signed(change: int) -> int:
+    """Return a difference of two counts, the shorter way around."""
+    return (change + _WRAP // 2) % _WRAP - _WRAP // 2
 
 
 def is_overture(datagram: bytes) -> bool:
