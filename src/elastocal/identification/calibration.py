@@ -46,6 +46,9 @@ from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.wording import phrase, sentences
 
+_PART_OF_DATA = 1e-2
+"""Least part of the measured deflection that has to move when springs go to their bounds."""
+
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
@@ -239,12 +242,7 @@ def _data_warnings(
 
 def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
-    c = calibrated.compliance
-    n = problem.springs
-    if np.all((c == problem.lower[n]) | (c == problem.upper[n])):
-        raise IdentificationError(
-            "every spring ends at a bound: the bounds, not the data, would make the model"
-        )
+    _require_data_decide(problem, calibrated.compliance)
     warnings: list[str] = []
     missing = reach - calibrated.observability.rank
     if missing > 0:
@@ -270,6 +268,25 @@ def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> 
                 (warnings[-1], phrase("it predicts no better than none at all")), "; "
             )
     return warnings
+
+
+def _require_data_decide(problem: Problem, compliance: FloatArray) -> None:
+    """Refuse a fit that the data had no part in: that the bounds alone would have made.
+
+    A spring that hardly deflects the arm may stand between its bounds by a rounding, so that it
+    does not help to ask whether every spring ends at a bound. What counts is whether the data are
+    explained the worse when each spring goes to the bound that is nearest to it.
+    """
+    n = problem.springs
+    lower, upper = problem.lower[n], problem.upper[n]
+    bounded = np.where(compliance - lower <= upper - compliance, lower, upper)
+    if not np.isfinite(bounded).all():
+        return
+    moved = (problem.O[:, :, n] @ (bounded - compliance)) * problem.weight
+    if not np.linalg.norm(moved) > _PART_OF_DATA * np.linalg.norm(problem.d * problem.weight):
+        raise IdentificationError(
+            "every spring ends at a bound: the bounds, not the data, would make the model"
+        )
 
 
 def _unsettled(solution: Solution, loss: str) -> list[str]:
