@@ -40,6 +40,8 @@ CORE_TYPES = ("SkylakeX", "Haswell", "Zen", "Sandybridge", "Prescott")
 """Kernels of OpenBLAS that the product must decide alike on."""
 _SIZES = (3, 4, 5, 6, 8, 10, 12, 16, 23, 31)
 _NOISES = (SHOP_FLOOR, TRACKED, QUIET)
+_BOUNDS = ((0.0, np.inf), (0.0, np.inf), (-np.inf, np.inf), (1e-9, 2e-9), (0.0, 1e-6))
+"""Lower and upper bound of every spring, in rad/(N·m)."""
 _CODECS = 20
 """Every so many campaigns one is cross-validated as well."""
 
@@ -72,11 +74,9 @@ def campaign(number: int) -> Case:
         noise=_NOISES[number // (2 * len(_SIZES)) % len(_NOISES)],
         blunders=blunders,
     )
-    bounds = ((0.0, np.inf), (0.0, np.inf), (-np.inf, np.inf), (1e-9, 2e-9), (0.0, 1e-6))[number // 11 % 5]
+    bounds = _BOUNDS[number // 11 % len(_BOUNDS)]
     springs = ("auto", "auto", "bearing", "actuated", "gears")[number // 3 % 5]
-    return Case(
-        robot(), cell.readings(), FitOptions(*bounds), springs, number % _CODECS == 9
-    )
+    return Case(robot(), cell.readings(), FitOptions(*bounds), springs, number % _CODECS == 9)
 
 
 def decisions(case: Case) -> dict[str, Any]:

@@ -61,12 +61,13 @@ def minimise(
     # of all minima the bounded solver then finds the one of least norm.
     s[determined:], y[determined:] = _FLOOR * s[0], 0.0
     x = Vt.T @ (y / s)
-    if np.all((lower <= x) & (x <= upper)):
-        return np.asarray(x)
-    A = s[:, None] * Vt
-    if np.all(np.isposinf(upper)):
-        return _bounded_below(A, y, lower)
-    return _boxed(A, y, lower, upper)
+    if not np.all((lower <= x) & (x <= upper)):
+        A = s[:, None] * Vt
+        bounded_above = not np.all(np.isposinf(upper))
+        x = _boxed(A, y, lower, upper) if bounded_above else _bounded_below(A, y, lower)
+    # What turns no spring is decided by no rounding: it stands at zero, or at the bound beside it.
+    seen = np.linalg.norm(s[:determined, None] * Vt[:determined], axis=0)
+    return np.where(seen > RANK_TOLERANCE * s[0], x, np.clip(0.0, lower, upper))
 
 
 def minimise_certified(

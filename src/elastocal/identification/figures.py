@@ -27,6 +27,9 @@ from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.wording import um
 
+_DUST = 1e-6
+"""Part of a sensible value within which a spring stands at its bound: rounding leaves less."""
+
 
 @record()
 class SpringSummary:
@@ -255,7 +258,9 @@ def spring_summaries(
     seen, natural = calibrated.observability, [p.lower for p in calibrated.model.parameters]
     options = settings.options() if settings else FitOptions()
     lower, upper = bounds(options, len(natural), natural)
-    at_bound = (calibrated.compliance <= lower) | (calibrated.compliance >= upper)
+    dust = _DUST * np.array([parameter.scale for parameter in calibrated.model.parameters])
+    room = np.minimum(calibrated.compliance - lower, upper - calibrated.compliance)
+    at_bound = room <= dust
     first, rows = 0, list[SpringSummary]()
     for spring in calibrated.model.springs:
         own = slice(first, first + len(spring.parameters))

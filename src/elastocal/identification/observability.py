@@ -26,6 +26,8 @@ from elastocal.results import brief_repr
 _NOTICEABLE = 1e-2
 """Smaller parts of a combination are not named: the data leave such a spring open by less than a
 hundredth of a sensible value. In rich models nearly every spring has a trace in one of them."""
+_DUST = 1e-6
+"""Part of a sensible value below which a spring counts as not yielding at all."""
 _MOVES = 0.5
 """Of a step that is 0 for a spring that is held at its bound, and 1 for one that is not."""
 _TWICE = 2.0
@@ -190,7 +192,7 @@ def find_faint(
         alike = [
             abs(c)
             for c, other in zip(compliance.tolist(), parameters, strict=True)
-            if other.unit == parameter.unit and c != 0.0
+            if other.unit == parameter.unit and abs(c) > _DUST * other.scale
         ]
         usual = float(np.median(alike)) if alike else 0.0
         size = max(parameter.scale, usual, abs(float(compliance[index])))
