@@ -1,10 +1,15 @@
 """What is decided about a campaign is the same on every processor; see decision 107."""
 
+import json
+import os
 import platform
+import subprocess
+import sys
 
 import pytest
 
 from support.decisions import CORE_TYPES, differences, furthest, under
+from support.demos import finished_demo
 
 pytestmark = pytest.mark.skipif(
     platform.machine() not in ("x86_64", "AMD64"), reason="core types of OpenBLAS on x86-64"
@@ -34,3 +39,36 @@ def test_five_core_types_decide_alike_on_two_hundred_campaigns():
     ]
     print({core_type: furthest(first, each) for core_type, each in found.items()})
     assert lines == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["afp", "machining"])
+def test_five_core_types_judge_a_demo_alike(kind, tmp_path):
+    demo = finished_demo(kind)
+    found = []
+    for core_type in CORE_TYPES:
+        model = tmp_path / f"{core_type}.json"
+        calibrated = _told(core_type, "calibrate", demo / "run" / "dataset.nc", "--out", model)
+        page = tmp_path / f"{core_type}.html"
+        judged = _told(core_type, "report", demo / "run", "--out", page)
+        springs = [
+            [each[key] for key in ("name", "observable", "group", "at_bound", "too_weak")]
+            for each in calibrated["springs"]
+        ]
+        chosen = [each["springs"] for each in calibrated["ladder"] if each["chosen"]]
+        verdict = judged["verdict"]
+        said = (verdict["light"], len(verdict["reasons"]), len(verdict["notes"]))
+        found.append((chosen, springs, calibrated["rank"], said))
+    assert all(each == found[0] for each in found)
+
+
+def _told(core_type, *arguments):
+    environment = {**os.environ, "OPENBLAS_CORETYPE": core_type}
+    done = subprocess.run(
+        [sys.executable, "-m", "elastocal", *map(str, arguments), "--json"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
