@@ -80,6 +80,9 @@ class Order(IntEnum):
     """Go into ``RSI_MOVECORR``."""
     MOVE = 2
     """``PTP`` to the axis positions given."""
+    ADOPT = 3
+    """Take the place where the arm stands for the programmed one: RSI off, ``PTP`` to the measured
+    axes, RSI on. The controller sends nothing meanwhile; programs before 2026-11 do not know it."""
     END = 9
 
 
