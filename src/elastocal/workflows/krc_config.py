@@ -10,7 +10,7 @@ from elastocal.drivers.kuka_rsi import (
     Bounds,
     RsiSettings,
     bounds_of,
-    check_ethernet_file,
+    check_controller_file,
     controller_files,
     write_controller_files,
 )
@@ -33,7 +33,7 @@ class KrcConfigSettings:
     out: Path | None = None
     """Folder to write into."""
     check: Path | None = None
-    """ETHERNET file of a controller, to be checked instead."""
+    """ETHERNET file or RSI context of a controller, to be checked instead."""
     force: bool = False
     """Replace files that are there."""
 
@@ -68,7 +68,7 @@ class KrcConfigResult(Result):
 
 @workflow(KrcConfigSettings)
 def krc_config(settings: KrcConfigSettings, progress: Progress) -> KrcConfigResult:  # noqa: ARG001 - done in an instant
-    """Write ETHERNET files, KRL programs and a sign-off sheet for a KUKA; or check a file of it.
+    """Write what a KUKA controller needs for RSI, and a sheet to be signed; or check a file of it.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def krc_config(settings: KrcConfigSettings, progress: Progress) -> KrcConfigResu
         assert settings.check is not None
         text = read_text(settings.check)
         try:
-            check_ethernet_file(text, arm.mode)
+            check_controller_file(text, cell, arm)
         except DeviceError as error:
             raise DeviceError(f"{settings.check}: {error}") from error
         files: tuple[str, ...] = (settings.check.name,)

@@ -29,6 +29,7 @@ WORDS = re.compile(
     r"IF .* THEN|ELSE|ENDIF|LOOP|ENDLOOP|SWITCH .*|CASE \d|DEFAULT|ENDSWITCH|EXIT|WAIT SEC [\d.]+|"
     r"BRAKE F|RESUME|elcal_\w+\( \)|(XNEXT\.\w\d|percent|wanted|done|braked) = .*)"
 )
+ENDS = ("xml", "rsi", "rsi.xml", "rsi.diagram", "src", "dat")
 PAIRS = {"IF": "ENDIF", "LOOP": "ENDLOOP", "SWITCH": "ENDSWITCH", "DEF": "END", "DEFDAT": "ENDDAT"}
 
 
@@ -41,7 +42,7 @@ def files() -> dict[str, str]:
 def test_every_file_for_the_controller_has_a_short_name_ascii_and_its_line_ends(files):
     assert set(files) == {
         SHEET,
-        *(f"{name}.{end}" for name in PROGRAMS.values() for end in ("xml", "src", "dat")),
+        *(f"{name}.{end}" for name in PROGRAMS.values() for end in ENDS),
     }
     for name, text in files.items():
         if name != SHEET:

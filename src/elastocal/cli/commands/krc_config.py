@@ -14,12 +14,13 @@ def _krc_config(
     *,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder to write into.")] = None,
     check: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Check this ETHERNET file instead.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Check this ETHERNET file or RSI context instead."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
     as_json: options.Written = False,
 ) -> None:
-    """Write ETHERNET files, KRL programs and a sign-off sheet for a KUKA."""
+    """Write ETHERNET files, RSI contexts, KRL programs and a sign-off sheet for a KUKA."""
     result = workflows.krc_config(cell, out=out, check=check, force=force)
     if as_json:
         output.print_json(result)

@@ -9,11 +9,27 @@ from .commissioning import (
     chirp as chirp,
     estimate_delay as estimate_delay,
 )
+from .context import (
+    CHOICES as CHOICES,
+    PRECISION as PRECISION,
+    ContextEntry as ContextEntry,
+    ContextInput as ContextInput,
+    ContextObject as ContextObject,
+    ContextOutput as ContextOutput,
+    ContextParameter as ContextParameter,
+    RsiContext as RsiContext,
+)
+from .context_reader import (
+    check_context as check_context,
+    read_context as read_context,
+)
 from .controller_files import (
+    FORMS as FORMS,
     LONGEST_NAME as LONGEST_NAME,
     PROGRAMS as PROGRAMS,
     SHEET as SHEET,
     ControllerSet as ControllerSet,
+    check_controller_file as check_controller_file,
     controller_files as controller_files,
     write_controller_files as write_controller_files,
 )
@@ -31,6 +47,7 @@ from .driver import (
 )
 from .ethernet_file import (
     MODES as MODES,
+    ContextPort as ContextPort,
     EthernetChannel as EthernetChannel,
     EthernetFile as EthernetFile,
     check_ethernet_file as check_ethernet_file,

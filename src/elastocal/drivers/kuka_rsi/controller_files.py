@@ -1,7 +1,7 @@
-"""The files for the controller: ETHERNET files, KRL programs, and the sheet to be signed.
+"""The files for the controller: ETHERNET files, RSI contexts, KRL programs, the sheet to be signed.
 
-What of the RSI contexts is known is on the sheet: their objects are set and wired by hand in
-RSIVisual or WorkVisual. Nothing here was tried on a controller; the programs say so.
+All are made from the same limits and channels. Nothing here was tried on a controller; the programs
+say so.
 """
 
 import hashlib
@@ -13,6 +13,9 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
+from elastocal.drivers.kuka_rsi._drawing import Drawing
+from elastocal.drivers.kuka_rsi.context import PRECISION, RsiContext
+from elastocal.drivers.kuka_rsi.context_reader import check_context
 from elastocal.drivers.kuka_rsi.ethernet_file import MODES, EthernetFile, check_ethernet_file
 from elastocal.drivers.kuka_rsi.force_control import ForceLaw, overshoot
 from elastocal.drivers.kuka_rsi.settings import Bounds, RsiSettings, bounds_of
@@ -25,8 +28,8 @@ PROGRAMS = {"measure": "elcal_meas", "contact": "elcal_run", "compensation": "el
 SHEET = "SIGN-OFF.md"
 LONGEST_NAME = 24
 """Of a file on the controller, with its suffix; not verified on one."""
-_PRECISION = 6
-"""Decimals that the controller sends; its default is 1, a tenth of a millimetre."""
+FORMS = {"rsi": ("rsi", "rsi.xml", "rsi.diagram"), "rsix": ("rsix",)}
+"""Suffixes of the files that make one RSI context, by the setting ``rsi_context``."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,9 @@ class ControllerSet:
     name: str
     ethernet: EthernetFile
     bounds: Bounds
+    context: RsiContext
+    loads: str
+    """What ``RSI_CREATE`` is called with."""
     ipo: str
     """``#IPO_FAST`` or ``#IPO``."""
 
@@ -62,12 +68,36 @@ def controller_files(cell: Cell, settings: RsiSettings) -> dict[str, bytes]:
         text = _render("ethernet.xml", ethernet=each.ethernet)
         check_ethernet_file(text, each.mode)
         files[f"{each.name}.xml"] = _controller_bytes(text)
+        files |= _context_files(each, settings)
         for suffix in ("src", "dat"):
             text = _render(f"{each.name}.{suffix}", each=each, settings=settings)
             files[f"{each.name}.{suffix}"] = _controller_bytes(text)
     assert all(len(name) <= LONGEST_NAME for name in files)
     files[SHEET] = _sheet(cell, settings, sets, files).encode("utf-8")
     return files
+
+
+def check_controller_file(text: str, cell: Cell, settings: RsiSettings) -> None:
+    """Refuse an ETHERNET file or RSI context that is not what the mode of the arm needs.
+
+    Parameters
+    ----------
+    text : str
+        Contents of the file; its root tells which it is.
+    cell : Cell
+        The cell.
+    settings : RsiSettings
+        Those of its arm.
+
+    Raises
+    ------
+    DeviceError
+        With the channel, object, limit or wire that is wrong.
+    """
+    if "<ROOT>" in text:
+        check_ethernet_file(text, settings.mode)
+    else:
+        check_context(text, _set_of(cell, settings, settings.mode).context)
 
 
 def write_controller_files(
@@ -90,11 +120,21 @@ def _set_of(cell: Cell, settings: RsiSettings, mode: str) -> ControllerSet:
     own = settings.largest_correction if mode == settings.mode else None
     pair = {"correction": None, "hold_on": None, "largest_correction": own}
     bounds = bounds_of(cell, settings.model_copy(update={"mode": mode, **pair}))
-    external = cell.robot.external_axes > 0
+    name, ethernet = PROGRAMS[mode], EthernetFile.of(settings, mode, cell.robot.external_axes > 0)
+    context = RsiContext.of(name, ethernet, bounds, settings.timeout)
+    loads = f"{name}.rsi" if settings.rsi_context == "rsi" else name
     ipo = "#IPO_FAST" if settings.cycle < 0.01 else "#IPO"
-    return ControllerSet(
-        mode, PROGRAMS[mode], EthernetFile.of(settings, mode, external), bounds, ipo
-    )
+    return ControllerSet(mode, name, ethernet, bounds, context, loads, ipo)
+
+
+def _context_files(each: ControllerSet, settings: RsiSettings) -> dict[str, bytes]:
+    files, drawing = {}, Drawing.of(each.context)
+    for suffix in FORMS[settings.rsi_context]:
+        text = _render(f"context.{suffix}", context=each.context, drawing=drawing)
+        if suffix != "rsi.diagram":
+            check_context(text, each.context)
+        files[f"{each.name}.{suffix}"] = _controller_bytes(text)
+    return files
 
 
 def _sheet(
@@ -115,7 +155,8 @@ def _sheet(
         margin=math.degrees(law.phase_margin(stiffness)),
         further=further,
         T_flange_tcp=cell.T_flange_tcp,
-        precision=_PRECISION,
+        precision=PRECISION,
+        forms=FORMS[settings.rsi_context],
         hashes={name: hashlib.sha256(contents).hexdigest() for name, contents in files.items()},
     )
 

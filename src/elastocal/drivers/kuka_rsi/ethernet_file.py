@@ -10,17 +10,34 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
+from elastocal.drivers.kuka_rsi._site_xml import attribute, parsed
 from elastocal.drivers.kuka_rsi.settings import CORRECTIONS, HOLD_ON, RsiSettings, require_pair
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
 MODES = ("measure", "contact", "compensation")
 _MOST_CHANNELS = 64
-_MOST_CHARACTERS = 65_536
 _OWN = ("RIst", "RSol", "AIPos", "EIPos", "Delay")
 """Channels of the controller's own that are sent."""
 _CORRECTION = tuple(f"RKorr.{axis}" for axis in "XYZABC")
 _STOP = "Stop"
+
+
+@dataclass(frozen=True)
+class ContextPort:
+    """Input or output of an object of the RSI context."""
+
+    kind: str
+    """Of the object: ``POSCORR``."""
+    port: str
+    variable: int | None = None
+    """Index of the KRL variable that the object reads or writes; such an object is for it alone."""
+
+    def __str__(self) -> str:
+        """Return how the sheet names it."""
+        return (
+            f"{self.kind}.{self.port}" if self.variable is None else f"{self.kind} {self.variable}"
+        )
 
 
 @dataclass(frozen=True)
@@ -32,8 +49,7 @@ class EthernetChannel:
     """``BOOL``, ``LONG`` or ``DOUBLE``."""
     number: int
     """Of the output (received) or input (sent) of the ETHERNET object, from 1."""
-    wired_to: str
-    """Object of the RSI context, with its input or index."""
+    wired_to: ContextPort
     hold_on: int | None = None
     """Of a received channel."""
 
@@ -76,22 +92,29 @@ class EthernetFile:
         if mode == "measure":
             return cls(*place)
         hold = HOLD_ON[CORRECTIONS[mode]]
-        received = [(_STOP, "BOOL", "STOP.In1", 1)]
-        received += [(tag, "DOUBLE", f"POSCORR.Corr{tag[-1]}", hold) for tag in _CORRECTION]
+        received = [(_STOP, "BOOL", ContextPort("STOP", "In1"), 1)]
+        received += [
+            (tag, "DOUBLE", ContextPort("POSCORR", f"Corr{tag[-1]}"), hold) for tag in _CORRECTION
+        ]
         if mode == "compensation":
             return cls(*place, (), _numbered(received))
         received += [
-            ("Cmd.N", "LONG", "MAP2SEN_PINT 1", 1),
-            ("Cmd.Op", "LONG", "MAP2SEN_PINT 2", 1),
+            (tag, "LONG", ContextPort("MAP2SEN_PINT", "In1", k), 1)
+            for k, tag in enumerate(("Cmd.N", "Cmd.Op"), start=1)
         ]
-        received += [("Cmd.V", "DOUBLE", "MAP2SEN_PREA 13", 1)]
         targets = [f"Ax.A{k}" for k in range(1, 7)] + [f"Ex.E{k}" for k in range(1, 7)]
-        received += [(t, "DOUBLE", f"MAP2SEN_PREA {k}", 1) for k, t in enumerate(targets, start=1)]
-        sent = [("Krl.N", "LONG", "SEN_PINT 11", None), ("Krl.State", "LONG", "SEN_PINT 12", None)]
+        reals = [(13, "Cmd.V"), *enumerate(targets, start=1)]
+        received += [(tag, "DOUBLE", ContextPort("MAP2SEN_PREA", "In1", k), 1) for k, tag in reals]
+        sent = [
+            (tag, "LONG", ContextPort("SEN_PINT", "Out1", k), None)
+            for k, tag in ((11, "Krl.N"), (12, "Krl.State"))
+        ]
         return cls(*place, _numbered(sent), _numbered(received))
 
 
-def _numbered(rows: Sequence[tuple[str, str, str, int | None]]) -> tuple[EthernetChannel, ...]:
+def _numbered(
+    rows: Sequence[tuple[str, str, ContextPort, int | None]],
+) -> tuple[EthernetChannel, ...]:
     return tuple(
         EthernetChannel(tag, kind, number, wired_to, hold_on)
         for number, (tag, kind, wired_to, hold_on) in enumerate(rows, start=1)
@@ -113,12 +136,14 @@ def check_ethernet_file(text: str, mode: str) -> None:
     DeviceError
         With the channel that is wrong.
     """
-    root = _parsed(text)
+    root = parsed(text)
+    if root.tag != "ROOT":
+        raise DeviceError(f"its root is <{root.tag:.20}>: must be <ROOT>")
     only_send = _text(root, "CONFIG/ONLYSEND").upper() == "TRUE"
     if only_send != (mode == "measure"):
         raise DeviceError(f"ONLYSEND is {only_send!s}: mode {mode} needs {not only_send!s}".upper())
-    sent = [_attribute(each, "TAG") for each in root.findall("SEND/ELEMENTS/ELEMENT")]
-    received = {_attribute(each, "TAG"): each for each in root.findall("RECEIVE/ELEMENTS/ELEMENT")}
+    sent = [attribute(each, "TAG") for each in root.findall("SEND/ELEMENTS/ELEMENT")]
+    received = {attribute(each, "TAG"): each for each in root.findall("RECEIVE/ELEMENTS/ELEMENT")}
     for what, count in (("SEND", len(sent)), ("RECEIVE", len(received))):
         if count > _MOST_CHANNELS:
             raise DeviceError(f"{what} has {count} channels: at most {_MOST_CHANNELS}")
@@ -130,7 +155,7 @@ def check_ethernet_file(text: str, mode: str) -> None:
     _require_tags("RECEIVE", [_STOP, *_CORRECTION[:3]], received)
     for tag in _CORRECTION:
         if tag in received:
-            _check_hold_on(tag, _attribute(received[tag], "HOLDON"), mode)
+            _check_hold_on(tag, attribute(received[tag], "HOLDON"), mode)
 
 
 def _check_hold_on(tag: str, text: str, mode: str) -> None:
@@ -148,31 +173,8 @@ def _require_tags(section: str, needed: list[str], given: list[str] | Mapping[st
             raise DeviceError(f"{section} has no element {tag}")
 
 
-def _parsed(text: str) -> ElementTree.Element:
-    if len(text) > _MOST_CHARACTERS:
-        raise DeviceError(
-            f"{len(text)} characters: an ETHERNET file has at most {_MOST_CHARACTERS}"
-        )
-    if "<!" in text.replace("<!--", ""):
-        raise DeviceError("a document type or entities: an ETHERNET file has none")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise DeviceError(f"no XML: {error}") from error
-    if root.tag != "ROOT":
-        raise DeviceError(f"its root is <{root.tag:.20}>: must be <ROOT>")
-    return root
-
-
 def _text(root: ElementTree.Element, path: str) -> str:
     found = root.findtext(path)
     if found is None:
         raise DeviceError(f"it has no {path}")
     return found.strip()
-
-
-def _attribute(element: ElementTree.Element, name: str) -> str:
-    found = element.get(name)
-    if found is None:
-        raise DeviceError(f"an ELEMENT has no {name}")
-    return found

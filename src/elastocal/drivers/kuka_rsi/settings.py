@@ -101,6 +101,10 @@ class RsiSettings(DeviceSettings):
     """Address of the controller."""
     cycle: Annotated[PositiveTime, AfterValidator(_one_of_the_cycles)] = 0.004
     sentype: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,24}$")] = "elastocal"
+    rsi_context: Literal["rsi", "rsix"] = "rsi"
+    """Form of the RSI contexts: ``rsi`` of KSS before 8.5 (RSI 3), ``rsix`` of KSS 8.5 and later
+    (RSI 4 and 5). ``RSI_CREATE`` is called with the suffix of the first, and without that of the
+    second."""
     tool: Annotated[int, Field(ge=1, le=16)] = 1
     """Number of the tool whose TOOL_DATA holds the cell's tcp."""
     base: Annotated[int, Field(ge=1, le=32)] = 1
