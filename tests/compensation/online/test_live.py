@@ -37,6 +37,7 @@ class Bench:
     force: tuple = PRESSING
     streams: bool = True
     refuses: str = ""
+    status: SensorStatus = SensorStatus.OK
 
     def __post_init__(self) -> None:
         settings = compensated.settings(deadband="0 mm", limits={"correction": "3 mm"})
@@ -52,12 +53,12 @@ class Bench:
             raise DeviceError(self.refuses)
         return self.sample
 
-    def step(self, begins: bool = False, q=Q):
+    def step(self, begins: bool = False, q=Q, **facts):
         self.time += CYCLE
         if self.streams:
             force, moment = np.array(self.force), np.array([1.0, 2.0, 0.5])
-            self.sample = WrenchSample(self.time - 5e-4, force, moment, SensorStatus.OK)
-        return self.loop.correction(PathCycle(self.time, q, begins))
+            self.sample = WrenchSample(self.time - 5e-4, force, moment, self.status)
+        return self.loop.correction(PathCycle(self.time, q, begins, **facts))
 
     def run(self, seconds: float, **changed) -> np.ndarray:
         """Return the corrections of some cycles, in mm."""
@@ -121,6 +122,29 @@ def test_a_sensor_that_refuses_is_faded_out_and_named():
     bench.run(0.1, refuses="")
     assert bench.loop.refusal == ""
     assert np.any(bench.cycles[-1].correction)
+
+
+def test_a_bad_status_is_held_faded_and_followed_again_at_the_rate():
+    bench = started()
+    still = np.array(bench.cycles[-1].correction) * 1e3
+    gone = bench.run(1.0, status=SensorStatus.FAULT)
+    np.testing.assert_array_equal(gone[-1], np.zeros(3))
+    assert bench.cycles[-1].status & Status.SENSOR
+    assert bench.loop.refusal == "it calls its newest sample bad"
+    back = bench.run(1.0, status=SensorStatus.OK)
+    np.testing.assert_allclose(back[-1], still, rtol=1e-4)
+    rate = 1e3 * bench.settings.limits.rate * CYCLE
+    assert steps(np.vstack([gone[-1:], back])).max() <= rate * (1 + 1e-9)
+    assert bench.loop.refusal == ""
+
+
+def test_it_goes_on_from_the_correction_that_the_arm_has():
+    bench = started()
+    effect = (1e-4, 0.0, 0.0)
+    assert bench.step(effect=effect, holds=True) == effect
+    moved = bench.step(effect=effect)
+    rate = bench.settings.limits.rate * CYCLE
+    assert 0.0 < np.linalg.norm(np.subtract(moved, effect)) <= rate * (1 + 1e-9)
 
 
 def test_the_end_fades_at_its_rate_and_then_there_is_no_correction():

@@ -29,10 +29,15 @@ class Stream:
         self.sensor.received(struct.pack(">III6i", self.rdt, self.ft, status, *counts))
 
     def reason(self) -> str:
-        with pytest.raises(DeviceError) as caught:
-            self.sensor.read()
+        """Return why the stream is refused for good."""
         with pytest.raises(DeviceError):
             self.sensor.newest()
+        return self.hole()
+
+    def hole(self) -> str:
+        """Return why the readings of a procedure are refused."""
+        with pytest.raises(DeviceError) as caught:
+            self.sensor.read()
         return str(caught.value)
 
 
@@ -119,7 +124,7 @@ def test_a_stalled_box_is_refused(stream):
     stream.send()
     for _ in range(100):
         stream.send(ft=0)
-    assert "it repeats sample 7: it has stalled" in stream.reason()
+    assert "it repeats sample 7: it has stalled" in stream.hole()
 
 
 def test_a_box_that_was_started_anew_is_refused(stream):
@@ -146,7 +151,35 @@ def test_a_saturated_gauge_spoils_the_block_alone(stream):
 
 def test_a_serious_status_is_told_by_name(stream):
     stream.send(status=0x80004000)
-    assert "status 0x80004000: error, watchdog" in stream.reason()
+    assert "status 0x80004000: error, watchdog" in stream.hole()
+
+
+def test_a_bad_status_is_a_bad_sample_for_a_correction_which_follows_again(stream):
+    stream.send()
+    stream.send(status=0x80004000)
+    assert stream.sensor.newest().status is SensorStatus.FAULT
+    stream.send()
+    assert stream.sensor.newest().status is SensorStatus.OK
+    assert not stream.sensor.failed
+    with pytest.raises(DeviceError, match="watchdog"):
+        stream.sensor.read()
+
+
+@pytest.mark.parametrize("wrong", ["stalled", "nonsense"])
+def test_a_stream_that_comes_to_itself_is_followed_again_by_a_correction(stream, wrong):
+    stream.send()
+    for _ in range(120):
+        stream.clock.sleep(0.001)
+        if wrong == "stalled":
+            stream.send(ft=0)
+        else:
+            stream.sensor.received(b"hello")
+    old = stream.sensor.newest().time
+    assert stream.clock.now() - old > 0.015
+    stream.send()
+    assert stream.sensor.newest().time > old
+    with pytest.raises(DeviceError):
+        stream.sensor.read()
 
 
 def test_datagrams_that_are_no_records_are_counted_then_refused(stream):
@@ -156,7 +189,7 @@ def test_datagrams_that_are_no_records_are_counted_then_refused(stream):
     assert len(stream.sensor.read()) == 1
     for _ in range(11):
         stream.sensor.received(b"hello")
-    assert "no RDT records: a datagram of 5 bytes" in stream.reason()
+    assert "no RDT records: a datagram of 5 bytes" in stream.hole()
 
 
 def test_a_flood_is_bounded(stream):

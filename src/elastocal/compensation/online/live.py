@@ -222,7 +222,7 @@ class LiveLoop:
         self.over = threading.Event()
         """Set when the correction has faded to zero after `finish`."""
         self.refusal = ""
-        """Why the sensor gives nothing; empty as long as it does."""
+        """Why the sensor gives nothing to correct by; empty as long as it does."""
         self.last: LiveCycle | None = None
         """The newest cycle; None before the first."""
 
@@ -261,7 +261,7 @@ class LiveLoop:
             self.refusal = str(error)
             self._state = state._replace(fresh=False, problem=Status.SENSOR.value)
             return None
-        self.refusal = ""
+        self.refusal = "" if not samples or samples[-1].ok else "it calls its newest sample bad"
         if self._tare is not None and self._tare.bias is None:
             for sample in samples:
                 self._tare.take(q, sample)

@@ -41,7 +41,10 @@ class NetFtSensor:
     """Samples of one box; see `elastocal.cell.devices.ForceSensor` and `elastocal.cell.WrenchFeed`.
 
     Datagrams come in by `received`, from whatever thread. What is wrong with the stream is raised
-    at the next `read`, and ever after: forces that nobody can trust end a run.
+    at the next `read`, and ever after: forces that nobody can trust end a run. `newest` refuses
+    only a stream that cannot be trusted again (`fail`: the box was started anew, or its counts mean
+    something else); a bad status is a bad sample, and nonsense and repetitions are none
+    (`leave_hole`).
 
     Parameters
     ----------
@@ -71,7 +74,7 @@ class NetFtSensor:
         self._newest: tuple[float, tuple[int, ...], SensorStatus] | None = None
         self._failure: str | None = None
         self.hole = ""
-        """Why too much is missing in the stream; empty as long as it is not."""
+        """Why samples are missing, or bad; empty as long as none are."""
         self._last: RdtRecord | None = None
         self._time = self._arrived = -np.inf
         self._count = 0
@@ -90,19 +93,19 @@ class NetFtSensor:
             self.malformed += 1
             self._malformed_now += 1
             if self._malformed_now > _MOST_MALFORMED:
-                self.fail(f"what it sends are no RDT records: {error}")
+                self.leave_hole(f"what it sends are no RDT records: {error}")
             return
         self._malformed_now = 0
         for record in records:
             self._take(record, now)
 
     def fail(self, why: str) -> None:
-        """Refuse every further `read`; the first reason stands."""
+        """Refuse every further `read` and `newest`; the first reason stands."""
         with self._lock:
             self._failure = self._failure or why
 
     def leave_hole(self, why: str) -> None:
-        """Refuse every further `read`: too much is missing in the stream.
+        """Refuse every further `read`: samples are missing in the stream, or bad.
 
         `newest` goes on. Its time says how old it is; where the stream comes again by itself, who
         corrects a process may go on, whereas readings of a procedure have a hole.
@@ -123,10 +126,11 @@ class NetFtSensor:
         self.taken += 1
         if record.status not in (0, *self._states) and len(self._states) < _MOST_STATES:
             self._states.add(record.status)
-        if status is SensorStatus.FAULT:
-            self.fail(f"status {status_names(record.status)}")
-            return
         self._time = self._time_of(now)
+        if status is SensorStatus.FAULT:
+            self.leave_hole(f"status {status_names(record.status)}")
+            self._newest = self._time, record.counts, status
+            return
         with self._lock:
             self._rows.append((self._time, record.counts))
             self._saturated |= status is SensorStatus.SATURATED
@@ -155,7 +159,7 @@ class NetFtSensor:
             return False
         self._standing = 0 if ahead else self._standing + 1
         if self._standing >= _STANDING:
-            self.fail(f"it repeats sample {record.ft_sequence}: it has stalled")
+            self.leave_hole(f"it repeats sample {record.ft_sequence}: it has stalled")
             return False
         self._count += step
         self._count_lost(step - 1)

@@ -13,6 +13,7 @@ from .rsi import (
     RsiFault as RsiFault,
     RsiServer as RsiServer,
     RsiStatistics as RsiStatistics,
+    TakenAnswer as TakenAnswer,
     ethernet_config as ethernet_config,
     rsi_server as rsi_server,
 )

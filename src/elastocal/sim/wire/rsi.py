@@ -18,7 +18,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from elastocal.cell import LOOPBACK, WallClock
 from elastocal.errors import DeviceError, ElastocalError
@@ -46,11 +46,36 @@ _LOOK = 0.05
 """Longest time without a look whether the server is to be closed, in s of the wall."""
 _BEHIND = 1.0
 """Cycles that the robot may be behind the clock before its time is stretched."""
+_WRAP = 1 << 32
+"""IPOC counts up to here, and from zero again."""
+_LOGGED = 50_000
+"""Answers that are kept."""
+_NEAR = 100
+"""Cycles by which the count of a controller that restarts nearby is lower."""
 RsiFault = Literal[
-    "ipoc_jump", "lost", "swapped", "repeated", "malformed", "intruder", "deaf", "restart"
+    "ipoc_jump",
+    "lost",
+    "swapped",
+    "repeated",
+    "malformed",
+    "intruder",
+    "deaf",
+    "restart",
+    "restart_nearby",
 ]
 """Faults on demand: count that jumps by a second; datagrams that get lost, come in the wrong order,
-come twice, or make no sense; a second robot; answers that come late; a controller that restarts."""
+come twice, or make no sense; a second robot; answers that come late; a controller that restarts,
+its count lower by a quarter of an hour, or by a hundred cycles."""
+
+
+class TakenAnswer(NamedTuple):
+    """The correction of an answer that came in time."""
+
+    session: int
+    """Number of the session, from 0; each begins without correction."""
+    ipoc: int
+    correction: tuple[float, ...]
+    """RKorr X, Y, Z, in mm."""
 
 
 def _elements(tags: Sequence[tuple[str, str, int]]) -> str:
@@ -150,6 +175,10 @@ class RsiServer:
         rate = live.clock.rate if isinstance(live.clock, WallClock) else 1.0
         self._window = max(context.cycle / rate, context.patience)
         self.statistics = RsiStatistics()
+        self.first_ipoc = IPOC_START
+        """Count that the first session begins at; to be set before `start`."""
+        self.taken: deque[TakenAnswer] = deque(maxlen=_LOGGED)
+        """The answers that came in time."""
         self._faults: deque[RsiFault | None] = deque()
         self._held: bytes | None = None
         self._malformed = deque(_MALFORMED)
@@ -193,12 +222,16 @@ class RsiServer:
         self._faults.extend([*[None] * after, *faults])
 
     def _run(self) -> None:
-        started = 0
+        started, stop = 0, ""
         while not self._closing.is_set():
             self._reset.clear()
+            if stop == "restart_nearby":
+                begin = self._ipoc - _NEAR * round(1e3 * self._context.cycle)
+            else:
+                begin = self.first_ipoc - 1_000_000 * started
             try:
                 self._robot.start()
-                stop = self._session(IPOC_START - 1_000_000 * started)
+                stop = self._session(started, begin)
             except ElastocalError as error:
                 stop = str(error)
             with contextlib.suppress(ElastocalError):
@@ -207,10 +240,10 @@ class RsiServer:
             if self._closing.is_set():
                 return
             self.statistics.stops.append(stop)
-            if stop != "restart":
+            if not stop.startswith("restart"):
                 self._reset.wait(self._context.operator)
 
-    def _session(self, ipoc: int) -> str:
+    def _session(self, number: int, ipoc: int) -> str:
         """Be in RSI from RSI_ON on; return why it has ended."""
         clock, counts = self._live.clock, self.statistics
         due, missed, heard = clock.now(), 0, False
@@ -218,20 +251,24 @@ class RsiServer:
             if self._robot.ended:
                 return "program ended"
             fault = self._faults.popleft() if self._faults else None
-            if fault == "restart":
-                return "restart"
-            ipoc += 1000 if fault == "ipoc_jump" else 0
+            if fault in ("restart", "restart_nearby"):
+                return fault
+            self._ipoc = ipoc = (ipoc + (1000 if fault == "ipoc_jump" else 0)) % _WRAP
             self._send(self._writer.write({**self._robot.values(), "Delay": missed}, ipoc), fault)
             counts.cycles += 1
             answer = None
             if not self._config.only_send:
-                answer = self._await(ipoc, self._window)
+                # A telegram that is lost has no answer that could be waited for.
+                answer = self._await(ipoc, 0.0 if fault == "lost" else self._window)
                 answer = None if fault == "deaf" else answer
                 if self._closing.is_set():
                     return "closed"
                 heard = heard or answer is not None
                 missed = missed + 1 if heard and answer is None else 0
-                counts.answered += answer is not None
+                if answer is not None:
+                    counts.answered += 1
+                    shift = tuple(answer.values.get(f"RKorr.{axis}", 0.0) for axis in "XYZ")
+                    self.taken.append(TakenAnswer(number, ipoc, shift))
                 counts.late += missed > 0
             if missed > self._context.timeout:
                 return f"KSS29002 SEN: RSI execution error: no valid answer for {missed} cycles"
