@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from elastocal import locks
 from support import bare
 
 bare.forbid()
@@ -24,6 +25,14 @@ END_TO_END = (
 )
 """Where tests run whole commands or build whole documents."""
 BROWSER = ("test_in_a_browser.py",)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _locks_of_this_process(tmp_path_factory):
+    """Keep the locks of devices apart from those of other suites on this machine."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(locks, "SHARED", tmp_path_factory.mktemp("locks") / "shared")
+        yield
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -5,12 +5,23 @@ lock, and what a killed writer has left is left alone.
 """
 
 import contextlib
+import errno
+import hashlib
 import os
+import re
+import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 POSIX = os.name == "posix"
 """Whether files are locked as on Linux and macOS."""
+_PUBLIC = "/tmp" if POSIX else os.environ.get("PROGRAMDATA", "C:/ProgramData")
+SHARED = Path(_PUBLIC, "elastocal-locks")
+"""Folder of the locks that all users of this machine share; TMPDIR may be another for each."""
+_OPEN_TO_ALL = 0o1777
+"""Mode of that folder: whoever may write there removes no file of others."""
+_MOST_TEXT = 400
+"""Bytes that are read of what a holder has written about itself."""
 _FAR = 0x7FFF_FFFE
 """The byte that stands for a whole file on Windows, whose locks keep others from reading, too: one
 that no file of ours reaches."""
@@ -84,3 +95,85 @@ def taken_over(place: Path) -> Iterator[bool]:
         yield True
     finally:
         os.close(handle)
+
+
+def claim(name: str, holder: str) -> Callable[[], None]:
+    """Take a lock that all users of this machine share; return what gives it back.
+
+    It ends with this process, however that ends. Its file may stay, and is nobody's then.
+
+    Parameters
+    ----------
+    name : str
+        What is locked.
+    holder : str
+        What others read who are refused, in one line.
+
+    Raises
+    ------
+    BlockingIOError
+        If it is taken; its ``strerror`` is what the holder says of itself.
+    OSError
+        If nothing can be locked here.
+    """
+    known = hashlib.sha256(name.encode()).hexdigest()[:16]
+    place = _shared_folder() / f"{re.sub(r'[^A-Za-z0-9.]+', '-', name)[:60]}-{known}"
+    while True:
+        handle = _open_shared(place)
+        try:
+            lock_file(handle)
+        except (BlockingIOError, PermissionError) as error:
+            text = os.read(handle, _MOST_TEXT).decode("utf-8", "replace")
+            os.close(handle)
+            said = "".join(each for each in text if each.isprintable()).strip()
+            raise BlockingIOError(errno.EAGAIN, said or "another program") from error
+        except OSError:
+            os.close(handle)
+            raise
+        # Whoever held it may have removed it between our opening and locking it.
+        if not POSIX or _is_there(place, handle):
+            break
+        os.close(handle)
+    with contextlib.suppress(OSError):  # the text is for people; the lock holds without it
+        os.ftruncate(handle, 0)
+        os.write(handle, holder.encode()[:_MOST_TEXT])
+
+    def give_back() -> None:
+        if POSIX:
+            with contextlib.suppress(OSError):  # another user's, in a folder with the sticky bit
+                place.unlink()
+        os.close(handle)
+
+    return give_back
+
+
+def _shared_folder() -> Path:
+    """Return the folder of shared locks: everybody writes there, nobody removes others' files."""
+    SHARED.mkdir(exist_ok=True)
+    found = SHARED.lstat()
+    if not stat.S_ISDIR(found.st_mode):
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(SHARED))
+    if POSIX and found.st_uid == os.geteuid() and stat.S_IMODE(found.st_mode) != _OPEN_TO_ALL:
+        SHARED.chmod(_OPEN_TO_ALL)
+    return SHARED
+
+
+def _open_shared(place: Path) -> int:
+    """Return a descriptor of a file that every user may lock."""
+    flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    while True:
+        # Without O_CREAT first: Linux refuses that for files of others in such folders.
+        with contextlib.suppress(FileNotFoundError):
+            return os.open(place, flags)
+        with contextlib.suppress(FileExistsError):
+            handle = os.open(place, flags | os.O_CREAT | os.O_EXCL, 0o666)
+            if POSIX:
+                os.fchmod(handle, 0o666)
+            return handle
+
+
+def _is_there(place: Path, handle: int) -> bool:
+    """Return whether a path still names the file of a descriptor."""
+    with contextlib.suppress(FileNotFoundError):
+        return os.path.samestat(place.stat(), os.fstat(handle))
+    return False

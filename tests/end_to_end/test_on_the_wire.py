@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,8 +18,9 @@ import elastocal as ec
 from elastocal.dataset import read_dataset
 from elastocal.drivers import rtde
 from elastocal.sim.wire import PORTS
+from support import live_bench
 from support.cli import PATIENCE
-from support.run_cells import planned_cell
+from support.run_cells import PlannedCell, planned_cell
 from support.ur_client import UrClient
 
 QUIET = min(1.0, (os.cpu_count() or 1) / max(os.getloadavg()[0], 1.0))
@@ -89,16 +91,51 @@ def require_same(over: Path, within: Path) -> None:
     np.testing.assert_allclose(*forces, atol=10.0)
 
 
+def refused_meanwhile(wired: PlannedCell, out: Path, told: list[tuple[int, str]]) -> None:
+    """Try everything else that talks to devices while a run goes on."""
+    live = wired.cell.with_name("live.yaml")
+    limits = 'mode: compensation, largest_correction: "1 mm", correction_speed: "30 mm/s"'
+    live.write_text(wired.cell.read_text().replace("mode: contact", limits))
+    model = live_bench.write_model_of(live, live.with_suffix(".json"))
+    while not (out / "journal.jsonl").is_file() or "approach" not in (
+        out / "journal.jsonl"
+    ).read_text(encoding="utf-8"):
+        time.sleep(0.2)
+    plan, again = ("--plan", wired.plan, "--yes"), out.with_name("again")
+    for words in (
+        ("run", wired.cell, "--out", again, *plan),
+        ("run", wired.cell, "--out", out, "--resume", *plan),
+        ("measure-delay", wired.cell, "--out", out.with_name("delay.json"), "--yes"),
+        ("live", live, "--model", model, "--arm"),
+        ("simulate", wired.cell),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", ENTRY, *map(str, words)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        told.append((done.returncode, done.stderr.strip().splitlines()[-1]))
+
+
 @pytest.mark.slow
 @pytest.mark.end_to_end
-def test_a_run_over_sockets_is_the_run_in_process(tmp_path):
+def test_a_run_over_sockets_is_the_run_in_process_whatever_else_is_tried(tmp_path):
     planned = planned_cell(tmp_path, 3)
     text = planned.cell.read_text(encoding="utf-8")
     text = text.replace("\nsimulation:", "\nsimulation:\n  sensor: {rate: 500 Hz}", 1)
     planned.cell.write_text(text, encoding="utf-8")
     wired = planned.with_text("wired.yaml", devices())
     drivers = {"kuka_rsi", "net_ft", "line_stream"}
+    told: list[tuple[int, str]] = []
+    others = threading.Thread(target=refused_meanwhile, args=(wired, tmp_path / "over", told))
+    others.start()
     over = run_over_sockets(wired.cell, wired.plan, tmp_path / "over", drivers)
+    others.join(PATIENCE)
+    assert [code for code, _ in told] == [1, 1, 1, 1, 1]
+    asked = ["elastocal run"] * 4 + ["elastocal simulate"]
+    assert all(f"is in use by {by}" in text for by, (_, text) in zip(asked, told, strict=True))
+    assert not (tmp_path / "again").exists()
     assert (over.figures.readings, over.figures.failed_attempts) == ({"ok": 6}, 0)
     assert over.figures.lines == over.summary.lines
     devices_seen = [each.device.split(" ")[0] for each in over.figures.lines]

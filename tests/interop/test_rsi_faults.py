@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from elastocal.cell import Motion, WallClock
+from elastocal.cell import Motion, RigContext, WallClock
 from elastocal.drivers.kuka_rsi import (
     Bounds,
     LinkAddress,
@@ -85,7 +85,7 @@ def connected():
     server = rsi_server(live, Told(), RsiContext(patience=0.2, operator=0.0))
     server.start()
     settings = RsiSettings(mode="contact", port=server.ports["udp"], delay="12 ms", ptp_percent=30)
-    arm = connect_arm(cell, settings, clock, live)
+    arm = connect_arm(cell, settings, RigContext(clock, 0, 0.0, live))
     until(lambda: live.wrench() is not None)
     arm.enable()
     yield arm, server

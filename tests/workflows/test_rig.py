@@ -93,7 +93,8 @@ def test_devices_of_two_drivers_share_the_clock_and_the_arm_comes_last(bench):
     rig = rig_of(mixed())
     assert tuple(rig.drivers) == ("bench_sensor", "simulated")
     assert not rig.real
-    devices = rig.connect(0, 5.0)
+    with rig.reserved("test") as reserved:
+        devices = reserved.connect(0, 5.0)
     settings, context = bench.DRIVER.seen
     assert (settings.port, context.start, context.feed) == (49152, 5.0, None)
     assert devices.clock is context.clock
@@ -105,14 +106,18 @@ def test_devices_of_two_drivers_share_the_clock_and_the_arm_comes_last(bench):
 
 def test_what_was_made_is_closed_when_another_device_fails(bench):
     bench.closed.clear()
-    with pytest.raises(DeviceError, match="driver 'bench_sensor' made none"):
-        rig_of(mixed(port=0)).connect(0, 0.0)
+    with (
+        rig_of(mixed(port=0)).reserved("test") as reserved,
+        pytest.raises(DeviceError, match="driver 'bench_sensor' made none"),
+    ):
+        reserved.connect(0, 0.0)
     assert bench.closed == ["sensor"]
 
 
 def test_time_runs_faster_only_on_this_machine(bench):
     devices = {"sensor": {"driver": "bench_sensor"}, "clock_rate": 20.0}
-    assert rig_of(example_cell(devices=devices)).connect(0, 0.0).clock.rate == 20.0
+    with rig_of(example_cell(devices=devices)).reserved("test") as reserved:
+        assert reserved.connect(0, 0.0).clock.rate == 20.0
     devices["sensor"]["address"] = "192.168.1.1"
     with pytest.raises(DeviceError, match=r"clock_rate is 20.*devices.sensor is at 192.168.1.1"):
         rig_of(example_cell(devices=devices))
@@ -135,7 +140,8 @@ def test_no_device_is_far_away_where_time_runs_faster(kind, told):
 
 def test_where_all_is_simulated_the_devices_are_those_of_before():
     cell = example_cell()
-    by_rig, before = rig_of(cell).connect(3, 5.0), simulated_devices(cell, 3, 5.0)
+    with rig_of(cell).reserved("test") as reserved:
+        by_rig, before = reserved.connect(3, 5.0), simulated_devices(cell, 3, 5.0)
     for devices in (by_rig, before):
         devices.arm.enable()
         devices.arm.move_joints(places()[0].q_approach, 0.5)

@@ -5,10 +5,11 @@ sensor and metrology of different drivers make one rig. What stands under a devi
 is checked by the driver's own settings; which drivers there are is known to `elastocal run`.
 """
 
+import socket
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Protocol
 
 from pydantic import (
     ConfigDict,
@@ -30,6 +31,7 @@ from elastocal.cell.devices import (
     require_duration,
 )
 from elastocal.cell.line_counts import LineCounts, no_lines
+from elastocal.errors import DeviceError
 from elastocal.records import StrictModel
 from elastocal.results import brief_repr
 
@@ -90,8 +92,81 @@ class DeviceChoices(StrictModel):
         return {kind: getattr(self, kind) for kind in KINDS}
 
 
+class DevicePlace(NamedTuple):
+    """Where a device is: no two programs may talk to it at a time."""
+
+    host: str
+    port: int
+    """0: the device has none that is known."""
+
+    def __str__(self) -> str:
+        return f"{self.host}:{self.port}" if self.port else self.host
+
+
+class LocalPort(NamedTuple):
+    """A port of this machine that a driver listens at."""
+
+    kind: Literal["udp", "tcp"]
+    address: str
+    port: int
+    """0: the system chooses one."""
+
+    def bind(self) -> socket.socket:
+        """Return a socket that has the port; one of TCP listens.
+
+        Raises
+        ------
+        DeviceError
+            If the address is none of this machine, or the port is taken.
+        """
+        place = (self.address, self.port)
+        try:
+            if self.kind == "tcp":
+                return socket.create_server(place, backlog=1)
+            line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            try:
+                line.bind(place)
+            except OSError:
+                line.close()
+                raise
+        except OSError as error:
+            raise DeviceError(
+                f"cannot listen at {self.address}:{self.port}: {error.strerror or error}"
+            ) from error
+        return line
+
+
 class DeviceSettings(StrictModel):
     """Base of what stands under a device in the cell file, beside the name of its driver."""
+
+    def device_places(self) -> tuple[DevicePlace, ...]:
+        """Return where the devices are, which are locked while somebody talks to them.
+
+        By default what ``address`` (``robot``) and ``port`` name, for each station where there are
+        several.
+        """
+        return tuple(_places(self))
+
+    def own_ports(self) -> tuple[LocalPort, ...]:
+        """Return the ports that the driver listens at, bound before any device is asked."""
+        return ()
+
+
+def _places(settings: StrictModel) -> Iterator[DevicePlace]:
+    values = dict(settings)
+    nested = [
+        each
+        for value in values.values()
+        if isinstance(value, Mapping)
+        for each in value.values()
+        if isinstance(each, StrictModel)
+    ]
+    for each in nested:
+        yield from _places(each)
+    if not nested:
+        for key in ("address", "robot"):
+            if key in values:
+                yield DevicePlace(str(values[key]), int(values.get("port", 0)))
 
 
 @brief_repr
@@ -129,6 +204,19 @@ class RigContext:
     """What the clock showed when the rig was made, in s: later than all of a run that goes on."""
     feed: WrenchFeed | None
     """Of another driver of the rig; None where none has one."""
+    ports: Mapping[LocalPort, socket.socket] = field(default_factory=dict)
+    """Ports that are bound already, as `DeviceSettings.own_ports` names them."""
+
+    def listener(self, port: LocalPort) -> socket.socket:
+        """Return a socket for a port, to be closed by whoever asked.
+
+        Raises
+        ------
+        DeviceError
+            If it is not bound yet and cannot be had.
+        """
+        bound = self.ports.get(port)
+        return port.bind() if bound is None else bound.dup()
 
 
 @brief_repr

@@ -34,6 +34,7 @@ from ._live_session import LiveReport as LiveReport
 from ._operator_and_devices import (
     GROUP as GROUP,
     Operator as Operator,
+    ReservedRig as ReservedRig,
     Rig as Rig,
     Supervision as Supervision,
     Unattended as Unattended,

@@ -38,7 +38,7 @@ from elastocal.compensation.online import (
 )
 from elastocal.errors import CompensationError, DeviceError
 from elastocal.identification import CalibratedModel
-from elastocal.workflows._operator_and_devices import Rig
+from elastocal.workflows._operator_and_devices import ReservedRig, Rig
 
 _LOOK = 0.05
 """Between two looks of the thread that watches, in s of the wall."""
@@ -187,6 +187,8 @@ class LiveSession:
     ----------
     ready : Prepared
         What is to be done.
+    rig : ReservedRig
+        Of the cell.
     report : callable
         Called twice a second.
     interrupted : callable
@@ -196,10 +198,12 @@ class LiveSession:
     def __init__(
         self,
         ready: Prepared,
+        rig: ReservedRig,
         report: Callable[[LiveReport], None],
         interrupted: Callable[[], bool],
     ) -> None:
-        self._ready, self._tell, self._interrupted = ready, report, interrupted
+        self._ready, self._rig = ready, rig
+        self._tell, self._interrupted = report, interrupted
         self._scheduling = "not begun"
         self._log: LiveLog | None = None
         self._rows: list[LiveCycle] = []
@@ -217,10 +221,10 @@ class LiveSession:
         """
         ready = self._ready
         clock = WallClock(rate=ready.cell.file.devices.clock_rate)
-        context = RigContext(clock, 0, 0.0, None)
+        context = RigContext(clock, 0, 0.0, None, self._rig.ports)
         with contextlib.ExitStack() as opened:
             with threads_first():
-                sensor = ready.rig.connect_sensor(context)
+                sensor = self._rig.connect_sensor(context)
             opened.callback(sensor.close)
             if log is not None:
                 self._log = LiveLog(log, ready.cell.robot.joint_names, self._facts(started))

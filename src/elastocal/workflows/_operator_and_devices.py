@@ -7,9 +7,9 @@ place that picks simulator or driver.
 import contextlib
 import importlib
 import importlib.util
-import ipaddress
 import pkgutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import socket
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib.metadata import entry_points
@@ -26,14 +26,16 @@ from elastocal.cell import (
     DeviceSettings,
     Driver,
     LineCounts,
+    LocalPort,
     PathDriver,
     RigContext,
     WallClock,
 )
 from elastocal.errors import DeviceError, ElastocalError, ProcedureError, nearest
 from elastocal.procedure import Progress as RunProgress
-from elastocal.records import StrictModel, validate
+from elastocal.records import validate
 from elastocal.results import brief_repr
+from elastocal.workflows._device_locks import at_device, devices_to_oneself, is_loopback
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,6 @@ class Unattended:
         yield Supervision(lambda _step: None, lambda: False)
 
 
-_ADDRESSES = ("address", "robot", "peer")
-"""Keys under which drivers take addresses."""
 GROUP = "elastocal.drivers"
 """Group of entry points that name drivers."""
 
@@ -144,42 +144,36 @@ class Rig:
         """Whether something moves that can hurt: a person is asked first."""
         return any(driver.real for driver in self.drivers.values())
 
-    def connect(self, seed: int, start: float) -> Devices:
-        """Return the devices.
+    @property
+    def by_kind(self) -> Mapping[str, DeviceSettings]:
+        """The settings of each of `KINDS`."""
+        return {kind: each for kinds in self.wanted.values() for kind, each in kinds.items()}
+
+    @contextmanager
+    def reserved(self, command: str, kinds: Collection[str] = KINDS) -> Iterator["ReservedRig"]:
+        """Have the devices to oneself, and every port that they need; nothing is asked of them yet.
 
         Parameters
         ----------
-        seed : int
-            Of simulated devices.
-        start : float
-            What the clock shows at the beginning, in s.
+        command : str
+            Which command has them, for others who want them.
+        kinds : collection of str, optional
+            Of the devices that it talks to.
 
         Raises
         ------
-        ElastocalError
-            If a device cannot be used; those that were made before are closed.
+        DeviceError
+            If another program has a device, or a port is taken: nothing has happened then.
         """
-        clock: Clock = WallClock(start, self.cell.file.devices.clock_rate)
-        made: list[DeviceSet] = []
-        try:
-            feed = None
-            for name, driver in self.drivers.items():
-                context = RigContext(clock, seed, start, feed)
-                made.append(driver.connect(self.cell, self.wanted[name], context))
-                feed = feed or made[-1].feed
-            clocks = [each.clock for each in made if each.clock is not None]
-            if clocks and len(made) > 1:
-                raise DeviceError(f"{self.cell.path}: devices: a driver with a clock of its own")
-            arm, sensor, metrology = (self._only(kind, made) for kind in KINDS)
-        except BaseException:
-            _refusals_to_close(made)
-            raise
-        running = clocks[0] if clocks else clock
-
-        def lines() -> tuple[LineCounts, ...]:
-            return tuple(counts for each in made for counts in each.lines())
-
-        return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
+        with contextlib.ExitStack() as opened:
+            ports: dict[LocalPort, socket.socket] = {}
+            devices = {kind: each for kind, each in self.by_kind.items() if kind in kinds}
+            opened.enter_context(devices_to_oneself(self.cell, devices, command))
+            for kind, settings in devices.items():
+                for port in settings.own_ports():
+                    with at_device(self.cell, kind):
+                        ports[port] = opened.enter_context(port.bind())
+            yield ReservedRig(self, ports)
 
     def path_arm(self) -> tuple[PathDriver, DeviceSettings]:
         """Return the driver of the arm, which takes corrections of a path, and its settings.
@@ -197,6 +191,55 @@ class Rig:
             )
         return driver, self.wanted[name]["arm"]
 
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class ReservedRig:
+    """The rig of a cell that nobody else talks to, as long as `Rig.reserved` lasts."""
+
+    rig: Rig
+    ports: Mapping[LocalPort, socket.socket]
+    """Bound already."""
+
+    def connect(self, seed: int, start: float) -> Devices:
+        """Return the devices.
+
+        Parameters
+        ----------
+        seed : int
+            Of simulated devices.
+        start : float
+            What the clock shows at the beginning, in s.
+
+        Raises
+        ------
+        ElastocalError
+            If a device cannot be used; those that were made before are closed.
+        """
+        clock: Clock = WallClock(start, self.rig.cell.file.devices.clock_rate)
+        made: list[DeviceSet] = []
+        try:
+            feed = None
+            for name, driver in self.rig.drivers.items():
+                context = RigContext(clock, seed, start, feed, self.ports)
+                made.append(driver.connect(self.rig.cell, self.rig.wanted[name], context))
+                feed = feed or made[-1].feed
+            clocks = [each.clock for each in made if each.clock is not None]
+            if clocks and len(made) > 1:
+                raise DeviceError(
+                    f"{self.rig.cell.path}: devices: a driver with a clock of its own"
+                )
+            arm, sensor, metrology = (self._only(kind, made) for kind in KINDS)
+        except BaseException:
+            _refusals_to_close(made)
+            raise
+        running = clocks[0] if clocks else clock
+
+        def lines() -> tuple[LineCounts, ...]:
+            return tuple(counts for each in made for counts in each.lines())
+
+        return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
+
     def connect_sensor(self, context: RigContext) -> DeviceSet:
         """Return the force sensor alone, with its feed; to be closed by whoever asked.
 
@@ -205,14 +248,14 @@ class Rig:
         DeviceError
             If it cannot be used, or its driver gives no newest wrench.
         """
-        name = self.cell.file.devices.sensor.driver
-        found = self.drivers[name].connect(
-            self.cell, {"sensor": self.wanted[name]["sensor"]}, context
+        name = self.rig.cell.file.devices.sensor.driver
+        found = self.rig.drivers[name].connect(
+            self.rig.cell, {"sensor": self.rig.wanted[name]["sensor"]}, context
         )
         if found.sensor is None or found.feed is None:
             found.close()
             raise DeviceError(
-                f"{self.cell.path}: devices.sensor: driver {name!r} gives no newest wrench in"
+                f"{self.rig.cell.path}: devices.sensor: driver {name!r} gives no newest wrench in"
                 " between, which a correction needs each cycle"
             )
         return found
@@ -220,12 +263,12 @@ class Rig:
     def _only(self, kind: str, made: Sequence[DeviceSet]) -> Any:
         (device,) = (
             getattr(each, kind)
-            for name, each in zip(self.drivers, made, strict=True)
-            if kind in self.wanted[name]
+            for name, each in zip(self.rig.drivers, made, strict=True)
+            if kind in self.rig.wanted[name]
         )
         if device is None:
-            driver = self.cell.file.devices.by_kind[kind].driver
-            raise DeviceError(f"{self.cell.path}: devices.{kind}: driver {driver!r} made none")
+            driver = self.rig.cell.file.devices.by_kind[kind].driver
+            raise DeviceError(f"{self.rig.cell.path}: devices.{kind}: driver {driver!r} made none")
         return device
 
 
@@ -277,31 +320,15 @@ def rig_of(cell: Cell) -> Rig:
     return rig
 
 
-def _is_loopback(address: str) -> bool:
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(address).is_loopback
-    return False
-
-
 def _require_real_time(rig: Rig) -> None:
     """Refuse a clock that is not the wall's where a device is on another machine."""
     rate = rig.cell.file.devices.clock_rate
-    for kinds in rig.wanted.values():
-        for kind, settings in kinds.items():
-            far = next((each for each in _addresses(settings) if not _is_loopback(each)), None)
-            if rate != 1.0 and far is not None:
-                raise DeviceError(
-                    f"{rig.cell.path}: devices.clock_rate is {rate:g}, for simulators on this"
-                    f" machine alone; devices.{kind} is at {far}"
-                )
-
-
-def _addresses(settings: StrictModel) -> Iterator[str]:
-    """Yield all addresses that settings name, those of single stations too."""
-    for key, value in settings:
-        if key in _ADDRESSES:
-            yield str(value)
-        elif isinstance(value, Mapping):
-            for each in value.values():
-                if isinstance(each, StrictModel):
-                    yield from _addresses(each)
+    for kind, settings in rig.by_kind.items():
+        hosts = [each.host for each in settings.device_places()]
+        hosts += [each.address for each in settings.own_ports()]
+        far = next((each for each in hosts if not is_loopback(each)), None)
+        if rate != 1.0 and far is not None:
+            raise DeviceError(
+                f"{rig.cell.path}: devices.clock_rate is {rate:g}, for simulators on this"
+                f" machine alone; devices.{kind} is at {far}"
+            )

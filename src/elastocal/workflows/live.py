@@ -164,15 +164,16 @@ def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG
             f" {1e3 * limits.correction:g} mm at up to {1e3 * limits.rate:g} mm/s; give --arm when"
             " somebody has looked at the cell"
         )
-    session = LiveSession(ready, settings.report, settings.interrupted)
     started = datetime.now(UTC).isoformat(timespec="seconds")
-    if settings.out is None:
-        return _result(settings, ready, session.run(None), started)
-    with filling(settings.out, LIVE_RECORD, settings.force) as folder:
-        end = session.run(folder / LIVE_LOG, started)
-        found = _result(settings, ready, end, started)
-        write_json(folder / LIVE_RECORD, found)
-    return found
+    with ready.rig.reserved("live", ("arm", "sensor")) as rig:
+        session = LiveSession(ready, rig, settings.report, settings.interrupted)
+        if settings.out is None:
+            return _result(settings, ready, session.run(None), started)
+        with filling(settings.out, LIVE_RECORD, settings.force) as folder:
+            end = session.run(folder / LIVE_LOG, started)
+            found = _result(settings, ready, end, started)
+            write_json(folder / LIVE_RECORD, found)
+        return found
 
 
 def _result(settings: LiveSettings, ready: Prepared, end: LiveEnd, started: str) -> LiveResult:

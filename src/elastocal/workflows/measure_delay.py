@@ -107,7 +107,10 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
     if not 2.0 <= settings.seconds <= 60.0:
         raise DeviceError(f"{settings.seconds:g} seconds: must be from 2 to 60")
     rig = rig_of(cell)
-    with contextlib.closing(rig.connect(cell.file.simulation.seed, 0.0)) as devices:
+    with (
+        rig.reserved("measure-delay") as reserved,
+        contextlib.closing(reserved.connect(cell.file.simulation.seed, 0.0)) as devices,
+    ):
         arm = devices.arm
         assert isinstance(arm, KukaArm)
         settings.operator.warn(

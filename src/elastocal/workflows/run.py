@@ -25,12 +25,7 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.verdict import OF_RUN, public_key, read_private_key, sign, write_signature
-from elastocal.workflows._operator_and_devices import (
-    Operator,
-    Rig,
-    Unattended,
-    rig_of,
-)
+from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, rig_of
 from elastocal.workflows._workflow import workflow
 
 if TYPE_CHECKING:
@@ -199,15 +194,14 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
     journal_file = job.folder.journal
     entries = procedure.read_journal(journal_file) if journal_file.is_file() else ()
     _check_folder(job, entries, settings.resume)
-    procedure.make_folder(job.folder.path)
-    with Journal(journal_file) as journal:
+    with job.rig.reserved("run") as rig, _journal(job.folder) as journal:
         # Read again: between the look above and the lock another process may have been here.
         if procedure.read_journal(journal_file) != entries:
             raise ProcedureError(f"{job.folder.path}: another process has just run here")
         if not entries:
             procedure.fill_folder(job.folder, job.cell, job.plan_folder)
         known = procedure.last_known(entries) if entries else None
-        devices = job.rig.connect(job.record.seed, known.entry.time if known else 0.0)
+        devices = rig.connect(job.record.seed, known.entry.time if known else 0.0)
         with contextlib.closing(devices):
             _confirm(job, known, devices, settings)
             session = _session(job, known, devices)
@@ -287,6 +281,11 @@ def _identified(job: _Job, operator: Operator) -> procedure.RunRecord:
     answers = dict(operator.identify(unstated(known)))
     certificate_of(known, answers)
     return job.record.model_copy(update={"stated": job.record.stated | answers})
+
+
+def _journal(folder: RunFolder) -> Journal:
+    procedure.make_folder(folder.path)
+    return Journal(folder.journal)
 
 
 def _now() -> str:

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from elastocal.cell import LOOPBACK, SIMULATED, Cell, WallClock, load_cell
+from elastocal.cell import LOOPBACK, SIMULATED, WallClock, load_cell
 from elastocal.errors import DeviceError, nearest
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.sim.wire import LiveCell, Told, WireServer, suited_servers, wire_servers
-from elastocal.workflows._operator_and_devices import rig_of
+from elastocal.workflows._device_locks import devices_to_oneself
+from elastocal.workflows._operator_and_devices import Rig, rig_of
 from elastocal.workflows._workflow import workflow
 
 
@@ -102,7 +103,8 @@ def simulate(
         If the cell cannot be used.
     """
     cell = load_cell(Path(settings.cell))
-    told = _told(cell, settings.devices)
+    rig = rig_of(cell)
+    told = _told(rig, settings.devices)
     rate = cell.file.devices.clock_rate if settings.rate is None else settings.rate
     if not 0.0 < rate <= 1000.0:
         raise DeviceError(f"rate is {rate:g}: must be above 0, at most 1000")
@@ -111,6 +113,8 @@ def simulate(
     makers = wire_servers()
     servers = dict[str, WireServer]()
     with contextlib.ExitStack() as opened:
+        served = {k: each for name in told for k, each in rig.wanted.get(name, {}).items()}
+        opened.enter_context(devices_to_oneself(cell, served, "simulate", "simulated"))
         for name, each in told.items():
             servers[name] = makers[name](live, each)
             opened.callback(servers[name].close)
@@ -124,12 +128,11 @@ def simulate(
     return result
 
 
-def _told(cell: Cell, devices: Iterable[str]) -> Mapping[str, Told]:
+def _told(rig: Rig, devices: Iterable[str]) -> Mapping[str, Told]:
     """Return what each server is told, by driver."""
     known = wire_servers()
-    rig = rig_of(cell)
     named = [name for name in rig.wanted if name != SIMULATED]
-    chosen = list(devices) or named or list(suited_servers(cell.robot))
+    chosen = list(devices) or named or list(suited_servers(rig.cell.robot))
     for name in chosen:
         if name not in known:
             raise DeviceError(

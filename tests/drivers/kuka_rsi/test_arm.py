@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from elastocal.cell import Motion, SensorStatus
+from elastocal.cell import Motion, RigContext, SensorStatus
 from elastocal.drivers.kuka_rsi import DRIVER, KukaArm, RsiSettings, connect_arm, read_rob
 from elastocal.errors import DeviceError
 from support.kuka_bench import SETTINGS, Bench
@@ -368,13 +368,13 @@ class TestModes:
         cell = example_cell("afp")
         settings = RsiSettings(mode="compensation")
         with pytest.raises(DeviceError, match="mode must be measure or contact"):
-            connect_arm(cell, settings, PeerClock(None), None)
+            connect_arm(cell, settings, RigContext(PeerClock(None), 0, 0.0, None))
 
     def test_without_a_controller_connecting_says_where_it_listened(self):
         cell = example_cell("afp")
         settings = RsiSettings.model_validate({"port": 0, "wait": "10 ms"})
         with pytest.raises(DeviceError, match=r"nothing from 127\.0\.0\.1 at 127\.0\.0\.1:\d+"):
-            connect_arm(cell, settings, PeerClock(None), None)
+            connect_arm(cell, settings, RigContext(PeerClock(None), 0, 0.0, None))
 
     def test_the_driver_makes_arms_that_can_hurt(self):
         assert DRIVER.kinds == {"arm"}

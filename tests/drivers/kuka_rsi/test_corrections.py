@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from elastocal.cell import PathCycle, WallClock
+from elastocal.cell import PathCycle, RigContext, WallClock
 from elastocal.drivers.kuka_rsi import (
     Arrival,
     Bounds,
@@ -291,7 +291,7 @@ def corrected():
         {"mode": "compensation", "port": 0, "largest_correction": "1 mm"}
     )
     source = Cycles()
-    arm = CorrectedKuka(cell, settings, WallClock(), source)
+    arm = CorrectedKuka(cell, settings, RigContext(WallClock(), 0, 0.0, None), source)
     place = xyzabc_from_T(cell.robot.forward(cell.home))
     yield arm, source, message_at(cell.home, place)
     arm.close()

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, Clock, CycleStatistics, PathCycle, PathSource, Shift
+from elastocal.cell import Cell, CycleStatistics, PathCycle, PathSource, RigContext, Shift
 from elastocal.drivers.kuka_rsi._held_correction import Effect, HeldCorrection
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
@@ -223,13 +223,15 @@ class CorrectedKuka:
         The cell.
     settings : RsiSettings
         Of its arm, in mode ``compensation``.
-    clock : Clock
+    context : RigContext
         Of the rig.
     source : PathSource
         Computes the corrections.
     """
 
-    def __init__(self, cell: Cell, settings: RsiSettings, clock: Clock, source: PathSource) -> None:
+    def __init__(
+        self, cell: Cell, settings: RsiSettings, context: RigContext, source: PathSource
+    ) -> None:
         self._settings, self._source = settings, source
         self._reader = PostureReader(cell.robot, settings.signs)
         bounds = bounds_of(cell, settings)
@@ -242,7 +244,10 @@ class CorrectedKuka:
             settings.motion_delay(cell),
         )
         place = LinkAddress(settings.address, settings.port, settings.robot, settings.cycle)
-        self._link = RsiLink(place, self._corrections, clock)
+        (port,) = settings.own_ports()
+        self._link = RsiLink(
+            place, self._corrections, context.clock, listener=context.listener(port)
+        )
         self._link.start()
         self.wait, self.require, self.close = self._link.wait, self._link.require, self._link.close
         self.port = self._link.port

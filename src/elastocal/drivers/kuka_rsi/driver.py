@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 from elastocal.cell import (
     Cell,
-    Clock,
     DeviceSet,
     DeviceSettings,
     LineCounts,
     PathLimits,
     PathSource,
     RigContext,
-    WrenchFeed,
     refused_telegrams,
 )
 from elastocal.drivers.kuka_rsi.arm import KukaArm
@@ -29,9 +27,7 @@ _LIMITS = ("largest_correction", "correction_speed")
 """Keys without which no path is corrected."""
 
 
-def connect_arm(
-    cell: Cell, settings: RsiSettings, clock: Clock, feed: WrenchFeed | None
-) -> KukaArm:
+def connect_arm(cell: Cell, settings: RsiSettings, context: RigContext) -> KukaArm:
     """Return the arm of a cell once its controller has spoken; its `link` is to be closed.
 
     Raises
@@ -44,11 +40,12 @@ def connect_arm(
             f"{cell.path}: devices.arm.mode is compensation: such an arm follows its own program,"
             " and carries out no procedure; mode must be measure or contact"
         )
-    arm = KukaArm(cell, settings, clock, feed)
+    clock, (port,) = context.clock, settings.own_ports()
+    arm = KukaArm(cell, settings, clock, context.feed)
     place = LinkAddress(
         settings.address, settings.port, settings.robot, settings.cycle, settings.mode != "measure"
     )
-    link = RsiLink(place, arm, clock)
+    link = RsiLink(place, arm, clock, listener=context.listener(port))
     arm.link = link
     link.start()
     if not link.wait(settings.wait):
@@ -85,7 +82,7 @@ class KukaRsiDriver:
         """Return the arm."""
         settings = wanted["arm"]
         assert isinstance(settings, RsiSettings)
-        arm = connect_arm(cell, settings, context.clock, context.feed)
+        arm = connect_arm(cell, settings, context)
         link = arm.link
         assert link is not None
 
@@ -117,7 +114,7 @@ class KukaRsiDriver:
     ) -> CorrectedKuka:
         """Return the arm, listened to and answered; see `elastocal.cell.PathDriver`."""
         assert isinstance(settings, RsiSettings)
-        return CorrectedKuka(cell, settings, context.clock, source)
+        return CorrectedKuka(cell, settings, context, source)
 
 
 DRIVER = KukaRsiDriver()

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from elastocal.cell import AnswerTimes, Clock
+from elastocal.cell import AnswerTimes, Clock, LocalPort
 from elastocal.drivers.kuka_rsi.link_statistics import LinkCounts, LinkStatistics
 from elastocal.drivers.kuka_rsi.messages import (
     MOST_BYTES,
@@ -87,6 +87,8 @@ class RsiLink:
         What the messages are stamped with.
     timer : callable
         Seconds that answers are timed with.
+    listener : socket, optional
+        That has the port already; closed with the link.
     """
 
     def __init__(
@@ -95,7 +97,9 @@ class RsiLink:
         handler: Handler,
         clock: Clock,
         timer: Callable[[], float] = time.perf_counter,
+        listener: socket.socket | None = None,
     ) -> None:
+        self._listener = listener
         self._place, self._handler, self._clock, self._timer = place, handler, clock, timer
         self._counts, self._ipoc = LinkCounts(), IpocWatch(place.cycle)
         self._socket: socket.socket | None = None
@@ -119,17 +123,11 @@ class RsiLink:
             If the address is none of this machine, or the port is taken.
         """
         place = self._place
-        found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            found.bind((place.address, place.port))
-        except OSError as error:
-            found.close()
-            raise DeviceError(
-                f"kuka_rsi: cannot listen at {place.address}:{place.port}:"
-                f" {error.strerror or error}"
-            ) from error
+        port = LocalPort("udp", place.address, place.port)
+        found = port.bind() if self._listener is None else self._listener
         if sys.platform == "linux":
             found.setsockopt(socket.SOL_SOCKET, _STAMP, 1)
+        _empty(found)
         found.settimeout(_PATIENCE)
         self._socket, self.port = found, found.getsockname()[1]
         self._thread = threading.Thread(target=self._listen, name="kuka_rsi", daemon=True)
@@ -302,3 +300,11 @@ class RsiLink:
         self._counts.skipped += max(len(ours) - 1, 0)
         self._counts.received += max(len(ours) - 1, 0)
         return [each for each in waiting if each[1] != known] + ours[-1:]
+
+
+def _empty(line: socket.socket) -> None:
+    """Drop what came before anybody listened: the controller waits for no answer to it any more."""
+    line.setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            line.recv(MOST_BYTES)

@@ -24,6 +24,7 @@ from elastocal.cell import (
     LOOPBACK,
     Cell,
     DeviceSettings,
+    LocalPort,
     PositiveForce,
     PositiveLength,
     PositiveSpeed,
@@ -151,6 +152,10 @@ class RsiSettings(DeviceSettings):
         if given != wanted:
             raise ValueError(f"mode {self.mode} takes {wanted} corrections, not {given}")
         return self
+
+    def own_ports(self) -> tuple[LocalPort, ...]:
+        """Return the port that the controller sends to."""
+        return (LocalPort("udp", self.address, self.port),)
 
     def measured(self, cell: Cell) -> CommissioningRecord | None:
         """Return the commissioning record that the settings name; None where they name none.

@@ -7,6 +7,7 @@ import socket
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -17,8 +18,10 @@ from elastocal.cell import (
     LOOPBACK,
     Cell,
     Clock,
+    DevicePlace,
     DeviceSet,
     DeviceSettings,
+    LocalPort,
     Name,
     Point,
     PositiveTime,
@@ -95,6 +98,23 @@ class LineStreamSettings(DeviceSettings):
         return self
 
     @property
+    def addresses(self) -> list["_Address"]:
+        """Where the lines are, each with its station."""
+        each = [_Address(line.address, line.port, name) for name, line in self.stations.items()]
+        return each or [_Address(self.address, self.port, None)]
+
+    def device_places(self) -> tuple[DevicePlace, ...]:
+        """Return where the adapters are; as server, each is known by the port that it comes to."""
+        if self.role == "server":
+            return tuple(DevicePlace(self.peer, line.port) for line in self.addresses)
+        return super().device_places()
+
+    def own_ports(self) -> tuple[LocalPort, ...]:
+        """Return the ports that adapters come to."""
+        served = self.addresses if self.role == "server" else ()
+        return tuple(LocalPort("tcp", line.host, line.port) for line in served)
+
+    @property
     def parsed_columns(self) -> tuple[Column, ...]:
         """Columns of a stream without a header."""
         return columns_of(self.columns) if self.columns else ()
@@ -119,6 +139,7 @@ class _Line(StationLink):
         settings: LineStreamSettings,
         feeds: Mapping[str, StationFeed],
         clock: Clock,
+        listener: socket.socket | None,
     ) -> None:
         own = list(feeds.values()) if address.station is None else [feeds[address.station]]
         name = f"line_stream {address.host}:{address.port}"
@@ -127,12 +148,12 @@ class _Line(StationLink):
         self._frame: str | None = None
         self._looked = next(iter(feeds)) if address.station is None else address.station
         self._to_look = threading.Event()
-        self._listener: socket.socket | None = None
+        self._listener = listener
         self.port = address.port
         """The port that was taken or is connected to."""
-        if settings.role == "server":
-            self._listener = _listen(address)
-            self.port = int(self._listener.getsockname()[1])
+        if listener is not None:
+            listener.settimeout(WAKE)
+            self.port = int(listener.getsockname()[1])
 
     @property
     def station(self) -> str | None:
@@ -232,18 +253,6 @@ class _Line(StationLink):
         return self._feeds[name]
 
 
-def _listen(address: _Address) -> socket.socket:
-    try:
-        listener = socket.create_server((address.host, address.port), backlog=1)
-    except OSError as error:
-        raise DeviceError(
-            f"line_stream: cannot listen at {address.host}:{address.port}:"
-            f" {error.strerror or error}"
-        ) from error
-    listener.settimeout(WAKE)
-    return listener
-
-
 def _at_point(position: FloatArray, R: FloatArray | None, point: tuple[float, ...]) -> FloatArray:
     """Return a point of a 6D marker, shape (3,), in m of the station's frame."""
     if R is None:
@@ -297,9 +306,8 @@ class LineStreamDriver:
         trackers = {tracker.name: tracker for tracker in require_trackers(cell)}
         for name in settings.stations:
             require_station(name, tuple(trackers))
-        addresses = [
-            _Address(line.address, line.port, name) for name, line in settings.stations.items()
-        ] or [_Address(settings.address, settings.port, None)]
+        addresses, ports = settings.addresses, settings.own_ports()
+        listeners = [context.listener(port) for port in ports]
         where = ", ".join(f"{each.host}:{each.port}" for each in addresses)
         names = tuple(settings.stations) or tuple(trackers)
         feeds = {
@@ -312,7 +320,10 @@ class LineStreamDriver:
             )
             for name in names
         }
-        lines = [_Line(address, settings, feeds, context.clock) for address in addresses]
+        lines = [
+            _Line(address, settings, feeds, context.clock, listener)
+            for address, listener in zip_longest(addresses, listeners)
+        ]
         return metrology_set(LineMetrology(feeds, settings.rate, lines), lines)
 
 

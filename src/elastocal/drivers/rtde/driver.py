@@ -6,12 +6,14 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from elastocal.cell import LOOPBACK, Cell, DeviceSet, DeviceSettings, RigContext
+from elastocal.cell import LOOPBACK, Cell, DevicePlace, DeviceSet, DeviceSettings, RigContext
 from elastocal.drivers.rtde._ur_rtde import UrControl, UrReceive, open_control, open_receive
 from elastocal.drivers.rtde.arm import UrArm
 from elastocal.drivers.rtde.line import UrLine, UrSensor, pose_of_T
 from elastocal.errors import DeviceError
 
+_PORT = 30004
+"""By which a controller is known, of those that it answers at."""
 _CONTROL_RATE = 500.0
 """Of the commanding half, in Hz; controllers of version 5 take it."""
 _FAR_OFF = 0.02
@@ -25,6 +27,10 @@ class RtdeSettings(DeviceSettings):
     """Of the controller, which has its ports fixed: 30004, 30003, 29999."""
     rate: Annotated[FiniteFloat, Field(ge=10.0, le=500.0)] = 125.0
     """Samples a second."""
+
+    def device_places(self) -> tuple[DevicePlace, ...]:
+        """Return where the controller is."""
+        return (DevicePlace(self.address, _PORT),)
 
 
 class RtdeDriver:
