@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import elastocal as ec
+from elastocal import locks
 from elastocal.dataset import read_dataset
 from elastocal.drivers import rtde
 from elastocal.sim.wire import PORTS
@@ -120,7 +121,9 @@ def refused_meanwhile(wired: PlannedCell, out: Path, told: list[tuple[int, str]]
 
 @pytest.mark.slow
 @pytest.mark.end_to_end
-def test_a_run_over_sockets_is_the_run_in_process_whatever_else_is_tried(tmp_path):
+def test_a_run_over_sockets_is_the_run_in_process_whatever_else_is_tried(tmp_path, monkeypatch):
+    # The folder that programs of their own take.
+    monkeypatch.setattr(locks, "SHARED", Path("/tmp/elastocal-locks"))
     planned = planned_cell(tmp_path, 3)
     text = planned.cell.read_text(encoding="utf-8")
     text = text.replace("\nsimulation:", "\nsimulation:\n  sensor: {rate: 500 Hz}", 1)
