@@ -197,6 +197,9 @@ class FakeArm:
         w.since, w.place, w.holds = w.clock.ticks, hash(tuple(np.round(q, 9))), 0
         w.visits, w.aside = w.visits + 1, 0.0
 
+    def adopt_position(self) -> None:
+        self._command("adopt_position", Motion.IDLE)
+
     def approach(
         self, direction_base: np.ndarray, distance: float, speed: float, contact_force: float
     ) -> None:

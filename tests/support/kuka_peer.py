@@ -49,6 +49,14 @@ class KukaPeer:
     bias: np.ndarray = field(default_factory=lambda: np.array([12.0, -7.0, 3.0]))
     knock: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """Force on the robot from somewhere, base."""
+    knows_adopt: bool = True
+    """Whether its program takes the present place for the programmed one."""
+    slips: float = 0.0
+    """How far the first axis of the arm turns meanwhile, in rad."""
+    off: float = 0.5
+    """How long it is silent then, in s."""
+    silent: int = 0
+    """Cycles without a message from now on."""
 
     def __post_init__(self):
         self.robot, self.q = self.cell.robot, self.cell.home.copy()
@@ -109,7 +117,7 @@ class KukaPeer:
         if "deaf" in self.fault:
             return
         command = element(text, "Cmd")
-        if self.state == 3:
+        if self.state == 3 and order != 3:
             self._ride(order)
         elif order == 1:
             assert "<Stop>0</Stop>" in text
@@ -121,9 +129,24 @@ class KukaPeer:
             given = [rail[f"E{i}"] for i in range(1, external + 1)]
             self.target = np.array([*given, *(axes[f"A{i}"] for i in range(1, 7))]) * scale
             self.percent, self.state, self.next = command["V"], 3, int(command["N"])
-        elif order == 0:
+        elif order == 3 and self.knows_adopt and int(command["N"]) != self.number:
+            assert "<Stop>1</Stop>" in text
+            if self.state == 1:
+                self.state, self.silent = 1, round(self.off / self.cycle)
+                self.number = int(command["N"])
+                self.q = self.q.copy()
+                self.q[self.robot.external_axes] += self.slips
+                self.restart()
+                self.ipoc += 1_000_000
+            self.state = 1
+        elif order in (0, 3):
             assert "<Stop>1</Stop>" in text
             self.state = 1
+
+    def restart(self) -> None:
+        """Take the place where the arm stands for the programmed one, as a started program does."""
+        self.offset, self.queue = np.zeros(3), deque([np.zeros(3)] * self.delay)
+        self.T_programmed = self.T
 
     def _ride(self, order):
         way = self.target - self.q
@@ -187,10 +210,13 @@ class PeerFeed:
     peer: KukaPeer
     silent: bool = False
     status: SensorStatus = SensorStatus.OK
+    fails: Exception | None = None
     _last: WrenchSample | None = None
 
     def newest(self) -> WrenchSample | None:
         peer, cell = self.peer, self.peer.cell
+        if self.fails is not None:
+            raise self.fails
         if self.silent:
             return self._last
         T_base_sensor = peer.T @ np.linalg.inv(cell.T_sensor_tcp)
@@ -222,6 +248,9 @@ class PeerClock:
         while self._next <= end:
             self.time = self.peer.time = self._next
             self._next += self.peer.cycle
+            if self.peer.silent:
+                self.peer.silent -= 1
+                continue
             if self.link is None or self.quiet:
                 continue
             answer = self.link.answer(self.peer.rob(), ("127.0.0.1", 50_000))

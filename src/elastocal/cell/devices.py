@@ -64,10 +64,13 @@ class ArmState:
     T_base_tcp: FloatArray
     """Tool frame that the controller computes from them, shape (4, 4), in m."""
     motion: Motion
-    in_contact: bool
-    """Whether a guarded move ended because the contact force was reached, until a retract."""
+    in_contact: bool | None
+    """Whether a guarded move ended because the contact force was reached, until a retract; None
+    where nothing has been felt or left since the connection: an arm that was pressing before does
+    not know it."""
     fault: str | None
-    """Why it stopped; None when nothing is wrong."""
+    """Why it stopped, or why it left a guarded move or force control; None when nothing is
+    wrong."""
     source: str
     """Device that says so."""
 
@@ -101,6 +104,13 @@ class RobotArm(Protocol):
             Target in rad or m.
         speed : float
             Fraction of the axis speeds, in (0, 1].
+        """
+
+    def adopt_position(self) -> None:
+        """Take the place where the arm stands for its programmed place.
+
+        A joint move can begin from here when it returns. The arm stands meanwhile, and may be
+        silent for some seconds: nobody watches it then. To be called off the surface, idle.
         """
 
     def approach(

@@ -130,6 +130,9 @@ class TestContact:
         assert not state.in_contact
         assert state.fault is None
         np.testing.assert_allclose(bench.peer.T[:3, 3] - before, 0.03 * R.normal, atol=3e-5)
+        with pytest.raises(DeviceError, match=r"move_joints: correction.*adopt_position"):
+            arm.move_joints(bench.place.q_approach, 1.0)
+        arm.adopt_position()
         arm.move_joints(bench.place.q_approach, 1.0)
         state = bench.wait(Motion.IDLE)
         np.testing.assert_allclose(state.q, bench.place.q_approach, atol=1e-6)
@@ -164,14 +167,20 @@ class TestContact:
         bench = Bench.of(cell=example_cell("afp", procedure={"travel_limit": "2 mm"}))
         bench.touch()
         bench.arm.hold(np.array([290.0, 0.0, -300.0]), 5000.0)
-        state = bench.wait(Motion.STOPPED)
+        state = bench.wait(Motion.IDLE)
         assert "force control gave up: the tool went 2.0 mm" in state.fault
 
-    def test_the_force_limit_stops_it(self, bench):
+    def test_beyond_the_force_limit_it_stands_and_can_be_taken_off(self, bench):
         bench.touch()
         bench.arm.hold(PRESS, 500.0)
         bench.peer.knock = np.array([0.0, 0.0, 5000.0])
-        assert "force limit exceeded" in bench.wait(Motion.STOPPED).fault
+        assert "force limit exceeded" in bench.wait(Motion.IDLE).fault
+        for name in ("move_joints", "hold"):
+            with pytest.raises(DeviceError, match=f"refuses {name}: (allowed|force limit)"):
+                commands(bench)[name]()
+        bench.arm.retract(bench.place.normal, 0.03, 0.05)
+        bench.wait(Motion.IDLE)
+        np.testing.assert_allclose(bench.force_tcp, bench.peer.T[:3, :3].T @ bench.peer.knock)
 
     @pytest.mark.parametrize("kind", ["silent", "saturated"])
     def test_without_a_force_to_trust_it_stands_and_can_be_taken_off(self, bench, kind):
@@ -190,12 +199,29 @@ class TestContact:
         assert bench.wait(Motion.IDLE).fault is None
         assert np.linalg.norm(bench.force_tcp) == 0.0
 
-    def test_force_control_that_stays_blind_stops(self, bench):
+    def test_force_control_that_stays_blind_is_left_for_position_control(self, bench):
         bench.touch()
         bench.arm.hold(PRESS, 500.0)
         bench.clock.sleep(0.1)
         bench.feed.silent = True
-        assert "force sensor silent for 1.0" in bench.wait(Motion.STOPPED).fault
+        assert "force sensor silent for 1.0" in bench.wait(Motion.IDLE).fault
+
+    def test_a_feed_that_fails_ends_no_thread_and_the_tool_comes_off(self, bench):
+        bench.touch()
+        bench.arm.hold(PRESS, 500.0)
+        bench.clock.sleep(0.2)
+        bench.feed.fails = DeviceError("box: status fault")
+        bench.clock.sleep(0.1)
+        state = bench.arm.state()
+        assert (state.motion, state.fault) == (Motion.IDLE, "box: status fault")
+        standing = bench.peer.q.copy()
+        bench.clock.sleep(0.3)
+        np.testing.assert_array_equal(bench.peer.q, standing)
+        bench.arm.release(500.0)
+        bench.wait(Motion.IDLE)
+        bench.arm.retract(bench.place.normal, 0.02, 0.02)
+        assert bench.wait(Motion.IDLE).in_contact is None
+        assert np.linalg.norm(bench.force_tcp) == 0.0
 
     def test_a_blow_while_it_moves_freely_stops_it(self, bench):
         bench.arm.enable()
@@ -206,6 +232,95 @@ class TestContact:
         assert "collision: the force changed by 150 N" in state.fault
         bench.clock.sleep(0.1)
         assert bench.peer.state in (1, 5)
+
+
+def pressing(bench, depth: float = 0.001) -> None:
+    """Let the tool stand in the surface, with a program that was started there."""
+    point, normal = bench.peer.surface
+    bench.peer.q = bench.place.q.copy()
+    bench.peer.restart()
+    bench.peer.surface = (point + depth * normal, normal)
+    bench.peer.stick = bench.peer.T[:3, 3]
+    bench.clock.sleep(0.1)
+
+
+class TestProgrammedPlace:
+    def test_a_correction_from_before_the_program_was_started_is_never_taken_back(self, bench):
+        pressing(bench)
+        arm, most = bench.arm, float(np.linalg.norm(bench.force_tcp))
+        assert arm.state().in_contact is None
+        arm.enable()
+        arm.retract(bench.place.normal, 0.1, 0.05)
+        bench.wait(Motion.IDLE)
+        off = bench.peer.T
+        arm.adopt_position()
+        np.testing.assert_allclose(bench.peer.T, off, atol=1e-9)
+        np.testing.assert_allclose(bench.peer.offset, 0.0)
+        arm.move_joints(bench.place.q_approach, 0.2)
+        while arm.state().motion is Motion.MOVING:
+            bench.clock.sleep(0.04)
+            assert np.linalg.norm(bench.force_tcp) == 0.0
+        assert arm.state().in_contact is False
+        assert most == pytest.approx(1000.0)
+
+    def test_a_program_that_cannot_adopt_is_left_to_the_pendant(self, bench):
+        bench.peer.knows_adopt = False
+        pressing(bench)
+        bench.arm.enable()
+        bench.arm.retract(bench.place.normal, 0.1, 0.05)
+        bench.wait(Motion.IDLE)
+        off = bench.peer.q.copy()
+        with pytest.raises(DeviceError, match=r"100\.0 mm from the programmed .* by the pendant"):
+            bench.arm.adopt_position()
+        np.testing.assert_array_equal(bench.peer.q, off)
+
+    def test_a_program_restarted_unseen_gives_itself_away_by_its_place(self, bench):
+        """No jump of IPOC, no other state: only RSol is another one."""
+        arm = bench.arm
+        arm.enable()
+        arm.move_joints(bench.place.q_approach, 1.0)
+        bench.wait(Motion.IDLE)
+        pressing(bench)
+        arm.retract(bench.place.normal, 0.1, 0.05)
+        bench.wait(Motion.IDLE)
+        off = bench.peer.T
+        arm.adopt_position()
+        np.testing.assert_allclose(bench.peer.T, off, atol=1e-9)
+
+    def test_what_is_felt_on_the_way_back_to_zero_stops_it(self, bench):
+        arm = bench.arm
+        arm.enable()
+        arm.move_joints(bench.place.q_approach, 1.0)
+        bench.wait(Motion.IDLE)
+        arm.retract(bench.place.normal, 0.02, 0.05)
+        state = bench.wait(Motion.IDLE)
+        bench.peer.surface = (
+            state.T_base_tcp[:3, 3] - 0.01 * bench.place.normal,
+            bench.place.normal,
+        )
+        with pytest.raises(DeviceError, match=r"(contact|collision): .* N"):
+            arm.adopt_position()
+        # 100 N, and what a delay of 60 ms adds at the contact speed against 1 N/um.
+        speed = bench.peer.cell.file.procedure.contact_speed
+        assert np.linalg.norm(bench.force_tcp) < 100.0 + speed * 0.06 * 1e6
+
+    def test_an_arm_that_moved_while_rsi_was_off_is_a_fault(self, bench):
+        pressing(bench)
+        bench.arm.enable()
+        bench.arm.retract(bench.place.normal, 0.1, 0.05)
+        bench.wait(Motion.IDLE)
+        bench.peer.slips = 0.002
+        with pytest.raises(DeviceError, match=r"the arm moved [0-9.]+ mm"):
+            bench.arm.adopt_position()
+
+    def test_a_controller_that_stays_silent_is_a_fault(self, bench):
+        pressing(bench)
+        bench.arm.enable()
+        bench.arm.retract(bench.place.normal, 0.1, 0.05)
+        bench.wait(Motion.IDLE)
+        bench.peer.off = 60.0
+        with pytest.raises(DeviceError, match="nothing from the controller for 5"):
+            bench.arm.adopt_position()
 
 
 class TestRefusals:
@@ -321,7 +436,7 @@ class TestFaultsOfTheLine:
         bench.ready()
         bench.peer.poscorr = 0.005
         bench.arm.approach(-bench.place.normal, 0.05, 0.05, np.inf)
-        assert "correction saturated" in bench.wait(Motion.STOPPED).fault
+        assert "correction saturated" in bench.wait(Motion.IDLE).fault
 
     @pytest.mark.parametrize("element", ["RIst", "RSol", "AIPos", "EIPos", "Krl"])
     def test_what_the_controller_does_not_send_is_named(self, bench, element):

@@ -20,8 +20,9 @@ from elastocal.sim.wire import (
     ethernet_config,
     rsi_server,
 )
+from elastocal.sim.wire._pos_corr import RsiStopError
 from elastocal.sim.wire._rsi_messages import EthernetConfig, RobWriter, SenReader
-from elastocal.sim.wire._rsi_robot import RsiRobot, RsiStopError, corrected_program
+from elastocal.sim.wire._rsi_robot import RsiRobot, corrected_program
 from elastocal.sim.workcell import SimClock
 from support.simulated import QUIET, example_cell, places
 

@@ -1,3 +1,9 @@
+from ._cycle import (
+    Cycle as Cycle,
+    Motion as Motion,
+    Pace as Pace,
+    Step as Step,
+)
 from .arm import (
     KukaArm as KukaArm,
 )
@@ -82,11 +88,7 @@ from .messages import (
 )
 from .motions import (
     ContactGuard as ContactGuard,
-    Cycle as Cycle,
-    Motion as Motion,
-    Pace as Pace,
     Press as Press,
-    Step as Step,
     approach as approach,
     free_move as free_move,
     hold as hold,
@@ -94,6 +96,7 @@ from .motions import (
     release as release,
     require_force as require_force,
     retract as retract,
+    take_back as take_back,
 )
 from .posture import (
     PostureReader as PostureReader,

@@ -16,14 +16,22 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Cell, Clock, CollisionWatch, Motion as MotionState, WrenchFeed
+from elastocal.cell import ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
+from elastocal.drivers.kuka_rsi import motions
+from elastocal.drivers.kuka_rsi._adoption import ADOPTS, adopt
 from elastocal.drivers.kuka_rsi._commands import (
     CHECKS,
+    OUT,
+    SILENT,
+    SOURCE,
     StraightMoveRules,
+    require_ready,
 )
+from elastocal.drivers.kuka_rsi._contact import ContactMemory, feeling
+from elastocal.drivers.kuka_rsi._cycle import EXACT, Cycle, Motion, Pace, Step
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
-from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw
 from elastocal.drivers.kuka_rsi.link import RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
     Arrival,
@@ -33,36 +41,20 @@ from elastocal.drivers.kuka_rsi.messages import (
     RobMessage,
     SenMessage,
 )
-from elastocal.drivers.kuka_rsi.motions import (
-    ContactGuard,
-    Cycle,
-    Motion,
-    Pace,
-    Press,
-    Step,
-    approach,
-    free_move,
-    hold,
-    play,
-    release,
-    retract,
-)
+from elastocal.drivers.kuka_rsi.motions import ContactGuard, Press
 from elastocal.drivers.kuka_rsi.posture import PostureReader
 from elastocal.drivers.kuka_rsi.settings import RsiSettings, bounds_of
 from elastocal.errors import DeviceError
-from elastocal.robot import inverse_transform
 
-_SOURCE = "kuka_rsi"
-_SILENT = 0.25
-"""Time without a message after which the arm counts as stopped, in s."""
 _EDGE_AGAIN = 25
 """Cycles for which a program stays guided against its order before STOP rises again."""
 _RESTING = (MotionState.DISARMED, MotionState.STOPPED)
 _STANDING = (MotionState.IDLE,)
-_OUT = (ProgramState.ABSENT, ProgramState.ENDED)
 _FORCED = (MotionState.IDLE, MotionState.HOLDING, MotionState.RELEASING)
-_LET_GO = 0.3
-"""Part of the contact force below which the tool has left the surface at the end of a retract."""
+_AWAY = ("release", "retract")
+"""Commands that lead away from the surface: allowed with a fault, and without a force."""
+_BY_FORCE = (MotionState.APPROACHING, MotionState.HOLDING, MotionState.RELEASING)
+"""States that end in position control where they fail: from there the tool can be retracted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +64,8 @@ class _Task:
     state: MotionState
     begin: Callable[[Cycle], Motion]
     done: Callable[[Cycle], None] | None = None
+    silence: float = SILENT
+    """Longest time without a message, in s."""
 
 
 class KukaArm:
@@ -91,14 +85,14 @@ class KukaArm:
         self.joint_names = cell.robot.joint_names
         self.bounds = bounds_of(cell, settings)
         delay = settings.motion_delay(cell)
-        self._pace = Pace(settings.cycle, delay, settings.acceleration, settings.correction_speed)
+        self._pace = Pace(settings.cycle, delay, settings.acceleration)
         stiffness, speed = settings.contact_stiffness, settings.force_speed
         self.law = ForceLaw.design(stiffness, delay, settings.cycle, speed)
         self._rules = StraightMoveRules(self.bounds, self.law, delay + 2.0 * settings.cycle)
         self._postures = PostureReader(cell.robot, settings.signs)
         self.guard = CorrectionGuard(self.bounds, settings.cycle, delay)
         """Bounds what is sent, and counts what the controller clamps."""
-        self._reader, self._watch = self._feeling(feed)
+        self._reader, self._watch = feeling(cell, settings, feed)
         self._lock = threading.RLock()
         self._cycle: Cycle | None = None
         self._problem: str | None = None
@@ -107,24 +101,10 @@ class KukaArm:
         self._task: _Task | None = None
         self._running: Motion | None = None
         self._number = 0
-        self._touched: ContactGuard | None = None
-        self._touched_at: FloatArray = np.zeros(3)
+        self._contact = ContactMemory()
         self._disobeyed = 0
         self.link: RsiLink | None = None
         """Line to the controller; its failure is raised at the next call."""
-
-    def _feeling(self, feed: WrenchFeed | None) -> tuple[ForceReader | None, CollisionWatch | None]:
-        T_sensor_tcp = self._cell.T_sensor_tcp
-        if self._settings.mode != "contact":
-            return None, None
-        if feed is None or T_sensor_tcp is None:
-            raise DeviceError(
-                f"{self._cell.path}: devices.arm: mode contact needs a force sensor whose driver"
-                " feeds the arm (section sensor, and devices.sensor)"
-            )
-        reader = ForceReader(feed, inverse_transform(T_sensor_tcp), self._settings.cycle)
-        weight = self._cell.file.tool.mass * self._cell.gravity_base
-        return reader, CollisionWatch(weight, self._settings.collision_force)
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -132,7 +112,8 @@ class KukaArm:
         with self._lock:
             cycle = self._newest()
             silent = self._clock.now() - cycle.time
-            if silent > _SILENT and self._state not in _RESTING:
+            patience = SILENT if self._task is None else self._task.silence
+            if silent > patience and self._state not in _RESTING:
                 counts = "" if self.link is None else self.link.statistics().sentence()
                 self._break_down(f"nothing from the controller for {silent:.2f} s; {counts}")
             return ArmState(
@@ -140,9 +121,9 @@ class KukaArm:
                 q=cycle.q.copy(),
                 T_base_tcp=cycle.T_base_tcp.copy(),
                 motion=self._state,
-                in_contact=self._touched is not None,
+                in_contact=self._contact.in_contact,
                 fault=self._fault,
-                source=_SOURCE,
+                source=SOURCE,
             )
 
     def enable(self) -> None:
@@ -150,7 +131,7 @@ class KukaArm:
         self._require_link()
         with self._lock:
             cycle = self._newest()
-            self._require_ready(cycle)
+            require_ready(cycle, self._clock.now() - cycle.time, self._settings.mode)
         self._postures.require_model(cycle, self._settings.model_tolerance)  # link goes on
         with self._lock:
             self._fault = None
@@ -174,17 +155,44 @@ class KukaArm:
         names, limits = self.joint_names, self._cell.robot.limits
         target = CHECKS.joint_move(q, speed, names, (limits.lower, limits.upper))
         with self._lock:
-            self._allow("move_joints", _STANDING)
-            if self._touched is not None:
-                raise DeviceError(
-                    f"{_SOURCE} refuses move_joints: the tool is at the surface, retract"
-                )
+            self._allow("move_joints", _STANDING, in_contact=False)
+            CHECKS.require_programmed_place(self._newest().offset)
             self._number += 1
             percent = min(max(1.0, 100.0 * speed), float(self._settings.ptp_percent))
             axes, external = self._postures.as_told(target)
             told = MoveTarget(self._number, axes, external, percent)
-            motion = partial(free_move, target=told, q=target, pace=self._pace)
-            self._start(_Task(MotionState.MOVING, motion))
+            self._contact.forget_place()
+            motion = partial(motions.free_move, target=told, q=target)
+            self._start(_Task(MotionState.MOVING, motion, self._contact.arrived))
+
+    def adopt_position(self) -> None:
+        """Leave no correction behind; see `RobotArm.adopt_position`.
+
+        The correction is taken back where a joint move of this connection has ended at zero. Where
+        zero may be the surface, the controller takes the present place for the programmed one.
+        """
+        with self._lock:
+            self._allow("adopt_position", _STANDING, in_contact=False)
+            cycle = self._newest()
+            if float(np.linalg.norm(cycle.offset)) <= EXACT:
+                return
+            if self._contact.is_zero_free(cycle):
+                assert self._reader is not None
+                limits = (self._settings.collision_force, self.bounds.force)
+                guard = ContactGuard(self._reader, None, *limits)
+                # As slow as an approach in which contact is expected: it is a short way.
+                speed = min(self.bounds.speed, self._cell.file.procedure.contact_speed)
+                back = partial(motions.take_back, guard=guard, speed=speed, pace=self._pace)
+                self._start(_Task(MotionState.MOVING, back))
+            else:
+                self._number += 1
+                self._contact.forget_place()
+                motion = partial(adopt, number=self._number)
+                self._start(_Task(MotionState.MOVING, motion, silence=ADOPTS))
+        while self.state().motion is MotionState.MOVING:
+            self._clock.sleep(self._pace.cycle)
+        if self._fault is not None:
+            raise DeviceError(f"{SOURCE}: {self._fault}")
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
@@ -200,8 +208,9 @@ class KukaArm:
             self._rules.require_gentle(speed, contact_force)
             assert self._reader is not None
             guard = ContactGuard(self._reader, direction, contact_force, self.bounds.force)
-            motion = partial(approach, way=way, speed=speed, guard=guard, pace=self._pace)
-            self._start(_Task(MotionState.APPROACHING, motion, partial(self._touch, guard)))
+            motion = partial(motions.approach, way=way, speed=speed, guard=guard, pace=self._pace)
+            felt = partial(self._contact.approached, guard)
+            self._start(_Task(MotionState.APPROACHING, motion, felt))
 
     def hold(self, force_tcp: FloatArray, rate: float) -> None:
         """Start to build up a force and hold it; see `RobotArm.hold`."""
@@ -212,7 +221,7 @@ class KukaArm:
         CHECKS.require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")
         with self._lock:
             self._allow("hold", _FORCED, in_contact=True)
-            motion = partial(hold, press=self._press(wanted, rate), pace=self._pace)
+            motion = partial(motions.hold, press=self._press(wanted, rate), pace=self._pace)
             self._start(_Task(MotionState.HOLDING, motion))
 
     def release(self, rate: float) -> None:
@@ -221,7 +230,7 @@ class KukaArm:
         with self._lock:
             self._allow("release", _FORCED, in_contact=True)
             press, stiffness = self._press(np.zeros(3), rate), self._settings.contact_stiffness
-            motion = partial(release, press=press, pace=self._pace, stiffness=stiffness)
+            motion = partial(motions.release, press=press, pace=self._pace, stiffness=stiffness)
             self._start(_Task(MotionState.RELEASING, motion))
 
     def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
@@ -229,16 +238,14 @@ class KukaArm:
         direction = CHECKS.line("retract", direction_base, distance, speed)
         with self._lock:
             self._allow("retract", _FORCED)
-            touched = self._touched
-            if touched is not None and not float(direction @ touched.direction) < 0.0:
-                raise DeviceError(
-                    f"{_SOURCE}: retract direction {direction.tolist()} leads into the surface,"
-                    f" which was approached along {np.round(touched.direction, 4).tolist()}"
-                )
+            touched = self._contact.guard
+            if touched is not None:
+                self._rules.require_away(direction, touched.direction)
             way = distance * direction
             self._rules.require_room("retract", self._newest().offset + way, speed)
-            motion = partial(retract, way=way, speed=speed, pace=self._pace)
-            self._start(_Task(MotionState.RETRACTING, motion, self._leave))
+            motion = partial(motions.retract, way=way, speed=speed, pace=self._pace)
+            left = partial(self._contact.retracted, self._reader)
+            self._start(_Task(MotionState.RETRACTING, motion, lambda _: left()))
 
     def excite(self, places: FloatArray) -> AnswerRecorder:
         """Start to follow places, shape (cycle, 3), base, in m, from where the tool stands.
@@ -251,7 +258,7 @@ class KukaArm:
         with self._lock:
             self._allow("excite", _STANDING, in_contact=False)
             recorder = AnswerRecorder(places, self._newest().offset, self._pace.cycle)
-            motion = partial(play, places=places, heard=recorder.hear)
+            motion = partial(motions.play, places=places, heard=recorder.hear)
             self._start(_Task(MotionState.MOVING, motion))
         return recorder
 
@@ -267,6 +274,7 @@ class KukaArm:
             self._cycle, self._problem = cycle, None
             if arrival in (Arrival.FIRST, Arrival.JUMPED):
                 self._number = cycle.command
+                self._contact.forget_place()
             if self._settings.mode == "measure":
                 return None
             self._look(cycle, arrival)
@@ -297,18 +305,23 @@ class KukaArm:
                 task.done(cycle)
             return Step()
         except DeviceError as error:
-            self._break_down(str(error))
-            return Step(order=Order.HOLD)
+            if self._state not in _BY_FORCE:
+                self._break_down(str(error))
+                return Step(order=Order.HOLD)
+            self._fault = str(error)
+            self._drop(MotionState.IDLE)
+            return Step()
 
     def _look(self, cycle: Cycle, arrival: Arrival) -> None:
         """Stop where the controller, or the force, says that something is wrong."""
         if self._reader is not None:
             self._reader.look(cycle.time)
-        if self._state in _RESTING:
+        adopting = self._task is not None and self._task.silence > SILENT
+        if self._state in _RESTING or adopting:
             return
         if arrival is Arrival.JUMPED:
             self._break_down("IPOC has jumped: the controller's program was started anew")
-        elif cycle.state in _OUT:
+        elif cycle.state in OUT:
             self._break_down("the program elcal_run on the controller is not in its loop any more")
         elif self._state is MotionState.MOVING and self._watch is not None:
             assert self._reader is not None
@@ -339,20 +352,9 @@ class KukaArm:
             self._fault = fault
             self._drop(MotionState.STOPPED)
 
-    def _touch(self, guard: ContactGuard, cycle: Cycle) -> None:
-        if guard.felt:
-            self._touched, self._touched_at = guard, cycle.offset
-
-    def _leave(self, _: Cycle) -> None:
-        if self._touched is None or self._reader is None:
-            return
-        left = float(np.linalg.norm(self._reader.force_tcp))
-        if left <= _LET_GO * self._touched.contact_force or self._reader.problem() is not None:
-            self._touched = None
-
     def _press(self, wanted: FloatArray, rate: float) -> Press:
         assert self._reader is not None
-        limits = (self._touched_at, self.bounds.travel, self.bounds.force)
+        limits = (self._contact.touched_at, self.bounds.travel, self.bounds.force)
         return Press(self._reader, self.law, wanted, rate, *limits)
 
     def _require_link(self) -> None:
@@ -361,29 +363,14 @@ class KukaArm:
 
     def listens(self) -> bool:
         """Return whether the program on the controller takes orders."""
-        return self._cycle is not None and self._cycle.state not in _OUT
+        return self._cycle is not None and self._cycle.state not in OUT
 
     def _newest(self) -> Cycle:
         if self._problem is not None:
-            raise DeviceError(f"{_SOURCE}: {self._problem}")
+            raise DeviceError(f"{SOURCE}: {self._problem}")
         if self._cycle is None:
-            raise DeviceError(f"{_SOURCE}: the controller has sent nothing yet")
+            raise DeviceError(f"{SOURCE}: the controller has sent nothing yet")
         return self._cycle
-
-    def _require_ready(self, cycle: Cycle) -> None:
-        """Refuse to be enabled while anything stands against it."""
-        why = None
-        silent = self._clock.now() - cycle.time
-        if self._settings.mode != "contact":
-            why = f"mode {self._settings.mode} moves nothing: devices.arm.mode must be contact"
-        elif not silent <= _SILENT:
-            why = f"no message from the controller for {silent:.2f} s"
-        elif cycle.state in _OUT:
-            why = "the program elcal_run on the controller is not in its loop: select and start it"
-        elif self._reader is not None:
-            why = self._reader.problem(_SILENT)
-        if why is not None:
-            raise DeviceError(f"{_SOURCE} cannot be enabled: {why}")
 
     def _allow(
         self, command: str, states: tuple[MotionState, ...], *, in_contact: bool | None = None
@@ -392,8 +379,13 @@ class KukaArm:
         if self._state not in states:
             allowed = ", ".join(state.value for state in states)
             raise DeviceError(
-                f"{_SOURCE} refuses {command}: it is {self._state.value} (allowed when {allowed})"
+                f"{SOURCE} refuses {command}: it is {self._state.value} (allowed when {allowed})"
             )
-        if in_contact is not None and in_contact is not (self._touched is not None):
+        blind = None if self._reader is None else self._reader.problem(SILENT)
+        why = self._fault or (None if command == "adopt_position" else blind)
+        if why is not None and command not in _AWAY:
+            raise DeviceError(f"{SOURCE} refuses {command}: {why}")
+        touches = self._contact.guard is not None
+        if in_contact is not None and in_contact is not touches:
             what = "only in contact" if in_contact else "not in contact: retract first"
-            raise DeviceError(f"{_SOURCE} refuses {command}: allowed {what}")
+            raise DeviceError(f"{SOURCE} refuses {command}: allowed {what}")

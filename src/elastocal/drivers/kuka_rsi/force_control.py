@@ -23,6 +23,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import SensorStatus, WrenchFeed
+from elastocal.errors import DeviceError
 
 _PRODUCT = 0.25
 """Gain times stiffness times delay."""
@@ -127,12 +128,21 @@ class ForceReader:
         self._now = self._newest = self._good = -math.inf
         self._smooth: FloatArray | None = None
         self._status = SensorStatus.OK
+        self._failure: str | None = None
         self.raw: FloatArray = np.zeros(3)
         """Newest force to be trusted, sensor frame, as measured, shape (3,), in N."""
 
     def look(self, now: float) -> None:
-        """Take the newest sample, if it can be trusted."""
-        self._now, sample = now, self._feed.newest()
+        """Take the newest sample, if it can be trusted; never raises.
+
+        A sensor that fails must not end the thread that holds the arm: `problem` says why there is
+        no force.
+        """
+        self._now = now
+        try:
+            sample, self._failure = self._feed.newest(), None
+        except (DeviceError, OSError) as error:
+            sample, self._failure = None, str(error) or type(error).__name__
         if sample is None or sample.time == self._newest:
             return
         self._newest, self._status = sample.time, sample.status
@@ -175,10 +185,12 @@ class ForceReader:
     @property
     def hesitates(self) -> bool:
         """Whether there is no force to move by at the moment."""
-        return not self._now - self._good <= _HESITATE
+        return self._failure is not None or not self._now - self._good <= _HESITATE
 
     def problem(self, patience: float = SILENT) -> str | None:
         """Return why there is no force to be trusted for a time in s; None if there is one."""
+        if self._failure is not None:
+            return self._failure
         if self._now - self._good <= patience:
             return None
         if math.isinf(self._newest):

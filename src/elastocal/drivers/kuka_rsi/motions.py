@@ -7,26 +7,32 @@ looked at then: an answer that was lost has taken its part of the movement with 
 """
 
 import math
-from collections.abc import Callable, Generator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.drivers.kuka_rsi._cycle import (
+    AMISS,
+    ANSWERS,
+    EXACT,
+    Cycle,
+    Motion,
+    Pace,
+    Phase,
+    Step,
+    does_not_answer,
+    guided,
+)
 from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
 from elastocal.drivers.kuka_rsi.messages import MoveTarget, Order, ProgramState
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
-_EXACT = 2e-5
-"""How near to its goal a straight move has to end, in m."""
-_AMISS = 1e-3
-"""How far from it the arm may be left, in m; more, and the controller did not follow."""
 _TRIES = 4
 _QUIET = 0.05
 """Time beyond the delay after which the arm stands, in s."""
-_ANSWERS = 3.0
-"""Time in which the program on the controller does as it is told, and a sensor speaks, in s."""
 _AT_JOINTS = 2e-3
 """How far from its target a joint may be after a ``PTP``, in rad or m: RIst and AIPos may be sent
 with one decimal of a degree."""
@@ -38,86 +44,30 @@ _RELEASE_SETTLINGS = 3.0
 """Settling times of the force control that a release waits for the last of the force."""
 
 
-def _zero() -> FloatArray:
-    return np.zeros(3)
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class Cycle:
-    """State of the arm in one cycle, in SI."""
-
-    time: float
-    """In s of the clock."""
-    q: FloatArray
-    """Shape (joint,), in rad or m."""
-    T_base_tcp: FloatArray
-    """Shape (4, 4)."""
-    offset: FloatArray
-    """Correction that is in effect, RIst less RSol, base, shape (3,), in m."""
-    state: int
-    """A `ProgramState`."""
-    command: int
-    """Number of the last ``PTP`` that is over."""
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class Step:
-    """What is to be done until the next cycle."""
-
-    shift: FloatArray = field(default_factory=_zero)
-    """Movement of the tool, base, shape (3,), in m."""
-    order: Order = Order.GUIDE
-    target: MoveTarget | None = None
-
-
-Motion = Generator[Step, Cycle, None]
-_Phase = Generator[Step, Cycle, Cycle]
-
-
-@dataclass(frozen=True)
-class Pace:
-    """How straight moves go."""
-
-    cycle: float
-    """In s."""
-    delay: float
-    """From command to motion, in s."""
-    acceleration: float
-    """In m/s²."""
-    speed: float
-    """Of a way that nobody asked for: back to where the correction is zero, in m/s."""
-
-
-def free_move(cycle: Cycle, target: MoveTarget, q: FloatArray, pace: Pace) -> Motion:
+def free_move(cycle: Cycle, target: MoveTarget, q: FloatArray) -> Motion:
     """Yield the steps of a joint move: the controller's ``PTP``, with the correction at zero.
 
     Parameters
     ----------
     cycle : Cycle
-        State at the beginning.
+        State at the beginning; without a correction.
     target : MoveTarget
         What the controller is told.
     q : ndarray, shape (joint,)
         The same in rad or m.
-    pace : Pace
-        How the correction is taken back before.
     """
-    cycle = yield from _guided(cycle)
-    if float(np.linalg.norm(cycle.offset)) > _EXACT:
-        cycle = yield from _shift(cycle, np.zeros(3), pace.speed, pace)
+    cycle = yield from guided(cycle)
     told = cycle.time
     while cycle.command != target.number or cycle.state not in _OVER:
-        if cycle.state != ProgramState.MOVING and cycle.time - told > _ANSWERS:
-            raise _does_not_answer("PTP", cycle)
+        if cycle.state != ProgramState.MOVING and cycle.time - told > ANSWERS:
+            raise does_not_answer("PTP", cycle)
         cycle = yield Step(order=Order.MOVE, target=target)
     if cycle.state == ProgramState.BRAKED:
         raise DeviceError("the program on the controller gave the PTP up on the way")
     away = float(np.abs(cycle.q - q).max())
     if not away <= _AT_JOINTS:
         raise DeviceError(f"the PTP ended {away:.3g} (rad or m) away from its target")
-    yield from _guided(cycle)
+    yield from guided(cycle)
 
 
 _OVER = (ProgramState.ARRIVED, ProgramState.BRAKED)
@@ -141,20 +91,45 @@ def approach(
     pace : Pace
         How.
     """
-    cycle = yield from _guided(cycle)
-    reader, began = guard.reader, cycle.time
+    cycle = yield from guided(cycle)
+    cycle = yield from _zeroed(cycle, guard.reader)
+    yield from _shift(cycle, cycle.offset + way, speed, pace, guard)
+
+
+def _zeroed(cycle: Cycle, reader: ForceReader) -> Phase:
+    """Stand until the force counts from the present one."""
+    began = cycle.time
     reader.begin_zero(began)
     while not reader.is_zeroed(cycle.time):
-        if cycle.time - began > _ANSWERS:
+        if cycle.time - began > ANSWERS:
             raise DeviceError(reader.problem() or "force sensor: too few samples for a zero")
         cycle = yield Step()
-    yield from _shift(cycle, cycle.offset + way, speed, pace, guard)
+    return cycle
 
 
 def retract(cycle: Cycle, way: FloatArray, speed: float, pace: Pace) -> Motion:
     """Yield the steps of a straight move that nothing stops; see `approach`."""
-    cycle = yield from _guided(cycle)
+    cycle = yield from guided(cycle)
     yield from _shift(cycle, cycle.offset + way, speed, pace)
+
+
+def take_back(cycle: Cycle, guard: "ContactGuard", speed: float, pace: Pace) -> Motion:
+    """Yield the steps back to where the correction is zero, a place that is known to be free.
+
+    Raises
+    ------
+    DeviceError
+        If something is felt on the way; the arm stands where it was felt.
+    """
+    cycle = yield from guided(cycle)
+    cycle = yield from _zeroed(cycle, guard.reader)
+    yield from _shift(cycle, np.zeros(3), speed, pace, guard)
+    if guard.felt:
+        felt = float(np.linalg.norm(guard.reader.quick_force_tcp))
+        raise DeviceError(
+            f"contact: {felt:.0f} N on the way back to where the last PTP ended, limit"
+            f" {guard.contact_force:g} N"
+        )
 
 
 def play(cycle: Cycle, places: FloatArray, heard: Callable[[FloatArray], None]) -> Motion:
@@ -169,7 +144,7 @@ def play(cycle: Cycle, places: FloatArray, heard: Callable[[FloatArray], None]) 
     heard : callable
         Takes the correction that is in effect in every cycle that follows a step.
     """
-    cycle = yield from _guided(cycle)
+    cycle = yield from guided(cycle)
     for shift in np.diff(places, axis=0, prepend=np.zeros((1, 3))):
         cycle = yield Step(shift)
         heard(cycle.offset)
@@ -181,8 +156,8 @@ class ContactGuard:
     """Ends a straight move where a force against it is felt."""
 
     reader: ForceReader
-    direction: FloatArray
-    """Of the move, base, shape (3,)."""
+    direction: FloatArray | None
+    """Of the move, base, shape (3,); None: a force in any direction ends it."""
     contact_force: float
     """In N; infinite: never."""
     force_limit: float
@@ -199,7 +174,11 @@ class ContactGuard:
         """
         require_force(self.reader, self.force_limit)
         force_base = cycle.T_base_tcp[:3, :3] @ self.reader.quick_force_tcp
-        self.felt |= float(-force_base @ self.direction) >= self.contact_force
+        if self.direction is None:
+            against = float(np.linalg.norm(force_base))
+        else:
+            against = float(-force_base @ self.direction)
+        self.felt |= against >= self.contact_force
         return self.felt
 
 
@@ -224,20 +203,20 @@ class Press:
 
 def hold(cycle: Cycle, press: Press, pace: Pace) -> Motion:
     """Yield the steps of force control; it does not end."""
-    cycle = yield from _guided(cycle)
+    cycle = yield from guided(cycle)
     yield from _controlled(cycle, press, pace, math.inf)
 
 
 def release(cycle: Cycle, press: Press, pace: Pace, stiffness: float) -> Motion:
     """Yield the steps of force control until the force is gone."""
-    cycle = yield from _guided(cycle)
+    cycle = yield from guided(cycle)
     size = float(np.linalg.norm(press.reader.force_tcp))
     slack = size / press.rate + _RELEASE_SETTLINGS * press.law.settling(stiffness)
     press = replace(press, wanted=np.zeros(3))
     yield from _controlled(cycle, press, pace, cycle.time + slack)
 
 
-def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> _Phase:
+def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> Phase:
     """Follow the wanted force; return once it is zero and reached, or at a time."""
     reader, reference = press.reader, press.reader.force_tcp
     releases = not np.any(press.wanted)
@@ -280,31 +259,13 @@ def require_force(reader: ForceReader, limit: float) -> None:
         raise DeviceError(f"force limit exceeded: {size:.0f} N, limit {limit:.0f} N")
 
 
-def _guided(cycle: Cycle) -> _Phase:
-    """Wait until corrections act."""
-    told = cycle.time
-    while cycle.state != ProgramState.GUIDED:
-        if not cycle.time - told <= _ANSWERS:
-            raise _does_not_answer("RSI_MOVECORR", cycle)
-        cycle = yield Step()
-    return cycle
-
-
-def _does_not_answer(what: str, cycle: Cycle) -> DeviceError:
-    known = [state.name.lower() for state in ProgramState if state == cycle.state]
-    return DeviceError(
-        f"the program on the controller does not begin {what}: it is"
-        f" {known[0] if known else cycle.state} for {_ANSWERS:g} s"
-    )
-
-
 def _shift(
     cycle: Cycle,
     goal: FloatArray,
     speed: float,
     pace: Pace,
     guard: ContactGuard | None = None,
-) -> _Phase:
+) -> Phase:
     """Bring the correction to a goal, straight, or to where a guard ends it; stand there."""
     missing = math.inf
     for _ in range(_TRIES):
@@ -332,9 +293,9 @@ def _shift(
             if guard is not None:
                 guard.look(cycle)
         missing = float(np.linalg.norm(goal - cycle.offset))
-        if missing <= _EXACT or (guard is not None and guard.felt):
+        if missing <= EXACT or (guard is not None and guard.felt):
             return cycle
-    if missing > _AMISS:
+    if missing > AMISS:
         raise DeviceError(
             f"correction not followed: the arm stands {1e3 * missing:.2f} mm from where it was"
             " corrected to: is POSCORR's limit below the one of the cell file?"

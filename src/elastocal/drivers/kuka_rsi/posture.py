@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.drivers.kuka_rsi._cycle import Cycle
 from elastocal.drivers.kuka_rsi.messages import NO_CORRECTION, ProgramState, RobMessage, Six
-from elastocal.drivers.kuka_rsi.motions import Cycle
 from elastocal.errors import DeviceError
 from elastocal.robot import Robot, T_from_xyzabc
 

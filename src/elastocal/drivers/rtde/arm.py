@@ -84,7 +84,9 @@ class UrArm:
         self._names, self._speeds, self._time = joint_names, axis_speeds, acceleration_time
         self._lock = threading.RLock()
         self._motion = Motion.DISARMED
-        self._touched = self._forced = False
+        self._touched: bool | None = None
+        """None: nothing has been felt or left since the connection."""
+        self._forced = False
         self._fault: str | None = None
         self._order: _Order | None = None
         self._step: _Step | None = None
@@ -164,6 +166,9 @@ class UrArm:
             return self._arrival()
 
         self._give("move_joints", _Order(begin, Motion.MOVING), _STANDING)
+
+    def adopt_position(self) -> None:
+        """Do nothing: the controller has no corrections on top of the programmed place."""
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float

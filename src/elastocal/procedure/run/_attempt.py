@@ -165,11 +165,10 @@ def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> Non
         See `Supervisor.wait`.
     """
     settings = supervisor.settings
+    adopt_position(supervisor)
     for leg, target in enumerate(legs):
         seen = supervisor.cycle(Guard())
-        # A joint move sweeps the tool sideways: in contact it would drag it over the surface.
-        if seen.arm.in_contact:
-            raise FaultError(Fault.IN_CONTACT, f"{seen.arm.source} says that it is")
+        _require_off(seen.arm)
         # Once: a tare at each leg would hide a force that grows from leg to leg.
         if leg == 0 and len(seen.wrenches):
             force = seen.wrenches.force.mean(axis=0)
@@ -183,6 +182,27 @@ def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> Non
             supervisor.wait(guard, partial(_at_joints, goal), limit, "a move")
 
 
+def adopt_position(supervisor: Supervisor) -> None:
+    """Let the arm take its place for the programmed one, if the tool is off the surface.
+
+    Raises
+    ------
+    FaultError
+        If the arm says that it is in contact.
+    """
+    arm = supervisor.devices.arm
+    _require_off(arm.state())
+    supervisor.pause()
+    arm.adopt_position()
+    supervisor.restart_watching()
+
+
+def _require_off(state: ArmState) -> None:
+    # A joint move sweeps the tool sideways: in contact it would drag it over the surface.
+    if state.in_contact:
+        raise FaultError(Fault.IN_CONTACT, f"{state.source} says that it is")
+
+
 def approach_by(a: Attempt, distance: float, speed: float, most: float = np.inf) -> Snapshot:
     """Make a guarded linear move along the inward normal; return what is seen at its end.
 
@@ -192,7 +212,7 @@ def approach_by(a: Attempt, distance: float, speed: float, most: float = np.inf)
     start = s.cycle(a.guard()).arm.T_base_tcp[:3, 3]
 
     def done(seen: Snapshot) -> bool:
-        touched = is_idle(seen.arm) and seen.arm.in_contact
+        touched = is_idle(seen.arm) and bool(seen.arm.in_contact)
         return touched or has_gone(seen.arm, start, distance) or largest_force(seen) > most
 
     limit = 2.0 * distance / speed + procedure.timeout

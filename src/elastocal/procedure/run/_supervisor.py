@@ -90,6 +90,10 @@ class Supervisor:
         """Drop what has come before the run, and start to watch."""
         self.devices.sensor.read()
         self.devices.metrology.read()
+        self.restart_watching()
+
+    def restart_watching(self) -> None:
+        """Give every device its time to say something, from now on."""
         self.watchdog.restart(self.now)
         self.pause()
 

@@ -12,18 +12,17 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Motion, RobotArm
 from elastocal.errors import DeviceError
+from elastocal.sim.wire._pos_corr import PosCorr, PosCorrLimits, RsiStopError
 from elastocal.sim.wire._rsi_messages import Channel
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.workcell import PoseFollower, SimulatedCell
 
 POLL = 0.012
 """Time between two looks of the interpreter at its channels, in s."""
-_CORRECTIONS = ("RKorr.X", "RKorr.Y", "RKorr.Z", "RKorr.A", "RKorr.B", "RKorr.C")
 _NONE = 1e-9
 """A correction below this is none, in m and rad."""
 _ARM_JOINTS = 6
@@ -31,82 +30,13 @@ _STANDING, _GUIDED, _MOVING, _DONE, _BRAKED, _ENDED = 1, 2, 3, 4, 5, 9
 """Krl.State; 0 until the program is in its loop."""
 _DRIVE_CONSTANT = 60.0
 """Torque of a gear per ampere of its motor, in N·m/A. An assumption."""
-_PTP = 2
-"""Cmd.Op of a PTP."""
+_PTP, _ADOPT = 2, 3
+"""Cmd.Op of a PTP, and of the present place for the programmed one."""
+_OFF = 0.1
+"""Time for which RSI is off while the present place is adopted, in s."""
 _OVER = object()
 Steps = Generator[None, None, None]
 """A KRL program as it runs: it gives the interpreter back at every wait."""
-
-
-class RsiStopError(DeviceError):
-    """The controller stops the arm and the RSI context; an operator has to reset it."""
-
-
-@dataclass(frozen=True)
-class PosCorrLimits:
-    """Limits in the RSI context; the defaults are the controller's, but for the ways."""
-
-    lower: tuple[float, float, float] = (-0.2, -0.2, -0.2)
-    """LowerLimX..Z of POSCORR in m; it clamps and says nothing."""
-    upper: tuple[float, float, float] = (0.2, 0.2, 0.2)
-    rotation: float = math.radians(5.0)
-    """MaxRotAngle of POSCORR in rad."""
-    monitor_way: float = 0.25
-    """MaxTrans of POSCORRMON in m; it stops the arm."""
-    monitor_rotation: float = math.radians(6.0)
-
-
-@dataclass
-class PosCorr:
-    """Sums corrections up (relative), or takes them as they are (absolute); frame Base."""
-
-    limits: PosCorrLimits
-    absolute: bool
-    shift: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """Shape (3,), in m."""
-    turn: FloatArray = field(default_factory=lambda: np.eye(3))
-    """Shape (3, 3)."""
-
-    def take(self, channels: Mapping[str, float]) -> None:
-        """Take the corrections of a cycle, in mm and deg.
-
-        Raises
-        ------
-        RsiStopError
-            Where their sum is beyond what POSCORRMON allows.
-        """
-        values = np.array([channels.get(tag, 0.0) for tag in _CORRECTIONS])
-        if self.absolute or np.any(values):
-            way = 1e-3 * values[:3] if self.absolute else self.shift + 1e-3 * values[:3]
-            self.shift = np.clip(way, self.limits.lower, self.limits.upper)
-        if np.any(values[3:]) or self.absolute:
-            self._turn(values[3:])
-        length, angle = float(np.linalg.norm(self.shift)), _angle(self.turn)
-        if length > self.limits.monitor_way or angle > self.limits.monitor_rotation:
-            raise RsiStopError(
-                f"KSS29000 POSCORRMON: correction {1e3 * length:.3f} mm, {math.degrees(angle):.3f}°"
-                f" beyond {1e3 * self.limits.monitor_way:g} mm,"
-                f" {math.degrees(self.limits.monitor_rotation):g}°"
-            )
-
-    def _turn(self, degrees: FloatArray) -> None:
-        asked: FloatArray = Rotation.from_euler("ZYX", degrees, degrees=True).as_matrix()
-        asked = asked if self.absolute else asked @ self.turn
-        # A turn that is too large is not made smaller: the axes would not be those asked for.
-        self.turn = asked if _angle(asked) <= self.limits.rotation else self.turn
-
-    def clear(self) -> None:
-        """Correct nothing; RSI_ON begins so."""
-        self.shift, self.turn = np.zeros(3), np.eye(3)
-
-    @property
-    def offset(self) -> FloatArray:
-        """The correction as shift (3,) over turn (3, 3), shape (4, 3)."""
-        return np.vstack([self.shift, self.turn])
-
-
-def _angle(turn: FloatArray) -> float:
-    return math.acos(min(1.0, max(-1.0, 0.5 * (float(np.trace(turn)) - 1.0))))
 
 
 @dataclass
@@ -140,6 +70,11 @@ def run_program(robot: "RsiRobot") -> Steps:
             krl.number, krl.state = number, _DONE if arrived else _BRAKED
             while robot.command == (_PTP, number):
                 yield
+        elif wanted == _ADOPT and number != krl.number:
+            krl.state = _MOVING
+            yield
+            yield from robot.adopt()
+            krl.number = number
         elif wanted == 9:
             krl.state = _ENDED
             yield
@@ -201,6 +136,8 @@ class RsiRobot:
         self.krl = KrlState()
         self.ended = True
         """Whether the KRL program is over."""
+        self.silent = False
+        """Whether RSI is off, so that nothing is sent."""
 
     def start(self) -> None:
         """Switch the drives on and start the KRL program, as an operator does.
@@ -220,7 +157,7 @@ class RsiRobot:
         self._offsets = deque([self._offset] * self._latency)
         self._program(sim.arm.state().q)
         self._corrected_by = np.zeros_like(self._q_programmed)
-        self._led, self._moving, self.ended = False, False, False
+        self._led, self._moving, self.ended, self.silent = False, False, False, False
         self._steps, self._looked = self._krl_program(self), 0
         self._said = self._values(sim)
 
@@ -345,6 +282,21 @@ class RsiRobot:
         self._moving = False
         self._program(q - self._corrected_by)
         return bool(np.array_equal(q, goal))
+
+    def adopt(self) -> Steps:
+        """RSI_OFF, PTP $AXIS_ACT_MEAS, RSI_ON: correct nothing, stand where the arm stands."""
+        self.silent = True
+        for _ in range(round(_OFF / POLL)):
+            yield
+        self._live.apart(self._adopt)
+        self.silent = False
+
+    def _adopt(self, sim: SimulatedCell) -> None:
+        q = self._follower.q if self._led else sim.arm.state().q
+        self._corrections.clear()
+        self._offset = self._corrections.offset
+        self._offsets = deque([self._offset] * self._latency)
+        self._program(q)
 
     @property
     def command(self) -> tuple[int, int]:

@@ -205,6 +205,9 @@ class _LiveArm:
     def move_joints(self, q: FloatArray, speed: float) -> None:
         self._live.apart(lambda sim: sim.arm.move_joints(q, speed))
 
+    def adopt_position(self) -> None:
+        self._live.apart(lambda sim: sim.arm.adopt_position())
+
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
     ) -> None:

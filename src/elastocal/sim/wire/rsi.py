@@ -23,11 +23,11 @@ from typing import Literal, NamedTuple
 from elastocal.cell import LOOPBACK, WallClock
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.results import brief_repr
+from elastocal.sim.wire._pos_corr import RsiStopError
 from elastocal.sim.wire._rsi_messages import LARGEST, Answer, EthernetConfig, RobWriter, SenReader
 from elastocal.sim.wire._rsi_robot import (
     RsiContext,
     RsiRobot,
-    RsiStopError,
     corrected_program,
 )
 from elastocal.sim.wire.live_cell import LiveCell
@@ -250,6 +250,11 @@ class RsiServer:
         while not self._closing.is_set():
             if self._robot.ended:
                 return "program ended"
+            if self._robot.silent:
+                self._robot.cycle(None)
+                ipoc += round(1e3 * self._context.cycle)
+                due = self._wait(due + self._context.cycle)
+                continue
             fault = self._faults.popleft() if self._faults else None
             if fault in ("restart", "restart_nearby"):
                 return fault

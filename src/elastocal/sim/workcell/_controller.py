@@ -105,6 +105,9 @@ class SimulatedArm:
         path = joint_path(plant.statics, start, end)
         plant.run(path, law, (Motion.MOVING, Motion.IDLE))
 
+    def adopt_position(self) -> None:
+        """Do nothing: there are no corrections on top of the programmed place."""
+
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
     ) -> None:
