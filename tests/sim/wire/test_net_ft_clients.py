@@ -1,4 +1,8 @@
-"""Other people's clients read the simulated Net F/T box; extra ``interop``."""
+"""Clients of other people read the simulated Net F/T box (extra ``interop``); its TCP commands."""
+
+import socket
+import struct
+import time
 
 import numpy as np
 import pytest
@@ -73,3 +77,78 @@ def test_netft_reads_counts(live, server):
     wanted = scale * np.concatenate([truth.force, truth.moment])
     for each in (counts, *streamed):
         np.testing.assert_allclose(each, wanted, atol=1.0)
+
+
+def until(holds):
+    for _ in range(500):
+        if holds():
+            return
+        time.sleep(0.01)
+    raise AssertionError("it did not come to hold")
+
+
+def command(code, orders=0):
+    return struct.pack(">B15xHH", code, 0, orders)
+
+
+def exactly(line, count):
+    data = b""
+    while len(data) < count:
+        more = line.recv(count - len(data))
+        assert more, "the box closed the line"
+        data += more
+    return data
+
+
+def calibration(line):
+    line.sendall(command(1))
+    header, force, torque, cpf, cpt, *scales = struct.unpack(">HBBII6H", exactly(line, 24))
+    assert (header, force, torque) == (0x1234, 2, 4)
+    return np.repeat([cpf, cpt], 3) / np.array(scales)
+
+
+def reading(line, orders=0):
+    line.sendall(command(0, orders))
+    header, status, *counts = struct.unpack(">HH6h", exactly(line, 16))
+    assert header == 0x1234
+    return status, np.array(counts)
+
+
+def test_readft_gives_the_wrench_in_counts_over_the_scale_of_readcalinfo(live, server):
+    with socket.create_connection(("127.0.0.1", server.ports["tcp"]), 10.0) as line:
+        per_unit = calibration(line)
+        until(lambda: reading(line)[1].any())
+        status, counts = reading(line)
+        truth = live.wrench()
+        wanted = np.concatenate([truth.force, 1e3 * truth.moment])
+        assert np.abs(counts / per_unit - wanted).max() < 1.0 / per_unit.min()
+        assert status == 0
+        server.box.status = 0x80020000
+        until(lambda: reading(line)[0] == 0x8002)
+
+
+def test_readft_can_take_the_bias(server):
+    with socket.create_connection(("127.0.0.1", server.ports["tcp"]), 10.0) as line:
+        until(lambda: reading(line)[1].any())
+        assert server.box.bias == (0,) * 6
+        reading(line, orders=1)
+        assert any(server.box.bias)
+        until(lambda: not reading(line)[1].any())
+
+
+def test_a_client_that_stays_keeps_no_other_from_the_calibration(server):
+    with (
+        socket.create_connection(("127.0.0.1", server.ports["tcp"]), 10.0) as first,
+        socket.create_connection(("127.0.0.1", server.ports["tcp"]), 10.0) as other,
+    ):
+        first.sendall(command(1)[:7])
+        assert calibration(other).all()
+        first.sendall(command(1)[7:])
+        assert exactly(first, 24)[:2] == b"\x12\x34"
+
+
+@pytest.mark.parametrize("code", [2, 3])
+def test_what_writes_to_the_box_is_refused(server, code):
+    with socket.create_connection(("127.0.0.1", server.ports["tcp"]), 10.0) as line:
+        line.sendall(command(code))
+        assert struct.unpack(">HBB", exactly(line, 4)) == (0x1234, code, 1)

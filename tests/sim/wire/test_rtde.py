@@ -40,13 +40,14 @@ def server(folder):
 @pytest.fixture
 def client(server):
     client = RtdeClient("127.0.0.1", server.port)
+    assert client.ask("V", struct.pack(">H", 2)) == b"\x01"
     yield client
     client.close()
 
 
-def test_version_two_is_spoken_and_no_other(client):
-    assert client.ask("V", struct.pack(">H", 2)) == b"\x01"
-    assert client.ask("V", struct.pack(">H", 1)) == b"\x00"
+def test_versions_one_and_two_are_spoken_and_no_other(client):
+    for version, answer in ((1, b"\x01"), (3, b"\x00"), (2, b"\x01"), (0, b"\x00")):
+        assert client.ask("V", struct.pack(">H", version)) == answer
     assert struct.unpack(">4I", client.ask("v"))[0] == 5
 
 
@@ -70,6 +71,25 @@ def test_outputs_come_in_the_order_of_the_recipe_until_paused(client, server):
     assert q == pytest.approx(server.robot.outputs()["actual_q"])
     assert times == sorted(times)
     assert client.ask("P") == b"\x01"
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_version_one_has_no_numbers_of_recipes_and_no_rate(server, asked):
+    line = RtdeClient("127.0.0.1", server.port)
+    if asked:
+        assert line.ask("V", struct.pack(">H", 1)) == b"\x01"
+    assert line.ask("O", b"timestamp,no_such_name") == b"DOUBLE,NOT_FOUND"
+    assert line.ask("S") == b"\x00"
+    assert line.ask("O", b"actual_q,robot_mode") == b"VECTOR6D,INT32"
+    assert line.ask("I", b"input_int_register_0") == b"\x01INT32"
+    assert line.ask("S") == b"\x01"
+    *q, mode = struct.unpack(">6di", line.ask("U"))
+    assert mode == 7
+    assert q == pytest.approx(server.robot.outputs()["actual_q"])
+    assert line.ask("P") == b"\x01"
+    line.send("U", b"\x07" + bytes(4))
+    assert line.ask("M") == b"\x02a package of no recipe"
+    line.close()
 
 
 def test_an_input_package_of_no_recipe_is_answered_by_a_text(client):

@@ -1,7 +1,8 @@
 """RTDE of Universal Robots on the controller's side: messages, types of variables, recipes.
 
 Every message is ``uint16 size, uint8 kind`` and a payload, big-endian. Written from the public
-description of the interface (protocol version 2).
+description of the interface (protocol versions 1 and 2); in version 1 packages of outputs have no
+number of their recipe, and their rate is fixed.
 """
 
 import struct
@@ -10,7 +11,8 @@ from dataclasses import dataclass
 
 from elastocal.errors import DeviceError
 
-VERSION = 2
+VERSIONS = (1, 2)
+"""Of the protocol; a client that asks for none is spoken to in the first."""
 _HEADER = struct.Struct(">HB")
 _LARGEST = 1 << 16
 """Bytes of one client that wait to be understood, at most."""
@@ -125,8 +127,10 @@ def message(kind: str, payload: bytes) -> bytes:
     return _HEADER.pack(_HEADER.size + len(payload), ord(kind)) + payload
 
 
-def text_message(text: str, source: str = "elastocal", level: int = 2) -> bytes:
+def text_message(text: str, version: int, source: str = "elastocal", level: int = 2) -> bytes:
     """Return a text for whoever shows it; level 2 is a warning."""
+    if version == 1:
+        return message("M", bytes([level]) + text.encode())
     parts = [part.encode()[:255] for part in (text, source)]
     return message("M", b"".join(bytes([len(p)]) + p for p in parts) + bytes([level]))
 

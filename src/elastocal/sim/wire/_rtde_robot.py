@@ -29,6 +29,11 @@ _STEP_TIME = 0.002
 _POLYSCOPE = (5, 11, 1, 108318)
 _ROBOT_RUNNING, _SAFETY_NORMAL, _PROTECTIVE_STOP = 7, 1, 3
 _PROGRAM_STOPPED, _PROGRAM_PLAYING = 1, 2
+_SETTINGS = ("set_tcp", "set_payload", "set_payload_cog", "set_gravity")
+_LINES = ("movej", "stopj", "stopl", "textmsg", *_SETTINGS)
+"""Of URScript, what is carried out as a single line."""
+_LINE_SPEED = 1.05
+"""Of ``movej`` without one, in rad/s."""
 
 
 @dataclass
@@ -55,7 +60,7 @@ class UrRobot:
         self.unserved: set[int] = set()
         """Commands of the program that came and are not simulated."""
         self._offset = 0
-        self._executing = False
+        self._executing = self._by_line = False
         self._waits_for: Callable[[], bool] | None = None
         self._finishes: Callable[[], bool] | None = None
         self._operations = self._writes = 0
@@ -85,8 +90,58 @@ class UrRobot:
         """Write input registers."""
         self._registers.inputs.update(values)
 
+    def run(self, script: str) -> str:
+        """Run a script: a program, or single lines; return what they show.
+
+        Of single lines, ``movej`` of joints and ``stopj``, ``stopl`` move the arm, ``textmsg``
+        shows its text, and `_SETTINGS` are taken without effect.
+
+        Raises
+        ------
+        DeviceError
+            If a line is not simulated, or the arm refuses it.
+        """
+        if re.search(r"^\s*(def|sec) \w+\(", script, re.MULTILINE):
+            self.load(script)
+            return ""
+        shown = [self._run_line(line.strip()) for line in script.splitlines() if line.strip()]
+        return " ".join(text for text in shown if text)
+
+    def _run_line(self, line: str) -> str:
+        match = re.fullmatch(r"(\w+)\s*\((.*)\)", line)
+        name, given = (match[1], match[2]) if match else (line, "")
+        if name == "movej":
+            self._move_by_line(given)
+        elif name in ("stopj", "stopl"):
+            self.program = ""
+            self._stop()
+        elif name == "textmsg":
+            return given.strip("\"' ")
+        elif name not in _SETTINGS:
+            raise DeviceError(f"{name[:40]} is not simulated: must be one of {', '.join(_LINES)}")
+        return ""
+
+    def _move_by_line(self, given: str) -> None:
+        match = re.match(r"\s*\[([^\]]*)\](.*)", given)
+        named = re.search(r"\bv\s*=\s*([\d.eE+-]+)", match[2]) if match else None
+        try:
+            q = [float(each) for each in match[1].split(",")] if match else []
+            speed = float(named[1]) if named else _LINE_SPEED
+        except ValueError:
+            q, speed = [], 0.0
+        if len(q) != 6 or not speed > 0.0:
+            raise DeviceError(f"movej({given[:60]}): must be a list of six joints, and v above 0")
+        self.load("def movej():\nend")
+        try:
+            self._arm.move_joints(np.array(q), float(np.clip(speed / self._speeds.max(), 1e-3, 1)))
+        except DeviceError:
+            self.program = ""
+            raise
+        self._by_line = True
+
     def load(self, script: str) -> None:
         """Start a program that came over the script interface, in place of the one that ran."""
+        self._by_line = False
         match = re.search(r"^def (\w+)\(", script, re.MULTILINE)
         offset = re.search(r"reg_offset_int = (\d+)", script)
         self._offset = int(offset[1]) if offset else 0
@@ -139,6 +194,9 @@ class UrRobot:
     def cycle(self) -> None:
         """Do what the program does in one cycle of the controller."""
         if not self.program:
+            return
+        if self._by_line:
+            self.program = "" if self._idle() else self.program
             return
         if self._finishes is not None and self._finishes():
             self._finishes = None

@@ -1,7 +1,9 @@
-"""A Net F/T box of the simulated cell: RDT, its configuration page, its calibration command.
+"""A Net F/T box of the simulated cell: RDT, its configuration page, its TCP commands.
 
-One client has the stream: who asked last. The page is ``/netftapi2.xml``. Not simulated: streams to
-another address, multi-unit synchronisation, thresholds.
+One client has the stream: who asked last. The page is ``/netftapi2.xml``. Of the TCP commands
+READFT and READCALINFO are served, as often as a client asks on its line; writing a transform or a
+threshold is refused. Not simulated: streams to another address, multi-unit synchronisation,
+thresholds.
 """
 
 import contextlib
@@ -11,6 +13,7 @@ import math
 import socket
 import struct
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
@@ -19,6 +22,7 @@ import numpy as np
 from elastocal.cell import LOOPBACK, Cell, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
+from elastocal.sim.wire._tcp import Peer, TcpServer
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.wire.servers import Told, bound, serves
 
@@ -30,8 +34,12 @@ _LARGEST = (1 << 31) - 1
 _WRAP = 1 << 32
 _MAGIC = 0x1234
 _REQUEST, _RECORD = struct.Struct(">HHI"), struct.Struct(">III6i")
-_COMMAND = 20
-"""Bytes of a TCP command."""
+_COMMAND = struct.Struct(">B15xHH")
+"""TCP command: code, thresholds that are meant, what the box shall do."""
+_READ_FT, _READ_CALIBRATION, _WRITES = 0, 1, (2, 3)
+_BIAS_BIT = 1
+_SHORT = (1 << 15) - 1
+"""Largest count of a READFT reply."""
 _SATURATED = 0x80020000
 _FORCES = {"lb": (1, 4.4482216152605), "N": (2, 1.0), "kN": (4, 1e3)}
 """Code in the calibration reply, and size in N."""
@@ -62,6 +70,8 @@ class NetFtBox:
     """The box's own counter stands."""
     bias: tuple[int, ...] = (0,) * 6
     """In counts; set by the command of software bias."""
+    scales: tuple[int, ...] = (0xFFFF,) * 6
+    """By which counts are divided in a READFT reply, which has 16 bits for each."""
 
     @classmethod
     def of(cls, cell: Cell, force_unit: str = "N", torque_unit: str = "N-m") -> "NetFtBox":
@@ -71,7 +81,10 @@ class NetFtBox:
             raise DeviceError(f"cell {cell.name} has no force sensor to simulate (key 'sensor')")
         force = max(sensor.force_range) / _FORCES[force_unit][1]
         torque = max(sensor.moment_range) / _TORQUES[torque_unit][1]
-        return cls(_counts(force), _counts(torque), force_unit, torque_unit)
+        counts = _counts(force), _counts(torque)
+        largest = counts[0] * force, counts[1] * torque
+        scales = [math.ceil(each / _SHORT) for each in largest for _ in range(3)]
+        return cls(*counts, force_unit, torque_unit, scales=tuple(scales))
 
     def count(self, block: WrenchBlock) -> list[list[int]]:
         """Return the samples of a block in counts, bias taken off, shape (sample, 6)."""
@@ -106,7 +119,13 @@ class NetFtBox:
         """Return the reply to READCALINFO."""
         codes = _FORCES[self.force_unit][0], _TORQUES[self.torque_unit][0]
         counts = self.counts_per_force, self.counts_per_torque
-        return struct.pack(">HBBII6H", _MAGIC, *codes, *counts, *(1,) * 6)
+        return struct.pack(">HBBII6H", _MAGIC, *codes, *counts, *self.scales)
+
+    def reading(self, counts: Sequence[int], status: int) -> bytes:
+        """Return the reply to READFT: counts over `scales`, the upper half of the status."""
+        scaled = (each / scale for each, scale in zip(counts, self.scales, strict=True))
+        short = [max(-_SHORT, min(_SHORT, round(each))) for each in scaled]
+        return struct.pack(">HH6h", _MAGIC, status >> 16, *short)
 
 
 def _counts(largest: float) -> int:
@@ -139,7 +158,7 @@ class NetFtServer:
         self._closed = threading.Event()
         self._udp = bound(socket.SOCK_DGRAM, port, address)
         self._udp.setblocking(False)
-        self._tcp = bound(socket.SOCK_STREAM, tcp_port, address)
+        self._tcp = _CommandServer(self, address, tcp_port)
         self._http = _PageServer(self, bound(socket.SOCK_STREAM, http_port, address))
         self._client: tuple[str, int] | None = None
         self._left: int | None = None
@@ -147,10 +166,9 @@ class NetFtServer:
         self._batch = 1
         self._waiting: list[bytes] = []
         self._rdt = self._ft = 0
-        self._last = [0] * 6
+        self._last, self._status = [0] * 6, 0
         self._threads = [
-            threading.Thread(target=each, daemon=True)
-            for each in (self._stream, self._calibrate, self._serve_page)
+            threading.Thread(target=each, daemon=True) for each in (self._stream, self._serve_page)
         ]
 
     @property
@@ -161,11 +179,11 @@ class NetFtServer:
     @property
     def ports(self) -> dict[str, int]:
         """All ports, by protocol."""
-        tcp = int(self._tcp.getsockname()[1])
-        return {"udp": self.port, "tcp": tcp, "http": int(self._http.server_address[1])}
+        return {"udp": self.port, **self._tcp.ports, "http": int(self._http.server_address[1])}
 
     def start(self) -> None:
         """Answer from now on."""
+        self._tcp.start()
         for thread in self._threads:
             thread.start()
 
@@ -211,12 +229,29 @@ class NetFtServer:
             self._batch = _BUFFER if command == _BUFFERED else 1
             self._rdt, self._waiting = 0, []
         elif command == _BIAS:
-            self.box.bias = tuple(b + c for b, c in zip(self.box.bias, self._last, strict=True))
+            self._take_bias()
+
+    def _take_bias(self) -> None:
+        self.box.bias = tuple(b + c for b, c in zip(self.box.bias, self._last, strict=True))
+
+    def answer(self, command: bytes) -> bytes:
+        """Return the reply to a TCP command; nothing to one that is none."""
+        code, _, orders = _COMMAND.unpack(command)
+        if code == _READ_CALIBRATION:
+            return self.box.calibration()
+        if code == _READ_FT:
+            reply = self.box.reading(self._last, self._status)
+            if orders & _BIAS_BIT:
+                self._take_bias()
+            return reply
+        # Header, echo of the command, and 1 for not done.
+        return struct.pack(">HBB", _MAGIC, code, 1) if code in _WRITES else b""
 
     def _send(self, block: WrenchBlock) -> None:
         status = self.box.status
         if block.status is SensorStatus.SATURATED:
             status |= _SATURATED
+        self._status = status
         for counts in self.box.count(block):
             self._last = counts
             self._ft += 0 if self.box.stalled else _TICKS
@@ -239,17 +274,26 @@ class NetFtServer:
     def _serve_page(self) -> None:
         self._http.serve_forever(poll_interval=_LISTEN)
 
-    def _calibrate(self) -> None:
-        self._tcp.listen()
-        self._tcp.settimeout(_LISTEN)
-        while not self._closed.is_set():
-            with contextlib.suppress(OSError):
-                line, _ = self._tcp.accept()
-                with line:
-                    line.settimeout(_LISTEN)
-                    command = line.recv(_COMMAND, socket.MSG_WAITALL)
-                    if len(command) == _COMMAND and command[0] == 1:
-                        line.sendall(self.box.calibration())
+
+class _CommandServer(TcpServer):
+    """Answers TCP commands, each of a fixed size, as often as they come on a line."""
+
+    def __init__(self, server: NetFtServer, address: str, port: int) -> None:
+        super().__init__(address, {"tcp": port})
+        self._server = server
+
+    def opened(self, peer: Peer) -> None:
+        """Say nothing: the client begins."""
+
+    def received(self, peer: Peer, data: bytes) -> None:
+        """Answer all commands that are complete."""
+        peer.rest += data
+        while len(peer.rest) >= _COMMAND.size:
+            command, peer.rest = peer.rest[: _COMMAND.size], peer.rest[_COMMAND.size :]
+            self.send(peer, self._server.answer(command))
+
+    def tick(self) -> None:
+        """Do nothing on its own."""
 
 
 class _PageServer(http.server.ThreadingHTTPServer):

@@ -1,11 +1,14 @@
-"""A Universal Robots controller on the wire: RTDE, the script interface, the dashboard.
+"""A Universal Robots controller on the wire: RTDE, primary, secondary, script, dashboard.
 
-Served of RTDE (protocol version 2): recipes of outputs and inputs, registers, start and pause, up
-to 500 Hz. Of the script interface: a program is taken and its name noted, not interpreted; the
-register protocol of ``ur_rtde``'s program is carried out as far as `UrRobot` says. Of the
-dashboard: what that client asks for.
+Served of RTDE (protocol versions 1 and 2): recipes of outputs and inputs, registers, start and
+pause, up to 500 Hz. Of the primary and secondary port: the state of the robot ten times a second,
+the message of the version, and scripts. Of a script: a program is taken and its name noted, not
+interpreted, and the register protocol of ``ur_rtde``'s program is carried out as far as `UrRobot`
+says; of single lines those that `UrRobot.run` knows are carried out, others are refused by a
+message. Of the dashboard: what that client asks for.
 
-Verified against ``ur_rtde`` and public descriptions, not against a controller.
+Verified against ``ur_rtde``, ``urx``, the RTDE client of Universal Robots and public descriptions,
+not against a controller.
 """
 
 import contextlib
@@ -14,7 +17,7 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from elastocal.cell import LOOPBACK
 from elastocal.errors import DeviceError
@@ -22,22 +25,39 @@ from elastocal.robot import Robot
 from elastocal.sim.wire._rtde_protocol import (
     INPUT_TYPES,
     OUTPUT_TYPES,
-    VERSION,
+    VERSIONS,
     MessageReader,
     Recipe,
+    Value,
     message,
     text_message,
 )
 from elastocal.sim.wire._rtde_robot import UrRobot
+from elastocal.sim.wire._ur_state import (
+    exception_message,
+    robot_state,
+    shown_text,
+    version_message,
+)
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.wire.servers import Told, bound, serves
 
-PORTS = {"rtde": 30004, "script": 30003, "dashboard": 29999}
+PORTS = {
+    "rtde": 30004,
+    "script": 30003,
+    "dashboard": 29999,
+    "primary": 30001,
+    "secondary": 30002,
+}
 """Those of a controller, which its clients take for granted."""
 _MOST_RATE, _LEAST_RATE = 500.0, 1.0
+_RATE = 125.0
+"""Of outputs in version 1 of RTDE, in Hz; the least that clients of version 2 take for granted."""
 _MOST_CLIENTS = 8
 _CYCLE = 0.002
 """Of the controller, in s of the wall."""
+_STATE_CYCLE = 0.1
+"""Of the primary and secondary port, in s of the wall."""
 _LISTEN = 0.05
 _MOST_SCRIPT = 1 << 20
 _QUIET = 0.05
@@ -49,7 +69,7 @@ def _takes(robot: Robot) -> bool:
 
 
 class RtdeServer:
-    """A controller on three ports of one address."""
+    """A controller on all its ports of one address."""
 
     def __init__(
         self, live: LiveCell, ports: Mapping[str, int] = PORTS, *, address: str = LOOPBACK
@@ -69,10 +89,16 @@ class RtdeServer:
         """Of the robot: clients and its program come in threads of their own."""
         self._closed = threading.Event()
         self._lines = {name: bound(socket.SOCK_STREAM, ports[name], address) for name in PORTS}
-        serve = {"rtde": self._serve_rtde, "script": self._serve_script}
+        serve = {
+            "rtde": self._serve_rtde,
+            "script": self._serve_script,
+            "dashboard": self._serve_dashboard,
+            "primary": self._serve_state,
+            "secondary": self._serve_state,
+        }
         self._threads = [threading.Thread(target=self._control, daemon=True)]
         for name, line in self._lines.items():
-            each = (line, serve.get(name, self._serve_dashboard))
+            each = (line, serve[name])
             self._threads.append(threading.Thread(target=self._accept, args=each, daemon=True))
         self._clients = threading.BoundedSemaphore(_MOST_CLIENTS)
 
@@ -146,20 +172,47 @@ class RtdeServer:
     # -- script and dashboard -----------------------------------------------------------------
 
     def _serve_script(self, client: socket.socket) -> None:
+        for _ in self._heard(client):
+            # The port has no answers: a line that is refused is one that does nothing.
+            pass
+
+    def _serve_state(self, client: socket.socket) -> None:
+        """Serve the primary or secondary port: states, and answers to scripts."""
+        client.sendall(version_message(self._outputs(), self.robot.version))
+        due = 0.0
+        for answer in self._heard(client):
+            client.sendall(answer)
+            if time.monotonic() >= due:
+                due = time.monotonic() + _STATE_CYCLE
+                client.sendall(robot_state(self._outputs()))
+
+    def _outputs(self) -> dict[str, Value]:
+        with self._lock:
+            return self.robot.outputs()
+
+    def _heard(self, client: socket.socket) -> Iterator[bytes]:
+        """Run scripts that come; yield an answer to each, and nothing in each pause."""
         text = b""
         client.settimeout(_QUIET)
         while not self._closed.is_set():
             try:
                 data = client.recv(65536)
             except TimeoutError:
-                if text:
-                    with self._lock:
-                        self.robot.load(text.decode("latin-1"))
-                    text = b""
+                yield self._run(text.decode("latin-1")) if text else b""
+                text = b""
                 continue
             if not data or len(text) > _MOST_SCRIPT:
                 return
             text += data
+            yield b""
+
+    def _run(self, script: str) -> bytes:
+        try:
+            with self._lock:
+                shown = self.robot.run(script)
+        except DeviceError as error:
+            return exception_message(self._outputs(), str(error))
+        return shown_text(self._outputs(), shown) if shown else b""
 
     def _serve_dashboard(self, client: socket.socket) -> None:
         client.sendall(b"Connected: Universal Robots Dashboard Server\n")
@@ -205,7 +258,8 @@ class _Session:
         self._outputs: Recipe | None = None
         self._inputs: dict[int, Recipe] = {}
         self.running = False
-        self.rate = 125.0
+        self.rate = _RATE
+        self._version = VERSIONS[0]
 
     def answer(self, kind: str, payload: bytes) -> bytes:
         """Return the answer to a message.
@@ -218,7 +272,9 @@ class _Session:
         match kind:
             case "V":
                 (version,) = struct.unpack(">H", payload)
-                return message("V", bytes([version == VERSION]))
+                if version in VERSIONS:
+                    self._version = version
+                return message("V", bytes([version in VERSIONS]))
             case "v":
                 return message("v", struct.pack(">4I", *self._robot.version))
             case "O":
@@ -233,7 +289,7 @@ class _Session:
                 return message("P", b"\x01")
             case "U":
                 return self._take(payload)
-        return text_message(f"message {kind!r} is not understood")
+        return text_message(f"message {kind!r} is not understood", self._version)
 
     def package(self) -> bytes:
         """Return the outputs as they are now."""
@@ -241,14 +297,18 @@ class _Session:
             return b""
         with self._lock:
             values = self._robot.outputs()
-        return message("U", b"\x01" + self._outputs.pack(values))
+        number = b"\x01" if self._version > 1 else b""
+        return message("U", number + self._outputs.pack(values))
 
     def _set_outputs(self, payload: bytes) -> bytes:
-        (rate,) = struct.unpack(">d", payload[:8])
-        self.rate = min(max(rate, _LEAST_RATE), _MOST_RATE)
-        self._outputs = Recipe.of(payload[8:].decode("ascii"), OUTPUT_TYPES)
-        number = 1 if self._outputs.complete else 0
-        return message("O", bytes([number]) + ",".join(self._outputs.types).encode())
+        number = b""
+        if self._version > 1:
+            (rate,) = struct.unpack(">d", payload[:8])
+            self.rate, payload = min(max(rate, _LEAST_RATE), _MOST_RATE), payload[8:]
+        self._outputs = Recipe.of(payload.decode("ascii"), OUTPUT_TYPES)
+        if self._version > 1:
+            number = bytes([self._outputs.complete])
+        return message("O", number + ",".join(self._outputs.types).encode())
 
     def _set_inputs(self, payload: bytes) -> bytes:
         recipe = Recipe.of(payload.decode("ascii"), INPUT_TYPES)
@@ -262,7 +322,7 @@ class _Session:
     def _take(self, payload: bytes) -> bytes:
         recipe = self._inputs.get(payload[0]) if payload else None
         if recipe is None:
-            return text_message("a package of no recipe")
+            return text_message("a package of no recipe", self._version)
         with self._lock:
             self._robot.take(recipe.unpack(payload[1:]))
         return b""
