@@ -19,7 +19,7 @@ except ImportError:
 
 with atheris.instrument_imports(include=["elastocal.drivers"]):
     from elastocal.drivers.emscon import Code, PacketReader, command
-    from elastocal.drivers.kuka_rsi import check_ethernet_file, read_rob
+    from elastocal.drivers.kuka_rsi import check_ethernet_file, read_context, read_rob
     from elastocal.drivers.line_stream import LineReader
     from elastocal.drivers.net_ft import parse_calibration, parse_configuration, parse_records
 from elastocal.errors import ElastocalError
@@ -32,6 +32,11 @@ ROB = (
 ETHERNET = (
     b"<ROOT><CONFIG><PORT>59152</PORT><ONLYSEND>FALSE</ONLYSEND></CONFIG><RECEIVE><ELEMENTS>"
     b'<ELEMENT TAG="RKorr.X" TYPE="DOUBLE" INDX="2" HOLDON="1"/></ELEMENTS></RECEIVE></ROOT>'
+)
+CONTEXT = (
+    b'<RSIObjects><RSIObject ObjType="STOP" ObjTypeID="18" ObjID="STOP1"><Inputs><Input InIdx="1"'
+    b' OutObjID="STOP1" OutIdx="1"/></Inputs><Parameters><Parameter Name="Mode" ParamID="1"'
+    b' ParamValue="4"/></Parameters></RSIObject></RSIObjects>'
 )
 PAGE = b"<netft><cfgcpf>1000000</cfgcpf><scfgfu>N</scfgfu><comrdte>Enabled</comrdte></netft>"
 LINES = b"t[s],x[mm],y[mm],z[mm]\n1.5,2412.07,-310.4,1203.1\nframe setup 3\nbeam broken\n"
@@ -46,6 +51,7 @@ PARSERS: tuple[tuple[Callable[[bytes], object], bytes], ...] = (
         lambda data: check_ethernet_file(data.decode("latin-1"), "contact"),
         ETHERNET,
     ),
+    (lambda data: read_context(data.decode("latin-1")), CONTEXT),
 )
 """Each parser with a message that it reads; the first byte of an input chooses one."""
 

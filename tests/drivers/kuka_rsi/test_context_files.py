@@ -1,6 +1,7 @@
 """RSI contexts: held against facts of public files, read back, and compared with the sheet."""
 
 import os
+import random
 import re
 import subprocess
 from collections import Counter
@@ -352,6 +353,24 @@ def test_an_object_that_moves_the_arm_otherwise_is_refused(files):
     text = files["rsi"]["elcal_run.rsi.xml"].replace("</RSIObjects>", more)
     with pytest.raises(DeviceError, match="AXISCORR1, which elcal_run must not have"):
         check_controller_file(text, example_cell("afp"), settings("rsi"))
+
+
+@pytest.mark.parametrize("suffix", ["rsi", "rsi.xml", "rsix"])
+def test_whatever_comes_is_read_or_refused_in_one_line(files, suffix):
+    rng = random.Random(3)
+    text = files["rsix" if suffix == "rsix" else "rsi"][f"elcal_comp.{suffix}"]
+    words = re.findall(r'[\w./]+="[^"]*"|<[^>]*>', text)
+    reasons = []
+    for _ in range(150):
+        other = text
+        for _ in range(rng.randint(1, 4)):
+            other = other.replace(rng.choice(words), rng.choice(words), rng.randint(1, 3))
+        try:
+            read_context(other)
+        except DeviceError as error:
+            reasons.append(str(error))
+    assert len(reasons) > 30
+    assert not any("\n" in reason for reason in reasons)
 
 
 def test_a_context_under_other_names_of_objects_is_the_same_one(files):

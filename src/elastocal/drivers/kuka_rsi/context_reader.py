@@ -45,9 +45,9 @@ def check_context(text: str, wanted: RsiContext) -> None:
         With the first object, limit or wire that is another.
     """
     found, table = read_context(text), wanted.table()
-    for name in table.keys() - found.keys():
+    for name in sorted(table.keys() - found.keys()):
         raise DeviceError(f"no object {name}")
-    for name in found.keys() - table.keys():
+    for name in sorted(found.keys() - table.keys()):
         raise DeviceError(f"it has an object {name}, which {wanted.name} must not have")
     for name, ours in table.items():
         _check_entry(name, found[name], ours)

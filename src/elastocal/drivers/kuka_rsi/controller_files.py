@@ -14,6 +14,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.drivers.kuka_rsi._drawing import Drawing
+from elastocal.drivers.kuka_rsi._site_xml import parsed
 from elastocal.drivers.kuka_rsi.context import PRECISION, RsiContext
 from elastocal.drivers.kuka_rsi.context_reader import check_context
 from elastocal.drivers.kuka_rsi.ethernet_file import MODES, EthernetFile, check_ethernet_file
@@ -94,7 +95,7 @@ def check_controller_file(text: str, cell: Cell, settings: RsiSettings) -> None:
     DeviceError
         With the channel, object, limit or wire that is wrong.
     """
-    if "<ROOT>" in text:
+    if parsed(text).tag == "ROOT":
         check_ethernet_file(text, settings.mode)
     else:
         check_context(text, _set_of(cell, settings, settings.mode).context)
