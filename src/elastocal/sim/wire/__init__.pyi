@@ -1,7 +1,10 @@
 from ._rsi_robot import PosCorrLimits as PosCorrLimits, RsiContext as RsiContext
 from .emscon import EmsconServer as EmsconServer
 from .line_stream import LineStreamServer as LineStreamServer
-from .live_cell import LiveCell as LiveCell
+from .live_cell import (
+    LiveCell as LiveCell,
+    TruePress as TruePress,
+)
 from .net_ft import (
     NetFtBox as NetFtBox,
     NetFtServer as NetFtServer,

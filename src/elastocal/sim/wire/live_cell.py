@@ -4,7 +4,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -110,6 +110,29 @@ class LiveCell:
             return marker
 
         return self.apart(seen)
+
+    def press(self) -> "TruePress":
+        """Return how the tool truly stands and presses now."""
+
+        def seen(sim: SimulatedCell) -> TruePress:
+            segment = sim.plant.segment
+            knots, part = segment.path.knots, np.array([segment.progress(sim.plant.now)])
+            q, force = knots.at(knots.q, part)[0], knots.at(knots.force, part)[0]
+            tool = sim.plant.statics.robot.forward(q)[:3, 3]
+            return TruePress(1e-6 * sim.plant.now, tool.copy(), force.copy())
+
+        return self.apart(seen)
+
+
+class TruePress(NamedTuple):
+    """Truth of a press."""
+
+    time: float
+    """In s of the cell's clock."""
+    tool: FloatArray
+    """Where the controller brings the tool centre point, in base, shape (3,), in m."""
+    force: FloatArray
+    """Force on the robot, in base, shape (3,), in N."""
 
 
 class _Tap(Generic[_Block]):
