@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from elastocal.errors import GeometryError
-from elastocal.geometry import GeometryProblem, Positions, climb, geometry_model
+from elastocal.geometry import (
+    GeometryProblem,
+    Positions,
+    climb,
+    geometry_model,
+    plausible_ladder,
+)
 from elastocal.progress import silent
 from elastocal.robot import Robot, catalogue
 from support.measured_arms import Measured, measure
@@ -40,8 +46,9 @@ def coupled(q: np.ndarray) -> np.ndarray:
 )
 def test_joints_of_another_convention_are_refused_by_it(recorded, message):
     data = measure(kuka(), 60).data
+    problem = GeometryProblem(kuka(), replace(data, q=recorded(data.q)))
     with pytest.raises(GeometryError, match=message):
-        findings(replace(data, q=recorded(data.q)))
+        plausible_ladder(problem, 40, _rng())
 
 
 @pytest.mark.parametrize("size", [1e-4, 3e-4, 5e-3])

@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.cell import Cell, load_cell
-from elastocal.compensation.offline import correct_rows
+from elastocal.compensation.offline import PathCorrection, correct_rows
 from elastocal.dataset import PathTable, find_columns
-from elastocal.errors import GeometryError
+from elastocal.errors import GeometryError, PathError
 from elastocal.geometry import (
     GeometryModel,
     GeometryProblem,
@@ -140,6 +140,32 @@ def test_predict_and_compensate_take_the_geometry(tmp_path):
     assert abs(told[1]["deviation"]["mean"] - told[0]["deviation"]["mean"]) > 1e-5
     lone = elastocal("compensate", model, rows, "--out", tmp_path / "c.csv", "--payload", "1 kg")
     assert "give --geometry" in lone.reason
+
+
+@pytest.mark.parametrize("largest", [0.0, 0.15, 0.5])
+def test_the_limit_holds_for_deflection_and_geometry_together(largest):
+    """A geometry of which half is nonsense, as a fit of mistaken positions is."""
+    measured = measure(kuka(), 40, noise=0.0)
+    model, robot = fitted(measured), measured.robot
+    q = np.array([[0.0, -1.0, 1.0, 0.3, 0.6, 0.0]])
+    load = (np.array([[0.0, 0.0, -500.0]]), None)
+    truth = model.tool_of(robot)
+
+    def nonsense(q: np.ndarray) -> np.ndarray:
+        return truth(q) + np.array([0.2, 0.0, 0.0])
+
+    def corrected() -> PathCorrection:
+        return correct_rows(
+            inverse_for(robot), calibrated(robot), q, robot.forward(q), load, str,
+            largest=max(largest, 0.02), unloaded=nonsense,
+        )  # fmt: skip
+
+    if largest == 0.5:
+        shift = np.linalg.norm(corrected().T_base_tcp[0, :3, 3] - robot.forward(q)[0, :3, 3])
+        assert shift < largest
+        return
+    with pytest.raises(PathError, match=r"a correction of 20.* mm is above the limit"):
+        corrected()
 
 
 @pytest.mark.slow

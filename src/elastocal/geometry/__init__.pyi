@@ -30,7 +30,7 @@ from .ladder import (
     blocks as blocks,
     climb as climb,
 )
-from .mistakes import findings as findings, require_own_joints as require_own_joints
+from .mistakes import findings as findings
 from .model import (
     SCHEMA as SCHEMA,
     DistanceFigures as DistanceFigures,
@@ -41,6 +41,13 @@ from .model import (
     HeldOutFigures as HeldOutFigures,
     geometry_model as geometry_model,
     read_geometry as read_geometry,
+)
+from .plausibility import (
+    MOST_LEFT_OUT as MOST_LEFT_OUT,
+    arm_length as arm_length,
+    implausible as implausible,
+    plausible_ladder as plausible_ladder,
+    require_known_markers as require_known_markers,
 )
 from .position_file import AXES as AXES, read_positions as read_positions
 from .position_plan import (

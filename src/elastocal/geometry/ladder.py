@@ -12,7 +12,6 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import GeometryError
-from elastocal.geometry.mistakes import require_own_joints
 from elastocal.geometry.problem import RUNGS, GeometryProblem, State
 from elastocal.geometry.solve import PRIOR_WIDTH, Fixed, GeometryFit, fit, register, told_apart
 from elastocal.identification import Overlap, judge_models
@@ -78,7 +77,6 @@ def climb(
     """
     progress("geometry", 0, 4)
     start = register(problem)
-    require_own_joints(problem, start)
     progress("geometry", 1, 4)
     nominal = problem.linearise(start)[1]
     # Unknowns are taken rung by rung, so that the richest tells of those below it, too.

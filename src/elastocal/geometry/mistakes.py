@@ -1,22 +1,14 @@
-"""What people and trackers do wrong with absolute positions, found from what a fit leaves."""
+"""What people and trackers do wrong with some of the positions, found from what a fit leaves."""
 
-from collections.abc import Callable
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.errors import GeometryError
-from elastocal.geometry.problem import GeometryProblem, State
-from elastocal.geometry.solve import GeometryFit, register
-from elastocal.robot import JointReading, Robot, other_joint_readings
+from elastocal.geometry.problem import GeometryProblem
+from elastocal.geometry.solve import GeometryFit
 from elastocal.wording import counted, phrase
 
-_ODD = 0.02
-"""Median distance of markers from a nominal arm, in m, that is no arm's own error."""
-_FAR_BETTER = 0.2
-"""Part of that distance that another reading of the joints has to leave at most."""
 _NEAR = 0.02
 """Farther positions, in m, are broken beams and say nothing of where a station stands."""
 _LEAST_ROWS = 6
@@ -29,53 +21,6 @@ _SHIFT = 2.0
 _SIGMAS = 7.0
 """Distance within which a swapped marker is where another one is expected."""
 _MOST_NAMED = 8
-
-
-def require_own_joints(problem: GeometryProblem, start: State) -> None:
-    """Refuse joints that are those of the arm only when they are read otherwise.
-
-    Parameters
-    ----------
-    problem : GeometryProblem
-        As stated.
-    start : State
-        Its registration.
-
-    Raises
-    ------
-    GeometryError
-        If the nominal arm is far off, and far less with another sign, order or coupling.
-    """
-    stated = _median_distance(problem, start)
-    if stated <= _ODD:
-        return
-    found = []
-    for reading in (*other_joint_readings(problem.robot), *_single_signs(problem.robot)):
-        q = reading.read(problem.robot, problem.data.q)
-        other = GeometryProblem(problem.robot, replace(problem.data, q=q))
-        found.append((_median_distance(other, register(other)), reading.message))
-    best, message = min(found)
-    if best <= _FAR_BETTER * stated and best <= _ODD:
-        raise GeometryError(
-            f"{message}: read that way the nominal arm is {1e3 * best:.3g} mm off (median), as"
-            f" stated {1e3 * stated:.3g} mm"
-        )
-
-
-def _median_distance(problem: GeometryProblem, at: State) -> float:
-    return float(np.median(np.linalg.norm(problem.residual(at), axis=1)))
-
-
-def _single_signs(robot: Robot) -> list[JointReading]:
-    """Return readings that turn one joint the other way round."""
-
-    def turned(joint: int) -> Callable[[Robot, FloatArray], FloatArray]:
-        return lambda _, q: np.where(np.arange(q.shape[1]) == joint, -q, q)
-
-    return [
-        JointReading(f"{name} turns the other way round than in the URDF", turned(joint))
-        for joint, name in enumerate(robot.joint_names)
-    ]
 
 
 def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[str, ...]:

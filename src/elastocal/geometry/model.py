@@ -12,6 +12,7 @@ from elastocal.errors import GeometryError, SchemaError
 from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
 from elastocal.geometry.ladder import GeometryLadder
 from elastocal.geometry.mistakes import findings
+from elastocal.geometry.plausibility import require_known_markers
 from elastocal.geometry.positions import Payload, Positions, joint_torques
 from elastocal.geometry.problem import GeometryProblem
 from elastocal.identification import interval
@@ -29,7 +30,6 @@ from elastocal.robot import (
     with_joint_origins,
     with_tool,
 )
-from elastocal.wording import counted
 
 SCHEMA = "elastocal.geometry/1"
 _OFFSET = MOTION.index("offset")
@@ -373,10 +373,7 @@ def geometry_model(
 
 def _tcp_as_built(fitted: FloatArray, known: FloatArray) -> FloatArray:
     """Return the tcp in which markers are where they are known to be, shape (4, 4), in m."""
-    if known.shape != fitted.shape:
-        raise GeometryError(
-            f"places of {counted(len(known), 'marker')} are given, positions are of {len(fitted)}"
-        )
+    require_known_markers(fitted, known)
     there, here, T = fitted.mean(axis=0), known.mean(axis=0), np.eye(4)
     if np.linalg.matrix_rank(known - here, tol=_LINE) > 1:
         # Markers that are not in line say how the tool is turned, too.

@@ -62,7 +62,7 @@ class CompensateSettings(NewTool, ArmAsBuilt):
     start: str | None = None
     """Posture before the first row, a quantity a joint from base to tip."""
     largest: float = LARGEST_DEFLECTION
-    """Largest deflection that is taken for one, in m."""
+    """Largest correction, whatever it is made of, in m."""
     program: str | None = None
     """Name of a robot program of a path, to be written beside ``out``; none: no program."""
     language: str | None = None

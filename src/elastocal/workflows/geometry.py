@@ -15,9 +15,9 @@ from elastocal.geometry import (
     GeometryProblem,
     LinkNumber,
     accuracy_figures,
-    climb,
     geometry_model,
     link_table,
+    plausible_ladder,
     read_positions,
 )
 from elastocal.progress import Progress
@@ -129,7 +129,9 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     path = Path(settings.positions)
     robot = find_robot(settings.robot, settings.tcp, None)
     problem = GeometryProblem(robot, read_positions(path, robot))
-    found = climb(problem, settings.draws, np.random.default_rng(settings.seed), progress)
+    found = plausible_ladder(
+        problem, settings.draws, np.random.default_rng(settings.seed), progress
+    )
     markers = (
         np.array([parse_point(each) for each in settings.markers]) if settings.markers else None
     )

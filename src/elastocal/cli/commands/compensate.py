@@ -24,7 +24,7 @@ def _compensate(  # noqa: PLR0913 (a command has as many options as it has)
     ] = None,
     start: Annotated[str | None, typer.Option(help=options.START_HELP)] = None,
     largest: Annotated[
-        str, typer.Option("--limit", help="Largest deflection that is taken for one.")
+        str, typer.Option("--limit", help="Largest correction, deflection and geometry together.")
     ] = "20 mm",
     tool: options.NewTool = None,
     tool_mass: options.ToolMass = None,

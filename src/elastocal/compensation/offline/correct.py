@@ -35,7 +35,7 @@ from elastocal.robot.inverse import (
 )
 
 LARGEST_DEFLECTION = 0.02
-"""Largest deflection that is taken for one, in m."""
+"""Largest correction, whatever it is made of, in m."""
 _TOLERANCE = 1e-9
 """Largest error left in position (m) and orientation (rad); the contract is 1e-7 m."""
 _STEPS = 12
@@ -119,7 +119,7 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
         Whether a joint that the correction takes over its limit may stand a whole turn elsewhere:
         in a path of poses the controller chooses the turn, in a path of joints it would rotate.
     largest : float
-        Largest deflection that is taken for one, in m.
+        Largest deflection that is taken for one, and largest correction, in m.
     memory : ndarray, shape (element,), optional
         What friction remembers of the rows before; by default it is free before the first row.
     unloaded : callable, optional
@@ -128,16 +128,16 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     Raises
     ------
     PathError
-        If a programmed or corrected row is outside the joint limits or out of reach, or deflects
-        farther than can be meant.
+        If a programmed or corrected row is outside the joint limits or out of reach, or would be
+        moved farther than the largest correction.
     """
     robot = solver.robot
     check_limits(robot, q, where, "is programmed")
     load = _Load(calibrated, *wrench, memory, unloaded).along(q)
     deflection = load.deflection(q, np.arange(len(q)))
-    _check_size(deflection, largest, where)
     q, reached = q.copy(), T_base_tcp.copy()
     off = deflection + load.misplaced(q, reached)
+    _check_size(off, deflection, largest, where)
     first = uncorrected = off.copy()
     error = _error(reached, off, T_base_tcp)
     for step in range(_STEPS):
@@ -165,9 +165,9 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     check_limits(robot, q, where, "would be corrected")
     commanded = T_base_tcp.copy()
     commanded[:, :3, 3] = reached[:, :3, 3]
+    _check_size(reached[:, :3, 3] - T_base_tcp[:, :3, 3], deflection, largest, where)
     residual = reached[:, :3, 3] + off - T_base_tcp[:, :3, 3]
     predicted = calibrated.predict(q, *wrench, friction=load.borne)
-    along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], wrench[0])
     return PathCorrection(
         q,
         commanded,
@@ -177,7 +177,7 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
         uncorrected,
         np.linalg.norm(first - uncorrected, axis=1),
         np.linalg.norm(residual, axis=1),
-        np.asarray(along > 0.5 * np.linalg.norm(wrench[0], axis=1)),
+        _draws_out(T_base_tcp, wrench[0]),
         load.after,
         calibrated.covered_rows(q, *wrench),
     )
@@ -232,17 +232,30 @@ class _Load:
         return np.asarray(self.unloaded(q) - T_base_tcp[:, :3, 3])
 
 
-def _check_size(deflection: FloatArray, largest: float, where: RowName) -> None:
-    """Refuse deflections that cannot be meant."""
+def _check_size(shift: FloatArray, deflection: FloatArray, largest: float, where: RowName) -> None:
+    """Refuse deflections, and corrections of whatever they are made, that cannot be meant."""
     with np.errstate(over="ignore"):
-        length = np.linalg.norm(deflection, axis=1)
-    fits = length <= largest
-    if not fits.all():
-        row = int(np.argmin(fits))
+        length, bend = np.linalg.norm(shift, axis=1), np.linalg.norm(deflection, axis=1)
+    fits = (length <= largest) & (bend <= largest)
+    if fits.all():
+        return
+    row = int(np.argmin(fits))
+    if not bend[row] <= largest:
         raise PathError(
-            f"{where(row)}: a deflection of {1e3 * length[row]:.4g} mm is above the limit of"
+            f"{where(row)}: a deflection of {1e3 * bend[row]:.4g} mm is above the limit of"
             f" {1e3 * largest:.4g} mm: is the force in another unit or frame?"
         )
+    raise PathError(
+        f"{where(row)}: a correction of {1e3 * length[row]:.4g} mm is above the limit of"
+        f" {1e3 * largest:.4g} mm; {1e3 * bend[row]:.4g} mm of it is deflection, the rest what the"
+        " arm as built is off by: is its geometry of this arm?"
+    )
+
+
+def _draws_out(T_base_tcp: FloatArray, force: FloatArray) -> BoolArray:
+    """Return where a force draws the tool out, along +z of the tcp, shape (row,)."""
+    along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], force)
+    return np.asarray(along > 0.5 * np.linalg.norm(force, axis=1))
 
 
 def _error(T: FloatArray, off: FloatArray, T_wanted: FloatArray) -> FloatArray:

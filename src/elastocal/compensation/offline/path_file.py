@@ -50,7 +50,7 @@ class CorrectionSettings:
     start: FloatArray | None = None
     """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
     largest: float = LARGEST_DEFLECTION
-    """Largest deflection that is taken for one, in m."""
+    """Largest correction, whatever it is made of, in m."""
     unloaded: Unloaded | None = None
     """Where the arm as built stands; by default where its controller believes."""
     controller: Robot | None = None
