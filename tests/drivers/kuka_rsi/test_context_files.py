@@ -108,6 +108,40 @@ SHAPES = {
     },
 }
 """Attributes in their order by element; elements that are not named have none. The same files."""
+CHILDREN = {
+    "rsi": {
+        "rSIModel": "rSIObjects",
+        "rSIObjects": "rSIElement*",
+        "rSIElement": "rSIInPorts? rSIOutPorts? rSIParameters?",
+        "rSIInPorts": "rSIInPort*",
+        "rSIInPort": "source?",
+        "source": "rSIOutPortMoniker",
+        "rSIOutPorts": "rSIOutPort*",
+        "rSIParameters": "rSIParameter*",
+    },
+    "rsi.xml": {
+        "RSIObjects": "RSIObject*",
+        "RSIObject": "Inputs? Parameters?",
+        "Inputs": "Input*",
+        "Parameters": "Parameter*",
+    },
+    "rsix": {
+        "RsiContext": "RsiObjects BlueprintCollections? Constructs?",
+        "RsiObjects": "RsiObject*",
+        "RsiObject": "Inputs? Parameters?",
+        "Inputs": "Input*",
+        "Parameters": "Parameter*",
+    },
+    "rsi.diagram": {
+        "rSIObjectDiagram": "rSIModelMoniker nestedChildShapes",
+        "rSIElementShape": "rSIElementMoniker relativeChildShapes nestedChildShapes",
+        "rSIInPortShape": "rSIInPortMoniker relativeChildShapes",
+        "rSIOutPortShape": "rSIOutPortMoniker relativeChildShapes",
+        "rSISignalConnector": "nodes",
+        "nodes": "rSIInPortShapeMoniker rSIOutPortShapeMoniker",
+    },
+}
+"""What stands below an element, in its order. The same files; shapes hold others of any order."""
 KUKA, SDK = "ros-industrial+kuka_experimental", "kroshu+kuka-external-control-sdk"
 _SETUP = "kuka_external_control_sdk/krc_setup"
 PUBLIC = {
@@ -154,15 +188,25 @@ def contexts(files: dict[str, dict[str, str]]) -> list[tuple[str, str, str, str]
 
 def fits(given: list[str], pattern: str) -> bool:
     words = pattern.split()
-    whole = "".join(f"({w[:-1]} )?" if w.endswith("?") else f"{w} " for w in words)
+    whole = "".join(f"({w[:-1]} ){w[-1]}" if w[-1] in "?*" else f"{w} " for w in words)
     return re.fullmatch(whole, "".join(f"{name} " for name in given)) is not None
 
 
-def test_every_element_has_the_attributes_of_public_files_in_their_order(files):
+def assert_shape(suffix: str, each: ElementTree.Element) -> None:
+    # The SDK lets KRL set limits (IsPublic), we do not.
+    given = [name for name in each.attrib if name.lower() != "ispublic"]
+    assert fits(given, SHAPES[suffix].get(each.tag, "")), (suffix, each.tag, given)
+    if each.tag.endswith("ChildShapes"):
+        return
+    below = [child.tag for child in each]
+    assert fits(below, CHILDREN[suffix].get(each.tag, "")), (suffix, each.tag, below)
+
+
+def test_every_element_has_attributes_and_children_of_public_files_in_their_order(files):
     seen = set()
     for _, _, suffix, text in contexts(files):
         for each in tree(text).iter():
-            assert fits([*each.attrib], SHAPES[suffix].get(each.tag, "")), (suffix, each.tag)
+            assert_shape(suffix, each)
             seen.add((suffix, each.tag))
     assert seen >= {(suffix, tag) for suffix, shapes in SHAPES.items() for tag in shapes}
 
@@ -407,9 +451,7 @@ def test_public_contexts_of_rsi_3_have_the_shapes_that_ours_are_held_against(mir
     path, forms = PUBLIC[mirror]
     for form in forms:
         for each in tree(public(mirror, path.format(form=form))).iter():
-            # The SDK lets KRL set limits (IsPublic), we do not.
-            given = [name for name in each.attrib if name.lower() != "ispublic"]
-            assert fits(given, SHAPES[form].get(each.tag, "")), (form, each.tag, given)
+            assert_shape(form, each)
 
 
 @pytest.mark.parametrize("mirror", PUBLIC)
@@ -427,8 +469,8 @@ def test_public_contexts_of_rsi_3_have_the_parameters_that_ours_are_held_against
 
 def test_the_catalogue_of_rsi_4_has_the_objects_that_ours_are_held_against():
     root = tree(public(SDK, RSIX))
-    for each in root.iter("RsiObject"):
-        assert fits([*each.attrib], SHAPES["rsix"]["RsiObject"])
+    for part in (root, *root.find("RsiObjects").iter()):
+        assert_shape("rsix", part)
     known = {e.get("Name"): e for e in root.iter("Element")}
     for kind, (type_id, camel, inputs, outputs) in KINDS.items():
         entry = known[camel]
