@@ -190,5 +190,6 @@ def _around(settings: ExportSettings, model: Robot) -> tuple[LinuxTarget, PathLi
         scale=PostureReader(cell.robot, arm.signs).scales,
         correction=limits.correction,
         rate=limits.rate,
+        delay=arm.motion_delay(cell),
     )
     return target, limits, cell

@@ -130,5 +130,5 @@ def test_an_address_is_a_number_since_it_stands_in_c():
     with pytest.raises(CompensationError, match="must be numbers, such as"):
         LinuxTarget(
             "cell", ('127.0.0.1"; system("x', 1), "127.0.0.1", "PC", 10, ("127.0.0.1", 1, 1), 0,
-            (1.0,), 1e-3, 0.03,
+            (1.0,), 1e-3, 0.03, 0.12,
         )  # fmt: skip

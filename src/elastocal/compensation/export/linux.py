@@ -5,6 +5,7 @@ What it is told, addresses and limits, is one generated header; all else is C as
 """
 
 import ipaddress
+import math
 from dataclasses import dataclass
 
 from elastocal import __version__
@@ -14,7 +15,14 @@ from elastocal.compensation.online import Design
 from elastocal.errors import CompensationError
 from elastocal.results import brief_repr
 
-LINUX_FILES = ("elastocal_live.c", "live_wire.c", "live_wire.h", "live_config.h")
+LINUX_FILES = (
+    "elastocal_live.c",
+    "live_held.c",
+    "live_held.h",
+    "live_wire.c",
+    "live_wire.h",
+    "live_config.h",
+)
 """The program; `Makefile` and `LIVE.md` are beside it."""
 _PRIORITY = 70
 
@@ -43,6 +51,8 @@ class LinuxTarget:
     """Largest, in m."""
     rate: float
     """In m/s."""
+    delay: float
+    """From a correction to its motion, at most, in s."""
 
     def __post_init__(self) -> None:
         """Refuse an address that is none: it stands in C as a text.
@@ -83,6 +93,7 @@ def linux_files(numbers: Design, target: LinuxTarget) -> dict[str, str]:
         "ROBOT_ADDRESS": target.controller,
         "SENTYPE": target.sentype,
         "TIMEOUT": str(target.timeout),
+        "DELAY_CYCLES": str(math.ceil(target.delay / settings.cycle)),
         "FT_ADDRESS": target.sensor[0],
         "FT_PORT": str(target.sensor[1]),
         "FT_TCP_PORT": str(target.sensor[2]),

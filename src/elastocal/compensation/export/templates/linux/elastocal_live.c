@@ -8,6 +8,7 @@
  */
 #define _DEFAULT_SOURCE 1
 
+#include "live_held.h"
 #include "live_wire.h"
 
 #include <arpa/inet.h>
@@ -18,6 +19,7 @@
 #include <poll.h>
 #include <sched.h>
 #include <signal.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,9 +32,11 @@
 
 #define PRIORITY 70
 #define STACK_BYTES (256 * 1024)
-#define FAR_CYCLES 250 /* an IPOC that is farther off is another time of the controller */
 #define SESSION 0.5 /* s after which a controller may come back from another port */
+#ifndef WAIT
 #define WAIT 60.0 /* s for the first message */
+#endif
+#define SAY_AGAIN 1.0 /* s between two lines about the same */
 #define SILENCE 1.0 /* s after which a stop is no longer waited for */
 #define STOP_CYCLES 25 /* in which the controller is told that corrections are over */
 #define MOST_BACKLOG 64 /* datagrams that are passed over at once */
@@ -79,12 +83,36 @@ static double quantile(const times *t, double share)
     return fmin(1e-6 * (double)(bin + 1), t->longest);
 }
 
+/* Say something while the loop runs: at most a line a second about the same, and none that would
+ * have to wait. */
+static void say(double *said, const char *format, ...)
+{
+    char line[256];
+    struct pollfd ready = {STDERR_FILENO, POLLOUT, 0};
+    const double now = seconds_of(CLOCK_MONOTONIC);
+    va_list values;
+    int length;
+    if ((*said > 0.0) && ((now - *said) < SAY_AGAIN)) {
+        return;
+    }
+    va_start(values, format);
+    length = vsnprintf(line, sizeof line, format, values);
+    va_end(values);
+    length = (length < (int)sizeof line) ? length : ((int)sizeof line - 1);
+    if ((length > 0) && (poll(&ready, 1, 0) > 0)
+        && (write(STDERR_FILENO, line, (size_t)length) == (ssize_t)length)) {
+        *said = now;
+    }
+}
+
 typedef struct {
-    unsigned long received, answered, lost, skipped, out_of_order, jumps, malformed, foreign, late;
+    unsigned long received, answered, skipped, out_of_order, jumps, malformed, foreign, late;
     unsigned long restarts, corrected, held, faded, limited, rate_limited, uncertain, sensor;
     unsigned long records, records_lost, records_late, records_bad;
+    unsigned long withheld; /* not answered, because nothing told which correction is in effect */
     long controller_delay;
     double largest_correction, largest_step;
+    wire_refusal first_refused, last_refused;
 } counts;
 
 static times answer_times; /* from when the kernel had the datagram */
@@ -103,6 +131,8 @@ typedef struct {
     int fresh; /* whether it has not been used yet */
     uint64_t place; /* of it in the stream */
     const char *failure; /* why it is not to be trusted any more; NULL: it is */
+    int good; /* whether the last record that was spoken of was good */
+    double said; /* s */
 } sensor;
 
 static const double FORCE_UNITS[7] = {0.0, 4.4482216152605, 1.0, 4448.2216152605,
@@ -179,6 +209,9 @@ static int goes_on(sensor *s, const wire_rdt *record)
 {
     const uint32_t step = record->rdt_sequence - s->last.rdt_sequence;
     const uint32_t ahead = record->ft_sequence - s->last.ft_sequence;
+    if (s->failure != NULL) {
+        return 0;
+    }
     if (s->begun == 0) {
         s->begun = 1;
         return 1;
@@ -189,6 +222,9 @@ static int goes_on(sensor *s, const wire_rdt *record)
     }
     if ((step >= HALF) || (ahead >= HALF)) {
         s->failure = "its counters went back: it was started anew, or another client asked for it";
+        s->said = 0.0;
+        say(&s->said, "elastocal_live: Net F/T at %s: %s; the correction fades\n", LIVE_FT_ADDRESS,
+            s->failure);
         return 0;
     }
     counted.records_lost += step - 1U;
@@ -208,6 +244,18 @@ static void as_reading(const sensor *s, const double q[], elastocal_reading *rea
     }
     reading->ok = ((s->failure == NULL) && (wire_is_good(s->last.status) != 0)) ? 1 : 0;
     reading->time = (LIVE_EVERY_RECORD != 0) ? (ELASTOCAL_SAMPLE * (double)s->place) : s->arrived;
+}
+
+/* Say once that the box calls its records bad, and that they are good again. */
+static void speak_of(sensor *s, uint32_t status)
+{
+    const int good = wire_is_good(status);
+    if ((good != s->good) && (s->failure == NULL)) {
+        s->good = good;
+        say(&s->said, "elastocal_live: Net F/T at %s: status 0x%08lx, %s\n", LIVE_FT_ADDRESS,
+            (unsigned long)status,
+            (good != 0) ? "good again" : "bad: the correction is held, then fades");
+    }
 }
 
 /* Take what has come; where the filters run at the rate of the box, each record is conditioned. */
@@ -237,6 +285,7 @@ static void take_records(sensor *s, elastocal_state *state, const double *q)
                 continue;
             }
             s->last = record;
+            speak_of(s, record.status);
             if (goes == 1) {
                 s->arrived = seconds_of(CLOCK_MONOTONIC);
                 s->fresh = 1;
@@ -255,6 +304,7 @@ static int open_sensor(sensor *s)
 {
     int turn;
     (void)memset(s, 0, sizeof *s);
+    s->good = 1;
     if (read_scale(s) != 0) {
         (void)fprintf(stderr, "elastocal_live: Net F/T at %s does not tell its counts (TCP %d)\n",
                       LIVE_FT_ADDRESS, LIVE_FT_TCP_PORT);
@@ -282,8 +332,9 @@ typedef struct {
     int heard; /* whether anything has come */
     struct sockaddr_in peer;
     double heard_at;
-    uint64_t ipoc;
-    uint64_t step; /* of IPOC in a cycle */
+    int anew; /* whether its port is another one */
+    double said; /* s */
+    held_count count;
 } controller;
 
 static int open_controller(controller *c)
@@ -294,7 +345,6 @@ static int open_controller(controller *c)
     (void)memset(&place, 0, sizeof place);
     place.sin_family = AF_INET;
     place.sin_port = htons(LIVE_RSI_PORT);
-    c->step = (uint64_t)((1000.0 * ELASTOCAL_CYCLE) + 0.5);
     c->socket = socket(AF_INET, SOCK_DGRAM, 0);
     if ((c->socket < 0) || (inet_pton(AF_INET, LIVE_RSI_ADDRESS, &place.sin_addr) != 1)
         || (bind(c->socket, (const struct sockaddr *)&place, sizeof place) != 0)) {
@@ -352,6 +402,7 @@ static ssize_t receive(controller *c, char *buffer, double *waited)
         counted.foreign++;
         return 0;
     }
+    c->anew |= ((c->heard != 0) && (sender.sin_port != c->peer.sin_port)) ? 1 : 0;
     c->peer = sender;
     c->heard = 1;
     c->heard_at = now;
@@ -359,32 +410,16 @@ static ssize_t receive(controller *c, char *buffer, double *waited)
     return size;
 }
 
-/* How a message follows: -1 out of order, 0 the next ones, 1 a program that was started anew. */
-static int follows(controller *c, uint64_t ipoc)
+/* Note why a telegram was refused, and say so. */
+static void refused(controller *c, const wire_refusal *why)
 {
-    const uint64_t change = ipoc - c->ipoc;
-    const uint64_t back = c->ipoc - ipoc;
-    const int first = (c->ipoc == 0U) ? 1 : 0;
-    uint64_t steps;
-    if ((first == 0) && (change == 1U)) {
-        c->step = 1U; /* simulators that count messages */
+    counted.malformed++;
+    counted.last_refused = *why;
+    if (counted.malformed == 1U) {
+        counted.first_refused = *why;
+        say(&c->said, "elastocal_live: a telegram of %s is refused: %s%s%s\n", LIVE_ROBOT_ADDRESS,
+            why->element, (why->element[0] != '\0') ? ": " : "", why->reason);
     }
-    if ((first == 0) && (back <= ((uint64_t)FAR_CYCLES * c->step))) {
-        counted.out_of_order++;
-        return -1;
-    }
-    c->ipoc = ipoc;
-    if (first != 0) {
-        return 1;
-    }
-    steps = change / c->step;
-    if (((change % c->step) != 0U) || (steps > (uint64_t)FAR_CYCLES)) {
-        counted.jumps++;
-        return 1;
-    }
-    counted.lost += steps - 1U;
-    /* Whoever was without an answer for longer has stopped, and begins anew. */
-    return (steps > (uint64_t)LIVE_TIMEOUT) ? 1 : 0;
 }
 
 /* ---- The loop -------------------------------------------------------------------------- */
@@ -399,7 +434,8 @@ static void interrupt(int number)
 
 typedef struct {
     elastocal_state state;
-    double sent[3]; /* the correction in effect, m */
+    held held;
+    double sent[3]; /* the correction of the last answer, m */
     double q[ELASTOCAL_JOINTS];
     int has_q;
     int over; /* cycles that the controller has been told so */
@@ -410,28 +446,32 @@ static double length_of(const double v[3])
     return sqrt((v[0] * v[0]) + (v[1] * v[1]) + (v[2] * v[2]));
 }
 
-/* Towards a correction, within the last bounds; what is not finite is the one before. */
-static void send_towards(loop *l, const double wanted[3], double most)
+/* Answer on the way from what is in effect to a correction, within the last bounds; what is not
+ * finite is no way. */
+static void go_towards(loop *l, const held_effect *e, const double wanted[3], double most)
 {
     const double size = length_of(wanted);
     const double share = (size > LIVE_LARGEST) ? (LIVE_LARGEST / size) : 1.0;
-    double way[3];
+    const int moves = ((e->advances != 0) && (size < HUGE_VAL)) ? 1 : 0;
+    double before[3];
+    double way[3] = {0.0, 0.0, 0.0};
     double distance;
-    double part;
     int i;
-    if (!(size < HUGE_VAL)) {
-        return;
-    }
-    for (i = 0; i < 3; i++) {
-        way[i] = (share * wanted[i]) - l->sent[i];
+    (void)memcpy(before, (e->begins != 0) ? e->shift : l->sent, sizeof before);
+    (void)memcpy(l->sent, e->shift, sizeof l->sent);
+    for (i = 0; (moves != 0) && (i < 3); i++) {
+        way[i] = (share * wanted[i]) - e->shift[i];
     }
     distance = length_of(way);
-    part = (distance > most) ? (most / distance) : 1.0;
-    for (i = 0; i < 3; i++) {
+    for (i = 0; (moves != 0) && (i < 3); i++) {
         /* The last step lands on the target exactly: zero is to be zero. */
-        l->sent[i] = (distance > most) ? (l->sent[i] + (part * way[i])) : (share * wanted[i]);
+        l->sent[i] = (distance > most) ? (e->shift[i] + ((most / distance) * way[i]))
+                                       : (share * wanted[i]);
     }
-    counted.largest_step = fmax(counted.largest_step, fmin(distance, most));
+    for (i = 0; i < 3; i++) {
+        way[i] = l->sent[i] - before[i];
+    }
+    counted.largest_step = fmax(counted.largest_step, length_of(way));
     counted.largest_correction = fmax(counted.largest_correction, length_of(l->sent));
 }
 
@@ -447,17 +487,18 @@ static void note_status(unsigned int status)
 }
 
 /* The correction of a cycle; whether the controller is to stop. */
-static int correct(loop *l, sensor *s, int begins)
+static int correct(loop *l, sensor *s, const held_effect *e)
 {
     static const double none[3] = {0.0, 0.0, 0.0};
     elastocal_correction out;
-    if (begins != 0) {
+    if (e->begins != 0) {
         elastocal_start(&l->state);
-        l->sent[0] = l->sent[1] = l->sent[2] = 0.0;
         counted.restarts++;
     }
+    /* Answers get lost: the ramp goes on from what the controller holds. */
+    (void)memcpy(l->state.correction, e->shift, sizeof l->state.correction);
     if (interrupted != 0) {
-        send_towards(l, none, LIVE_FADE_STEP);
+        go_towards(l, e, none, LIVE_FADE_STEP);
         if (length_of(l->sent) > 0.0) {
             return 0;
         }
@@ -473,8 +514,31 @@ static int correct(loop *l, sensor *s, int begins)
     /* In every cycle, also without a reading: hold and fade count these calls. */
     elastocal_correct(&l->state, l->q, &out);
     note_status(out.status);
-    send_towards(l, out.correction, LIVE_STEP);
+    go_towards(l, e, out.correction, LIVE_STEP);
     return 0;
+}
+
+/* What is in effect in a cycle; 0: known, else there is no answer. */
+static int look(loop *l, controller *c, const wire_rob *message, held_effect *effect)
+{
+    const held_arrival arrival = held_classify(&c->count, message->ipoc, c->anew);
+    int found;
+    c->anew = 0;
+    counted.jumps += (arrival == HELD_JUMPED) ? 1U : 0U;
+    counted.out_of_order += (arrival == HELD_OLD) ? 1U : 0U;
+    if (arrival == HELD_OLD) {
+        return 1;
+    }
+    found = held_look(&l->held, arrival, (message->has_offset != 0) ? message->offset : NULL,
+                      message->delay, c->heard_at, effect);
+    if (found != 0) {
+        counted.withheld++;
+        say(&c->said, "elastocal_live: no answer: RIst is %.2f mm from RSol, %s\n",
+            1e3 * length_of(message->offset),
+            (found < 0) ? "a correction that is not of this program: start the controller's anew"
+                        : "which does not tell whether the correction is in effect");
+    }
+    return found;
 }
 
 /* Answer the newest datagram that waits. */
@@ -483,6 +547,8 @@ static void answer(loop *l, sensor *s, controller *c)
     static char buffers[2][WIRE_MOST_BYTES + 1];
     char reply[WIRE_SEN_BYTES];
     wire_rob message;
+    wire_refusal why;
+    held_effect effect;
     double millimetres[6];
     double waited = 0.0;
     double begun = 0.0;
@@ -490,7 +556,6 @@ static void answer(loop *l, sensor *s, controller *c)
     size_t length;
     int newest = 0;
     int turn;
-    int begins;
     int stop;
     for (turn = 0; turn < MOST_BACKLOG; turn++) {
         double age;
@@ -509,21 +574,21 @@ static void answer(loop *l, sensor *s, controller *c)
     if (size <= 0) {
         return;
     }
-    if (wire_read_rob(buffers[newest], (size_t)size, &message) != 0) {
-        counted.malformed++;
+    if (wire_read_rob(buffers[newest], (size_t)size, &message, &why) != 0) {
+        refused(c, &why);
         return;
     }
     if (message.delay > counted.controller_delay) {
         counted.controller_delay = message.delay;
     }
-    begins = follows(c, message.ipoc);
-    if (begins < 0) {
-        return;
-    }
     (void)memcpy(l->q, message.q, sizeof l->q);
     l->has_q = 1;
+    if (look(l, c, &message, &effect) != 0) {
+        return;
+    }
     take_records(s, &l->state, l->q);
-    stop = correct(l, s, begins);
+    stop = correct(l, s, &effect);
+    held_note(&l->held, l->sent);
     elastocal_rkorr(l->sent, millimetres);
     length = wire_write_sen(reply, stop, millimetres, message.ipoc);
     if (sendto(c->socket, reply, length, 0, (const struct sockaddr *)&c->peer, sizeof c->peer)
@@ -543,6 +608,7 @@ static int run(loop *l, sensor *s, controller *c, double duration)
     double first = -1.0;
     double asked = -1.0;
     elastocal_start(&l->state);
+    held_start(&l->held, &c->count);
     while (l->over < STOP_CYCLES) {
         struct pollfd waits[2] = {{c->socket, POLLIN, 0}, {s->socket, POLLIN, 0}};
         const int ready = poll(waits, 2, 50);
@@ -554,7 +620,7 @@ static int run(loop *l, sensor *s, controller *c, double duration)
         } else {
             /* Nothing has come. */
         }
-        first = ((first < 0.0) && (counted.received > 0U)) ? now : first;
+        first = ((first < 0.0) && (l->has_q != 0)) ? now : first;
         if ((first >= 0.0) && ((now - first) >= duration)) {
             interrupted = 1;
         }
@@ -565,8 +631,14 @@ static int run(loop *l, sensor *s, controller *c, double duration)
             }
         }
         if ((first < 0.0) && ((now - opened) > WAIT)) {
-            (void)fprintf(stderr, "elastocal_live: nothing from %s for %g s\n",
-                          LIVE_ROBOT_ADDRESS, WAIT);
+            const wire_refusal *const why = &counted.first_refused;
+            (void)fprintf(stderr, "elastocal_live: nothing from %s for %g s", LIVE_ROBOT_ADDRESS,
+                          WAIT);
+            if (counted.malformed > 0U) {
+                (void)fprintf(stderr, " (%lu telegrams refused: %s%s%s)", counted.malformed,
+                              why->element, (why->element[0] != '\0') ? ": " : "", why->reason);
+            }
+            (void)fprintf(stderr, "\n");
             return 1;
         }
     }
@@ -611,16 +683,29 @@ static void print_times(const char *name, const times *t)
                  quantile(t, 0.5), quantile(t, 0.99), quantile(t, 0.999), t->longest);
 }
 
-static void print_counts(int locked, int priority, const char *failure)
+static void print_refusal(const char *name, const wire_refusal *why)
+{
+    if (why->reason == NULL) {
+        (void)printf("\"%s\": null, ", name);
+    } else {
+        (void)printf("\"%s\": \"%s%s%s\", ", name, why->element,
+                     (why->element[0] != '\0') ? ": " : "", why->reason);
+    }
+}
+
+static void print_counts(const controller *c, int locked, int priority, const char *failure)
 {
     const counts *const n = &counted;
     (void)printf("{");
     print_times("answer", &answer_times);
     print_times("work", &work_times);
     (void)printf("\"received\": %lu, \"answered\": %lu, \"lost\": %lu, \"skipped\": %lu, ",
-                 n->received, n->answered, n->lost, n->skipped);
+                 n->received, n->answered, c->count.lost, n->skipped);
     (void)printf("\"out_of_order\": %lu, \"jumps\": %lu, \"malformed\": %lu, \"foreign\": %lu, ",
                  n->out_of_order, n->jumps, n->malformed, n->foreign);
+    print_refusal("first_refused", &n->first_refused);
+    print_refusal("last_refused", &n->last_refused);
+    (void)printf("\"withheld\": %lu, ", n->withheld);
     (void)printf("\"late\": %lu, \"controller_delay\": %ld, \"restarts\": %lu, ", n->late,
                  n->controller_delay, n->restarts);
     (void)printf("\"corrected\": %lu, \"held\": %lu, \"faded\": %lu, \"limited\": %lu, ",
@@ -703,6 +788,6 @@ int main(int count, char **words)
         (void)fprintf(stderr, "elastocal_live: Net F/T at %s: %s\n", LIVE_FT_ADDRESS, box.failure);
         result = 1;
     }
-    print_counts(locked, priority, box.failure);
+    print_counts(&robot, locked, priority, box.failure);
     return result;
 }

@@ -15,6 +15,7 @@
 #define LIVE_ROBOT_ADDRESS "@ROBOT_ADDRESS@"
 #define LIVE_SENTYPE "@SENTYPE@"
 #define LIVE_TIMEOUT @TIMEOUT@ /* cycles without an answer after which the controller stops */
+#define LIVE_DELAY_CYCLES @DELAY_CYCLES@ /* from a correction to its motion, at most */
 
 /* Net F/T. */
 #define LIVE_FT_ADDRESS "@FT_ADDRESS@"

@@ -97,13 +97,39 @@ static int read_number(const char *data, size_t size, double *number)
     return (value <= LARGEST) ? 0 : -1;
 }
 
+/* Why a text is no number. */
+static const char *wrong_number(const char *data, size_t size)
+{
+    size_t at;
+    int commas = 0;
+    for (at = 0U; at < size; at++) {
+        const char c = data[at];
+        commas += (c == ',') ? 1 : 0;
+        if ((is_digit(c) == 0) && (c != ',') && (c != '-') && (c != '+')) {
+            commas = 2;
+        }
+    }
+    return (commas == 1) ? "no number: decimal comma" : "no number in range";
+}
+
 /* ---- XML ------------------------------------------------------------------------------ */
 
 typedef struct {
     const char *data;
     size_t size;
     size_t at;
+    wire_refusal why;
 } scan;
+
+/* Note why a telegram is refused; the first reason stands. */
+static int refuse(scan *s, const char *element, const char *reason)
+{
+    if (s->why.reason == NULL) {
+        s->why.element = element;
+        s->why.reason = reason;
+    }
+    return -1;
+}
 
 static int ends_name(char c)
 {
@@ -139,15 +165,53 @@ static size_t read_name(scan *s, char name[NAME_BYTES])
     return length;
 }
 
-/* Numbers of an element by the last character of their attribute: A1 to A6, E1 to E6, D. */
+#define SEEN 0x100U /* the element itself */
+#define ALL_SIX 0x7EU
+
+/* Numbers of an element by the place of their attribute: A1 to A6, E1 to E6, X Y Z A B C from 1 on,
+ * D at 0. */
 typedef struct {
     double values[7];
     unsigned int present;
 } numbers;
 
-/* The attributes of an element up to its end; whether it closes itself, or -1. Numbers of
- * attributes that begin with the letter are kept, if there is one. */
-static int read_attributes(scan *s, char letter, numbers *found)
+/* An element that is read: its name, for people too, and its attributes by their letter; 'x': the
+ * six of a frame. */
+typedef struct {
+    const char *name;
+    const char *shown;
+    char letter;
+} element;
+
+enum { AXES, EXTERNAL, DELAY, ACTUAL, SETPOINT, ELEMENTS };
+
+static const element READ[ELEMENTS] = {{"aipos", "AIPos", 'a'},
+                                       {"eipos", "EIPos", 'e'},
+                                       {"delay", "Delay", 'd'},
+                                       {"rist", "RIst", 'x'},
+                                       {"rsol", "RSol", 'x'}};
+
+/* The place of an attribute among the numbers of its element, -1: it is none of them. */
+static int place_of(char letter, const char *name, size_t length)
+{
+    static const char frame[] = "xyzabc";
+    const char *found;
+    if (letter == 'x') {
+        found = ((length == 1U) && (name[0] != '\0')) ? strchr(frame, name[0]) : NULL;
+        return (found == NULL) ? -1 : (1 + (int)(found - frame));
+    }
+    if ((letter == '\0') || (name[0] != letter) || (length > 2U)) {
+        return -1;
+    }
+    if (length == 1U) {
+        return 0;
+    }
+    return ((name[1] >= '0') && (name[1] <= '6')) ? (name[1] - '0') : -1;
+}
+
+/* The attributes of an element up to its end; whether it closes itself, or -1. Its numbers are
+ * kept, if it is one that is read. */
+static int read_attributes(scan *s, const element *of, numbers *found)
 {
     while (s->at < s->size) {
         char name[NAME_BYTES];
@@ -188,13 +252,16 @@ static int read_attributes(scan *s, char letter, numbers *found)
         if ((s->at >= s->size) || (s->data[s->at] != quote)) {
             return -1;
         }
-        if ((letter != '\0') && (name[0] == letter) && (length <= 2U)) {
-            const int place = (length == 1U) ? 0 : (name[1] - '0');
-            if ((place >= 0) && (place <= 6)) {
+        if (of != NULL) {
+            const int place = place_of(of->letter, name, length);
+            if (place >= 0) {
                 const unsigned int bit = 1U << (unsigned int)place;
-                if (((found->present & bit) != 0U)
-                    || (read_number(&s->data[begin], s->at - begin, &found->values[place]) != 0)) {
-                    return -1;
+                const char *const text = &s->data[begin];
+                if ((found->present & bit) != 0U) {
+                    return refuse(s, of->shown, "an attribute twice");
+                }
+                if (read_number(text, s->at - begin, &found->values[place]) != 0) {
+                    return refuse(s, of->shown, wrong_number(text, s->at - begin));
                 }
                 found->present |= bit;
             }
@@ -206,9 +273,7 @@ static int read_attributes(scan *s, char letter, numbers *found)
 
 /* What has been found of a <Rob>. */
 typedef struct {
-    numbers axes;
-    numbers external;
-    numbers delay;
+    numbers of[ELEMENTS];
     uint64_t ipoc;
     int ipocs;
 } rob_parts;
@@ -230,39 +295,32 @@ static int read_ipoc(scan *s, rob_parts *parts)
     return ((digits > 0) && (digits <= MOST_DIGITS) && (s->at < s->size)
             && (s->data[s->at] == '<') && (parts->ipocs == 1))
                ? 0
-               : -1;
+               : refuse(s, "IPOC", "must be one whole number");
 }
 
 /* An element that begins at its name, at a depth; whether it closes itself, or -1. */
 static int read_element(scan *s, int depth, rob_parts *parts)
 {
     char name[NAME_BYTES];
-    numbers ignored = {{0.0}, 0U};
-    numbers *found = &ignored;
-    char letter = '\0';
     int closed;
+    int i;
     if (read_name(s, name) == 0U) {
         return -1;
     }
     if (depth == 0) {
-        return (strcmp(name, "rob") == 0) ? read_attributes(s, '\0', &ignored) : -1;
+        return (strcmp(name, "rob") == 0) ? read_attributes(s, NULL, NULL)
+                                          : refuse(s, "", "it is no <Rob>");
     }
-    if ((depth == 1) && (strcmp(name, "aipos") == 0)) {
-        letter = 'a';
-        found = &parts->axes;
-    } else if ((depth == 1) && (strcmp(name, "eipos") == 0)) {
-        letter = 'e';
-        found = &parts->external;
-    } else if ((depth == 1) && (strcmp(name, "delay") == 0)) {
-        letter = 'd';
-        found = &parts->delay;
-    } else {
-        letter = '\0';
+    for (i = 0; (depth == 1) && (i < (int)ELEMENTS); i++) {
+        if (strcmp(name, READ[i].name) == 0) {
+            if (parts->of[i].present != 0U) {
+                return refuse(s, READ[i].shown, "twice");
+            }
+            parts->of[i].present = SEEN;
+            return read_attributes(s, &READ[i], &parts->of[i]);
+        }
     }
-    if (found->present != 0U) {
-        return -1; /* twice */
-    }
-    closed = read_attributes(s, letter, found);
+    closed = read_attributes(s, NULL, NULL);
     if ((closed == 0) && (depth == 1) && (strcmp(name, "ipoc") == 0)) {
         return (read_ipoc(s, parts) == 0) ? 0 : -1;
     }
@@ -306,27 +364,60 @@ static int read_parts(scan *s, rob_parts *parts)
     return ((begun != 0) && (depth == 0)) ? 0 : -1;
 }
 
-int wire_read_rob(const char *data, size_t size, wire_rob *message)
+/* Whether an element has all that is wanted of it, or is not there and need not be. */
+static int is_whole(scan *s, const rob_parts *parts, int place, unsigned int wanted, int optional)
 {
-    scan s = {data, size, 0U};
-    rob_parts parts;
+    const unsigned int present = parts->of[place].present;
+    if ((optional != 0) && (present == 0U)) {
+        return 1;
+    }
+    if ((present & wanted) != wanted) {
+        (void)refuse(s, READ[place].shown, "something is missing");
+        return 0;
+    }
+    return 1;
+}
+
+static int are_whole(scan *s, const rob_parts *parts)
+{
     unsigned int wanted = 0U;
     int i;
-    (void)memset(&parts, 0, sizeof parts);
-    if ((size > WIRE_MOST_BYTES) || (read_parts(&s, &parts) != 0) || (parts.ipocs != 1)) {
-        return -1;
-    }
     for (i = 1; i <= LIVE_EXTERNAL; i++) {
         wanted |= 1U << (unsigned int)i;
     }
-    if (((parts.axes.present & 0x7EU) != 0x7EU) || ((parts.external.present & wanted) != wanted)) {
+    return is_whole(s, parts, AXES, ALL_SIX, 0) & is_whole(s, parts, EXTERNAL, wanted, 0)
+           & is_whole(s, parts, DELAY, 1U, 1) & is_whole(s, parts, ACTUAL, ALL_SIX, 1)
+           & is_whole(s, parts, SETPOINT, ALL_SIX, 1);
+}
+
+int wire_read_rob(const char *data, size_t size, wire_rob *message, wire_refusal *why)
+{
+    scan s = {data, size, 0U, {"", NULL}};
+    rob_parts parts;
+    int well;
+    int i;
+    (void)memset(&parts, 0, sizeof parts);
+    well = ((size <= WIRE_MOST_BYTES) && (read_parts(&s, &parts) == 0)) ? 1 : 0;
+    if ((well != 0) && (parts.ipocs != 1)) {
+        (void)refuse(&s, "IPOC", "missing");
+        well = 0;
+    }
+    if ((well == 0) || (are_whole(&s, &parts) == 0)) {
+        (void)refuse(&s, "", "no XML, or none that is read");
+        *why = s.why;
         return -1;
     }
     message->ipoc = parts.ipoc;
-    message->delay = ((parts.delay.present & 1U) != 0U) ? (long)parts.delay.values[0] : -1L;
+    message->delay = (parts.of[DELAY].present != 0U) ? (long)parts.of[DELAY].values[0] : -1L;
+    message->has_offset =
+        ((parts.of[ACTUAL].present != 0U) && (parts.of[SETPOINT].present != 0U)) ? 1 : 0;
+    for (i = 0; i < 3; i++) {
+        message->offset[i] =
+            1e-3 * (parts.of[ACTUAL].values[i + 1] - parts.of[SETPOINT].values[i + 1]);
+    }
     for (i = 0; i < ELASTOCAL_JOINTS; i++) {
-        const double value = (i < LIVE_EXTERNAL) ? parts.external.values[i + 1]
-                                                 : parts.axes.values[i - LIVE_EXTERNAL + 1];
+        const double value = (i < LIVE_EXTERNAL) ? parts.of[EXTERNAL].values[i + 1]
+                                                 : parts.of[AXES].values[i - LIVE_EXTERNAL + 1];
         message->q[i] = LIVE_SCALE[i] * value;
     }
     return 0;
@@ -445,32 +536,45 @@ static int reads_numbers(void)
 static int reads_messages(void)
 {
     static const char good[] =
-        "<?xml version=\"1.0\"?><ROB type='KUKA'><RIst X=\"1.0\" Y=\"x\"/><own><AIPos A1=\"7\"/></own>"
+        "<?xml version=\"1.0\"?><ROB type='KUKA'><own><AIPos A1=\"7\"/></own><Other X=\"1,0\"/>"
+        "<RIst X=\"1.5\" Y=\"2.0\" Z=\"3.0\" A=\"0.0\" B=\"90.0\" C=\"0.0\"/>"
+        "<RSol X=\"1.0\" Y=\"2.0\" Z=\"4.0\" A=\"0.0\" B=\"90.0\" C=\"0.0\"/>"
         "<AIPOS a1=\"10.5\" A2=\"-90.0\" A3=\"90.0\" A4=\"0.0\" A5=\"45.0\" A6=\"1.0\"/>"
         "<EIPos E1=\"100.0\" E2=\"0.0\" E3=\"0.0\" E4=\"0.0\" E5=\"0.0\" E6=\"0.0\"/>"
         "<Delay D=\"3\"/><IPOC>4208163634</IPOC></ROB>";
-    static const char *const wrong[] = {
-        "",
-        "<Rob",
-        "<Sen><IPOC>1</IPOC></Sen>",
-        "<!DOCTYPE a><Rob><IPOC>1</IPOC></Rob>",
-        "<Rob><AIPos A1=\"nan\"/><IPOC>1</IPOC></Rob>",
-        "<Rob><IPOC>1</IPOC></Rob>",
-        "<Rob><a><b><c><d><e><f><g><h><i><j>",
+    static const char *const wrong[][2] = {
+        {"", "no XML, or none that is read"},
+        {"<Rob", "no XML, or none that is read"},
+        {"<Sen><IPOC>1</IPOC></Sen>", "it is no <Rob>"},
+        {"<!DOCTYPE a><Rob><IPOC>1</IPOC></Rob>", "it is no <Rob>"},
+        {"<Rob><AIPos A1=\"nan\"/><IPOC>1</IPOC></Rob>", "no number in range"},
+        {"<Rob><RIst X=\"1620,9999\"/><IPOC>1</IPOC></Rob>", "no number: decimal comma"},
+        {"<Rob><RSol X=\"1,2,3\"/><IPOC>1</IPOC></Rob>", "no number in range"},
+        {"<Rob><Delay D=\"1\"/><Delay/><IPOC>1</IPOC></Rob>", "twice"},
+        {"<Rob><IPOC>1</IPOC></Rob>", "something is missing"},
+        {"<Rob><IPOC>x</IPOC></Rob>", "must be one whole number"},
+        {"<Rob></Rob>", "missing"},
+        {"<Rob><a><b><c><d><e><f><g><h><i><j>", "no XML, or none that is read"},
     };
     wire_rob message;
+    wire_refusal why = {"", ""};
     size_t i;
     size_t cut;
-    int well = (wire_read_rob(good, sizeof good - 1U, &message) == 0) ? 1 : 0;
+    int well = (wire_read_rob(good, sizeof good - 1U, &message, &why) == 0) ? 1 : 0;
     well &= (message.ipoc == UINT64_C(4208163634)) ? 1 : 0;
+    well &= ((message.has_offset == 1) && (fabs(message.offset[0] - 5e-4) < 1e-12)
+             && (fabs(message.offset[2] + 1e-3) < 1e-12))
+                ? 1
+                : 0;
     well &= (message.delay == 3L) ? 1 : 0;
     well &= (fabs(message.q[LIVE_EXTERNAL] - (LIVE_SCALE[LIVE_EXTERNAL] * 10.5)) < 1e-12) ? 1 : 0;
     for (i = 0U; i < (sizeof wrong / sizeof wrong[0]); i++) {
-        well &= (wire_read_rob(wrong[i], strlen(wrong[i]), &message) != 0) ? 1 : 0;
+        well &= (wire_read_rob(wrong[i][0], strlen(wrong[i][0]), &message, &why) != 0) ? 1 : 0;
+        well &= (strcmp(why.reason, wrong[i][1]) == 0) ? 1 : 0;
     }
     /* Whatever is cut off is none, and nothing behind the end is read. */
     for (cut = 0U; cut < (sizeof good - 1U); cut++) {
-        well &= (wire_read_rob(good, cut, &message) != 0) ? 1 : 0;
+        well &= (wire_read_rob(good, cut, &message, &why) != 0) ? 1 : 0;
     }
     return well;
 }

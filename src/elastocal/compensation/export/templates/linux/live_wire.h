@@ -21,6 +21,8 @@ typedef struct {
     uint64_t ipoc;
     double q[ELASTOCAL_JOINTS]; /* in the order and units of the model: rad, m */
     long delay; /* answers that it missed in a row; -1: it does not say */
+    int has_offset;
+    double offset[3]; /* RIst less RSol, base, m; where it sends both */
 } wire_rob;
 
 /* One record of a Net F/T. */
@@ -31,9 +33,15 @@ typedef struct {
     int32_t counts[6];
 } wire_rdt;
 
-/* Read a <Rob>; 0: well. Capitals do not count, tags of a site's own are let pass, a document type,
- * a number that is none and what is missing are not. */
-int wire_read_rob(const char *data, size_t size, wire_rob *message);
+/* Why a telegram was refused: the element, "" where it is none of them, and the reason. */
+typedef struct {
+    const char *element;
+    const char *reason;
+} wire_refusal;
+
+/* Read a <Rob>; 0: well, else why not. Capitals do not count, tags of a site's own are let pass, a
+ * document type, a number that is none and what is missing are not. */
+int wire_read_rob(const char *data, size_t size, wire_rob *message, wire_refusal *why);
 
 /* Write a <Sen> with the correction in mm; return its length. The buffer has WIRE_SEN_BYTES. */
 size_t wire_write_sen(char *buffer, int stop, const double millimetres[3], uint64_t ipoc);
