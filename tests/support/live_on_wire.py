@@ -10,6 +10,7 @@ import yaml
 
 from elastocal.cell import WallClock, load_cell
 from elastocal.sim.wire import (
+    IPOC_START,
     LiveCell,
     NetFtServer,
     RsiContext,
@@ -68,16 +69,19 @@ class LiveFiles:
 
 
 @contextlib.contextmanager
-def served(files: LiveFiles) -> Iterator[tuple[RsiServer, NetFtServer]]:
+def served(
+    files: LiveFiles, patience: float = 0.5, first_ipoc: int = IPOC_START
+) -> Iterator[tuple[RsiServer, NetFtServer]]:
     """Serve controller and box; the controller is patient, its time stands where we are slow."""
     cell = load_cell(files.cell)
     devices = cell.file.devices
     live = LiveCell(cell, 0, WallClock())
     box = wire_servers()["net_ft"](live, Told(settings=dict(devices.sensor.told)))
     context = RsiContext(
-        program=corrected_program, absolute=True, timeout=TIMEOUT, patience=0.5, delay=0.008
+        program=corrected_program, absolute=True, timeout=TIMEOUT, patience=patience, delay=0.008
     )
     robot = rsi_server(live, Told(settings=dict(devices.arm.told)), context)
+    robot.first_ipoc = first_ipoc
     box.start()
     try:
         robot.start()
