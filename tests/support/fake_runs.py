@@ -178,6 +178,8 @@ class FakeRun:
     tell: Callable[[Any], None] = lambda _: None
     interrupted: Callable[[], bool] = lambda: False
     recorder: Callable[[], Any] | None = None
+    faults: list[str] = field(default_factory=list)
+    """What was told at once."""
 
     @property
     def settings(self) -> RunSettings:
@@ -207,7 +209,7 @@ class FakeRun:
             known = last_known(read_journal(self.journal))
             start = known.entry.time
             log.write(start, Event.RESUME)
-            return self._go(log, start, prepare, cell)
+            return self._go(log, start, prepare, cell, resumes=True)
 
     def _go(
         self,
@@ -215,6 +217,8 @@ class FakeRun:
         start: float,
         prepare: Callable[[FakeCell], None],
         cell: FakeCell | None = None,
+        *,
+        resumes: bool = False,
     ) -> SessionResult:
         self.cell = cell or fake_cell(HOME, start)
         prepare(self.cell)
@@ -233,9 +237,10 @@ class FakeRun:
                 self.settings.procedure.travel_limit,
                 known.uncommitted,
             ),
+            resumes=resumes,
         )
         recorder = self.recorder or (lambda: MemoryRecorder(self.kept))
-        hooks = SessionHooks(recorder, self.tell, self.interrupted)
+        hooks = SessionHooks(recorder, self.tell, self.interrupted, self.faults.append)
         return Runner(job, self.cell.devices, log, hooks).run()
 
     def readings(self) -> dict[tuple[int, str | None], np.ndarray]:

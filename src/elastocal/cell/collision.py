@@ -49,6 +49,13 @@ class CollisionWatch:
         self._rest.clear()
         self._first = None
 
+    def departure(self, force_sensor: FloatArray, R_base_sensor: FloatArray) -> float:
+        """Return how far a force is from that at the beginning, the weight taken off, in N."""
+        if self._first is None:
+            return math.inf
+        rest = force_sensor - R_base_sensor.T @ self._weight_base
+        return float(np.linalg.norm(rest - self._first))
+
     def look(self, time: float, force_sensor: FloatArray, R_base_sensor: FloatArray) -> str | None:
         """Return what was hit, in words; None when nothing was.
 

@@ -25,6 +25,7 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.verdict import OF_RUN, public_key, read_private_key, sign, write_signature
+from elastocal.workflows._contact_lines import contact_sentence, tell_at_once
 from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, rig_of
 from elastocal.workflows._workflow import workflow
 
@@ -245,17 +246,15 @@ def _prepare(settings: RunSettings) -> _Job:
     loaded, read = load_cell(Path(settings.cell)), read_plan(plan)
     folder = plan if plan.is_dir() else plan.parent
     key = None if settings.sign is None else read_private_key(settings.sign)
-    text = read_text(folder / PLAN)
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
-    copy, signer = procedure.cell_path_in_run(loaded), public_key(key) if key else None
     stated = procedure.run_record(
         loaded,
         read,
-        plan_text=text,
-        cell_file=copy,
+        plan_text=read_text(folder / PLAN),
+        cell_file=procedure.cell_path_in_run(loaded),
         seed=seed,
         started=_now(),
-        signer=signer,
+        signer=public_key(key) if key else None,
         stated=dict(settings.state),
     )
     certificate_of(loaded.file.certificate, stated.stated)
@@ -303,7 +302,10 @@ def _carry_out(
             progress(POSES_MEASURED, step.number - 1, count)
 
         hooks = procedure.SessionHooks(
-            lambda: procedure.PoseRecorder(session.plan.robot.joints), show, supervision.interrupted
+            lambda: procedure.PoseRecorder(session.plan.robot.joints),
+            show,
+            supervision.interrupted,
+            lambda fault: tell_at_once(operator, fault),
         )
         return procedure.Runner(session, devices, journal, hooks).run()
 
@@ -362,6 +364,7 @@ def _session(job: _Job, known: LastKnown | None, devices: Devices) -> Session:
         committed=frozenset(known.committed) if known else frozenset(),
         attempts=known.attempts if known else {},
         home=procedure.home_route(job.plan, state.q, state.T_base_tcp, limit, likely),
+        resumes=known is not None,
     )
 
 
@@ -392,7 +395,6 @@ def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: Run
     """Have the operator agree before anything moves that was not expected to."""
     settings.operator.warn([f"warning: {warning}" for warning in job.warnings])
     if known is not None:
-        contact = "in contact" if devices.arm.state().in_contact else "not in contact"
-        settings.operator.warn((*known.lines, f"the arm says that it is {contact}"))
+        settings.operator.warn((*known.lines, contact_sentence(devices.arm.state())))
     if (known or job.rig.real) and not settings.confirmed:
         settings.operator.confirm()

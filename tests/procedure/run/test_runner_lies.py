@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DeviceError
-from elastocal.procedure import Event, PoseRecorder, RunEnd, read_journal
+from elastocal.procedure import Event, Journal, PoseRecorder, RunEnd, read_journal
 from elastocal.procedure.record import read_commits
 from elastocal.procedure.run.steps import ArmLocation
 from support import fake_faults as fault, fake_lies as lie
 from support.fake_devices import R_BASE_TRACKER, Motion, fake_cell
 from support.fake_faults import when
-from support.fake_runs import HOME, FakeRun, MemoryRecorder, plan, replace
+from support.fake_runs import HOME, RECORD, FakeRun, MemoryRecorder, plan, replace
 
 LINE = ConnectionResetError(104, "Connection reset by peer")
 LATE = TimeoutError("timed out")
@@ -188,14 +188,14 @@ def test_an_arm_that_feels_nothing_is_stopped_before_near_contact(run):
 
     result = run.start(prepare)
     assert "near: touched the surface before near contact" in texts(run, Event.FAULT)[0]
-    assert result.given_up == (0,)
+    assert result.end is RunEnd.STOPPED
     assert run.cell.world.largest_force < 36.0 + 0.005 * 0.04 * 1e6 + 60.0
 
 
 def test_a_sensor_that_does_not_feel_the_tool_ends_the_run(run):
     light = lie.saying("sensor", "read", lambda b: replace(b, force=b.force * 0.1))
     result = run.start(light)
-    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.BETWEEN_POSES)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.NOT_KNOWN)
     assert "force sensor does not feel the tool: 59 N in free air, it weighs 600 N" in (
         result.message
     )
@@ -212,7 +212,7 @@ def test_a_force_that_grows_from_leg_to_leg_is_not_tared_away(run):
         world.faults.append(pull)
 
     result = run.start(drag)
-    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.BETWEEN_POSES)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.NOT_KNOWN)
     assert "force limit exceeded: 1800 N, limit 1650 N" in result.message
 
 
@@ -237,7 +237,7 @@ def test_a_miss_does_not_depend_on_noise_of_the_arms_place(run):
         when(fault.approaching, fault.lower_floor)(cell)
 
     result = run.start(prepare)
-    assert (result.end, result.failed_attempts) == (RunEnd.DONE, 1)
+    assert (result.end, result.failed_attempts) == (RunEnd.STOPPED, 1)
     assert "contact missed: none within 14 mm" in texts(run, Event.FAULT)[0]
 
 
@@ -318,6 +318,54 @@ def test_an_arm_that_was_left_in_contact_away_from_every_pose_is_not_moved(run):
     cell.world.q, cell.world.in_contact = np.array([0.05, 0.0, 0.275]), True
     result = run.resume(cell=cell)
     assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
-    assert "before no pose: free it by hand" in result.message
+    assert "before no pose: `elastocal release CELL --arm` frees it" in result.message
     assert cell.world.contacts_kept == 0
     assert not {"move", "retract"} & set(cell.world.commands)
+
+
+def pressing_cell(force):
+    """Return a cell whose tool stands 1 mm in the surface of pose 0, with what presses on it."""
+    cell = fake_cell(HOME, 100.0)
+    world = cell.world
+    world.q = np.array([0.1, 0.0, -0.001])
+
+    def press(world):
+        world.hit = force(world.q[2])
+        if not world.hit.any():
+            world.faults.remove(press)
+
+    world.faults.append(press)
+    return cell
+
+
+def spring(height):
+    """A surface that lets go."""
+    return np.array([0.0, 0.0, min(height, 0.0) * 1.1e6])
+
+
+def test_a_run_begins_nothing_while_something_presses_and_names_the_way_out(run):
+    with Journal(run.journal) as log:
+        log.write(0.0, Event.START, run=RECORD)
+        result = run._go(log, 0.0, lambda _: None, pressing_cell(spring))
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
+    assert "1100 N press on the tool beyond its weight, at most 255 N" in result.message
+    assert "`elastocal release CELL --arm` frees it" in result.message
+    assert set(run.cell.world.commands) <= {"stop", "disable"}
+
+
+def test_a_run_that_goes_on_frees_its_tool_first_by_a_force_that_falls(run):
+    run.start(when(fault.pressing(), fault.stop_arm))
+    result = run.resume(cell=pressing_cell(spring))
+    assert result.end is RunEnd.DONE
+    commands = run.cell.world.commands
+    assert commands[:4] == ["enable", "retract", "adopt_position", "move"]
+
+
+def test_a_force_that_grows_while_the_tool_is_freed_stops_it(run):
+    run.start(when(fault.pressing(), fault.stop_arm))
+    stuck = pressing_cell(lambda height: np.array([0.0, 0.0, -1100.0 - 2e5 * (height + 0.001)]))
+    result = run.resume(cell=stuck)
+    assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
+    assert "the force while the tool leaves the surface: it grew from" in result.message
+    assert "move" not in run.cell.world.commands
+    assert run.cell.world.hit[2] > -1100.0 - 170.0 - 3 * 0.04 * 0.25 * 2e5

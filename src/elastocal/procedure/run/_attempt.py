@@ -14,6 +14,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Motion
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import Action, PoseLog, ReadingStatus, Window
+from elastocal.procedure.run._leaving import LeavingWatch
 from elastocal.procedure.run._stability import SlideDetector, SlipReference
 from elastocal.procedure.run._supervisor import Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
@@ -165,7 +166,8 @@ def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> Non
         See `Supervisor.wait`.
     """
     settings = supervisor.settings
-    adopt_position(supervisor)
+    if legs:
+        _adopt_position(supervisor)
     for leg, target in enumerate(legs):
         seen = supervisor.cycle(Guard())
         _require_off(seen.arm)
@@ -182,7 +184,7 @@ def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> Non
             supervisor.wait(guard, partial(_at_joints, goal), limit, "a move")
 
 
-def adopt_position(supervisor: Supervisor) -> None:
+def _adopt_position(supervisor: Supervisor) -> None:
     """Let the arm take its place for the programmed one, if the tool is off the surface.
 
     Raises
@@ -221,8 +223,21 @@ def approach_by(a: Attempt, distance: float, speed: float, most: float = np.inf)
         return s.wait(a.guard(), done, limit, "an approach")
 
 
-def retract_to(supervisor: Supervisor, line: ApproachLine, guard: Guard, height: float) -> None:
+def retract_to(
+    supervisor: Supervisor,
+    line: ApproachLine,
+    guard: Guard,
+    height: float,
+    leaving: LeavingWatch | None = None,
+) -> None:
     """Go along a line's normal until a height above the expected contact, in m.
+
+    Parameters
+    ----------
+    supervisor, line, guard, height : Supervisor, ApproachLine, Guard, float
+        The cycle, the way, what must hold on it, and its end.
+    leaving : LeavingWatch, optional
+        Refuses a force that grows on the way.
 
     Raises
     ------
@@ -234,12 +249,16 @@ def retract_to(supervisor: Supervisor, line: ApproachLine, guard: Guard, height:
     if distance <= 0.0:
         return
     limit = retract_limit(supervisor.settings, distance)
+
+    def done(seen: Snapshot) -> bool:
+        if leaving is not None:
+            leaving.look(seen.wrenches, seen.arm.T_base_tcp)
+        return has_gone(seen.arm, start[:3, 3], distance)
+
     with supervisor.actuation(Action.RETRACT, (distance,)):
         speed = supervisor.settings.procedure.approach_speed
         supervisor.devices.arm.retract(line.normal, distance, speed)
-        supervisor.wait(
-            guard, lambda seen: has_gone(seen.arm, start[:3, 3], distance), limit, "the retract"
-        )
+        supervisor.wait(guard, done, limit, "the retract")
 
 
 def release_force(supervisor: Supervisor, guard: Guard) -> None:

@@ -29,7 +29,6 @@ from elastocal.procedure.run.steps import (
     BackOffResult,
     Fault,
     FaultError,
-    FaultScope,
     Step,
     StepResult,
     as_fault,
@@ -90,10 +89,11 @@ def run_attempt(a: Attempt, enter: Callable[[Attempt], None], commit: StepAction
             a.step = next_step(a.step, result, a.loads_left)
     except EXPECTED_ERRORS as error:
         fault, place = as_fault(error), _place(a)
-        raise AttemptFailedError(fault, place, _back_off(a, fault.fault.scope)) from error
+        a.supervisor.tell_fault(f"{place}: {fault}")
+        raise AttemptFailedError(fault, place, _back_off(a)) from error
     except BaseException:
         # A mistake in the program, while a tonne of robot may press on the tooling.
-        a.location = _back_off(a, FaultScope.RUN).location
+        a.location = _back_off(a).location
         raise
 
 
@@ -112,7 +112,13 @@ def _place(a: Attempt) -> str:
     return f"pose {a.pose.id}, attempt {a.number}, {a.step.value}{load_case}"
 
 
-def _back_off(a: Attempt, scope: FaultScope) -> BackOffResult:
+def between_poses(supervisor: Supervisor) -> ArmLocation:
+    """Return what the force on the tool says of a tool between two poses."""
+    free = supervisor.feels_free()
+    return ArmLocation.BETWEEN_POSES if free else ArmLocation.NOT_KNOWN
+
+
+def _back_off(a: Attempt) -> BackOffResult:
     """Make the cell safe after a fault: no force, off the surface, stopped.
 
     Devices are no longer trusted here and their faults change nothing any more: only the arm is
@@ -123,8 +129,6 @@ def _back_off(a: Attempt, scope: FaultScope) -> BackOffResult:
     ----------
     a : Attempt
         The attempt, in the state in which the fault was seen.
-    scope : FaultScope
-        What the fault ends. An attempt that may be tried again retracts in any case.
 
     Returns
     -------
@@ -135,28 +139,33 @@ def _back_off(a: Attempt, scope: FaultScope) -> BackOffResult:
     # A full disk must not keep the tool at the surface.
     s.logbook.must_write = False
     try:
-        left = _leave_surface(a, scope)
+        left = _leave_surface(a)
         halt(s)
     finally:
         s.logbook.must_write = True
     return left
 
 
-def _leave_surface(a: Attempt, scope: FaultScope) -> BackOffResult:
+def _leave_surface(a: Attempt) -> BackOffResult:
     if a.step not in ON_APPROACH_LINE:
         return _location_between_surfaces(a)
-    # An arm that does not answer is taken to touch: to retract in free air does no harm.
-    touching = a.step in MAY_TOUCH or _may_be_in_contact(a.supervisor)
-    if not touching and scope is FaultScope.RUN:
-        return BackOffResult(ArmLocation.NEAR_CONTACT)
     # The force first; the retract is tried even when the release was refused.
     if a.in_force_control and not _attempt(a.supervisor, Action.RELEASE, lambda: _release(a)):
         a.in_force_control = False
     reason = _attempt(a.supervisor, Action.RETRACT, lambda: _retract(a))
     if not reason:
         return BackOffResult(ArmLocation.APPROACH_POSE)
-    location = ArmLocation.AT_SURFACE if touching else ArmLocation.NEAR_CONTACT
-    return BackOffResult(location, reason)
+    return BackOffResult(_location_without_retract(a), reason)
+
+
+def _location_without_retract(a: Attempt) -> ArmLocation:
+    """Return where the tool is by the arm's own joints; one that does not answer may press."""
+    arm = a.supervisor.arm_state()
+    if arm is not None:
+        high = a.line.height(arm.T_base_tcp) > a.settings.procedure.travel_limit
+        if high or (a.step not in MAY_TOUCH and arm.in_contact is False):
+            return ArmLocation.NEAR_CONTACT
+    return ArmLocation.AT_SURFACE
 
 
 def _location_between_surfaces(a: Attempt) -> BackOffResult:
@@ -164,13 +173,9 @@ def _location_between_surfaces(a: Attempt) -> BackOffResult:
     if arm is not None and arm.in_contact:
         reason = f"{arm.source} says that it is in contact, nobody knows where"
         return BackOffResult(ArmLocation.AT_SURFACE, reason)
-    moving = a.step is Step.MOVE
-    return BackOffResult(ArmLocation.BETWEEN_POSES if moving else ArmLocation.APPROACH_POSE)
-
-
-def _may_be_in_contact(supervisor: Supervisor) -> bool:
-    arm = supervisor.arm_state()
-    return arm is None or arm.in_contact
+    if a.step is not Step.MOVE:
+        return BackOffResult(ArmLocation.APPROACH_POSE)
+    return BackOffResult(between_poses(a.supervisor))
 
 
 def _attempt(supervisor: Supervisor, action: Action, motion: Callable[[], None]) -> str:

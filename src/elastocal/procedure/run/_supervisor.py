@@ -14,7 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, AskedMetrology, Devices, PointBlock, WrenchBlock
+from elastocal.cell import (
+    ArmState,
+    AskedMetrology,
+    Devices,
+    PointBlock,
+    SensorStatus,
+    WrenchBlock,
+)
 from elastocal.errors import DeviceError
 from elastocal.procedure.record import Action, Logbook, StreamRecorder
 from elastocal.procedure.run._watchdog import (
@@ -28,6 +35,8 @@ from elastocal.procedure.run._watchdog import (
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import Fault, FaultError, FaultScope
 
+_FORCE_CYCLES = 5
+"""Cycles for which the force is looked at before anything moves."""
 TIME_SLACK = 1e-6
 """Times that differ by less are equal, in s: sums of cycles are not exact."""
 DEVICE_ERRORS = (DeviceError, FaultError, OSError)
@@ -42,6 +51,8 @@ class Observers:
     """Called each cycle."""
     interrupted: Callable[[], bool]
     """Whether somebody wants the run to stop."""
+    fault: Callable[[str], None] = lambda _: None
+    """Called when a fault is seen, before anything is done about it."""
 
 
 class Supervisor:
@@ -80,6 +91,8 @@ class Supervisor:
         self._last_read: float | None = None
         self.arm: ArmState | None = None
         """The last state of the arm; None before the first."""
+        self.wrenches: WrenchBlock | None = None
+        """The last samples of the force sensor; None where it has failed."""
 
     @property
     def now(self) -> float:
@@ -104,6 +117,34 @@ class Supervisor:
     def tare(self, force_sensor: FloatArray) -> None:
         """Take a force in the sensor's frame, shape (3,), as that of the free tool, in N."""
         self._tare = force_sensor
+
+    def tell_fault(self, text: str) -> None:
+        """Let a person read a fault now: what follows may take long."""
+        self._observers.fault(text)
+
+    def feels_free(self) -> bool:
+        """Return whether the force on the tool is that at the beginning of the joint move."""
+        arm, block = self.arm, self.wrenches
+        if arm is None or block is None or block.status is not SensorStatus.OK or not len(block):
+            return False
+        age, force = abs(self.now - float(block.time[-1])), block.force[-1]
+        R_base_sensor = arm.T_base_tcp[:3, :3] @ self.settings.R_tcp_sensor
+        departure = self.watchdog.collisions.departure(force, R_base_sensor)
+        procedure = self.settings.procedure
+        return age <= procedure.stale and departure <= procedure.contact_force
+
+    def beyond_weight(self) -> FloatArray | None:
+        """Return the force that presses on the tool, base, shape (3,), in N, after some cycles.
+
+        None where no force can be trusted. Nothing is refused.
+        """
+        found = None
+        for _ in range(_FORCE_CYCLES):
+            arm = self.arm_cycle()
+            if arm is not None and self.wrenches is not None:
+                now = self.settings.tool_load.beyond_weight(self.wrenches, arm.T_base_tcp)
+                found = now if now is not None else found
+        return found
 
     def aim(self, station: str) -> None:
         """Let a tracker station look for the marker."""
@@ -187,8 +228,10 @@ class Supervisor:
         return state
 
     def _read_sensor(self) -> WrenchBlock:
+        self.wrenches = None
         block = self.devices.sensor.read()
         check_wrenches(block)
+        self.wrenches = block
         if self.recorder is not None:
             self.recorder.wrenches(block)
         return block

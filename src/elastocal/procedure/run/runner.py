@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell import CONDITIONING, LIGHT_CONTACT, Devices, Motion
+from elastocal.cell import CONDITIONING, LIGHT_CONTACT, ArmState, Devices, Motion
 from elastocal.errors import ProcedureError
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import (
@@ -17,7 +17,14 @@ from elastocal.procedure.record import (
     StreamRecorder,
 )
 from elastocal.procedure.run._attempt import Attempt, drive, leave_force_control, retract_to
-from elastocal.procedure.run._sequence import AttemptFailedError, disarm, halt, run_attempt
+from elastocal.procedure.run._leaving import LeavingWatch
+from elastocal.procedure.run._sequence import (
+    AttemptFailedError,
+    between_poses,
+    disarm,
+    halt,
+    run_attempt,
+)
 from elastocal.procedure.run._supervisor import Observers, Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
 from elastocal.procedure.run.routes import HOME_AT_START, ApproachLine, remaining_times, route
@@ -61,7 +68,7 @@ class Runner:
         self._session, self._devices, self._hooks = session, devices, hooks
         self._plan, self._settings = session.plan, session.settings
         self._log = Logbook(journal, devices.clock)
-        observers = Observers(self._report, hooks.interrupted)
+        observers = Observers(self._report, hooks.interrupted, hooks.fault)
         self._supervisor = Supervisor(devices, session.settings, self._log, observers)
         self._left = remaining_times(session.plan, session.settings)
         self._attempt: Attempt | None = None
@@ -91,11 +98,11 @@ class Runner:
             result = self._failure(error, error.location)
         except EXPECTED_ERRORS as error:
             halt(self._supervisor)
-            result = self._failure(as_fault(error), self._location)
+            result = self._failure(as_fault(error), self._present_location())
         except BaseException as error:
             halt(self._supervisor)
             reason = f"mistake in the program: {type(error).__name__}"
-            self._finish(self._result(RunEnd.STOPPED, self._location, reason))
+            self._finish(self._result(RunEnd.STOPPED, self._present_location(), reason))
             raise
         self._finish(result)
         return result
@@ -104,7 +111,8 @@ class Runner:
         """Bring the arm to HOME from wherever an earlier session, or a crash, has left it.
 
         Out of force control first, then straight off the surface, then along the plan's legs: a
-        joint move that begins at the surface would drag the tool over it.
+        joint move that begins at the surface would drag the tool over it. Whether the tool presses
+        is measured; a run that begins anew does not free it.
         """
         s = self._supervisor
         home, moving = self._session.home, (Motion.MOVING, Motion.APPROACHING, Motion.RETRACTING)
@@ -112,10 +120,8 @@ class Runner:
         state = self._devices.arm.state()
         # Said before anything is tried, so that it is right should the first command fail.
         touches = state.in_contact or home.retract_from is not None
-        self._location = ArmLocation.AT_SURFACE if touches else ArmLocation.BETWEEN_POSES
-        if state.in_contact and home.retract_from is None:
-            text = f"{state.source} says that it is, before no pose: free it by hand"
-            raise FaultError(Fault.IN_CONTACT, text)
+        self._location = ArmLocation.AT_SURFACE if touches else ArmLocation.NOT_KNOWN
+        self._require_free(state)
         if state.motion in moving:
             halt(s)
         self._enable()
@@ -123,9 +129,38 @@ class Runner:
         if home.retract_from is not None:
             limit = self._settings.procedure.travel_limit
             height = self._settings.approach_distance
-            retract_to(s, ApproachLine.of_pose(home.retract_from, limit), Guard(), height)
+            line = ApproachLine.of_pose(home.retract_from, limit)
+            leaving = LeavingWatch(
+                self._settings.tool_load, line.normal, self._settings.collision_limit
+            )
+            retract_to(s, line, Guard(), height, leaving)
         self._location = ArmLocation.BETWEEN_POSES
         drive(s, home.legs, Guard(self._free_limit, free=True))
+
+    def _require_free(self, state: ArmState) -> None:
+        """Refuse to begin with a tool that presses, unless it is this run's and can be freed."""
+        home, load = self._session.home, self._settings.tool_load
+        remedy = "`elastocal release CELL --arm` frees it"
+        if state.in_contact and home.retract_from is None:
+            raise FaultError(
+                Fault.IN_CONTACT, f"{state.source} says that it is, before no pose: {remedy}"
+            )
+        if home.retract_from is None or self._session.resumes:
+            return
+        beyond = self._supervisor.beyond_weight()
+        pressing = 0.0 if beyond is None else float(np.linalg.norm(beyond))
+        if pressing > load.tolerance:
+            raise FaultError(
+                Fault.IN_CONTACT,
+                f"{pressing:.0f} N press on the tool beyond its weight, at most"
+                f" {load.tolerance:.0f} N in free air: {remedy}",
+            )
+
+    def _present_location(self) -> ArmLocation:
+        """Return where the arm is; between poses the force says whether it is off every surface."""
+        if self._location is ArmLocation.BETWEEN_POSES:
+            return between_poses(self._supervisor)
+        return self._location
 
     def _visit_all(self) -> None:
         in_a_row = 0

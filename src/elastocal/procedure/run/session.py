@@ -51,6 +51,8 @@ class Session:
     """Attempts that each pose has seen already."""
     home: HomeRoute = field(default_factory=lambda: HomeRoute(None, ()))
     """The way to HOME, which comes first."""
+    resumes: bool = False
+    """Whether it goes on with a run: a tool that an earlier session left pressing is freed."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ class SessionHooks:
     """Called several times a second."""
     interrupted: Callable[[], bool] = lambda: False
     """Whether somebody wants the run to stop."""
+    fault: Callable[[str], None] = lambda _: None
+    """Called at once when a fault is seen; what follows may take long. It must not wait."""
 
 
 class RunEnd(Enum):

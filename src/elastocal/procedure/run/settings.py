@@ -16,6 +16,7 @@ from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
 from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
 from elastocal.planning.motion import AxisMotion
+from elastocal.procedure.run._leaving import ToolLoad
 from elastocal.results import brief_repr
 
 _LIMIT_PER_LOAD = 1.3
@@ -66,10 +67,20 @@ class RunSettings:
         """In N."""
         return float(np.linalg.norm(self.weight_base))
 
+    @property
+    def collision_limit(self) -> float:
+        """Change of the force that is a collision, in N."""
+        asked = self.procedure.collision_force
+        return _COLLISION + _COLLISION_PER_WEIGHT * self.tool_weight if asked is None else asked
+
+    @property
+    def tool_load(self) -> ToolLoad:
+        """What tells a press from the tool's weight."""
+        return ToolLoad(self.weight_base, self.R_tcp_sensor, self.force_limit)
+
     def collision_watch(self) -> CollisionWatch:
         """Return what finds collisions of free moves."""
-        weight, asked = self.tool_weight, self.procedure.collision_force
-        limit = _COLLISION + _COLLISION_PER_WEIGHT * weight if asked is None else asked
+        weight, limit = self.tool_weight, self.collision_limit
         # What is wrong with the mass turns with the tool; without one all of its weight does.
         largest = limit + _WRONG_WEIGHT * weight if weight > 0.0 else np.inf
         return CollisionWatch(self.weight_base, limit, largest, _COLLISION_WINDOW)

@@ -90,6 +90,9 @@ class ArmLocation(Enum):
 
     HOME = "at HOME"
     BETWEEN_POSES = "on its way between poses, off every surface"
+    """The force on the tool is that of free air."""
+    NOT_KNOWN = "on its way between poses; whether the tool touches anything is not known"
+    """No force can be trusted, or it is not that of free air."""
     NEAR_CONTACT = "off the surface, before contact"
     APPROACH_POSE = "retracted to the approach pose"
     AT_SURFACE = "AT THE SURFACE: it could not retract and may still press"
@@ -136,7 +139,8 @@ class FaultScope(Enum):
     """How much a fault ends. What ends less than an attempt is a `ReadingStatus`, not a fault."""
 
     ATTEMPT = "attempt"
-    """The attempt at this pose; it may be tried again."""
+    """The attempt at this pose: a reading was lost, with force and contact in order. After a full
+    retract it may be tried again."""
     RUN = "run"
     """The run; a person has to look."""
 
@@ -144,12 +148,12 @@ class FaultScope(Enum):
 class Fault(Enum):
     """Every fault, with what it ends and its message."""
 
-    CONTACT_EARLY = (FaultScope.ATTEMPT, "touched the surface before near contact: {}")
-    CONTACT_MISSED = (FaultScope.ATTEMPT, "contact missed: {}")
-    CONTACT_LOST = (FaultScope.ATTEMPT, "contact lost: {}")
+    CONTACT_EARLY = (FaultScope.RUN, "touched the surface before near contact: {}")
+    CONTACT_MISSED = (FaultScope.RUN, "contact missed: {}")
+    CONTACT_LOST = (FaultScope.RUN, "contact lost: {}")
     UNLOADED_NOISY = (FaultScope.ATTEMPT, "unloaded reference too noisy: {}")
     BEAM_LOST = (FaultScope.ATTEMPT, "beam lost: {}")
-    SENSOR_SATURATED = (FaultScope.ATTEMPT, "force sensor saturated: {}")
+    SENSOR_SATURATED = (FaultScope.RUN, "force sensor saturated: {}")
     UNSTABLE = (FaultScope.ATTEMPT, "no load case settles: {}")
     REFERENCE_LOST = (FaultScope.ATTEMPT, "reference not had: {}")
     SENSOR_OVERLOAD = (FaultScope.RUN, "force sensor saturated in contact: {}")

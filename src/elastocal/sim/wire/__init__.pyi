@@ -1,4 +1,5 @@
-from ._rsi_robot import PosCorrLimits as PosCorrLimits, RsiContext as RsiContext
+from ._pos_corr import PosCorrLimits as PosCorrLimits
+from ._rsi_robot import RsiContext as RsiContext
 from .emscon import EmsconServer as EmsconServer
 from .line_stream import LineStreamServer as LineStreamServer
 from .live_cell import (
