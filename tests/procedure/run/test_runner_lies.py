@@ -348,7 +348,7 @@ def test_a_run_begins_nothing_while_something_presses_and_names_the_way_out(run)
         log.write(0.0, Event.START, run=RECORD)
         result = run._go(log, 0.0, lambda _: None, pressing_cell(spring))
     assert (result.end, result.location) == (RunEnd.STOPPED, ArmLocation.AT_SURFACE)
-    assert "1100 N press on the tool beyond its weight, at most 255 N" in result.message
+    assert "1112 N press on the tool beyond its weight, at most 255 N" in result.message
     assert "`elastocal release CELL --arm` frees it" in result.message
     assert set(run.cell.world.commands) <= {"stop", "disable"}
 
