@@ -216,7 +216,7 @@ def bounds_of(cell: Cell, settings: RsiSettings) -> Bounds:
     needed = engagement.approach_distance + procedure.travel_limit + _ROOM
     usual = _COMPENSATION if settings.mode == "compensation" else needed
     largest = settings.largest_correction or usual
-    # A whole number of tenths of a millimetre: it is copied by hand.
+    # A whole number of tenths of a millimetre: it is compared by hand.
     poscorr = 1e-4 * math.ceil(1e4 * largest / _BELOW - 1e-6)
     loads: list[FloatArray] = list(cell.file.presses.values())
     most = max(float(np.linalg.norm(load)) for load in loads)
