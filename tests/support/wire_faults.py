@@ -1,8 +1,8 @@
 """Faults on the lines between a run and its devices, made by whoever stands in between.
 
 A `DatagramProxy` or a `StreamProxy` passes on what it is given. From the moment in which a damage
-is set, it does to the data what a fault does. Neither the product nor its simulators take part: what
-they send is damaged on the way.
+is set, it does to the data what a fault does. Neither the product nor its simulators take part:
+what they send is damaged on the way.
 """
 
 import re
