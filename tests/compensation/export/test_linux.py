@@ -5,21 +5,29 @@ import shutil
 import signal
 import subprocess
 import time
+from collections import deque
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from elastocal import workflows
 from elastocal.cell import load_cell
 from elastocal.compensation.export import LinuxTarget
-from elastocal.errors import CompensationError
+from elastocal.drivers.kuka_rsi import Arrival, IpocWatch, RobMessage
+from elastocal.drivers.kuka_rsi._held_correction import HeldCorrection
+from elastocal.errors import CompensationError, DeviceError
 from support.cli import PATIENCE
-from support.exported import SANITIZED, needs_gcc
+from support.exported import HARNESS, SANITIZED, needs_gcc
 from support.live_on_wire import LiveFiles, served
 
 pytestmark = [
     needs_gcc,
     pytest.mark.skipif(shutil.which("make") is None, reason="make is not on this machine"),
 ]
+CYCLE = 0.004
+LATE_CYCLES = 30
+"""Cycles of the delay that is assumed where none was measured."""
 BIAS = 250.0
 """A bias that the tool file states and the sensor has not, in N: as good as a force."""
 
@@ -100,6 +108,110 @@ def test_over_loopback_it_corrects_holds_fades_and_ends_at_zero(program):
     assert "start the controller's program now" in err.decode()
     assert stops in ([], ["program ended"]), "Stop has ended RSI_MOVECORR"
     assert not offset.any()
+
+
+def test_what_is_refused_and_a_bad_status_are_said_when_they_happen(program):
+    path, files = program
+    telegram = b'<Rob><RIst X="1620,9999"/><IPOC>1</IPOC></Rob>'
+    with served(files) as (robot, box):
+        robot._malformed = deque([telegram])
+        process = subprocess.Popen([path, "--arm"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        try:
+            wait(lambda: robot.statistics.answered > 40)
+            robot.inject("malformed")
+            box.box.status = 0x80004000
+            here = robot.statistics.answered
+            wait(lambda: robot.statistics.answered > here + 60)
+            box.box.status = 0
+            wait(lambda: robot.statistics.answered > here + 400)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
+    text = err.decode()
+    assert "a telegram of 127.0.0.1 is refused: RIst: no number: decimal comma" in text
+    assert "status 0x80004000, bad: the correction is held, then fades" in text
+    found = json.loads(out)
+    assert found["first_refused"] == found["last_refused"] == "RIst: no number: decimal comma"
+    assert found["malformed"] == 1
+    assert text.count("good again") == 1
+    assert found["sensor_failure"] is None
+
+
+def random_line(seed):
+    """Return what a controller says whose line is bad, and what the Python makes of it, by rows."""
+    rng = np.random.default_rng(seed)
+    step, delay, timeout = 0.03 * CYCLE, int(rng.integers(1, 20)), 100
+    watch, held = IpocWatch(CYCLE), HeldCorrection(step, timeout * CYCLE, LATE_CYCLES)
+    rows, found = [], []
+    ipoc, now, missed, has = (
+        2**32 - 4 * int(rng.integers(1, 900)),
+        5.0,
+        0,
+        float(rng.random() < 0.8),
+    )
+    effect_there, late, wanted = np.zeros(3), [np.zeros(3)] * delay, np.zeros(3)
+    for _ in range(2500):
+        event = rng.choice(7, p=[0.86, 0.03, 0.03, 0.02, 0.03, 0.01, 0.02])
+        lost = (
+            int(rng.integers(1, 12))
+            if event == 1
+            else int(rng.integers(100, 140))
+            if event == 2
+            else 0
+        )
+        ipoc, now, missed = ipoc + 4 * lost, now + CYCLE * lost, missed + lost
+        late += [effect_there] * lost
+        ipoc += {3: 1000, 4: -4 * int(rng.integers(1, 4)), 5: -400}.get(int(event), 0)
+        if event == 5:
+            effect_there, late, missed = np.zeros(3), [np.zeros(3)] * delay, 0
+        late = [*late, effect_there][-delay:]
+        if rng.random() < 0.05:
+            wanted = rng.uniform(-1e-3, 1e-3, 3)
+        ipoc, now = (ipoc + 4) % 2**32, now + CYCLE
+        offset, anew = late[0] + rng.normal(0.0, 2e-6, 3), float(event == 6 and rng.random() < 0.3)
+        arrival = watch.classify(ipoc, anew > 0.0)
+        way = wanted - effect_there
+        way *= min(1.0, 0.5 * step / max(float(np.linalg.norm(way)), 1e-12))
+        rows.append([ipoc, anew, has, *offset, missed, now, *way])
+        out = [list(Arrival).index(arrival), -2.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        missed += 1
+        if arrival is not Arrival.OUT_OF_ORDER:
+            millimetres = tuple(1e3 * offset) + (0.0,) * 3
+            told = {"actual": millimetres, "setpoint": (0.0,) * 6} if has else {}
+            try:
+                effect = held.look(RobMessage(ipoc, delay=missed - 1, **told), arrival, now)
+                out[1] = 1.0 if effect is None else 0.0
+            except DeviceError:
+                effect, out[1] = None, -1.0
+            if effect is not None:
+                out[2:] = [effect.begins, effect.advances, *effect.shift]
+                answer = np.array(effect.shift) + (way if effect.advances else 0.0)
+                held.note(tuple(answer.tolist()))
+                if rng.random() < 0.95:
+                    effect_there, missed = answer, 0
+        found.append(out)
+    return np.array(rows, dtype=float), np.array(found, dtype=float)
+
+
+def test_python_and_c_see_the_same_correction_in_effect(program, tmp_path):
+    folder = program[0].parent
+    harness = Path(HARNESS.with_name("held_harness.c"))
+    words = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", *SANITIZED, f"-I{folder}"]
+    subprocess.run(
+        [*words, harness, folder / "live_held.c", "-lm", "-o", tmp_path / "held"], check=True
+    )
+    kinds = set()
+    for seed in range(6):
+        rows, expected = random_line(seed)
+        done = subprocess.run(
+            [tmp_path / "held"], input=rows.tobytes(), capture_output=True, check=True
+        )
+        found = np.frombuffer(done.stdout).reshape(len(rows), -1)
+        np.testing.assert_array_equal(found[:, :4], expected[:, :4])
+        np.testing.assert_allclose(found[:, 4:], expected[:, 4:], rtol=0.0, atol=1e-12)
+        kinds |= {tuple(row) for row in found[:, :3].astype(int)}
+    assert {(4, 0, 0), (4, 0, 1), (4, 1, 0), (2, 0, 0), (3, -2, 0)} <= kinds
 
 
 def wait(holds, seconds=PATIENCE):

@@ -26,6 +26,9 @@ _NONE: Shift = (0.0, 0.0, 0.0)
 _CLEARLY = 2.0
 """How much farther the other correction must be for one to be in effect."""
 
+_ROUNDED = 1.0 + 1e-9
+"""A correction of one step may be longer by a rounding."""
+
 
 class Effect(NamedTuple):
     """The correction that is in effect when a cycle begins."""
@@ -101,7 +104,7 @@ class HeldCorrection:
     def _decide(self, message: RobMessage, stopped: bool) -> Effect | None:
         """Return what is in effect after a jump or a silence."""
         offset, held = offset_of(message), self._before
-        small = math.hypot(*held) <= self._step
+        small = math.hypot(*held) <= self._step * _ROUNDED
         if not self._answered:
             self._require_none(offset)
             begins = True

@@ -38,6 +38,7 @@
 #endif
 #define SAY_AGAIN 1.0 /* s between two lines about the same */
 #define SILENCE 1.0 /* s after which a stop is no longer waited for */
+#define LONGEST_FADE (2.0 + (ELASTOCAL_CYCLE * (LIVE_LARGEST / LIVE_FADE_STEP))) /* s */
 #define STOP_CYCLES 25 /* in which the controller is told that corrections are over */
 #define MOST_BACKLOG 64 /* datagrams that are passed over at once */
 #define LATE_RECORDS 64U /* a record that comes so many places late is dropped; beyond: restarted */
@@ -84,8 +85,8 @@ static double quantile(const times *t, double share)
 }
 
 /* Say something while the loop runs: at most a line a second about the same, and none that would
- * have to wait. */
-static void say(double *said, const char *format, ...)
+ * have to wait; whether it was said. */
+static int say(double *said, const char *format, ...)
 {
     char line[256];
     struct pollfd ready = {STDERR_FILENO, POLLOUT, 0};
@@ -93,7 +94,7 @@ static void say(double *said, const char *format, ...)
     va_list values;
     int length;
     if ((*said > 0.0) && ((now - *said) < SAY_AGAIN)) {
-        return;
+        return 0;
     }
     va_start(values, format);
     length = vsnprintf(line, sizeof line, format, values);
@@ -102,7 +103,9 @@ static void say(double *said, const char *format, ...)
     if ((length > 0) && (poll(&ready, 1, 0) > 0)
         && (write(STDERR_FILENO, line, (size_t)length) == (ssize_t)length)) {
         *said = now;
+        return 1;
     }
+    return 0;
 }
 
 typedef struct {
@@ -223,8 +226,8 @@ static int goes_on(sensor *s, const wire_rdt *record)
     if ((step >= HALF) || (ahead >= HALF)) {
         s->failure = "its counters went back: it was started anew, or another client asked for it";
         s->said = 0.0;
-        say(&s->said, "elastocal_live: Net F/T at %s: %s; the correction fades\n", LIVE_FT_ADDRESS,
-            s->failure);
+        (void)say(&s->said, "elastocal_live: Net F/T at %s: %s; the correction fades\n", LIVE_FT_ADDRESS,
+                  s->failure);
         return 0;
     }
     counted.records_lost += step - 1U;
@@ -250,11 +253,12 @@ static void as_reading(const sensor *s, const double q[], elastocal_reading *rea
 static void speak_of(sensor *s, uint32_t status)
 {
     const int good = wire_is_good(status);
-    if ((good != s->good) && (s->failure == NULL)) {
+    if ((good != s->good) && (s->failure == NULL)
+        && (say(&s->said, "elastocal_live: Net F/T at %s: status 0x%08lx, %s\n", LIVE_FT_ADDRESS,
+                (unsigned long)status,
+                (good != 0) ? "good again" : "bad: the correction is held, then fades")
+            != 0)) {
         s->good = good;
-        say(&s->said, "elastocal_live: Net F/T at %s: status 0x%08lx, %s\n", LIVE_FT_ADDRESS,
-            (unsigned long)status,
-            (good != 0) ? "good again" : "bad: the correction is held, then fades");
     }
 }
 
@@ -417,8 +421,9 @@ static void refused(controller *c, const wire_refusal *why)
     counted.last_refused = *why;
     if (counted.malformed == 1U) {
         counted.first_refused = *why;
-        say(&c->said, "elastocal_live: a telegram of %s is refused: %s%s%s\n", LIVE_ROBOT_ADDRESS,
-            why->element, (why->element[0] != '\0') ? ": " : "", why->reason);
+        (void)say(&c->said, "elastocal_live: a telegram of %s is refused: %s%s%s\n",
+                  LIVE_ROBOT_ADDRESS, why->element, (why->element[0] != '\0') ? ": " : "",
+                  why->reason);
     }
 }
 
@@ -533,10 +538,11 @@ static int look(loop *l, controller *c, const wire_rob *message, held_effect *ef
                       message->delay, c->heard_at, effect);
     if (found != 0) {
         counted.withheld++;
-        say(&c->said, "elastocal_live: no answer: RIst is %.2f mm from RSol, %s\n",
-            1e3 * length_of(message->offset),
-            (found < 0) ? "a correction that is not of this program: start the controller's anew"
-                        : "which does not tell whether the correction is in effect");
+        (void)say(&c->said, "elastocal_live: no answer: RIst is %.2f mm from RSol, %s\n",
+                  1e3 * length_of(message->offset),
+                  (found < 0) ? "a correction that is not of this program: start the controller's"
+                                " anew"
+                              : "which does not tell whether the correction is in effect");
     }
     return found;
 }
@@ -626,8 +632,9 @@ static int run(loop *l, sensor *s, controller *c, double duration)
         }
         if (interrupted != 0) {
             asked = (asked < 0.0) ? now : asked;
-            if ((c->heard == 0) || ((now - c->heard_at) > SILENCE)) {
-                break; /* nobody is there to be told */
+            if ((c->heard == 0) || ((now - c->heard_at) > SILENCE) || (l->held.answered == 0)
+                || ((now - asked) > LONGEST_FADE)) {
+                break; /* nobody is there to be told, or who is there is not answered */
             }
         }
         if ((first < 0.0) && ((now - opened) > WAIT)) {

@@ -13,6 +13,7 @@
 
 #define FAR_CYCLES 250 /* an IPOC that is farther off is another time of the controller */
 #define IN_A_ROW 3 /* old messages that follow one another are of a program that was started anew */
+#define ROUNDED (1.0 + 1e-9) /* a correction of one step may be longer by a rounding */
 #define CLEARLY 2.0 /* how much farther the other correction must be for one to be in effect */
 
 static double length_of(const double v[3])
@@ -83,7 +84,7 @@ held_arrival held_classify(held_count *c, uint64_t ipoc, int anew)
 static int decide(held *h, const double offset[3], held_effect *effect)
 {
     static const double none[3] = {0.0, 0.0, 0.0};
-    const int small = (length_of(h->before) <= LIVE_STEP) ? 1 : 0;
+    const int small = (length_of(h->before) <= (LIVE_STEP * ROUNDED)) ? 1 : 0;
     int begins;
     if (h->answered == 0) {
         if ((offset != NULL) && !(length_of(offset) <= (CLEARLY * LIVE_STEP))) {
