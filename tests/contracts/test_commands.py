@@ -28,7 +28,8 @@ from support.cli import elastocal
 
 GROUP = typer.main.get_command(app)
 ELSEWHERE = {
-    "codec", "demo", "live", "measure-delay", "plan", "run", "simulate-process", "studio", "study",
+    "codec", "demo", "live", "measure-delay", "plan", "release", "run", "simulate-process",
+    "studio", "study",
 }  # fmt: skip
 """They take long, or need a device: what they print is tested beside what they do."""
 

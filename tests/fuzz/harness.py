@@ -213,6 +213,7 @@ _PLAIN = {
     "verify": "verify {s}/report.html",
     "krc-config": "krc-config {s}/kuka.yaml --out {o}",
     "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
+    "release": "release {s}/cell.yaml",
     "live": "live {s}/kuka.yaml --model {s}/model.json --duration 1",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
     "studio": "studio {s}/cell.yaml --no-browser",

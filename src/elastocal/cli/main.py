@@ -87,7 +87,7 @@ app = typer.Typer(
 )
 _GROUPS = {
     "Prepare": ("robots", "new", "init", "check", "studio", "plan", "study"),
-    "Measure": ("run", "simulate", "krc_config", "measure_delay", "derive", "import_"),
+    "Measure": ("run", "release", "simulate", "krc_config", "measure_delay", "derive", "import_"),
     "Identify": ("tool", "geometry", "calibrate", "codec"),
     "Use": ("predict", "compensate", "live", "stiffness", "simulate_process", "export"),
     "Judge and hand over": ("report", "compare", "verify"),

@@ -17,6 +17,7 @@ __all__ = [
     "new",
     "plan",
     "predict",
+    "release",
     "report",
     "run",
     "simulate",
@@ -151,6 +152,12 @@ from .process_trial import (
     TrialRuns as TrialRuns,
     run_budget as run_budget,
     run_loads as run_loads,
+)
+from .release import (
+    ReleaseFigures as ReleaseFigures,
+    ReleaseResult as ReleaseResult,
+    ReleaseSettings as ReleaseSettings,
+    release as release,
 )
 from .report import (
     ReportFigures as ReportFigures,

@@ -1,3 +1,9 @@
+from .leaving import (
+    ForceTap as ForceTap,
+    LeavingWatch as LeavingWatch,
+    ToolLoad as ToolLoad,
+    leave_surface as leave_surface,
+)
 from .routes import (
     HOME_AT_START as HOME_AT_START,
     ApproachLine as ApproachLine,

@@ -14,10 +14,10 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Motion
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import Action, PoseLog, ReadingStatus, Window
-from elastocal.procedure.run._leaving import LeavingWatch
 from elastocal.procedure.run._stability import SlideDetector, SlipReference
 from elastocal.procedure.run._supervisor import Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
+from elastocal.procedure.run.leaving import LeavingWatch
 from elastocal.procedure.run.routes import ApproachLine
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import (

@@ -17,7 +17,6 @@ from elastocal.procedure.record import (
     StreamRecorder,
 )
 from elastocal.procedure.run._attempt import Attempt, drive, leave_force_control, retract_to
-from elastocal.procedure.run._leaving import LeavingWatch
 from elastocal.procedure.run._sequence import (
     AttemptFailedError,
     between_poses,
@@ -27,6 +26,7 @@ from elastocal.procedure.run._sequence import (
 )
 from elastocal.procedure.run._supervisor import Observers, Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
+from elastocal.procedure.run.leaving import LeavingWatch
 from elastocal.procedure.run.routes import HOME_AT_START, ApproachLine, remaining_times, route
 from elastocal.procedure.run.session import RunEnd, Session, SessionHooks, SessionResult
 from elastocal.procedure.run.steps import (

@@ -16,7 +16,7 @@ from elastocal.errors import ProcedureError
 from elastocal.planning import PlanResult
 from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
 from elastocal.planning.motion import AxisMotion
-from elastocal.procedure.run._leaving import ToolLoad
+from elastocal.procedure.run.leaving import ToolLoad
 from elastocal.results import brief_repr
 
 _LIMIT_PER_LOAD = 1.3

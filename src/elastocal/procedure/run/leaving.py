@@ -4,16 +4,20 @@ What the arm remembers is not asked: a process that was killed has taken its mem
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import SensorStatus, WrenchBlock
+from elastocal.cell import Clock, ForceSensor, Motion, RobotArm, SensorStatus, WrenchBlock
+from elastocal.errors import DeviceError
 from elastocal.procedure.run.steps import Fault, FaultError
 
 _WRONG_WEIGHT = 0.35
 """Part of the weight that may be missing: a mass a quarter off, with a tool turned by 90 deg."""
+_STRAIGHT_TOLERANCE = 1e-3
+"""How near to its end a straight motion has come when it is over, in m."""
 _BIAS = 0.1
 """Bias of a sensor that is let pass, as a part of the force limit."""
 
@@ -91,3 +95,91 @@ class LeavingWatch:
             Fault.COLLISION,
             f"the force while the tool leaves the surface: {text}, limit {self._limit:.0f} N",
         )
+
+
+@dataclass(frozen=True)
+class ForceTap:
+    """A force sensor that may be absent or fail; neither ends anything."""
+
+    sensor: ForceSensor | None
+    load: ToolLoad
+
+    def block(self) -> WrenchBlock | None:
+        """Return the samples since the last look; None where there is no sensor to ask."""
+        try:
+            return None if self.sensor is None else self.sensor.read()
+        except (DeviceError, OSError):
+            return None
+
+    def beyond_weight(self, arm: RobotArm, clock: Clock, seconds: float) -> FloatArray | None:
+        """Return the last force that could be trusted within a time, as `ToolLoad` does."""
+        found, end = None, clock.now() + seconds
+        self.block()
+        while clock.now() < end:
+            clock.sleep(_LOOK)
+            block = self.block()
+            now = block and self.load.beyond_weight(block, arm.state().T_base_tcp)
+            found = found if now is None else now
+        return found
+
+
+_LOOK = 0.04
+"""Time between two looks at arm and force, in s."""
+
+
+def leave_surface(
+    devices: tuple[RobotArm, ForceTap, Clock],
+    way: FloatArray,
+    speed: float,
+    watch: LeavingWatch,
+    interrupted: Callable[[], bool],
+) -> None:
+    """Retract an enabled arm along a way, base, shape (3,), in m, and wait until it is there.
+
+    Parameters
+    ----------
+    devices : tuple
+        Arm, force and clock. Without a force nothing is watched: the speed then has to be low.
+    way : ndarray, shape (3,)
+        Base, in m.
+    speed : float
+        In m/s.
+    watch : LeavingWatch
+        Refuses a force that grows.
+    interrupted : callable
+        Whether a person wants it to stop.
+
+    Raises
+    ------
+    FaultError
+        If the force grows, the arm stops, or takes too long; the arm has been stopped.
+    DeviceError
+        If the arm does not answer.
+    """
+    arm, force, clock = devices
+    distance, start = float(np.linalg.norm(way)), arm.state().T_base_tcp[:3, 3].copy()
+    end = clock.now() + 2.0 * distance / speed + _PATIENCE
+    arm.retract(way / distance, distance, speed)
+    try:
+        while True:
+            clock.sleep(_LOOK)
+            state, block = arm.state(), force.block()
+            if block is not None:
+                watch.look(block, state.T_base_tcp)
+            gone = float(np.linalg.norm(state.T_base_tcp[:3, 3] - start))
+            if state.motion is Motion.IDLE and gone > distance - _STRAIGHT_TOLERANCE:
+                return
+            if state.fault is not None or state.motion is Motion.STOPPED:
+                reason = state.fault or state.motion.value
+                raise FaultError(Fault.ARM_STOPPED, f"{state.source} says: {reason}")
+            if interrupted():
+                raise FaultError(Fault.INTERRUPTED)
+            if not clock.now() <= end:
+                raise FaultError(Fault.TIME_LIMIT, f"{1e3 * gone:.1f} mm of {1e3 * distance:.1f}")
+    except BaseException:
+        arm.stop()
+        raise
+
+
+_PATIENCE = 10.0
+"""Time that a retract may take beyond twice its own, in s."""

@@ -1,0 +1,291 @@
+"""``release``: bring a tool off the surface at which a run, or what ended it, has left it.
+
+The force is measured where the sensor answers, and must not grow; where it does not, the tool goes
+slowly, in position control, along its own axis. A tracker is not asked.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray
+from elastocal.cell import (
+    Cell,
+    Clock,
+    DeviceSet,
+    RigContext,
+    RobotArm,
+    WallClock,
+    WrenchSample,
+    load_cell,
+)
+from elastocal.errors import DeviceError, ElastocalError, ProcedureError
+from elastocal.procedure.run import FaultError, ForceTap, LeavingWatch, ToolLoad, leave_surface
+from elastocal.progress import Progress
+from elastocal.records import record
+from elastocal.results import Result, brief_repr
+from elastocal.workflows._operator_and_devices import (
+    Operator,
+    ReservedRig,
+    Unattended,
+    rig_of,
+)
+from elastocal.workflows._workflow import workflow
+
+_SLOW, _SLOW_WAY = 0.002, 0.01
+"""Speed of the first part of the way in m/s, and its length in m: what is wrong shows there."""
+_GROWTH = 50.0
+"""By how much the force may grow on the way, in N."""
+_MEASURED = 0.4
+"""Time over which the force is looked at before and after, in s."""
+_LIMIT_PER_LOAD = 1.3
+"""Default force limit over the largest load case, as in `elastocal run`."""
+
+
+@dataclass(frozen=True)
+class ReleaseSettings:
+    """Which cell's tool is brought off the surface, and who watches."""
+
+    cell: str | PathLike[str]
+    """Cell file, ``.yaml``."""
+    arm: bool = False
+    """Move the arm; without it only what would be done is said. Simulated arms move anyway."""
+    confirmed: bool = False
+    """A person has looked at the cell: do not ask."""
+    operator: Operator = field(default_factory=Unattended)
+
+
+@brief_repr
+@record()
+class ReleaseFigures:
+    """The key figures of ``release --json``; forces in N, lengths in m."""
+
+    moved: bool
+    """Whether the arm was moved."""
+    distance: float
+    """By which the tool was, or would be, retracted."""
+    direction: tuple[float, ...]
+    """Of the way, base."""
+    force_before: float | None
+    """Force on the tool beyond its weight; None where none can be trusted."""
+    force_after: float | None
+    free_air: float | None
+    """Largest force beyond the weight that a wrong mass and a bias explain; None: no mass."""
+    sensor: str
+    """Why there is no force sensor; empty where there is one."""
+    message: str
+    """What is known of the tool at the end."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReleaseResult(Result):
+    """How a tool was brought off the surface."""
+
+    figures: ReleaseFigures
+    plan: tuple[str, ...]
+    """What was said before."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what a person wants to know at the end."""
+        return (("tool", self.figures.message),)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bench:
+    """The devices of a release."""
+
+    arm: RobotArm
+    force: ForceTap
+    clock: Clock
+    sensor_problem: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """The way off the surface."""
+
+    direction: FloatArray
+    """Base, shape (3,)."""
+    stages: tuple[tuple[float, float], ...]
+    """Length in m and speed in m/s of each part."""
+
+    @property
+    def distance(self) -> float:
+        """In m."""
+        return sum(length for length, _ in self.stages)
+
+    def sentence(self) -> str:
+        """Return the way as a phrase."""
+        x, y, z = self.direction
+        parts = ", then ".join(
+            f"{1e3 * length:g} mm at {1e3 * speed:g} mm/s" for length, speed in self.stages
+        )
+        return f"{parts}, along -z of the tool ({x:+.2f}, {y:+.2f}, {z:+.2f} in base)"
+
+
+class _NoForce:
+    """A feed that never has a sample."""
+
+    def newest(self) -> WrenchSample | None:
+        return None
+
+
+@workflow(ReleaseSettings)
+def release(settings: ReleaseSettings, progress: Progress) -> ReleaseResult:  # noqa: ARG001 - short
+    """Bring a tool that stands at a surface off it, along its own axis.
+
+    Parameters
+    ----------
+    settings : ReleaseSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    ProcedureError
+        If the operator does not agree, the force grows, or the arm stops.
+    DeviceError
+        If the arm cannot be used.
+    """
+    cell = load_cell(Path(settings.cell))
+    rig = rig_of(cell)
+    with (
+        rig.reserved("release", ("arm", "sensor")) as reserved,
+        _connected(cell, reserved) as bench,
+    ):
+        before = _beyond(bench)
+        way = _way(cell, bench, before)
+        plan = _plan(bench, way, before)
+        settings.operator.warn(plan)
+        if rig.real and not settings.arm:
+            message = "nothing was moved: --arm moves it"
+            return ReleaseResult(_figures(bench, way, before, None, message), plan)
+        if rig.real and not settings.confirmed:
+            settings.operator.confirm()
+        with settings.operator.supervise(0) as supervision:
+            message = _move(bench, way, supervision.interrupted)
+        after = _beyond(bench)
+        message = f"{message}; {_force_sentence(bench, after)}"
+    return ReleaseResult(_figures(bench, way, before, after, message, moved=True), plan)
+
+
+@contextlib.contextmanager
+def _connected(cell: Cell, reserved: ReservedRig) -> Iterator[_Bench]:
+    """Yield arm and force; a sensor that is missing is none."""
+    rig, made, problem = reserved.rig, list[DeviceSet](), ""
+    clock: Clock = WallClock(0.0, cell.file.devices.clock_rate)
+    with contextlib.ExitStack() as opened:
+        for name, driver in rig.drivers.items():
+            wanted = {k: each for k, each in rig.wanted[name].items() if k != "metrology"}
+            feed = next((each.feed for each in made if each.feed is not None), _NoForce())
+            context = RigContext(clock, cell.file.simulation.seed, 0.0, feed, reserved.ports)
+            if not wanted:
+                continue
+            try:
+                made.append(driver.connect(cell, wanted, context))
+                opened.callback(made[-1].close)
+            except (ElastocalError, OSError) as error:
+                if "arm" in wanted:
+                    raise
+                problem = str(error)
+        arm = next(each.arm for each in made if each.arm is not None)
+        sensor = next((each.sensor for each in made if each.sensor is not None), None)
+        yield _Bench(arm, ForceTap(sensor, _load(cell)), clock, problem)
+
+
+def _load(cell: Cell) -> ToolLoad:
+    T_sensor_tcp = cell.T_sensor_tcp
+    R = np.eye(3) if T_sensor_tcp is None else T_sensor_tcp[:3, :3].T
+    largest = max(float(np.linalg.norm(each)) for each in cell.file.presses.values())
+    limit = cell.file.procedure.force_limit or _LIMIT_PER_LOAD * largest
+    return ToolLoad(cell.file.tool.mass * cell.gravity_base, R, limit)
+
+
+def _beyond(bench: _Bench) -> FloatArray | None:
+    return bench.force.beyond_weight(bench.arm, bench.clock, _MEASURED)
+
+
+def _way(cell: Cell, bench: _Bench, force: FloatArray | None) -> _Way:
+    procedure, distance = cell.file.procedure, cell.file.engagement.approach_distance
+    direction: FloatArray = -bench.arm.state().T_base_tcp[:3, 2]
+    first = min(_SLOW_WAY, distance)
+    rest = procedure.contact_speed if force is None else procedure.approach_speed
+    stages = ((first, min(_SLOW, rest)), (distance - first, rest))
+    return _Way(direction, tuple(stage for stage in stages if stage[0] > 0.0))
+
+
+def _plan(bench: _Bench, way: _Way, force: FloatArray | None) -> tuple[str, ...]:
+    """Return what a person reads before anything moves."""
+    x, y, z = 1e3 * bench.arm.state().T_base_tcp[:3, 3]
+    guarded = f"it stops where the force grows by {_GROWTH:g} N"
+    blind = "no force is watched: it goes slowly, in position control"
+    return (
+        f"the tool stands at {x:.1f}, {y:.1f}, {z:.1f} mm in base",
+        _force_sentence(bench, force),
+        f"it is retracted by {1e3 * way.distance:g} mm: {way.sentence()}",
+        blind if force is None else guarded,
+    )
+
+
+def _force_sentence(bench: _Bench, force: FloatArray | None) -> str:
+    if force is None:
+        why = f" ({bench.sensor_problem})" if bench.sensor_problem else ""
+        return f"the force on the tool is not known{why}"
+    size, tolerance = float(np.linalg.norm(force)), bench.force.load.tolerance
+    if np.isinf(tolerance):
+        return f"{size:.0f} N on the tool; the cell states no mass of it to tell weight from press"
+    judged = "it presses" if size > tolerance else "as in free air"
+    return f"{size:.0f} N on the tool beyond its weight, {judged} (limit {tolerance:.0f} N)"
+
+
+def _move(bench: _Bench, way: _Way, interrupted: Callable[[], bool]) -> str:
+    """Retract; return what is known of the place then."""
+    arm = bench.arm
+    watch = LeavingWatch(bench.force.load, way.direction, _GROWTH)
+    arm.enable()
+    start = arm.state().T_base_tcp[:3, 3].copy()
+    try:
+        for length, speed in way.stages:
+            leave_surface(
+                (arm, bench.force, bench.clock), length * way.direction, speed, watch, interrupted
+            )
+        gone = 1e3 * float(np.linalg.norm(arm.state().T_base_tcp[:3, 3] - start))
+        message = f"retracted by {gone:.1f} mm"
+        try:
+            arm.adopt_position()
+        except DeviceError as error:
+            message = f"{message}; {error}"
+    except FaultError as error:
+        gone = 1e3 * float(np.linalg.norm(arm.state().T_base_tcp[:3, 3] - start))
+        raise ProcedureError(f"{error}. The tool has left by {gone:.1f} mm and stands") from error
+    finally:
+        with contextlib.suppress(DeviceError, OSError):
+            arm.disable()
+    return message
+
+
+def _figures(
+    bench: _Bench,
+    way: _Way,
+    before: FloatArray | None,
+    after: FloatArray | None,
+    message: str,
+    *,
+    moved: bool = False,
+) -> ReleaseFigures:
+    tolerance = bench.force.load.tolerance
+    return ReleaseFigures(
+        moved=moved,
+        distance=way.distance,
+        direction=tuple(way.direction.tolist()),
+        force_before=None if before is None else float(np.linalg.norm(before)),
+        force_after=None if after is None else float(np.linalg.norm(after)),
+        free_air=None if np.isinf(tolerance) else tolerance,
+        sensor=bench.sensor_problem,
+        message=message,
+    )
