@@ -35,7 +35,7 @@ class UntilAnotherPress(Unattended):
         self.told += lines
 
     @contextmanager
-    def supervise(self, poses):
+    def supervise(self, poses):  # noqa: ARG002 - the protocol
         yield Supervision(lambda _: None, lambda: begun(self.out).count("approach") > self.before)
 
 

@@ -118,8 +118,9 @@ class ForceTap:
         while clock.now() < end:
             clock.sleep(_LOOK)
             block = self.block()
-            now = block and self.load.beyond_weight(block, arm.state().T_base_tcp)
-            found = found if now is None else now
+            if block is not None:
+                now = self.load.beyond_weight(block, arm.state().T_base_tcp)
+                found = found if now is None else now
         return found
 
 
