@@ -85,6 +85,7 @@ class Bench:
         )
         link = RsiLink(address, arm, clock, timer=lambda: 0.0)
         arm.link = clock.link = link
+        arm.arming = Arming.of(cell)
         clock.sleep(0.1)
         return cls(arm, peer, link, clock, feed, place)
 

@@ -15,6 +15,7 @@ from ._quantities import (
     SignedForce as SignedForce,
     TranslationalStiffness as TranslationalStiffness,
 )
+from .arming import Arming as Arming, RealArm as RealArm
 from .cell import (
     SCHEMA as SCHEMA,
     TOOLING as TOOLING,

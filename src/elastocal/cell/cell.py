@@ -46,7 +46,8 @@ from elastocal.cell.rig import DeviceChoices
 from elastocal.cell.simulation import Fault, Simulation
 from elastocal.dataset import require_joint_names
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
-from elastocal.records import StrictModel, read_yaml
+from elastocal.files import read_text, sha256
+from elastocal.records import StrictModel, from_data, parse_yaml
 from elastocal.robot import (
     GRAVITY,
     Rail,
@@ -199,6 +200,8 @@ class Cell:
     """Speeds that are used between poses, override included, shape (joint,), in rad/s or m/s."""
     process: ProductionPath | None = None
     """Poses and forces of the production process."""
+    sha256: str = ""
+    """Of the text of the file, as it was read."""
 
     def __repr__(self) -> str:
         return "\n  ".join([f"Cell {self.name!r} of {self.path}", *self.file.summary()])
@@ -300,7 +303,8 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
         If the file, or one that it names, cannot be read.
     """
     path = Path(path)
-    file = read_yaml(path, CellFile, SCHEMA)
+    text = read_text(path)
+    file = from_data(CellFile, parse_yaml(text, path), str(path), SCHEMA)
     robot = _at(f"{path}: robot", lambda: mounted_robot(path, file.robot, file.tcp))
     margins = _at(str(path), lambda: joint_margins(robot, file.limits))
     positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))
@@ -318,7 +322,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
         )
     for array in (positions, torques, home, speeds):
         array.setflags(write=False)
-    return Cell(path, file, robot, positions, torques, home, speeds, process)
+    return Cell(path, file, robot, positions, torques, home, speeds, process, sha256(text))
 
 
 def _at(place: str, make: Callable[[], _Result]) -> _Result:

@@ -21,6 +21,7 @@ from pydantic import (
 )
 
 from elastocal.arrays import FloatArray
+from elastocal.cell.arming import Arming
 from elastocal.cell.devices import (
     Clock,
     ForceSensor,
@@ -206,6 +207,9 @@ class RigContext:
     """Of another driver of the rig; None where none has one."""
     ports: Mapping[LocalPort, socket.socket] = field(default_factory=dict)
     """Ports that are bound already, as `DeviceSettings.own_ports` names them."""
+
+    arming: Arming = Arming()  # noqa: RUF009 - frozen
+    """Of an arm that moves as soon as its path is corrected, see `elastocal.cell.PathDriver`."""
 
     def listener(self, port: LocalPort) -> socket.socket:
         """Return a socket for a port, to be closed by whoever asked.

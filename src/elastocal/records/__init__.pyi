@@ -27,6 +27,7 @@ from ._netcdf import (
 )
 from ._strict import (
     StrictModel as StrictModel,
+    parse_yaml as parse_yaml,
     read_yaml as read_yaml,
     read_yaml_data as read_yaml_data,
 )

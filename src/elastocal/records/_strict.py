@@ -134,7 +134,11 @@ def read_yaml_data(path: Path) -> Any:
     FileAccessError
         If it cannot be read.
     """
-    text = read_text(path)
+    return parse_yaml(read_text(path), path)
+
+
+def parse_yaml(text: str, path: Path) -> Any:
+    """Return what the text of a YAML file holds; the path is for messages. See `read_yaml_data`."""
     _MOST_YAML.require(len(text) / _KILOBYTE, f"{path} has {len(text) / _KILOBYTE:.0f} kB, which")
     try:
         # The loader is PyYAML's safe one with duplicate keys refused.

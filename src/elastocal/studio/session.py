@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from elastocal.cell import Cell, load_cell
+from elastocal.cell import Arming, Cell, load_cell
 from elastocal.errors import ElastocalError, ProcedureError, SchemaError
 from elastocal.planning import PLAN, read_plan
 from elastocal.records import from_data, record, to_data
@@ -81,6 +81,8 @@ class RunMessage:
     resume: bool = False
     confirmed: bool = False
     """A person has looked at the cell."""
+    cell: str = ""
+    """SHA-256 of the cell file that the page shows; needed where real devices move."""
     rate: float = 0.0
     """Seconds of a simulated cell a second of the wall, at most; 0: as fast as it goes."""
 
@@ -110,7 +112,7 @@ class StudioWork(Protocol):
     def plan(self, cell: Path, message: PlanMessage) -> Callable[[Outbox], Data]:
         """Return the work of planning; it can be pickled."""
 
-    def run(self, cell: Path, message: RunMessage) -> Callable[[Outbox], Data]:
+    def run(self, cell: Path, message: RunMessage, arming: Arming) -> Callable[[Outbox], Data]:
         """Return the work of a run; it can be pickled."""
 
     def is_real(self, cell: Cell) -> bool:
@@ -241,6 +243,7 @@ class Session:
                 ],
                 "home": cell.home.tolist(),
                 "posture": to_data(view.at(cell.home.tolist())),
+                "sha256": cell.sha256,
                 "real": self._work.is_real(cell),
                 "armed": self._armed,
             }
@@ -295,7 +298,9 @@ class Session:
     def _run(self, message: RunMessage) -> Mapping[str, object]:
         self._require_folder(message.folder)
         self._require_folder(message.plan)
-        if self._work.is_real(self._opened.view.cell):
+        cell = self._opened.view.cell
+        real = self._work.is_real(cell)
+        if real:
             if not self._armed:
                 raise ProcedureError(
                     "the cell names devices that are not simulated: nothing moves unless the studio"
@@ -303,8 +308,14 @@ class Session:
                 )
             if not message.confirmed:
                 raise ProcedureError("not confirmed: nothing was moved")
+            if message.cell != cell.sha256:
+                raise ProcedureError(
+                    "the page shows another state of the cell file: look at the new one first"
+                )
             message = replace(message, rate=0.0)
-        self.worker.begin("run", self._work.run(self._path, message))
+        # The worker reads the file anew: it must be this one.
+        arming = Arming(cell.sha256, real)
+        self.worker.begin("run", self._work.run(self._path, message, arming))
         return {}
 
     def _stop(self, _: Nothing) -> Mapping[str, object]:

@@ -39,6 +39,7 @@ from ._operator_and_devices import (
     Rig as Rig,
     Supervision as Supervision,
     Unattended as Unattended,
+    arm_devices as arm_devices,
     driver_names as driver_names,
     find_driver as find_driver,
     rig_of as rig_of,

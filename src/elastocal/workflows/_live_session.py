@@ -13,6 +13,7 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.cell import (
+    Arming,
     Cell,
     CorrectedArm,
     CycleStatistics,
@@ -189,6 +190,8 @@ class LiveSession:
         What is to be done.
     rig : ReservedRig
         Of the cell.
+    arming : Arming
+        Of the cell.
     report : callable
         Called twice a second.
     interrupted : callable
@@ -199,10 +202,11 @@ class LiveSession:
         self,
         ready: Prepared,
         rig: ReservedRig,
+        arming: Arming,
         report: Callable[[LiveReport], None],
         interrupted: Callable[[], bool],
     ) -> None:
-        self._ready, self._rig = ready, rig
+        self._ready, self._rig, self._arming = ready, rig, arming
         self._tell, self._interrupted = report, interrupted
         self._scheduling = "not begun"
         self._log: LiveLog | None = None
@@ -221,7 +225,7 @@ class LiveSession:
         """
         ready = self._ready
         clock = WallClock(rate=ready.cell.file.devices.clock_rate)
-        context = RigContext(clock, 0, 0.0, None, self._rig.ports)
+        context = RigContext(clock, 0, 0.0, None, self._rig.ports, self._arming)
         with contextlib.ExitStack() as opened:
             with threads_first():
                 sensor = self._rig.connect_sensor(context)

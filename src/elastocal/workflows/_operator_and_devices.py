@@ -19,6 +19,7 @@ from elastocal import drivers
 from elastocal.cell import (
     KINDS,
     SIMULATED,
+    Arming,
     Cell,
     Clock,
     Devices,
@@ -28,6 +29,7 @@ from elastocal.cell import (
     LineCounts,
     LocalPort,
     PathDriver,
+    RealArm,
     RigContext,
     WallClock,
 )
@@ -270,6 +272,48 @@ class ReservedRig:
             driver = self.rig.cell.file.devices.by_kind[kind].driver
             raise DeviceError(f"{self.rig.cell.path}: devices.{kind}: driver {driver!r} made none")
         return device
+
+
+def arm_devices(
+    rig: Rig,
+    devices: Devices,
+    operator: Operator,
+    confirmed: bool,
+    arming: Arming | None = None,
+) -> None:
+    """Let the arm of a cell move, which nothing does before: here alone is a real arm armed.
+
+    Parameters
+    ----------
+    rig, devices : Rig, Devices
+        Of the cell.
+    operator : Operator
+        Is asked, where a real arm is to move and nobody has agreed yet.
+    confirmed : bool
+        A person has agreed to this command on the cell file as it is now.
+    arming : Arming, optional
+        Of a person who agreed earlier, to the cell file as it was then.
+
+    Raises
+    ------
+    ProcedureError
+        If the operator does not agree.
+    DeviceError
+        If the cell file is not the one that was agreed to, or its arm takes no arming.
+    """
+    if arming is None:
+        if rig.real and not confirmed:
+            operator.confirm()
+        arming = Arming.of(rig.cell)
+    arming.require(rig.cell, rig.real)
+    driver = rig.cell.file.devices.arm.driver
+    if rig.drivers[driver].real:
+        if not isinstance(devices.arm, RealArm):
+            raise DeviceError(
+                f"{rig.cell.path}: devices.arm: driver {driver!r} can hurt, and its arm takes no"
+                " arming (attribute 'arming', see elastocal.cell.RealArm)"
+            )
+        devices.arm.arming = arming
 
 
 def _close(made: Sequence[DeviceSet]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.cell import Cell, CycleStatistics, PathLimits, load_cell
+from elastocal.cell import Arming, Cell, CycleStatistics, PathLimits, load_cell
 from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.online import LiveCounts, design
@@ -166,7 +166,9 @@ def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG
         )
     started = datetime.now(UTC).isoformat(timespec="seconds")
     with ready.rig.reserved("live", ("arm", "sensor")) as rig:
-        session = LiveSession(ready, rig, settings.report, settings.interrupted)
+        session = LiveSession(
+            ready, rig, Arming.of(ready.cell), settings.report, settings.interrupted
+        )
         if settings.out is None:
             return _result(settings, ready, session.run(None), started)
         with filling(settings.out, LIVE_RECORD, settings.force) as folder:

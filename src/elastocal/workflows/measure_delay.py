@@ -22,7 +22,7 @@ from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result
 from elastocal.units import parse_quantity
-from elastocal.workflows._operator_and_devices import Operator, Unattended, rig_of
+from elastocal.workflows._operator_and_devices import Operator, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
 from elastocal.workflows.krc_config import kuka_settings
 
@@ -116,8 +116,7 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
         settings.operator.warn(
             [f"the tool moves by {settings.amplitude} about where it stands: it must be free there"]
         )
-        if rig.real and not settings.confirmed:
-            settings.operator.confirm()
+        arm_devices(rig, devices, settings.operator, settings.confirmed)
         arm.enable()
         chirps = []
         for number, axis in enumerate(np.eye(3)):

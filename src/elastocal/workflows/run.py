@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal import procedure
-from elastocal.cell import Cell, Devices, LineCounts, certificate_of, load_cell, unstated
+from elastocal.cell import Arming, Cell, Devices, LineCounts, certificate_of, load_cell, unstated
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan
@@ -26,7 +26,7 @@ from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.verdict import OF_RUN, public_key, read_private_key, sign, write_signature
 from elastocal.workflows._contact_lines import contact_sentence, tell_at_once
-from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, rig_of
+from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
 
 if TYPE_CHECKING:
@@ -50,7 +50,9 @@ class RunSettings:
     resume: bool = False
     """Go on with the run that is in the folder."""
     confirmed: bool = False
-    """A person has looked at the cell: do not ask."""
+    """A person has looked at the cell: do not ask. On real devices this arms the arm."""
+    arming: Arming | None = None
+    """Of a person who agreed before: the cell file must still be the same, to the byte."""
     seed: int | None = None
     """Seed of simulated devices; by default the cell's."""
     operator: Operator = field(default_factory=Unattended)
@@ -260,13 +262,16 @@ def _prepare(settings: RunSettings) -> _Job:
     certificate_of(loaded.file.certificate, stated.stated)
     procedure.check_compatible(read, loaded)
     carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
+    rig = rig_of(loaded)
+    if settings.arming is not None:
+        settings.arming.require(loaded, rig.real)
     procedure.rehearse_derivation(loaded, read, place, stated)
     return _Job(
         loaded,
         read,
         folder,
         carried_out,
-        rig_of(loaded),
+        rig,
         stated,
         place,
         procedure.registration_warnings(read),
@@ -396,5 +401,6 @@ def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: Run
     settings.operator.warn([f"warning: {warning}" for warning in job.warnings])
     if known is not None:
         settings.operator.warn((*known.lines, contact_sentence(devices.arm.state())))
-    if (known or job.rig.real) and not settings.confirmed:
+    if known and not (job.rig.real or settings.confirmed):
         settings.operator.confirm()
+    arm_devices(job.rig, devices, settings.operator, settings.confirmed, settings.arming)

@@ -11,7 +11,7 @@ from functools import partial
 from os import PathLike
 from pathlib import Path
 
-from elastocal.cell import LOOPBACK, SIMULATED, Cell, load_cell
+from elastocal.cell import LOOPBACK, SIMULATED, Arming, Cell, load_cell
 from elastocal.errors import DeviceError
 from elastocal.planning import read_plan
 from elastocal.procedure import Progress as RunProgress, RunEnd
@@ -161,8 +161,8 @@ class _Commands:
     def plan(self, cell: Path, message: PlanMessage) -> Callable[[Outbox], Data]:
         return partial(_plan, cell, message)
 
-    def run(self, cell: Path, message: RunMessage) -> Callable[[Outbox], Data]:
-        return partial(_run, cell, message)
+    def run(self, cell: Path, message: RunMessage, arming: Arming) -> Callable[[Outbox], Data]:
+        return partial(_run, cell, message, arming)
 
     def is_real(self, cell: Cell) -> bool:
         try:
@@ -178,7 +178,7 @@ def _plan(cell: Path, message: PlanMessage, outbox: Outbox) -> Data:
     return {"folder": message.folder}
 
 
-def _run(cell: Path, message: RunMessage, outbox: Outbox) -> Data:
+def _run(cell: Path, message: RunMessage, arming: Arming, outbox: Outbox) -> Data:
     """Carry a plan out, in the worker's process."""
     beside = cell.resolve().parent
     settings = RunSettings(
@@ -187,6 +187,7 @@ def _run(cell: Path, message: RunMessage, outbox: Outbox) -> Data:
         beside / message.folder,
         resume=message.resume,
         confirmed=message.confirmed,
+        arming=arming,
     )
     loaded = load_cell(cell)
     simulated = set(rig_of(loaded).wanted) == {SIMULATED}

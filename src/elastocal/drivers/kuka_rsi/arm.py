@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
+from elastocal.cell import Arming, ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
 from elastocal.drivers.kuka_rsi import motions
 from elastocal.drivers.kuka_rsi._adoption import ADOPTS, adopt
 from elastocal.drivers.kuka_rsi._commands import (
@@ -105,6 +105,8 @@ class KukaArm:
         self._disobeyed = 0
         self.link: RsiLink | None = None
         """Line to the controller; its failure is raised at the next call."""
+        self.arming = Arming()
+        """See `elastocal.cell.RealArm`."""
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -127,7 +129,8 @@ class KukaArm:
             )
 
     def enable(self) -> None:
-        """Release the arm for motion; it then is idle. Refused while a fault stands."""
+        """Release the arm for motion; it then is idle. Refused unarmed, or while a fault stands."""
+        self.arming.require(self._cell)
         self._require_link()
         with self._lock:
             cycle = self._newest()

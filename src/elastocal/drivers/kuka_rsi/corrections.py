@@ -12,7 +12,15 @@ from typing import Protocol
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Cell, CycleStatistics, PathCycle, PathSource, RigContext, Shift
+from elastocal.cell import (
+    Cell,
+    CycleStatistics,
+    PathCycle,
+    PathSource,
+    RigContext,
+    Shift,
+    require_armed,
+)
 from elastocal.drivers.kuka_rsi._held_correction import Effect, HeldCorrection
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
@@ -232,6 +240,7 @@ class CorrectedKuka:
     def __init__(
         self, cell: Cell, settings: RsiSettings, context: RigContext, source: PathSource
     ) -> None:
+        require_armed(context.arming, cell)
         self._settings, self._source = settings, source
         self._reader = PostureReader(cell.robot, settings.signs)
         bounds = bounds_of(cell, settings)

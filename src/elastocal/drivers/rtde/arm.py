@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Clock, Motion
+from elastocal.cell import ArmState, Arming, Cell, Clock, Motion, require_armed
 from elastocal.drivers.rtde._guard import Guard, frame_along, unit_vector
 from elastocal.drivers.rtde._ur_rtde import UrControl
 from elastocal.drivers.rtde.line import UrLine, UrSample, pose_of_T
@@ -61,9 +61,7 @@ class UrArm:
         line: UrLine,
         control: UrControl,
         clock: Clock,
-        joint_names: tuple[str, ...],
-        axis_speeds: FloatArray,
-        acceleration_time: float,
+        cell: Cell,
     ) -> None:
         """Take a controller whose line has a sample.
 
@@ -73,15 +71,15 @@ class UrArm:
             Both halves of the connection.
         clock : Clock
             Of the rig.
-        joint_names : tuple of str
-            Six, in the order of the controller.
-        axis_speeds : ndarray, shape (6,)
-            Largest speeds, in rad/s.
-        acceleration_time : float
-            To full speed, in s.
+        cell : Cell
+            Of six joints, in the order of the controller.
         """
         self._line, self._control, self._clock = line, control, clock
-        self._names, self._speeds, self._time = joint_names, axis_speeds, acceleration_time
+        motion = cell.file.motion
+        self._cell, self._names = cell, cell.robot.joint_names
+        self._speeds, self._time = cell.axis_speeds / motion.override, motion.acceleration_time
+        self.arming: Arming | None = None
+        """See `elastocal.cell.RealArm`."""
         self._lock = threading.RLock()
         self._motion = Motion.DISARMED
         self._touched: bool | None = None
@@ -124,8 +122,9 @@ class UrArm:
         Raises
         ------
         DeviceError
-            If the controller is stopped, or the program does not start.
+            If it is not armed, the controller is stopped, or the program does not start.
         """
+        require_armed(self.arming, self._cell)
         fault = self._line.sample().fault
         if fault is not None:
             raise DeviceError(f"{_SOURCE} cannot be enabled: {fault}")

@@ -98,15 +98,7 @@ class RtdeDriver:
             control.stopScript()
             control.disconnect()
             raise
-        motion = cell.file.motion
-        return UrArm(
-            line,
-            control,
-            context.clock,
-            cell.robot.joint_names,
-            cell.axis_speeds / motion.override,
-            motion.acceleration_time,
-        )
+        return UrArm(line, control, context.clock, cell)
 
 
 def _require_same_tcp(cell: Cell, line: UrLine) -> None:

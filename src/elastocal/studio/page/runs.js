@@ -241,6 +241,6 @@ export function openRuns() {
     event.preventDefault();
     const { plan, folder, resume, confirmed, rate } = event.target.elements;
     if (!plan.value) { say("Plan first."); return; }
-    begin("run", { plan: plan.value, folder: folder.value.trim(), resume: resume.checked, confirmed: confirmed.checked, rate: Number(rate.value) });
+    begin("run", { plan: plan.value, folder: folder.value.trim(), resume: resume.checked, confirmed: confirmed.checked, cell: state.cell.sha256, rate: Number(rate.value) });
   });
 }
