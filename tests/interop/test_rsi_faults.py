@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from elastocal.cell import Motion, RigContext, WallClock
+from elastocal.cell import Arming, Motion, RigContext, WallClock
 from elastocal.drivers.kuka_rsi import (
     Bounds,
     LinkAddress,
@@ -87,6 +87,7 @@ def connected():
     settings = RsiSettings(mode="contact", port=server.ports["udp"], delay="12 ms", ptp_percent=30)
     arm = connect_arm(cell, settings, RigContext(clock, 0, 0.0, live))
     until(lambda: live.wrench() is not None)
+    arm.arming = Arming.of(cell)
     arm.enable()
     yield arm, server
     arm.link.close()

@@ -14,12 +14,32 @@ def install(folder: Path, monkeypatch, name: str, source: str) -> None:
 
 
 REAL = '''
-"""The simulated devices, as if somebody could be hurt."""
+"""The simulated devices, as if somebody could be hurt; every enabling is noted."""
+from elastocal.cell import Arming
+from elastocal.errors import DeviceError
 from elastocal.sim import SimulatedDriver
+
+enabled = []
+moves = True
 
 
 class RealDriver(SimulatedDriver):
     real = True
+
+    def connect(self, cell, wanted, context):
+        found = super().connect(cell, wanted, context)
+        arm, enable = found.arm, found.arm.enable
+        arm.arming = Arming()
+
+        def checked():
+            arm.arming.require(cell)
+            enabled.append(cell.sha256)
+            if not moves:
+                raise DeviceError("this is as far as it goes")
+            enable()
+
+        arm.enable = checked
+        return found
 
 
 DRIVER = RealDriver()

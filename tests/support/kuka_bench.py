@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from elastocal.cell import ArmState, Cell, Motion
+from elastocal.cell import Arming, ArmState, Cell, Motion
 from elastocal.drivers.kuka_rsi import (
     CommissioningRecord,
     DelayEstimate,

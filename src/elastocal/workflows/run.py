@@ -197,23 +197,25 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
     journal_file = job.folder.journal
     entries = procedure.read_journal(journal_file) if journal_file.is_file() else ()
     _check_folder(job, entries, settings.resume)
-    with job.rig.reserved("run") as rig, _journal(job.folder) as journal:
-        # Read again: between the look above and the lock another process may have been here.
-        if procedure.read_journal(journal_file) != entries:
-            raise ProcedureError(f"{job.folder.path}: another process has just run here")
-        if not entries:
-            procedure.fill_folder(job.folder, job.cell, job.plan_folder)
-        known = procedure.last_known(entries) if entries else None
-        devices = rig.connect(job.record.seed, known.entry.time if known else 0.0)
-        with contextlib.closing(devices):
-            _confirm(job, known, devices, settings)
-            session = _session(job, known, devices)
-            if known is None:
-                record = _identified(job, settings.operator)
-                journal.write(devices.clock.now(), Event.START, run=record)
-            else:
-                journal.write(devices.clock.now(), Event.RESUME)
-            result = _carry_out(session, devices, journal, settings.operator, progress)
+    with job.rig.reserved("run") as rig:
+        procedure.make_folder(job.folder.path)
+        with Journal(journal_file) as journal:
+            # Read again: between the look above and the lock another process may have been here.
+            if procedure.read_journal(journal_file) != entries:
+                raise ProcedureError(f"{job.folder.path}: another process has just run here")
+            if not entries:
+                procedure.fill_folder(job.folder, job.cell, job.plan_folder)
+            known = procedure.last_known(entries) if entries else None
+            devices = rig.connect(job.record.seed, known.entry.time if known else 0.0)
+            with contextlib.closing(devices):
+                _confirm(job, known, devices, settings)
+                session = _session(job, known, devices)
+                if known is None:
+                    record = _identified(job, settings.operator)
+                    journal.write(devices.clock.now(), Event.START, run=record)
+                else:
+                    journal.write(devices.clock.now(), Event.RESUME)
+                result = _carry_out(session, devices, journal, settings.operator, progress)
     if job.key is not None:
         vouched = sign(job.key, OF_RUN, procedure.file_sha256(journal_file), _now())
         write_signature(job.folder.signature, vouched)
@@ -263,8 +265,7 @@ def _prepare(settings: RunSettings) -> _Job:
     procedure.check_compatible(read, loaded)
     carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
     rig = rig_of(loaded)
-    if settings.arming is not None:
-        settings.arming.require(loaded, rig.real)
+    (settings.arming or Arming.of(loaded)).require(loaded, rig.real)
     procedure.rehearse_derivation(loaded, read, place, stated)
     return _Job(
         loaded,
@@ -285,11 +286,6 @@ def _identified(job: _Job, operator: Operator) -> procedure.RunRecord:
     answers = dict(operator.identify(unstated(known)))
     certificate_of(known, answers)
     return job.record.model_copy(update={"stated": job.record.stated | answers})
-
-
-def _journal(folder: RunFolder) -> Journal:
-    procedure.make_folder(folder.path)
-    return Journal(folder.journal)
 
 
 def _now() -> str:

@@ -1,11 +1,11 @@
 """Bounds of corrections, and how a controller that does not follow them is found."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
-from elastocal.cell import PathCycle, RigContext, WallClock
+from elastocal.cell import Arming, PathCycle, RigContext, WallClock
 from elastocal.drivers.kuka_rsi import (
     Arrival,
     Bounds,
@@ -291,7 +291,10 @@ def corrected():
         {"mode": "compensation", "port": 0, "largest_correction": "1 mm"}
     )
     source = Cycles()
-    arm = CorrectedKuka(cell, settings, RigContext(WallClock(), 0, 0.0, None), source)
+    unarmed = RigContext(WallClock(), 0, 0.0, None)
+    with pytest.raises(DeviceError, match="the arm is not armed: nothing moves"):
+        CorrectedKuka(cell, settings, unarmed, source)
+    arm = CorrectedKuka(cell, settings, replace(unarmed, arming=Arming.of(cell)), source)
     place = xyzabc_from_T(cell.robot.forward(cell.home))
     yield arm, source, message_at(cell.home, place)
     arm.close()

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from elastocal.cell import LOOPBACK, RigContext, WallClock, load_cell
+from elastocal.cell import LOOPBACK, Arming, RigContext, WallClock, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.drivers.rtde import DRIVER, RtdeDriver, RtdeSettings, UrLine, pose_of_T
 from elastocal.errors import DeviceError
@@ -80,6 +80,9 @@ def test_a_controller_that_is_stopped_says_why_and_is_not_enabled(cell, modes, s
     devices = connect(cell, Controller(cell, **modes), "arm")
     try:
         assert devices.arm.state().fault == said
+        with pytest.raises(DeviceError, match="the arm is not armed: nothing moves"):
+            devices.arm.enable()
+        devices.arm.arming = Arming.of(cell)
         with pytest.raises(DeviceError, match=f"cannot be enabled: {said}"):
             devices.arm.enable()
     finally:

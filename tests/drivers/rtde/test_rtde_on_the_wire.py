@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from elastocal.cell import Motion, RigContext, WallClock, load_cell
+from elastocal.cell import Arming, Motion, RigContext, WallClock, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.drivers.rtde import RtdeDriver, RtdeSettings
 from elastocal.errors import DeviceError
@@ -41,6 +41,7 @@ def rig(cell):
     driver = RtdeDriver(lambda *_: client, control)
     wanted = {"arm": RtdeSettings(), "sensor": RtdeSettings()}
     found = driver.connect(cell, wanted, RigContext(clock, 0, 0.0, None))
+    found.arm.arming = Arming.of(cell)
     yield live, server, found
     found.close()
     server.close()

@@ -19,7 +19,6 @@ from elastocal.cell import (
     PathSource,
     RigContext,
     Shift,
-    require_armed,
 )
 from elastocal.drivers.kuka_rsi._held_correction import Effect, HeldCorrection
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
@@ -240,7 +239,7 @@ class CorrectedKuka:
     def __init__(
         self, cell: Cell, settings: RsiSettings, context: RigContext, source: PathSource
     ) -> None:
-        require_armed(context.arming, cell)
+        context.arming.require(cell)
         self._settings, self._source = settings, source
         self._reader = PostureReader(cell.robot, settings.signs)
         bounds = bounds_of(cell, settings)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Arming, Cell, Clock, Motion, require_armed
+from elastocal.cell import Arming, ArmState, Cell, Clock, Motion
 from elastocal.drivers.rtde._guard import Guard, frame_along, unit_vector
 from elastocal.drivers.rtde._ur_rtde import UrControl
 from elastocal.drivers.rtde.line import UrLine, UrSample, pose_of_T
@@ -78,7 +78,7 @@ class UrArm:
         motion = cell.file.motion
         self._cell, self._names = cell, cell.robot.joint_names
         self._speeds, self._time = cell.axis_speeds / motion.override, motion.acceleration_time
-        self.arming: Arming | None = None
+        self.arming = Arming()
         """See `elastocal.cell.RealArm`."""
         self._lock = threading.RLock()
         self._motion = Motion.DISARMED
@@ -124,7 +124,7 @@ class UrArm:
         DeviceError
             If it is not armed, the controller is stopped, or the program does not start.
         """
-        require_armed(self.arming, self._cell)
+        self.arming.require(self._cell)
         fault = self._line.sample().fault
         if fault is not None:
             raise DeviceError(f"{_SOURCE} cannot be enabled: {fault}")
