@@ -280,6 +280,7 @@ def arm_devices(
     operator: Operator,
     confirmed: bool,
     arming: Arming | None = None,
+    asks: bool = False,
 ) -> None:
     """Let the arm of a cell move, which nothing does before: here alone is a real arm armed.
 
@@ -293,6 +294,8 @@ def arm_devices(
         A person has agreed to this command on the cell file as it is now.
     arming : Arming, optional
         Of a person who agreed earlier, to the cell file as it was then.
+    asks : bool
+        Whether somebody has to agree even where nothing real moves.
 
     Raises
     ------
@@ -301,10 +304,9 @@ def arm_devices(
     DeviceError
         If the cell file is not the one that was agreed to, or its arm takes no arming.
     """
-    if arming is None:
-        if rig.real and not confirmed:
-            operator.confirm()
-        arming = Arming.of(rig.cell)
+    if (rig.real or asks) and not confirmed:
+        operator.confirm()
+    arming = arming or Arming.of(rig.cell)
     arming.require(rig.cell, rig.real)
     driver = rig.cell.file.devices.arm.driver
     if rig.drivers[driver].real:

@@ -51,8 +51,6 @@ class RunSettings:
     """Go on with the run that is in the folder."""
     confirmed: bool = False
     """A person has looked at the cell: do not ask. On real devices this arms the arm."""
-    arming: Arming | None = None
-    """Of a person who agreed before: the cell file must still be the same, to the byte."""
     seed: int | None = None
     """Seed of simulated devices; by default the cell's."""
     operator: Operator = field(default_factory=Unattended)
@@ -60,6 +58,8 @@ class RunSettings:
     """Private key that signs the journal at the end; see `elastocal.verdict.make_key`."""
     state: Mapping[str, str] = field(default_factory=dict)
     """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
+    arming: Arming | None = None
+    """Of a person who agreed before: the cell file must still be the same, to the byte."""
 
 
 @brief_repr
@@ -194,6 +194,7 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
         If cell, plan, a file or a device cannot be used.
     """
     job = _prepare(settings)
+    (settings.arming or Arming.of(job.cell)).require(job.cell, job.rig.real)
     journal_file = job.folder.journal
     entries = procedure.read_journal(journal_file) if journal_file.is_file() else ()
     _check_folder(job, entries, settings.resume)
@@ -264,15 +265,13 @@ def _prepare(settings: RunSettings) -> _Job:
     certificate_of(loaded.file.certificate, stated.stated)
     procedure.check_compatible(read, loaded)
     carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
-    rig = rig_of(loaded)
-    (settings.arming or Arming.of(loaded)).require(loaded, rig.real)
     procedure.rehearse_derivation(loaded, read, place, stated)
     return _Job(
         loaded,
         read,
         folder,
         carried_out,
-        rig,
+        rig_of(loaded),
         stated,
         place,
         procedure.registration_warnings(read),
@@ -397,6 +396,5 @@ def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: Run
     settings.operator.warn([f"warning: {warning}" for warning in job.warnings])
     if known is not None:
         settings.operator.warn((*known.lines, contact_sentence(devices.arm.state())))
-    if known and not (job.rig.real or settings.confirmed):
-        settings.operator.confirm()
-    arm_devices(job.rig, devices, settings.operator, settings.confirmed, settings.arming)
+    asked = settings.operator, settings.confirmed, settings.arming
+    arm_devices(job.rig, devices, *asked, asks=known is not None)
