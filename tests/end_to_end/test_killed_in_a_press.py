@@ -15,11 +15,13 @@ from elastocal.errors import ProcedureError
 from elastocal.procedure import RunEnd
 from elastocal.workflows import Supervision, Unattended, release
 from support.cli import PATIENCE
-from support.fault_matrix import RATE, Lines, _Watch, begun, wired
+from support.fault_matrix import RATE as FAST, Lines, _Watch, begun, wired
 from support.run_cells import planned_cell
 
 pytestmark = [pytest.mark.slow, pytest.mark.end_to_end]
 ENTRY = "from elastocal.cli.main import run; run()"
+RATE = 0.5 * FAST
+"""Two processes speak here, and one of them begins while the other presses."""
 NOISE = 10.0
 """Force that a standing arm may seem to gain, in N."""
 
@@ -47,7 +49,7 @@ def planned(tmp_path_factory):
 @contextmanager
 def killed(planned, folder):
     """Yield the lines, the cell and the run's folder, its process killed while it held a load."""
-    found, opened = wired(planned, f"{folder.name}.yaml")
+    found, opened = wired(planned, f"{folder.name}.yaml", RATE)
     out = folder / "run"
     with opened() as lines:
         words = ["run", str(found.cell), "--plan", str(found.plan), "--out", str(out), "--yes"]

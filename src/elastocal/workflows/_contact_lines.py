@@ -22,5 +22,8 @@ def tell_at_once(operator: Operator, fault: str) -> None:
 
     In a thread of its own: a terminal that takes nothing must not hold the arm up.
     """
-    lines = [f"fault: {fault}", "the arm now lets go and retracts"]
+    lines = [
+        f"fault: {fault}",
+        "the arm now lets go, retracts where it is before a surface, and stops",
+    ]
     threading.Thread(target=operator.warn, args=(lines,), daemon=True).start()
