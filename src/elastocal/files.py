@@ -269,16 +269,13 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write ``data`` to ``path`` atomically as JSON, one key or item a line.
+    """Write ``data`` to ``path`` atomically, as `json_text`; what cannot be is refused likewise."""
+    write_text(path, json_text(data))
 
-    Raises
-    ------
-    ValueError
-        If a number is not finite: JSON has no sign for it.
-    FileAccessError
-        If the file cannot be written.
-    """
-    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+
+def json_text(data: Any) -> str:
+    """Return ``data`` as JSON, one key or item a line; ValueError where a number is not finite."""
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
 @contextlib.contextmanager

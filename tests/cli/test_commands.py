@@ -293,7 +293,7 @@ def test_check_says_what_a_good_file_is(folder, name):
         ("a.yaml", "robot: x\n", "states no schema (known: elastocal.catalogue, elastocal.cell"),
         ("a.yaml", "a: [1\nb: 2", "while parsing a flow sequence line 1, column 4"),
         ("a.urdf", "<robot><link/></robot>", "a.urdf: URDF: link 1 of the file has no name"),
-        ("a.jsonl", "no json\n", "a.jsonl: line 1: Invalid JSON"),
+        ("a.jsonl", "no json\n", "a.jsonl: line 1 is not valid JSON"),
         ("a.urdf", "<robot>", "not valid XML"),
         ("a.yaml", "schema: elastocal.springs/1\nspings: []\n", "did you mean 'springs'"),
         ("a.yaml", "schema: elastocal.springs/1\nsprings: [{joint: j, axis: w}]\n", "springs.0"),

@@ -7,9 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.procedure import RunFolder, read_journal
-from elastocal.verdict import file_links, make_key, read_manifest
-from support import reported
+from elastocal.procedure import Event, Journal, RunFolder, read_journal
+from elastocal.verdict import (
+    file_links,
+    make_key,
+    read_manifest,
+    read_signature,
+    write_signature,
+)
+from support import forged, reported
 from support.cli import elastocal
 from support.run_cells import planned_cell
 
@@ -100,18 +106,18 @@ def test_an_edited_verdict_is_named(signed, keys, tmp_path):
     assert found.code == 1
     assert "the page was edited after it was written" in found.err.splitlines()[-1]
     # Who renews the hash of the page as well has no key to sign it with.
-    manifest, page = read_manifest(edited)
-    edited.write_text(edited.read_text("utf-8").replace(manifest.page_sha256, page), "utf-8")
+    page = read_manifest(edited).page_sha256
+    forged.renew(edited, page_sha256=page)
     found = elastocal("verify", edited)
     assert found.err.splitlines()[-1].endswith("the report was changed after it was signed")
 
 
 def test_a_forged_verdict_makes_no_line_of_its_own(signed, tmp_path):
-    page = (signed / "report.html").read_text(encoding="utf-8")
-    manifest, _ = read_manifest(signed / "report.html")
-    forged = manifest.verdict + r"\nwhole          signature: the report is signed by key 00"
+    manifest = read_manifest(signed / "report.html").manifest
+    line = manifest.verdict + "\nwhole          signature: the report is signed by key 00"
     path = tmp_path / "forged.html"
-    path.write_text(page.replace(f'"{manifest.verdict}"', f'"{forged}"', 1), encoding="utf-8")
+    path.write_bytes((signed / "report.html").read_bytes())
+    forged.renew(path, verdict=line)
     said = elastocal("verify", path)
     assert "by key 00" in said.err
     assert not re.search(r"^whole +signature", said.err, re.MULTILINE)
@@ -122,16 +128,13 @@ def copied_run(signed, tmp_path):
 
 
 def add_a_line(folder):
-    journal = folder / "run" / "journal.jsonl"
-    count = len(journal.read_text().splitlines())
-    with journal.open("a") as file:
-        file.write(json.dumps({"n": count, "time": 1e6, "event": "resume"}) + "\n")
+    with Journal(folder / "run" / "journal.jsonl") as journal:
+        journal.write(1e6, Event.RESUME)
 
 
 def forge(folder):
     path = folder / "run" / "signature.json"
-    record = json.loads(path.read_text())
-    path.write_text(json.dumps(record | {"made": "2020-01-01T00:00:00+00:00"}))
+    write_signature(path, replace(read_signature(path), made="2020-01-01T00:00:00+00:00"))
 
 
 def unlink(folder):
@@ -218,7 +221,7 @@ def test_without_the_package_signatures_are_refused_in_a_line(keys, tmp_path, mo
 
 
 def test_a_manifest_names_nothing_outside_its_folder(signed, tmp_path):
-    manifest, _ = read_manifest(signed / "report.html")
+    manifest = read_manifest(signed / "report.html").manifest
     (tmp_path / "secret").write_text("x")
     folder = tmp_path / "inner"
     folder.mkdir()

@@ -11,6 +11,7 @@ import pytest
 from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.errors import ElastocalError
+from elastocal.procedure import file_sha256
 from elastocal.records import read_arrays, write_arrays
 from elastocal.verdict import (
     EvidenceOptions,
@@ -25,6 +26,7 @@ from elastocal.verdict import (
     reading_findings,
 )
 from elastocal.verdict._files import read_seal
+from support import sealed
 from support.cli import elastocal
 from support.reported import MADE
 
@@ -76,7 +78,7 @@ def raise_the_tolerance(folder):
 
 
 def drop_the_warnings(folder):
-    edit(folder / "run" / "summary.json", lambda record: record.update(warnings=["none"]))
+    sealed.edit(folder / "run" / "summary.json", lambda record: record.update(warnings=["none"]))
 
 
 def edit_a_compliance(folder):
@@ -128,10 +130,9 @@ BROKEN = {
     "a byte of a stream": (flip_a_byte_of_a_stream, "pose_0002_1.mcap is not what the run wrote"),
     "a stream is gone": (remove("run/streams/pose_0001_1.mcap"), "cannot read .*pose_0001_1.mcap"),
     "all streams are gone": (remove("run/streams"), "^cannot read .*pose_0000_1.mcap"),
-    "a line of the journal": (edit_a_line_of_the_journal, "journal.jsonl was changed after"),
+    "a line of the journal": (edit_a_line_of_the_journal, "line \\d+ was changed after it was"),
     "the tolerance": (raise_the_tolerance, "cell/cell.yaml was changed after the run began"),
     "the run's warnings": (drop_the_warnings, "summary of the run is not .*: warnings differs"),
-    "a compliance": (edit_a_compliance, "model.json was changed after it was written"),
     "half a table": (cut_the_table, "the process cannot be used: process/table.json"),
     "a setting in the table": (edit_the_settings_of_the_process, "process/table.json was changed"),
     "the table's hash": (take_the_hash_out_of_the_table, "table.json does not state the SHA-256"),
@@ -149,7 +150,7 @@ def test_a_whole_chain_is_green(parts):
     assert {link.state for link in parts.chain} == {LinkState.WHOLE, LinkState.UNSIGNED}
     assert [link.name for link in parts.chain] == [
         *("signature", "cell and plan", "streams", "journal", "dataset", "summary"),
-        *("model", "codec", "process"),
+        *("model", "codec", "process", "history"),
     ]
     assert judged(parts).light is Light.GREEN
 
@@ -166,8 +167,23 @@ def test_what_is_broken_is_named_and_costs_the_green(copied, name):
     assert str(folder) not in reasons[0]
 
 
+def test_an_edited_model_is_not_read_and_nothing_is_judged(copied):
+    folder = copied()
+    edit_a_compliance(folder)
+    evidence = gathered(folder)
+    verdict = judged(evidence)
+    assert verdict.light is None
+    assert evidence.calibrated is None
+    (reason,) = (each for each in verdict.reasons if "model.json was changed after it was" in each)
+    assert str(folder) not in reason
+
+
 def strip(folder):
     """Make every file one of before hashes were stated."""
+    edit(
+        folder / "run" / "summary.json",
+        lambda record: (record.pop("content_sha256"), record.pop("dataset_sha256")),
+    )
     path = folder / "run" / "dataset.nc"
     data = dataset.read(path)
     attributes = {name: text for name, text in data.attributes.items() if name != "made_from"}
@@ -269,6 +285,9 @@ def test_a_difference_below_rounding_is_none(copied):
     data = dataset.read(path).to_xarray().copy(deep=True)
     data["marker_displacement"] = data["marker_displacement"] * (1.0 + 1e-9)
     dataset.write(dataset.Dataset.from_xarray(data), path)
+    # As a machine that rounds otherwise derives it.
+    summary = folder / "run" / "summary.json"
+    sealed.edit(summary, lambda record: record.update(dataset_sha256=file_sha256(path)))
     links = {link.name: link.state for link in gathered(folder).chain}
     assert links["dataset"] is LinkState.WHOLE
     assert np.isfinite(data["marker_displacement"]).all()

@@ -1,6 +1,5 @@
 """Parts that do not belong to the run: left out with the reason, or doubted."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +14,7 @@ from elastocal.verdict import (
     EvidenceOptions,
     gather_evidence,
 )
+from support import sealed
 from support.cells import Cell, linear_truth, robot
 from support.reported import MADE
 
@@ -23,12 +23,14 @@ def absent(parts):
     return {each.name: each.reason for each in parts.missing}
 
 
+def err_more(record):
+    record["calibration"]["held_out"]["mean"] *= 1.01
+
+
 def test_a_model_of_other_readings_is_doubted(copied):
     folder = copied("run", "model.json")
     model = folder / "model.json"
-    record = json.loads(model.read_text())
-    record["calibration"]["held_out"]["mean"] *= 1.01
-    model.write_text(json.dumps(record))
+    sealed.edit(model, err_more)
     parts = gather_evidence(EvidenceOptions(folder), MADE)
     assert not parts.reproduction.same
     (doubt,) = (d for d in parts.doubts if "does not give the figures of the model file" in d)
@@ -38,11 +40,10 @@ def test_a_model_of_other_readings_is_doubted(copied):
 def test_a_model_of_an_earlier_version_is_named_as_the_reason(copied):
     folder = copied("run", "model.json")
     model = folder / "model.json"
-    record = json.loads(model.read_text())
-    record["calibration"]["held_out"]["mean"] *= 1.01
+    sealed.edit(model, err_more)
     # What calibrations of before did not say.
-    del record["calibration"]["spring_count"], record["calibration"]["coverage"]
-    model.write_text(json.dumps(record))
+    for name in ("spring_count", "coverage"):
+        sealed.edit(model, lambda record, name=name: record["calibration"].pop(name))
     parts = gather_evidence(EvidenceOptions(folder), MADE)
     (doubt,) = (d for d in parts.doubts if "does not give the figures of the model file" in d)
     assert "the model was made by an earlier version of elastocal; calibrate again" in doubt
@@ -81,7 +82,7 @@ def test_a_codec_of_another_robot_or_of_other_poses_is_no_part_of_the_run(copied
 def test_a_process_of_another_cell_is_no_part_of_the_run(copied):
     folder = copied("run", "process")
     path = folder / "process" / "table.json"
-    path.write_text(path.read_text().replace('"cell": "afp"', '"cell": "other"'))
+    sealed.edit_text(path, '"cell": "afp"', '"cell": "other"')
     assert "of cell 'other'" in absent(gather_evidence(EvidenceOptions(folder), MADE))["process"]
 
 
@@ -97,7 +98,7 @@ def test_a_process_with_another_model_is_doubted(copied):
 def test_a_tool_of_another_robot_is_no_part_of_the_run(copied):
     folder = copied("run", "tool.json")
     path = folder / "tool.json"
-    path.write_text(path.read_text().replace('"flange": "', '"flange": "no_'))
+    sealed.edit_text(path, '"flange": "', '"flange": "no_')
     assert "is no link of" in absent(gather_evidence(EvidenceOptions(folder), MADE))["tool file"]
 
 
@@ -112,13 +113,6 @@ def test_a_cell_file_that_was_changed_after_the_plan_is_doubted(copied):
 
 def doubts(folder):
     return " | ".join(gather_evidence(EvidenceOptions(folder), MADE).doubts)
-
-
-def edited(path, change):
-    """Change a JSON file in place."""
-    record = json.loads(path.read_text())
-    change(record)
-    path.write_text(json.dumps(record))
 
 
 def test_parts_of_one_run_raise_no_doubt(finished):
@@ -154,7 +148,7 @@ def test_a_journal_that_was_cut_is_doubted(copied):
 
 def test_a_summary_of_another_run_is_doubted(copied):
     folder = copied("run")
-    edited(
+    sealed.edit(
         folder / "run" / "summary.json",
         lambda record: record["times"].update(started="2020-01-01T00:00:00+00:00"),
     )
@@ -176,7 +170,9 @@ def test_a_codec_of_another_run_is_doubted(copied):
 )
 def test_a_process_with_another_tool_or_on_another_cell_is_doubted(copied, change, told):
     folder = copied()
-    edited(folder / "process" / "table.json", lambda record: record["runs"][0].update(**change))
+    sealed.edit(
+        folder / "process" / "table.json", lambda record: record["runs"][0].update(**change)
+    )
     if "seed" in change:
         path = folder / "process" / "deviations.csv"
         head, *rows = path.read_text().splitlines()

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from elastocal.records import (
     arrays_of,
     arrays_sha256,
     from_data,
+    parse_json,
     read_arrays,
     to_data,
     write_arrays,
@@ -357,23 +358,27 @@ def _data_of(found: LabelledArrays) -> CodecData:
         ),
         pose_labels=tuple(labels),
         compliance=tuple(found[f"compliance_{k}"].values for k in numbers),
-        load_cases=tuple(json.loads(found.attributes["load_cases"])),
-        options=CodecOptions(**(_ALL_POSES | json.loads(found.attributes["options"]))),
+        load_cases=tuple(_said(found, "load_cases")),
+        options=CodecOptions(**(_ALL_POSES | _said(found, "options"))),
         robot=str(found.attributes["robot_name"]),
         provenance=str(found.attributes["provenance"]),
-        findings=tuple(json.loads(found.attributes["findings"])),
-        versions=json.loads(found.attributes["versions"]),
+        findings=tuple(_said(found, "findings")),
+        versions=_said(found, "versions"),
         zero_error=found["zero_error"].values if "zero_error" in found else None,
         layouts=_listed(found["variant_layout"]) if "variant_layout" in found else (),
         split_layouts=_split_layouts(found),
         ladder=tuple(
-            from_data(RungSummary, rung, "ladder")
-            for rung in json.loads(found.attributes.get("ladder", "[]"))
+            from_data(RungSummary, rung, "ladder") for rung in _said(found, "ladder", "[]")
         ),
         left_out=found["left_out"].values if "left_out" in found else None,
-        made_from=json.loads(found.attributes.get("made_from", "{}")),
+        made_from=_said(found, "made_from", "{}"),
         **arrays,
     )
+
+
+def _said(found: LabelledArrays, name: str, default: str = "") -> Any:
+    """Return what an attribute says as JSON."""
+    return parse_json(str(found.attributes.get(name, default)), f"attribute {name!r}")
 
 
 def _split_layouts(found: LabelledArrays) -> tuple[tuple[tuple[str, ...], ...], ...]:

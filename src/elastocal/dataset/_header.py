@@ -25,6 +25,7 @@ from elastocal.dataset._layout import (
     joint_name_problem,
 )
 from elastocal.errors import DatasetError, UnitError, nearest
+from elastocal.records import parse_json
 from elastocal.tables import Column, TableError, TableReader, TableRows
 from elastocal.units import factor, split_column
 
@@ -125,7 +126,7 @@ def _attribute(line: str, number: int) -> dict[str, object]:
         return {}
     known, name = (*ATTRIBUTES, *CF_ATTRIBUTES), match[1]
     try:
-        value = json.loads(match[2])
+        value = parse_json(match[2], f"row {number}")
     except ValueError as error:
         if name in ATTRIBUTES:
             raise DatasetError(

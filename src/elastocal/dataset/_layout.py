@@ -6,7 +6,6 @@ variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``
 
 import contextlib
 import difflib
-import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from elastocal.errors import DatasetError, SchemaError, UnitError, nearest
+from elastocal.records import parse_json
 from elastocal.units import parse_quantity
 
 FloatArray = NDArray[np.float64]
@@ -388,8 +388,8 @@ def read_made_from(attributes: Mapping[str, str]) -> dict[str, str]:
         If it is not JSON of texts.
     """
     text = attributes.get(MADE_FROM, "{}")
-    with contextlib.suppress(ValueError, RecursionError):
-        found = json.loads(text)
+    with contextlib.suppress(SchemaError):
+        found = parse_json(text, MADE_FROM)
         if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()):
             return found
     raise DatasetError(f"attribute {MADE_FROM!r} is {text!r:.60}: it must be SHA-256s as JSON")

@@ -6,7 +6,6 @@ the message's header, or when it was recorded where it has none. Of a topic of t
 is a table: ``/tf:tool0``.
 """
 
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from zstandard import ZstdError
 from elastocal.errors import FileAccessError, LogError, nearest
 from elastocal.logs.bounded import read_bounded
 from elastocal.logs.table import LogTable
+from elastocal.records import parse_json
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -215,7 +215,7 @@ def _summary(path: Path, reader: McapReader) -> Summary:
 def _json_messages(path: Path, topic: str) -> Iterator[_Row]:
     with _mcap(path) as reader:
         for _, _, message in reader.iter_messages(topics=[topic]):
-            yield message.log_time * _NANOSECONDS, json.loads(message.data)
+            yield message.log_time * _NANOSECONDS, parse_json(message.data, "a message")
 
 
 def _bag_messages(path: Path, topic: str) -> Iterator[_Row]:

@@ -7,15 +7,21 @@ from ._array_records import (
     write_netcdf as write_netcdf,
 )
 from ._codec import (
-    SEAL as SEAL,
     from_data as from_data,
-    json_sha256 as json_sha256,
     read_json as read_json,
     read_json_data as read_json_data,
     record as record,
     schema_of as schema_of,
+    sealed_data as sealed_data,
     to_data as to_data,
     write_json as write_json,
+)
+from ._json import (
+    SEAL as SEAL,
+    json_sha256 as json_sha256,
+    parse_json as parse_json,
+    require_seal as require_seal,
+    require_written as require_written,
 )
 from ._netcdf import (
     LabelledArray as LabelledArray,

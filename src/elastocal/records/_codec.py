@@ -2,7 +2,6 @@
 
 import dataclasses
 import enum
-import json
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -13,14 +12,11 @@ import numpy as np
 
 from elastocal import files
 from elastocal.errors import SchemaError
-from elastocal.files import Limit, read_text
+from elastocal.files import read_text
+from elastocal.records._json import SEAL, json_sha256, parse_json, require_seal
 
 T = TypeVar("T")
-_MOST_VALUES = Limit("ELASTOCAL_MAX_JSON_VALUES", 2_000_000, "values")
-_MOST_NESTING = Limit("ELASTOCAL_MAX_NESTING", 64, "levels")
 _CONFIG = {"extra": "forbid", "allow_inf_nan": False}
-SEAL = "content_sha256"
-"""Key or attribute by which a file states the hash of all else that it says."""
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
@@ -52,15 +48,6 @@ def record(
         return made
 
     return mark
-
-
-def json_sha256(data: Any) -> str:
-    """Return the SHA-256 of JSON-ready data, the same whatever the order of keys and the spaces.
-
-    The key `SEAL` is left out: a hash cannot count itself.
-    """
-    kept = {key: each for key, each in data.items() if key != SEAL} if SEAL in data else data
-    return files.sha256(json.dumps(kept, sort_keys=True, separators=(",", ":")))
 
 
 def schema_of(cls: type) -> str:
@@ -126,10 +113,15 @@ def write_json(path: Path, value: Any) -> None:
     FileAccessError
         If the file cannot be written.
     """
+    files.write_json(path, sealed_data(value))
+
+
+def sealed_data(value: Any) -> Any:
+    """Return a record as JSON-ready data, with the hash of its content where its files state it."""
     data = to_data(value)
     if type(value).__dict__.get("__sealed__"):
         data[SEAL] = json_sha256(data)
-    files.write_json(path, data)
+    return data
 
 
 def read_json(path: Path, cls: type[T], schema: str = "") -> T:
@@ -147,11 +139,17 @@ def read_json(path: Path, cls: type[T], schema: str = "") -> T:
     Raises
     ------
     SchemaError
-        If the file is not JSON, states another schema, or does not fit the record.
+        If the file is not JSON, states another schema, does not fit the record, or was changed
+        since its hash was put into it.
     FileAccessError
         If it cannot be read.
     """
-    return from_data(cls, read_json_data(path), str(path), schema)
+    data = read_json_data(path)
+    found = from_data(cls, data, str(path), schema)
+    # After the schema, which tells of a later version more plainly.
+    if isinstance(data, dict) and SEAL in data:
+        require_seal(data[SEAL], json_sha256(data), str(path))
+    return found
 
 
 def read_json_data(path: Path) -> Any:
@@ -160,50 +158,11 @@ def read_json_data(path: Path) -> Any:
     Raises
     ------
     SchemaError
-        If the file is not JSON.
+        If the file is not JSON, see `parse_json`.
     FileAccessError
         If it cannot be read.
     """
-    text = read_text(path)
-    # A comma takes a byte, the value behind it a hundred times as much.
-    _MOST_VALUES.require(text.count(","), f"{path} has {text.count(',')} commas, which")
-    try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise SchemaError(f"{path} is not valid JSON: {parser_reason(error)}") from error
-    require_shallow(data, str(path))
-    return data
-
-
-def require_shallow(data: Any, what: str) -> None:
-    """Refuse lists and mappings that are nested so deeply that who follows them runs out of stack.
-
-    Raises
-    ------
-    SchemaError
-        If they are; ``what`` is the file, for the message.
-    """
-    level, depth, most = [data] if isinstance(data, dict | list) else [], 0, _MOST_NESTING.most
-    while level:
-        depth += 1
-        if depth > most:
-            _MOST_NESTING.require(depth, f"{what}: how deeply its brackets are nested")
-        level = [
-            inner
-            for node in level
-            for inner in (node.values() if isinstance(node, dict) else node)
-            if isinstance(inner, dict | list)
-        ]
-
-
-def parser_reason(error: Exception) -> str:
-    """Return why a parser gave up, without its advice to programmers."""
-    if isinstance(error, RecursionError):
-        return "its brackets are nested too deeply"
-    if "set_int_max_str_digits" in str(error):
-        return "it holds a number of thousands of digits"
-    # PyYAML has seen the text alone, and calls it a string in brackets.
-    return " ".join(str(error).split()).replace(' in "<unicode string>",', "")
+    return parse_json(read_text(path), str(path))
 
 
 def _unstated(cls: Any, data: Any, what: str, schema: str = "") -> Any:

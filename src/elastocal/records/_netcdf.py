@@ -18,7 +18,7 @@ import numpy as np
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import Limit, readable, write_bytes
 from elastocal.parallel import GuardedError, guarded
-from elastocal.records._codec import SEAL
+from elastocal.records._json import SEAL, require_seal
 from elastocal.results import brief_repr
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -118,7 +118,8 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
     Raises
     ------
     SchemaError
-        If the file is not NetCDF4, is damaged, or states another schema.
+        If the file is not NetCDF4, is damaged, states another schema, or was changed since its
+        hash was put into it.
     FileAccessError
         If the file is missing, unreadable or empty.
     """
@@ -138,6 +139,8 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
         from elastocal.records._validation import check_schema
 
         check_schema(found.attributes.get("schema"), schema, str(path))
+    if SEAL in found.attributes:
+        require_seal(found.attributes[SEAL], arrays_sha256(found), str(path))
     return found
 
 

@@ -18,7 +18,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, fie
 
 from elastocal.errors import SchemaError
 from elastocal.files import Limit, read_text
-from elastocal.records._codec import from_data, parser_reason, require_shallow
+from elastocal.records._codec import from_data
+from elastocal.records._json import parser_reason, require_shallow
 
 
 class StrictModel(BaseModel):

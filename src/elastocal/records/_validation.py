@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import SchemaValidator
 
 from elastocal.errors import SchemaError, nearest
 from elastocal.units import in_unit_of
@@ -17,6 +18,8 @@ T = TypeVar("T")
 
 _LONGEST_SHOWN = 60
 """Longer values are left out of messages."""
+_MOST_PROBLEMS = 10_000
+"""Each takes a kilobyte as soon as one of them is looked at."""
 
 
 def check_schema(found: object, known: str, what: str) -> None:
@@ -41,12 +44,12 @@ def validate(data: Any, cls: type[T], what: str) -> T:
     SchemaError
         With the path of the first problem, its value and what is allowed.
     """
-    adapter: TypeAdapter[T] = _adapter(typing.cast("Any", cls))
+    validator = _validator(typing.cast("Any", cls))
     try:
         if issubclass(cls, BaseModel):
-            return adapter.validate_python(data)
+            return typing.cast("T", validator.validate_python(data))
         # Strict checks know JSON's lists for tuples only where they read JSON itself.
-        return adapter.validate_json(json.dumps(data), strict=True)
+        return typing.cast("T", validator.validate_json(json.dumps(data), strict=True))
     except ValidationError as error:
         raise SchemaError(f"{what}: {_first_problem(error, cls, data)}") from error
     except (TypeError, LookupError, AttributeError, OverflowError, RecursionError) as error:
@@ -56,12 +59,28 @@ def validate(data: Any, cls: type[T], what: str) -> T:
 
 
 @cache
-def _adapter(cls: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(cls)
+def _validator(cls: Any) -> SchemaValidator:
+    """Return what validates a class; of a list with wrong items it tells the first alone.
+
+    A million of them would otherwise take gigabytes.
+    """
+    schema = TypeAdapter(cls).core_schema
+    _stop_at_the_first(schema)
+    return SchemaValidator(schema)
+
+
+def _stop_at_the_first(schema: Any) -> None:
+    if isinstance(schema, dict) and "items_schema" in schema:
+        schema["fail_fast"] = True
+    for inner in schema.values() if isinstance(schema, dict) else schema:
+        if isinstance(inner, dict | list | tuple):
+            _stop_at_the_first(inner)
 
 
 def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
     """Return the first problem in the words of the file."""
+    if error.error_count() > _MOST_PROBLEMS:
+        return f"it does not fit its schema at {error.error_count()} places"
     first = error.errors(include_url=False)[0]
     # An item of an array is known by its place in it; see `elastocal.arrays`.
     item = first.get("ctx", {})

@@ -6,7 +6,6 @@ a page shows what a file says, such as the warnings of a run, the phrase is foun
 template. What no template gave stays English, and the page marks it as English.
 """
 
-import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 from elastocal.errors import ReportError
+from elastocal.records import parse_json
 from elastocal.wording import Phrase, phrase, sentences
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def language_of(code: str, option: str = "--language") -> Language:
     if code == "en":
         return Language(code)
     file = resources.files("elastocal.report").joinpath("words", f"{code}.json")
-    return Language(code, json.loads(file.read_text(encoding="utf-8")))
+    return Language(code, parse_json(file.read_text(encoding="utf-8"), file.name))
 
 
 ENGLISH = language_of("en")

@@ -24,6 +24,7 @@ from urllib.parse import urlsplit
 
 from elastocal.cell import LOOPBACK
 from elastocal.errors import DeviceError, ElastocalError, SchemaError
+from elastocal.records import parse_json
 
 MOST_BYTES = 1_000_000
 """Of a message to the server."""
@@ -292,8 +293,8 @@ class _Request(BaseHTTPRequestHandler):
         if len(text) < int(length):
             raise _RefusedError(HTTPStatus.BAD_REQUEST, "the message is cut off")
         try:
-            return json.loads(text, parse_constant=_refuse_constant)
-        except (ValueError, RecursionError) as error:
+            return parse_json(text, "the message", finite=True)
+        except SchemaError as error:
             raise _RefusedError(HTTPStatus.BAD_REQUEST, "the message is no JSON") from error
 
     def _tell_news(self) -> None:
@@ -319,7 +320,3 @@ class _Request(BaseHTTPRequestHandler):
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
-
-
-def _refuse_constant(name: str) -> None:
-    raise SchemaError(f"{name} is no number")

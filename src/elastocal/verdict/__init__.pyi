@@ -1,4 +1,5 @@
 from ._files import BYTES as BYTES, CONTENT as CONTENT, content_hash as content_hash
+from ._finding import Finding as Finding
 from .chain import (
     ChainFiles as ChainFiles,
     Link as Link,
@@ -21,7 +22,6 @@ from .evidence import (
 )
 from .findings import (
     FINDINGS as FINDINGS,
-    Finding as Finding,
     codec_findings as codec_findings,
     compliance_findings as compliance_findings,
     find_everything as find_everything,
@@ -34,6 +34,11 @@ from .findings import (
     recertification_findings as recertification_findings,
 )
 from .gather import EvidenceOptions as EvidenceOptions, gather_evidence as gather_evidence
+from .history import (
+    begin_record as begin_record,
+    history_findings as history_findings,
+    history_link as history_link,
+)
 from .judgement import (
     Light as Light,
     Verdict as Verdict,
@@ -43,6 +48,7 @@ from .judgement import (
 )
 from .manifest import (
     EMPTY_MANIFEST as EMPTY_MANIFEST,
+    FoundManifest as FoundManifest,
     Manifest as Manifest,
     ManifestFile as ManifestFile,
     embed_manifest as embed_manifest,

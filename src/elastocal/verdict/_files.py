@@ -19,16 +19,24 @@ from elastocal.dataset import MADE_FROM
 from elastocal.errors import ElastocalError, FileAccessError
 from elastocal.files import read_text
 from elastocal.procedure import JOURNAL, RunFolder, file_sha256
-from elastocal.records import SEAL, arrays_sha256, json_sha256, read_arrays, read_json_data
+from elastocal.records import (
+    SEAL,
+    arrays_sha256,
+    json_sha256,
+    parse_json,
+    read_arrays,
+    read_json_data,
+)
 from elastocal.verdict.evidence import MissingPart, Seal, UsedFile
 from elastocal.wording import phrases
 
 BYTES, CONTENT = phrases("bytes", "content without times and folders")
 _LEFT_OUT = (
     "provenance", "started", "source", "sha256", "file", "findings", "model", "model_sha256",
-    "tool", "tool_sha256", "plan", "streams_sha256", SEAL,
+    "tool", "tool_sha256", "plan", "streams_sha256", "line_check", "dataset_sha256", SEAL,
 )  # fmt: skip
 """Keys and attributes that tell when and where, or are hashes of what does."""
+_WHOLE_LEFT_OUT = (MADE_FROM, "files_sha256", "run_number", "earlier_runs")
 _STAMPED = (".json", ".jsonl", ".nc")
 _SEALED = (
     "elastocal.model", "elastocal.tool", "elastocal.process", "elastocal.codec_verdicts",
@@ -57,12 +65,13 @@ def content_hash(path: Path) -> tuple[str, str]:
 def _content(path: Path) -> str:
     if path.suffix == ".nc":
         return arrays_sha256(read_arrays(path), (*_LEFT_OUT, MADE_FROM))
-    text = read_text(path)
-    documents = text.splitlines() if path.suffix == ".jsonl" else [text]
+    whole = read_text(path)
+    documents = whole.splitlines() if path.suffix == ".jsonl" else [whole]
     digest = hashlib.sha256()
     for document in documents:
-        kept = json.dumps(_kept(json.loads(document)), sort_keys=True, separators=(",", ":"))
-        digest.update(kept.encode("utf-8") + b"\n")
+        kept = _kept(parse_json(document, str(path)))
+        text = json.dumps(kept, sort_keys=True, separators=(",", ":"))
+        digest.update(text.encode("utf-8") + b"\n")
     return digest.hexdigest()
 
 
@@ -74,7 +83,7 @@ def _kept(value: Any) -> Any:
 
 def _left_out(key: str, value: Any) -> bool:
     # A section of that name, such as the tool in the summary of a run, says more than where.
-    return key == MADE_FROM or (key in _LEFT_OUT and not isinstance(value, dict))
+    return key in _WHOLE_LEFT_OUT or (key in _LEFT_OUT and not isinstance(value, dict))
 
 
 def read_seal(path: Path) -> Seal:

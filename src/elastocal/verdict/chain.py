@@ -7,7 +7,7 @@ of what they say themselves.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from elastocal.procedure import (
 )
 from elastocal.procedure.record import check_stream
 from elastocal.progress import silent
-from elastocal.records import record, to_data
+from elastocal.records import read_json_data, record, require_written, to_data
 from elastocal.results import counted_alike
 from elastocal.verdict._differences import changed_place, changed_reading, changed_text
 from elastocal.verdict.evidence import Evidence, Seal
@@ -171,11 +171,13 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
     try:
         cell, _ = read_copies(run, record)
         # The fingerprint leaves out the tolerance, by which the light is given.
-        if record.cell_sha256 in (None, sha256(read_text(cell.path))):
-            yield _whole("cell and plan", "cell and plan are those that the run began with")
-        else:
+        if record.cell_sha256 not in (None, sha256(read_text(cell.path))):
             text = f"cell/{record.cell_file} was changed after the run began"
             yield _broken("cell and plan", text)
+        elif changed := _changed_copy(run, record):
+            yield _broken("cell and plan", f"{changed} was changed after the run began")
+        else:
+            yield _whole("cell and plan", "cell and plan are those that the run began with")
     except ElastocalError as error:
         yield _broken("cell and plan", files.plain(error))
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
@@ -200,6 +202,12 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         yield _whole("journal", "the journal is the one that the dataset was derived from")
     else:
         yield _broken("journal", f"{JOURNAL} was changed after the dataset was derived from it")
+
+
+def _changed_copy(run: RunFolder, record: RunRecord) -> str:
+    """Return a file of cell or plan that is not, byte by byte, the one that was copied."""
+    known = record.files_sha256.items()
+    return next((name for name, sha in known if file_sha256(run.path / name) != sha), "")
 
 
 def _logged(evidence: Evidence) -> Link:
@@ -236,11 +244,27 @@ def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> It
         yield _whole("dataset", f"the dataset is what the {source} give, made again from them")
     if summary is None:
         return
+    if again_summary is not None:
+        again_summary = replace(again_summary, dataset_sha256=summary.dataset_sha256)
     if place := changed_place(to_data(summary), to_data(again_summary)):
         text = f"the summary of the run is not what the streams give: {place} differs"
         yield _unlike(old, "summary", text, advice)
     else:
         yield _whole("summary", "the summary of the run is what the streams give")
+    if files.run is not None and summary.dataset_sha256:
+        yield from _rewritten(files.run, summary)
+
+
+def _rewritten(run: RunFolder, summary: RunSummary) -> Iterator[Link]:
+    """Yield what was written again, or edited too little to say something else."""
+    if file_sha256(run.dataset) != summary.dataset_sha256:
+        text = f"{run.dataset.name} was changed after it was derived: its SHA-256 is not the one"
+        advice = _ADVICE.format(command="derive")
+        yield _broken("dataset", f"{text} in {run.summary.name}{advice}")
+    try:
+        require_written(run.summary, read_json_data(run.summary))
+    except SchemaError:
+        yield _broken("summary", f"{run.summary.name} was changed after it was derived")
 
 
 def _unlike(old: bool, name: str, text: str, advice: str) -> Link:
@@ -311,13 +335,8 @@ def _made_of(
 
 
 def _is_broken(evidence: Evidence, what: str) -> bool:
-    """Return whether the file of the model, or one of a codec's, does not say what it said."""
-    model = None if evidence.calibrated is None else evidence.calibrated.sha256
-    return any(
-        each.bytes_sha256 == model if what == _MODEL else each.name.startswith(what)
-        for each in evidence.files
-        if each.seal is Seal.BROKEN
-    )
+    """Return whether a file of a codec does not say what it said; a model is then not read."""
+    return any(each.name.startswith(what) for each in evidence.files if each.seal is Seal.BROKEN)
 
 
 def _process(evidence: Evidence) -> Iterator[Link]:

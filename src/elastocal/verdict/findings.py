@@ -1,7 +1,6 @@
 """Findings: what a reader of the verdict has to know, part by part, in the order of the report."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,8 +9,10 @@ from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.procedure import commits
 from elastocal.results import counted_alike
+from elastocal.verdict._finding import Finding as Finding
 from elastocal.verdict.chain import LinkState
 from elastocal.verdict.evidence import Evidence
+from elastocal.verdict.history import history_findings
 from elastocal.wording import Phrase, counted, mm, phrase, sentences, spans
 
 _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
@@ -20,19 +21,6 @@ _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
 taken away. The codec has a finding of its own."""
 _TOLD_ELSEWHERE = ("codec", "earlier calibration")
 """A codec has a finding of its own; a first calibration has no earlier one."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something that a reader of the verdict has to know."""
-
-    text: str
-    holds_back: bool = True
-    """Whether it keeps the light from being green."""
-    advice: str = ""
-    """Advice that follows; empty where the text says it."""
-    breaks_trust: bool = False
-    """Whether files were changed or contradict one another; such findings are told first."""
 
 
 def find_everything(evidence: Evidence) -> tuple[Finding, ...]:
@@ -395,5 +383,6 @@ FINDINGS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
     process_findings,
     recertification_findings,
     missing_findings,
+    history_findings,
 )
 """All findings, in the order of the report's sections; new ones are added here."""

@@ -5,7 +5,7 @@ name and cannot be used is left out, and the report says why. Parts that belong 
 or another cell count as unusable.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -52,7 +52,7 @@ from elastocal.verdict._files import (
     find_folders,
     run_files,
 )
-from elastocal.verdict.chain import ChainFiles, LinkState, verify_chain
+from elastocal.verdict.chain import ChainFiles, Link, LinkState, verify_chain
 from elastocal.verdict.evidence import (
     AcceptanceLimits,
     CodecEvidence,
@@ -64,6 +64,7 @@ from elastocal.verdict.evidence import (
     check_tool,
     find_doubts,
 )
+from elastocal.verdict.history import history_link
 from elastocal.wording import phrase
 
 _UNKNOWN = "nothing is known of how the readings came about"
@@ -122,13 +123,20 @@ def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:
     evidence = replace(evidence, files=tuple(reader.files), missing=tuple(reader.missing))
     tool = options.tool or reader.folders.default(TOOL)
     files = ChainFiles(reader.folders.run, tool, reader.without_folders, options.signer)
-    evidence = replace(evidence, chain=verify_chain(evidence, files))
+    chain = (*verify_chain(evidence, files), *_history(evidence, reader.folders.run))
+    evidence = replace(evidence, chain=chain)
     broken = (link.text for link in evidence.chain if link.state is LinkState.BROKEN)
     return replace(
         evidence,
         name=evidence.cell.name if evidence.cell else evidence.robot or "robot",
         doubts=tuple(dict.fromkeys((*broken, *find_doubts(evidence)))),
     )
+
+
+def _history(evidence: Evidence, run: RunFolder | None) -> Iterator[Link]:
+    if run is not None and evidence.run_record is not None and evidence.cell is not None:
+        link = history_link(evidence.run_record, run, evidence.cell.name)
+        yield from () if link is None else (link,)
 
 
 def _with_readings(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:

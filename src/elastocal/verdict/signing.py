@@ -8,19 +8,27 @@ Whoever has no key can renew every hash; only a signature tells who has vouched 
 import importlib.util
 import json
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal.errors import FileAccessError, VerificationError
-from elastocal.files import read_text, require_file
-from elastocal.records import read_json, record, to_data, write_json
+from elastocal.files import read_text
+from elastocal.records import (
+    read_json,
+    record,
+    require_written,
+    to_data,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 OF_RUN, OF_REPORT = "run", "report"
 """What a signature may be of."""
+_KEY, _SIGNATURE = re.compile("[0-9a-f]{64}"), re.compile("[0-9a-f]{128}")
 _SHOWN = 16
 """Digits of a public key that people compare."""
 
@@ -215,6 +223,9 @@ def check_signature(found: Signature, of: str, sha256: str, trusted: str | None)
             f" ({trusted[:_SHOWN]})"
         )
     try:
+        # Python also reads capitals and spaces, so that one signature had many spellings.
+        if not (_KEY.fullmatch(found.key) and _SIGNATURE.fullmatch(found.signature)):
+            raise ValueError("not in hexadecimal digits")
         key = Ed25519PublicKey.from_public_bytes(bytes.fromhex(found.key))
         key.verify(bytes.fromhex(found.signature), found.signed)
     except (ValueError, InvalidSignature) as error:
@@ -240,12 +251,13 @@ def read_signature(path: Path) -> Signature:
     Raises
     ------
     SchemaError
-        If it is none.
+        If it is none, or has another space, key or letter than the file that was written.
     FileAccessError
         If it cannot be read.
     """
-    require_file(path)
-    return read_json(path, Signature)
+    found = read_json(path, Signature)
+    require_written(path, to_data(found))
+    return found
 
 
 def _require_cryptography() -> None:

@@ -13,7 +13,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elastocal import procedure
+from elastocal import procedure, verdict
 from elastocal.cell import Arming, Cell, Devices, LineCounts, certificate_of, load_cell, unstated
 from elastocal.errors import ElastocalError, ProcedureError
 from elastocal.files import read_text
@@ -24,7 +24,6 @@ from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.verdict import OF_RUN, public_key, read_private_key, sign, write_signature
 from elastocal.workflows._contact_lines import contact_sentence, tell_at_once
 from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
@@ -218,8 +217,8 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
                     journal.write(devices.clock.now(), Event.RESUME)
                 result = _carry_out(session, devices, journal, settings.operator, progress)
     if job.key is not None:
-        vouched = sign(job.key, OF_RUN, procedure.file_sha256(journal_file), _now())
-        write_signature(job.folder.signature, vouched)
+        vouched = verdict.sign(job.key, verdict.OF_RUN, procedure.file_sha256(journal_file), _now())
+        verdict.write_signature(job.folder.signature, vouched)
     if result.end is RunEnd.STOPPED:
         raise ProcedureError(f"{result.message}. The arm is {result.location.value}")
     return _derived(job, result)
@@ -250,7 +249,7 @@ def _prepare(settings: RunSettings) -> _Job:
     plan = Path(settings.plan)
     loaded, read = load_cell(Path(settings.cell)), read_plan(plan)
     folder = plan if plan.is_dir() else plan.parent
-    key = None if settings.sign is None else read_private_key(settings.sign)
+    key = None if settings.sign is None else verdict.read_private_key(settings.sign)
     seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
     stated = procedure.run_record(
         loaded,
@@ -259,7 +258,7 @@ def _prepare(settings: RunSettings) -> _Job:
         cell_file=procedure.cell_path_in_run(loaded),
         seed=seed,
         started=_now(),
-        signer=public_key(key) if key else None,
+        signer=verdict.public_key(key) if key else None,
         stated=dict(settings.state),
     )
     certificate_of(loaded.file.certificate, stated.stated)
@@ -284,7 +283,8 @@ def _identified(job: _Job, operator: Operator) -> procedure.RunRecord:
     known = certificate_of(job.cell.file.certificate, job.record.stated)
     answers = dict(operator.identify(unstated(known)))
     certificate_of(known, answers)
-    return job.record.model_copy(update={"stated": job.record.stated | answers})
+    record = job.record.model_copy(update={"stated": job.record.stated | answers})
+    return verdict.begin_record(record, job.folder, job.cell.name)
 
 
 def _now() -> str:

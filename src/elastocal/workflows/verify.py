@@ -1,5 +1,6 @@
 """``verify``: is a run, or a report, what it was when it was made; who vouches for it."""
 
+import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from os import PathLike
@@ -12,6 +13,7 @@ from elastocal.results import Result
 from elastocal.verdict import (
     OF_REPORT,
     EvidenceOptions,
+    FoundManifest,
     Link,
     LinkState,
     Manifest,
@@ -23,6 +25,9 @@ from elastocal.verdict import (
 )
 from elastocal.workflows._workflow import workflow
 
+_HASH = re.compile("[0-9a-f]{8,64}")
+_SHOWN = 16
+"""Digits of a run's hash that people compare."""
 _OF_A_RUN = ("run", "journal", "cell", "plan", "dataset", "summary of the run")
 """Parts that a run has, whatever was made from it; without one nothing is verified."""
 
@@ -37,6 +42,8 @@ class VerifySettings:
     """Public key that must have signed it; by default none need have."""
     run: Path | None = None
     """Folder of the run that a report shows; by default the report's own."""
+    expect: str | None = None
+    """Hash of the run that it must be, or its first 8 digits or more; by default any."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,26 +97,28 @@ def verify(settings: VerifySettings, progress: Progress) -> VerifyResult:  # noq
     target = Path(settings.file)
     trusted = None if settings.key is None else read_public_key(settings.key)
     if target.is_file() and target.suffix.lower() in (".html", ".htm"):
-        return VerifyResult(str(target), (*_report(target, settings.run, trusted),))
+        return VerifyResult(str(target), (*_report(target, settings, trusted),))
     if not target.exists():
         raise FileAccessError(f"cannot read {target}: there is no such file or folder")
     if not target.is_dir():
         raise FileAccessError(f"{target} is neither a report (.html) nor the folder of a run")
     if settings.run is not None:
         raise FileAccessError(f"--run {settings.run}: it says where the run of a report lies")
-    return VerifyResult(str(target), (*_run(target, trusted, required=settings.key is not None),))
+    return VerifyResult(str(target), (*_run(target, trusted, settings.expect, alone=True),))
 
 
-def _report(path: Path, run: Path | None, trusted: str | None) -> list[Link]:
+def _report(path: Path, settings: VerifySettings, trusted: str | None) -> list[Link]:
     """Return the links of a report: page, signature, files, and those of the run beside it."""
-    manifest, page = read_manifest(path)
-    if page == manifest.page_sha256:
+    found, run = read_manifest(path), settings.run
+    manifest = found.manifest
+    if found.page_sha256 == manifest.page_sha256:
         text = f"the page is the one that was written: {_light(manifest)}"
         links = [Link("page", LinkState.WHOLE, text)]
     else:
         text = "the page was edited after it was written: its SHA-256 is not that of its manifest"
         links = [Link("page", LinkState.BROKEN, text)]
-    links.append(_signature(manifest, trusted))
+    links.append(_signature(found, trusted))
+    links += _expected(manifest.run, settings.expect)
     folder = path.parent if run is None else run
     folders = tuple(dict.fromkeys((folder, folder.resolve().parent))) if run else (folder,)
     files = file_links(manifest, folders)
@@ -129,20 +138,41 @@ def _light(manifest: Manifest) -> str:
     return f"{manifest.verdict} ({manifest.light} light)" if manifest.light else manifest.verdict
 
 
-def _signature(manifest: Manifest, trusted: str | None) -> Link:
-    if manifest.signature is None:
+def _signature(found: FoundManifest, trusted: str | None) -> Link:
+    signature = found.manifest.signature
+    if signature is None:
         state = LinkState.UNSIGNED if trusted is None else LinkState.BROKEN
         return Link("signature", state, "the report is not signed: whoever edits it can renew it")
     try:
-        check_signature(manifest.signature, OF_REPORT, manifest.sha256, trusted)
+        check_signature(signature, OF_REPORT, found.signed_sha256, trusted)
     except VerificationError as error:
         return Link("signature", LinkState.BROKEN, str(error))
-    signer = f"the report is signed by key {manifest.signature.signer}"
+    signer = f"the report is signed by key {signature.signer}"
     text = signer if trusted else f"{signer}; give --key to hold it against one that you trust"
     return Link("signature", LinkState.WHOLE, text)
 
 
-def _run(folder: Path, trusted: str | None, *, required: bool = False) -> list[Link]:
+def _expected(found: str | None, expect: str | None) -> list[Link]:
+    """Return whether a run is the one that somebody expects."""
+    if expect is None:
+        return []
+    if not _HASH.fullmatch(expect):
+        raise VerificationError(
+            f"--expect {expect!r:.80}: it must be the 64 digits of a run's hash, or its first 8 or"
+            " more; `elastocal verify` shows them"
+        )
+    if found is None:
+        text = "it does not state its run (made before files stated it)"
+        return [Link("expected run", LinkState.BROKEN, text)]
+    if not found.startswith(expect):
+        text = f"it is of run {found[:_SHOWN]}, not of the run {expect[:_SHOWN]} that is expected"
+        return [Link("expected run", LinkState.BROKEN, text)]
+    return [Link("expected run", LinkState.WHOLE, f"it is of run {found[:_SHOWN]}, as expected")]
+
+
+def _run(
+    folder: Path, trusted: str | None, expect: str | None = None, *, alone: bool = False
+) -> list[Link]:
     """Return the links of a run, with every part that is damaged and every doubt about it."""
     made = datetime.now(UTC).isoformat(timespec="seconds")
     try:
@@ -163,6 +193,8 @@ def _run(folder: Path, trusted: str | None, *, required: bool = False) -> list[L
     links += [
         Link("whole run", LinkState.BROKEN, text) for text in evidence.doubts if text not in told
     ]
-    if required and not any(link.name == "signature" for link in links):
+    record = evidence.run_record
+    links += _expected(None if record is None else record.identity, expect)
+    if alone and trusted and not any(link.name == "signature" for link in links):
         links.append(Link("signature", LinkState.BROKEN, "there is no run that could be signed"))
     return links

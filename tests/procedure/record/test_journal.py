@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 
 import pytest
 
@@ -26,6 +27,11 @@ def begun(path):
     return path
 
 
+def unchecked(path):
+    """Take the checksums out of a journal, so that it is one of before."""
+    path.write_text(re.sub(',"line_check":"[0-9a-f]{16}"', "", path.read_text()))
+
+
 def test_what_is_written_is_read(begun):
     first, second = read_journal(begun)
     assert (first.n, first.time, first.event, first.run) == (0, 1.5, Event.START, RECORD)
@@ -33,6 +39,7 @@ def test_what_is_written_is_read(begun):
 
 
 def test_the_first_line_carries_its_schema_and_is_refused_without(begun):
+    unchecked(begun)
     lines = begun.read_text().splitlines()
     assert json.loads(lines[0])["run"]["schema_name"] == "elastocal.journal/1"
     begun.write_text(lines[0].replace('"schema_name":"elastocal.journal/1",', "") + "\n")
@@ -42,6 +49,7 @@ def test_the_first_line_carries_its_schema_and_is_refused_without(begun):
 
 def test_a_line_is_json_with_number_time_and_event(begun):
     line = json.loads(begun.read_text().splitlines()[1])
+    assert re.fullmatch("[0-9a-f]{16}", line.pop("line_check"))
     assert line == {
         "n": 1, "time": 2.0, "event": "begin", "pose": 3, "attempt": 1, "action": "move",
         "target": [0.1, 0.2],
@@ -113,10 +121,10 @@ def test_a_second_process_is_refused(begun):
     ("text", "message"),
     [
         ('{"n":0,"time":0.0,"event":"end"}\n', "line 1 is not the start of a run"),
-        ("no json\n", "line 1: "),
+        ("no json\n", "line 1 is not valid JSON"),
         ('{"n":0,"time":0.0,"event":"never"}\n', "line 1: event: "),
         ('{"n":7,"time":0.0,"event":"end"}\n', "line 1: n must be 0, got 7"),
-        ('{"n":0,"time":0.0,"event":"end","x":1}\n', "line 1: x: "),
+        ('{"n":0,"time":0.0,"event":"end","x":1}\n', "line 1: unknown key 'x'"),
     ],
 )
 def test_what_is_no_journal_is_refused(path, text, message):
@@ -127,4 +135,49 @@ def test_what_is_no_journal_is_refused(path, text, message):
 
 def test_a_journal_that_is_not_there_is_refused(path):
     with pytest.raises(FileAccessError, match="cannot read"):
+        read_journal(path)
+
+
+def test_every_changed_byte_of_a_line_is_found(begun):
+    data = begun.read_bytes()
+    for place in range(len(data) - 1):
+        begun.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+        with pytest.raises(SchemaError, match=r"journal\.jsonl: line [12]"):
+            read_journal(begun)
+
+
+@pytest.mark.parametrize("more", [b" ", b"\r", b"\n", b"0", b"\xef\xbb\xbf"])
+def test_every_byte_too_much_is_found(begun, more):
+    data = begun.read_bytes()
+    for place in range(len(data)):
+        begun.write_bytes(data[:place] + more + data[place:])
+        with pytest.raises(SchemaError, match=r"journal\.jsonl: line [123]"):
+            read_journal(begun)
+
+
+def test_a_line_that_is_gone_is_found_although_the_numbers_were_mended(begun):
+    with Journal(begun) as journal:
+        journal.write(3.0, Event.END)
+    first, _, last = begun.read_text().splitlines(keepends=True)
+    begun.write_text(first + last.replace('"n":2', '"n":1'))
+    with pytest.raises(SchemaError, match=r"line 2 was changed .*, or the one before it is gone"):
+        read_journal(begun)
+
+
+def test_a_journal_of_before_is_read_and_goes_on_with_checksums(begun):
+    unchecked(begun)
+    before = read_journal(begun)
+    with Journal(begun) as journal:
+        journal.write(3.0, Event.RESUME)
+        journal.write(4.0, Event.END)
+    assert read_journal(begun)[:2] == before
+    data = begun.read_bytes()
+    begun.write_bytes(data.replace(b'"time":3.0', b'"time":3.5'))
+    with pytest.raises(SchemaError, match="line 3 was changed"):
+        read_journal(begun)
+
+
+def test_a_key_that_stands_twice_in_a_line_is_refused(path):
+    path.write_text('{"n":0,"time":0.0,"time":1.0,"event":"end"}\n')
+    with pytest.raises(SchemaError, match="line 1 is not valid JSON: key 'time' stands twice"):
         read_journal(path)

@@ -224,7 +224,7 @@ def no_json(path) -> None:
         (foreign, "has schema None"),
         (no_joints, "its metadata do not name the joints of the arm"),
         (odd_message, "/wrench holds a message that is not ours: KeyError 'status'"),
-        (no_json, "/marks holds a message that is not ours: JSONDecodeError"),
+        (no_json, "/marks holds a message that is not ours: its text is not valid JSON"),
     ],
 )
 def test_files_of_others_are_refused_in_one_line(tmp_path, make, message):

@@ -22,6 +22,10 @@ def _verify(
         Path | None,
         typer.Option(metavar="DIR", help="Run that a report shows; default: beside the report."),
     ] = None,
+    expect: Annotated[
+        str | None,
+        typer.Option(metavar="HASH", help="The run that it must be of, by 8 digits or more."),
+    ] = None,
     new_key: Annotated[
         Path | None,
         typer.Option(metavar="KEY", help="Make a key pair instead: KEY and KEY.pub."),
@@ -46,7 +50,7 @@ def _verify(
         )
         return
     assert target is not None
-    found = workflows.verify(target, key=key, run=run)
+    found = workflows.verify(target, key=key, run=run, expect=expect)
     if as_json:
         output.print_json({"whole": found.broken is None, "links": found.links})
     else:

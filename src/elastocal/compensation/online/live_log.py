@@ -22,7 +22,7 @@ from elastocal.compensation.online.live import LiveCycle
 from elastocal.compensation.online.state import Status
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import readable, require_file
-from elastocal.records import check_schema
+from elastocal.records import check_schema, parse_json
 from elastocal.results import brief_repr
 
 LIVE_LOG_SCHEMA = "elastocal.live-log/1"
@@ -157,7 +157,7 @@ def read_live_log_facts(path: Path) -> LiveLogFacts:
             reader = make_reader(file)
             found = next((each.metadata for each in reader.iter_metadata()), {})
             summary = reader.get_summary()
-            joints = json.loads(found.get("joints", "[]"))
+            joints = parse_json(found.get("joints", "[]"), "its list of joints")
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
     except (

@@ -201,7 +201,8 @@ def write_derived(run: Path, derived: DerivedRun) -> None:
     """
     folder = RunFolder(Path(run))
     write(derived.dataset, folder.dataset)
-    write_json(folder.summary, derived.summary)
+    stated = replace(derived.summary, dataset_sha256=file_sha256(folder.dataset))
+    write_json(folder.summary, stated)
 
 
 def derive_poses(

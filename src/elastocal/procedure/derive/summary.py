@@ -213,7 +213,7 @@ class TimeSummary:
     total: Number
 
 
-@record("elastocal.run-summary/1")
+@record("elastocal.run-summary/1", sealed=True)
 class RunSummary(Result):
     """Findings on the way to the dataset of a run."""
 
@@ -233,6 +233,8 @@ class RunSummary(Result):
     lines: tuple[LineCounts, ...] = ()
     """What was counted on the lines of the devices, all sessions together; none of simulated ones,
     and of runs before it was."""
+    dataset_sha256: str = ""
+    """Of the file ``dataset.nc`` that it was written with; empty before it was."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""

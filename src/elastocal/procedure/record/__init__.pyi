@@ -4,12 +4,22 @@ from .folder import (
     cell_path_in_run as cell_path_in_run,
     check_plan as check_plan,
     check_stream as check_stream,
+    copies_sha256 as copies_sha256,
     file_sha256 as file_sha256,
     fill_folder as fill_folder,
     make_folder as make_folder,
     read_copies as read_copies,
     refuse_foreign_files as refuse_foreign_files,
     signs_of_a_cut as signs_of_a_cut,
+)
+from .history import (
+    HISTORY as HISTORY,
+    JOURNAL_SCHEMA as JOURNAL_SCHEMA,
+    EarlierRun as EarlierRun,
+    HistoryEntry as HistoryEntry,
+    RunRecord as RunRecord,
+    note_run as note_run,
+    read_history as read_history,
 )
 from .journal import (
     Action as Action,
@@ -19,7 +29,6 @@ from .journal import (
     Logbook as Logbook,
     PoseLog as PoseLog,
     ReadingStatus as ReadingStatus,
-    RunRecord as RunRecord,
     Sync as Sync,
     Window as Window,
     commits as commits,

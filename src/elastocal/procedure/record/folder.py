@@ -14,7 +14,8 @@ from elastocal.cell import Cell, fingerprint, load_cell, named_files
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_bytes, read_text, replacing, sha256
 from elastocal.planning import PLAN, POOL, PlanResult, read_plan
-from elastocal.procedure.record.journal import Entry, RunRecord
+from elastocal.procedure.record.history import RunRecord
+from elastocal.procedure.record.journal import Entry
 from elastocal.wording import counted
 
 JOURNAL = "journal.jsonl"
@@ -106,6 +107,19 @@ def fill_folder(folder: RunFolder, cell: Cell, plan: Path) -> None:
         if (plan / name).is_file():
             _copy(plan / name, folder.plan / name)
     make_folder(folder.streams)
+
+
+def copies_sha256(folder: RunFolder) -> dict[str, str]:
+    """Return the SHA-256 of every file of cell and plan in a run's folder, by its path there.
+
+    Raises
+    ------
+    FileAccessError
+        If one cannot be read.
+    """
+    places = sorted(place for part in (folder.cell, folder.plan) for place in part.rglob("*"))
+    files = (place for place in places if place.is_file())
+    return {file.relative_to(folder.path).as_posix(): file_sha256(file) for file in files}
 
 
 def refuse_foreign_files(folder: RunFolder) -> None:

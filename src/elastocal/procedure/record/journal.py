@@ -1,24 +1,26 @@
 """Journal of a run: JSON lines, only ever appended to, on the disk before anything moves on.
 
 An entry that is on the disk is complete: a line that a crash has torn is known by its missing end
-and cut off before the next entry is written.
+and cut off before the next entry is written. Each line ends with a checksum of itself and of the
+line before it, so that one that a disk or a hand has changed is known, and one that is gone.
 """
 
 import contextlib
 import errno
+import hashlib
 import os
+import re
 from collections.abc import Callable, Iterator
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer
-
 from elastocal.cell import Clock, LineCounts
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_bytes
 from elastocal.locks import lock_file
-from elastocal.records import StrictModel
+from elastocal.procedure.record.history import JOURNAL_SCHEMA, RunRecord
+from elastocal.records import StrictModel, from_data, parse_json
 
 
 class ReadingStatus(Enum):
@@ -61,7 +63,8 @@ class PoseLog(StrictModel):
 
 _BYTES: int = getattr(os, "O_BINARY", 0)
 """Keeps Windows from writing another line end than it is given."""
-_JOURNAL_SCHEMA = "elastocal.journal/1"
+_CHECKED = re.compile(rb'(\{.+),"line_check":"([0-9a-f]{16})"\}')
+"""A line with its checksum."""
 
 
 class Event(Enum):
@@ -96,44 +99,6 @@ class Action(Enum):
     RETRACT = "retract"
     STOP = "stop"
     DISABLE = "disable"
-
-
-class RunRecord(StrictModel):
-    """Which run a journal belongs to."""
-
-    schema_name: str = _JOURNAL_SCHEMA
-    elastocal: str
-    """Version that started it."""
-    plan: str
-    """SHA-256 of ``plan.json``."""
-    cell: str
-    """Fingerprint of the cell."""
-    cell_file: str
-    """Path of the cell file in the run's folder ``cell``."""
-    seed: int
-    """Seed of simulated devices."""
-    started: str
-    """Date and time of day, ISO 8601, UTC."""
-    cell_sha256: str | None = None
-    """SHA-256 of the cell file: the fingerprint leaves out by what a result is judged. None in
-    journals before it was written."""
-    signer: str | None = None
-    """Public key of who signs it; None: nobody does."""
-    stated: dict[str, str] = Field(default_factory=dict)
-    """What was stated for the certificate when the run began, by key: who, where, serials."""
-
-    @property
-    def origin(self) -> str:
-        """Provenance that a dataset states."""
-        return (
-            f"started {self.started} with elastocal {self.elastocal}, plan {self.plan[:12]}, cell"
-            f" {self.cell[:12]}, seed {self.seed}"
-        )
-
-    @model_serializer(mode="wrap")
-    def _schema_first(self, rest: SerializerFunctionWrapHandler) -> dict[str, object]:
-        # An entry leaves out what is at its default; the schema must be there all the same.
-        return {"schema_name": self.schema_name, **rest(self)}
 
 
 class Entry(StrictModel):
@@ -196,7 +161,7 @@ class Journal:
             raise _cannot("write", self.path, error) from error
         try:
             self._lock()
-            entries, self._size = _read(self.path)
+            entries, self._size, self._check = _read(self.path)
             self._cut()
         except BaseException:
             os.close(self._file)
@@ -227,16 +192,19 @@ class Journal:
             If it cannot be written whole; what was written of it is taken back.
         """
         entry = Entry(n=self._count, time=time, event=event, **fields)
-        line = entry.model_dump_json(exclude_defaults=True).encode() + b"\n"
-        before = self._count, self._size
+        body = entry.model_dump_json(exclude_defaults=True).encode()[:-1]
+        check = _line_check(self._check, body)
+        line = b'%s,"line_check":"%s"}\n' % (body, check)
+        before = self._count, self._size, self._check
         try:
             if os.write(self._file, line) < len(line):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             # Counted before the sync: should that be interrupted, the line is there all the same.
             self._count, self._size = self._count + 1, self._size + len(line)
+            self._check = check
             self._sync(self._file)
         except OSError as error:
-            self._count, self._size = before
+            self._count, self._size, self._check = before
             self._cut()
             raise _cannot("write", self.path, error) from error
         return entry
@@ -278,15 +246,33 @@ def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
     return tuple(entry.log for entry in entries if entry.log is not None)
 
 
-def _read(path: Path) -> tuple[tuple[Entry, ...], int]:
-    """Return the complete entries and the number of bytes that they take."""
+def _read(path: Path) -> tuple[tuple[Entry, ...], int, bytes]:
+    """Return the complete entries, the bytes that they take, and the checksum of the last.
+
+    Journals of before have no checksums, up to where a later version went on with them.
+    """
     data = read_bytes(path)
     whole = data.rfind(b"\n") + 1
-    lines = data[:whole].splitlines()
-    entries = tuple(_entry(path, number, line) for number, line in enumerate(lines))
+    entries, check = [], b""
+    for number, line in enumerate(data[:whole].split(b"\n")[:-1]):
+        what, checked = f"{path}: line {number + 1}", _CHECKED.fullmatch(line)
+        if checked is not None:
+            line, stated = checked[1] + b"}", checked[2]
+            check = _line_check(check, checked[1])
+        if check and (checked is None or stated != check):
+            raise SchemaError(
+                f"{what} was changed after it was written, or the one before it is gone: its"
+                f" checksum is not {check.decode()}; put the original journal back"
+            )
+        entries.append(_entry(what, number, line))
     if entries and not _starts(entries[0]):
-        raise SchemaError(f"{path}: line 1 is not the start of a run (schema {_JOURNAL_SCHEMA!r})")
-    return entries, whole
+        raise SchemaError(f"{path}: line 1 is not the start of a run (schema {JOURNAL_SCHEMA!r})")
+    return tuple(entries), whole, check
+
+
+def _line_check(before: bytes, body: bytes) -> bytes:
+    """Return the checksum of a line: of that of the line before it, and of its own text."""
+    return hashlib.sha256(before + body).hexdigest()[:16].encode()
 
 
 def _starts(entry: Entry) -> bool:
@@ -294,20 +280,15 @@ def _starts(entry: Entry) -> bool:
     run = entry.run
     return (
         run is not None
-        and run.schema_name == _JOURNAL_SCHEMA
+        and run.schema_name == JOURNAL_SCHEMA
         and "schema_name" in run.model_fields_set
     )
 
 
-def _entry(path: Path, number: int, line: bytes) -> Entry:
-    try:
-        entry = Entry.model_validate_json(line)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = "".join(f"{part}: " for part in [".".join(map(str, first["loc"]))] if part)
-        raise SchemaError(f"{path}: line {number + 1}: {place}{first['msg']}") from error
+def _entry(what: str, number: int, line: bytes) -> Entry:
+    entry = from_data(Entry, parse_json(line, what), what)
     if entry.n != number:
-        raise SchemaError(f"{path}: line {number + 1}: n must be {number}, got {entry.n}")
+        raise SchemaError(f"{what}: n must be {number}, got {entry.n}")
     return entry
 
 

@@ -20,6 +20,7 @@ from elastocal import __version__
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import ArmState, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import ProcedureError, SchemaError
+from elastocal.files import Limit
 from elastocal.procedure.record._mcap import (
     ARM,
     MARKER,
@@ -37,7 +38,7 @@ from elastocal.procedure.record._mcap import (
     write_mcap,
 )
 from elastocal.procedure.record.folder import file_sha256
-from elastocal.records import check_schema
+from elastocal.records import check_schema, parse_json
 from elastocal.results import brief_repr
 
 STREAMS_SCHEMA = "elastocal.streams/1"
@@ -49,6 +50,9 @@ _NANOSECONDS = 1e9
 """In a second."""
 _DAMAGE = (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError)
 """What JSON of another shape, of other types, of endless numbers or brackets raises."""
+
+_MOST_VALUES = Limit("ELASTOCAL_MAX_STREAM_VALUES", 20_000_000, "values")
+"""Of a topic; ten times as many as of a document: an hour of a pose takes 3 million."""
 
 _Stream = TypeVar("_Stream")
 
@@ -271,7 +275,8 @@ def read_streams(path: Path, spans: Sequence[tuple[float, float]] | None = None)
         try:
             return make(*_parsed(contents.topics.get(name, Messages()), spans))
         except _DAMAGE as error:
-            reason = f"{type(error).__name__} {' '.join(str(error).split())}"
+            kind = "" if isinstance(error, SchemaError) else f"{type(error).__name__} "
+            reason = f"{kind}{' '.join(str(error).split())}"
             message = f"{path}: {name} holds a message that is not ours: {reason}"
             raise SchemaError(message) from error
 
@@ -286,7 +291,7 @@ def read_streams(path: Path, spans: Sequence[tuple[float, float]] | None = None)
 
 def _joints(path: Path, note: Mapping[str, str]) -> tuple[str, ...]:
     try:
-        return tuple(map(str, json.loads(note["joints"])))
+        return tuple(map(str, parse_json(note["joints"], str(path))))
     except _DAMAGE as error:
         raise SchemaError(f"{path}: its metadata do not name the joints of the arm") from error
 
@@ -302,7 +307,8 @@ def _parsed(
             inside |= (time >= start - SAME_TIME) & (time <= end + SAME_TIME)
         time, data = time[inside], [data[row] for row in np.flatnonzero(inside).tolist()]
     # One parse of all of them is several times as quick as one each.
-    parsed: list[Any] = json.loads(b"[" + b",".join(data) + b"]")
+    whole = b"[" + b",".join(data) + b"]"
+    parsed: list[Any] = parse_json(whole, "its text", most=_MOST_VALUES)
     return time, parsed
 
 

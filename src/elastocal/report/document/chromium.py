@@ -20,6 +20,7 @@ from typing import Any
 
 from elastocal.errors import FileAccessError
 from elastocal.files import replacing
+from elastocal.records import parse_json
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
 """Names that are looked for on the search path, in order."""
@@ -167,7 +168,7 @@ class Tab:
                 raise self._failed("it ended")
             self._buffer += more
         text, _, self._buffer = self._buffer.partition(b"\0")
-        return dict(json.loads(text))
+        return dict(parse_json(text, "what the browser says"))
 
     def _failed(self, reason: str) -> FileAccessError:
         return FileAccessError(f"{self._browser} did not show the page: {reason}")
