@@ -6,9 +6,13 @@ import os
 import re
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import time
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import pytest
 
@@ -54,6 +58,22 @@ def test_the_page_is_opened_after_the_address_was_printed(cell, monkeypatch):
     assert opened == []
     assert elastocal("studio", cell).code == 0
     assert [text[:17] for text in opened] == ["http://127.0.0.1:"]
+
+
+def test_the_browser_is_given_a_file_of_this_user_and_no_token(cell, monkeypatch):
+    opened = []
+
+    def seen(address: str) -> None:
+        file = Path(url2pathname(urlsplit(address).path))
+        opened.append((address, file, stat.S_IMODE(file.stat().st_mode), file.read_text()))
+
+    monkeypatch.setattr("webbrowser.open", seen)
+    monkeypatch.setattr(workflows.StudioResult, "wait", lambda _: None)
+    told = elastocal("studio", cell)
+    ((address, file, mode, text),) = opened
+    page = told.out.split()[0]
+    assert page.rsplit("/", 2)[1] not in address
+    assert (mode, page in text, file.exists()) == (0o600, True, False)
 
 
 def test_who_lets_others_in_or_arms_it_is_warned(cell, monkeypatch):

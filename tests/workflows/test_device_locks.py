@@ -172,5 +172,17 @@ def test_a_live_compensation_goes_on_while_others_are_refused(tmp_path, planned,
     assert [each.name for each in tmp_path.iterdir()] == ["live"]
 
 
+@pytest.mark.parametrize("address", ["0.0.0.0", "::"])
+def test_an_address_for_all_networks_is_said_aloud_by_check_and_run(cell, address, planned):
+    devices = {"arm": {"driver": "kuka_rsi", "address": address}}
+    (text,) = rig_of(cell(**devices)).warnings
+    assert text.startswith(f"devices.arm.address is {address}: whoever is in any network")
+    wired = planned.with_text("open.yaml", yaml.safe_dump({"devices": devices}))
+    assert text in elastocal("check", wired.cell).err + elastocal("check", wired.cell).out
+    (lost,) = rig_of(cell(sensor=BOX | {"address": address})).warnings
+    assert lost.startswith(f"devices.sensor: the address {address} names no device")
+    assert rig_of(cell(sensor=BOX, arm={"driver": "kuka_rsi"})).warnings == []
+
+
 def test_a_place_without_a_port_is_written_as_its_host():
     assert str(DevicePlace("10.0.0.1", 0)) == "10.0.0.1"

@@ -95,7 +95,10 @@ class _Door:
         origins = headers.get_all("Origin") or []
         if any(origin != f"http://{headers['Host']}" for origin in origins):
             raise _RefusedError(HTTPStatus.FORBIDDEN, "a page of another origin")
-        if headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
+        # A file, or a link, may lead to the page; it reads nothing of it.
+        kinds = headers.get("Sec-Fetch-Mode"), headers.get("Sec-Fetch-Dest")
+        own = headers.get("Sec-Fetch-Site", "none") in ("same-origin", "none")
+        if not own and kinds != ("navigate", "document"):
             raise _RefusedError(HTTPStatus.FORBIDDEN, "a page of another site")
         try:
             _, token, name = [*urlsplit(path).path.split("/", 2), "", "?"][:3]

@@ -76,6 +76,38 @@ def _resolved(place: DevicePlace) -> DevicePlace:
     return place._replace(host=place.host.casefold())
 
 
+def open_doors(devices: Mapping[str, DeviceSettings]) -> list[str]:
+    """Return warnings of addresses that stand for all addresses of this machine.
+
+    Parameters
+    ----------
+    devices : mapping
+        Settings by kind of device.
+    """
+    found = []
+    for kind, settings in devices.items():
+        own = [each for each in settings.own_ports() if _is_any(each.address)]
+        found += [
+            f"devices.{kind}.address is {each.address}: whoever is in any network of this machine"
+            f" reaches the {each.kind.upper()} port {each.port}, and none of these protocols knows"
+            " who speaks; name this machine's address in the device's own network"
+            for each in own
+        ]
+        found += [
+            f"devices.{kind}: the address {each.host} names no device: it stands for all addresses"
+            " of this machine"
+            for each in settings.device_places()
+            if _is_any(each.host) and each.host not in [port.address for port in own]
+        ]
+    return found
+
+
+def _is_any(address: str) -> bool:
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(address).is_unspecified
+    return False
+
+
 def is_loopback(address: str) -> bool:
     """Return whether an address is this machine's for itself."""
     with contextlib.suppress(ValueError):

@@ -50,7 +50,7 @@ def cell_file(path: Path) -> FileDescription:
         the search technique, the place of the surface, or a collision at HOME.
     """
     cell = load_cell(path)
-    rig_of(cell)
+    doors = rig_of(cell).warnings
     search = cell.file.search
     planning.require_possible_search(cell)
     surface = planning.cell_surface(cell)
@@ -67,7 +67,7 @@ def cell_file(path: Path) -> FileDescription:
         "trackers": [tracker.name for tracker in cell.file.trackers],
         "technique": cell.technique,
         "faces": len(surface.mesh.faces),
-        "findings": [finding.message for finding in findings] + refused,
+        "findings": [finding.message for finding in findings] + doors + refused,
     }
 
 

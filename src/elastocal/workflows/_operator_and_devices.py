@@ -37,7 +37,12 @@ from elastocal.errors import DeviceError, ElastocalError, ProcedureError, neares
 from elastocal.procedure import Progress as RunProgress
 from elastocal.records import validate
 from elastocal.results import brief_repr
-from elastocal.workflows._device_locks import at_device, devices_to_oneself, is_loopback
+from elastocal.workflows._device_locks import (
+    at_device,
+    devices_to_oneself,
+    is_loopback,
+    open_doors,
+)
 
 
 @dataclass(frozen=True)
@@ -150,6 +155,11 @@ class Rig:
     def by_kind(self) -> Mapping[str, DeviceSettings]:
         """The settings of each of `KINDS`."""
         return {kind: each for kinds in self.wanted.values() for kind, each in kinds.items()}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a person should know of the cell's addresses."""
+        return open_doors(self.by_kind)
 
     @contextmanager
     def reserved(self, command: str, kinds: Collection[str] = KINDS) -> Iterator["ReservedRig"]:

@@ -393,7 +393,7 @@ def _check_folder(job: _Job, entries: tuple[procedure.Entry, ...], resume: bool)
 
 def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: RunSettings) -> None:
     """Have the operator agree before anything moves that was not expected to."""
-    settings.operator.warn([f"warning: {warning}" for warning in job.warnings])
+    settings.operator.warn([f"warning: {text}" for text in (*job.rig.warnings, *job.warnings)])
     if known is not None:
         settings.operator.warn((*known.lines, contact_sentence(devices.arm.state())))
     asked = settings.operator, settings.confirmed, settings.arming

@@ -2,6 +2,8 @@
 
 import contextlib
 import ipaddress
+import os
+import tempfile
 import threading
 import time
 import webbrowser
@@ -38,6 +40,10 @@ from elastocal.workflows.check import describe_file
 from elastocal.workflows.plan import plan
 from elastocal.workflows.run import RunSettings, dry_run, run
 
+_REDIRECT = """<!doctype html>
+<meta charset="utf-8"><meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0; url={0}"><title>elastocal studio</title>
+"""
 _PAUSE = 0.1
 """Shortest time between two reports of a run to the page, in s of the wall."""
 
@@ -80,6 +86,8 @@ class StudioResult(Result):
 
     figures: StudioFigures
     session: Session
+    at_end: contextlib.ExitStack
+    """What is left to be done when the studio ends."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
@@ -87,8 +95,16 @@ class StudioResult(Result):
         return (("cell", found.cell), ("page", found.address), *(("note", n) for n in found.notes))
 
     def open_page(self) -> None:
-        """Show the page in the browser of whoever sits here, if there is one."""
-        webbrowser.open(self.figures.address)
+        """Show the page in the browser of whoever sits here, if there is one.
+
+        Arguments of a program can be read by every user of the machine, so the browser gets a file
+        that leads to the page, which this user alone may read.
+        """
+        handle, name = tempfile.mkstemp(".html", "elastocal-studio-")
+        self.at_end.callback(Path(name).unlink, missing_ok=True)
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(_REDIRECT.format(self.figures.address))
+        webbrowser.open(Path(name).as_uri())
 
     def wait(self) -> None:
         """Wait for Ctrl-C."""
@@ -120,15 +136,14 @@ def studio(
     session = Session(path, _Commands(settings.model), settings.arm)
     server = StudioServer(session.actions, session.news, settings.host, settings.port)
     figures = StudioFigures(server.address, session.name, tuple(_notes(settings)))
-    result = StudioResult(figures, session)
-    server.start()
-    try:
+    with contextlib.ExitStack() as at_end:
+        at_end.callback(server.close)
+        at_end.callback(session.close)
+        result = StudioResult(figures, session, at_end)
+        server.start()
         # Ctrl-C is how it ends, whatever is being done just then.
         with contextlib.suppress(KeyboardInterrupt):
             settings.while_open(result)
-    finally:
-        session.close()
-        server.close()
     return result
 
 
