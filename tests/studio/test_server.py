@@ -122,6 +122,15 @@ def test_a_page_of_another_origin_is_refused(server, ask, headers):
         assert ask(path, body, **given)[0].status == 403
 
 
+def test_a_file_that_leads_to_the_page_opens_it_and_reads_nothing(ask):
+    """As a browser asks that follows a file with the address: with the token, to be shown."""
+    shown = {"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "navigate"}
+    assert ask("", Sec_Fetch_Dest="document", **shown)[0].status == 200
+    assert ask("", Sec_Fetch_Dest="document", token="guess", **shown)[0].status == 403
+    assert ask("", Sec_Fetch_Dest="iframe", **shown)[0].status == 403
+    assert ask("news", Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="cors")[0].status == 403
+
+
 def test_the_own_page_is_answered(server, ask):
     answer, text = ask(
         "echo",
