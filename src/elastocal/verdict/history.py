@@ -19,6 +19,11 @@ from elastocal.wording import Phrase, phrase
 _SHOWN = 16
 """Digits of a run's hash that people compare."""
 _NO_REPORT = phrase("no report")
+_LIGHTS = {
+    "green": phrase("green light"),
+    "yellow": phrase("yellow light"),
+    "red": phrase("red light"),
+}
 
 
 def begin_record(record: RunRecord, run: RunFolder, cell: str) -> RunRecord:
@@ -108,7 +113,7 @@ def _listed(earlier: tuple[EarlierRun, ...]) -> Phrase:
 
 
 def _said(run: EarlierRun) -> Phrase:
-    light = _NO_REPORT if run.light is None else phrase(f"{run.light} light")
+    light = _LIGHTS.get(run.light or "", _NO_REPORT)
     if run.same_plan:
         return phrase("{date} ({light})", date=run.started[:10], light=light)
     return phrase("{date} by another plan ({light})", date=run.started[:10], light=light)

@@ -21,7 +21,7 @@ _LINKS: dict[str, str] = {
     name: name
     for name in phrases(
         "signature", "cell and plan", "streams", "journal", "dataset", "summary", "model", "codec",
-        "process", "content",
+        "process", "content", "history",
     )
 }  # fmt: skip
 """Links of the chain; any other is a file."""
