@@ -50,7 +50,9 @@ def planned(tmp_path_factory):
 def killed(planned, folder):
     """Yield the lines, the cell and the run's folder, its process killed while it held a load."""
     found, opened = wired(planned, f"{folder.name}.yaml", RATE)
-    out = folder / "run"
+    out, text = folder / "run", found.cell.read_text(encoding="utf-8")
+    # A machine at work lets a cycle wait; what is tested here is force and place, not time.
+    found.cell.write_text(f'{text}\nprocedure: {{stale: "1 s"}}\n', encoding="utf-8")
     with opened() as lines:
         words = ["run", str(found.cell), "--plan", str(found.plan), "--out", str(out), "--yes"]
         process = subprocess.Popen(
