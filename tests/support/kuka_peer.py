@@ -211,6 +211,8 @@ class PeerFeed:
     silent: bool = False
     status: SensorStatus = SensorStatus.OK
     fails: Exception | None = None
+    scale: float = 1.0
+    """What the sensor states over what presses: of another unit."""
     _last: WrenchSample | None = None
 
     def newest(self) -> WrenchSample | None:
@@ -222,7 +224,7 @@ class PeerFeed:
         T_base_sensor = peer.T @ np.linalg.inv(cell.T_sensor_tcp)
         weight = cell.file.tool.mass * cell.gravity_base
         force = T_base_sensor[:3, :3].T @ (peer.force_base + weight) + peer.bias
-        force = force + peer.noise * peer.rng.standard_normal(3)
+        force = self.scale * (force + peer.noise * peer.rng.standard_normal(3))
         self._last = WrenchSample(peer.time, force, np.zeros(3), self.status)
         return self._last
 

@@ -206,6 +206,18 @@ class TestContact:
         bench.feed.silent = True
         assert "force sensor silent for 1.0" in bench.wait(Motion.IDLE).fault
 
+    def test_a_sensor_that_changes_its_unit_in_a_press_is_not_pressed_by(self, bench):
+        bench.touch()
+        bench.arm.hold(PRESS, 500.0)
+        bench.clock.sleep(1.5)
+        pressing = np.linalg.norm(bench.force_tcp)
+        bench.feed.scale = 1.0 / 4.448
+        bench.clock.sleep(0.5)
+        state = bench.arm.state()
+        assert state.motion is Motion.IDLE
+        assert "within a cycle: contact is lost, or the sensor's scale or zero" in state.fault
+        assert np.linalg.norm(bench.force_tcp) <= pressing + 5.0
+
     def test_a_feed_that_fails_ends_no_thread_and_the_tool_comes_off(self, bench):
         bench.touch()
         bench.arm.hold(PRESS, 500.0)

@@ -40,6 +40,8 @@ _RELEASED = 0.02
 """Part of the force that was held from which on a release is over."""
 _LEAST_FORCE = 3.0
 """Force that counts as none at the end of a release, in N."""
+_JUMP = 100.0
+"""Change of the force within a cycle, in N, that is looked into; noise and ramps are below it."""
 _RELEASE_SETTLINGS = 3.0
 """Settling times of the force control that a release waits for the last of the force."""
 
@@ -221,8 +223,11 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> Phase:
     reader, reference = press.reader, press.reader.force_tcp
     releases = not np.any(press.wanted)
     gone = max(_RELEASED * float(np.linalg.norm(reference)), _LEAST_FORCE)
+    before = reader.quick_force_tcp
     while cycle.time < ends:
         require_force(reader, press.force_limit)
+        _require_steady(before, reader.quick_force_tcp)
+        before = reader.quick_force_tcp
         if reader.hesitates:
             if releases:
                 break  # in position control, from where it can be retracted without a force
@@ -241,6 +246,25 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> Phase:
             )
         cycle = yield Step(pace.cycle * cycle.T_base_tcp[:3, :3] @ velocity)
     return cycle
+
+
+def _require_steady(before: FloatArray, force: FloatArray) -> None:
+    """Refuse a force that half of it, or more, has left or joined since the cycle before, in N.
+
+    Force control presses the harder the less it feels, and no ramp does that within a cycle:
+    contact is lost, or the sensor measures in another unit or from another zero than before.
+
+    Raises
+    ------
+    DeviceError
+        With both forces.
+    """
+    size, change = float(np.linalg.norm(before)), float(np.linalg.norm(force - before))
+    if change > max(_JUMP, 0.5 * size):
+        raise DeviceError(
+            f"the force changed by {change:.0f} N from {size:.0f} N within a cycle: contact is"
+            " lost, or the sensor's scale or zero has changed"
+        )
 
 
 def require_force(reader: ForceReader, limit: float) -> None:
