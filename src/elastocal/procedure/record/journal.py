@@ -5,7 +5,6 @@ and cut off before the next entry is written.
 """
 
 import contextlib
-import errno
 import os
 from collections.abc import Callable, Iterator
 from enum import Enum
@@ -230,8 +229,9 @@ class Journal:
         line = entry.model_dump_json(exclude_defaults=True).encode() + b"\n"
         before = self._count, self._size
         try:
-            if os.write(self._file, line) < len(line):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            rest = line
+            while rest:  # A disk that is full says so when the rest is written.
+                rest = rest[os.write(self._file, rest) :]
             # Counted before the sync: should that be interrupted, the line is there all the same.
             self._count, self._size = self._count + 1, self._size + len(line)
             self._sync(self._file)
