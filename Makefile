@@ -86,14 +86,19 @@ package: $(VENV)/installed-nightly
 	$(BIN)/uv build --quiet --out-dir dist
 	set -e; for built in dist/*.whl dist/*.tar.gz; do \
 		$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(PACKAGE); \
-		$(BIN)/uv pip install --quiet --python $(PACKAGE)/bin/python $$built; \
+		$(BIN)/uv pip install --quiet --require-hashes --python $(PACKAGE)/bin/python \
+			-r requirements/user.lock; \
+		$(BIN)/uv pip install --quiet --no-deps --python $(PACKAGE)/bin/python $$built; \
 		$(PACKAGE)/bin/elastocal --version; \
 		$(PACKAGE)/bin/elastocal init $(PACKAGE)/cell --json; \
 		$(PACKAGE)/bin/python -m elastocal check $(PACKAGE)/cell/cell.yaml --json; \
 	done
 
-# What developers share, with hashes: `pip install --require-hashes -r requirements/dev.lock`.
+# What users and developers share, with hashes:
+# `pip install --require-hashes -r requirements/user.lock`, then elastocal with `--no-deps`.
 lock: $(VENV)/installed-nightly
+	$(BIN)/uv pip compile pyproject.toml --universal \
+		--python-version 3.11 --generate-hashes --quiet --no-header -o requirements/user.lock
 	$(BIN)/uv pip compile pyproject.toml --extra dev --extra docs --universal \
 		--python-version 3.11 --generate-hashes --quiet --no-header -o requirements/dev.lock
 

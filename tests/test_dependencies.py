@@ -10,30 +10,38 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
-LOCK = (ROOT / "requirements" / "dev.lock").read_text(encoding="utf-8")
+LOCKS = {"dev": ("dev", "docs"), "user": ()}
+"""Files of locked versions with the extras that each holds."""
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 HOOK = runpy.run_path(str(ROOT / "docs" / "hooks" / "licences.py"))
-LOCKED = [
-    Requirement(re.sub(r"\s*\\\n.*", "", block, flags=re.DOTALL))
-    for block in re.split(r"\n(?=[\w.-]+==)", LOCK)[1:]
-]
 
 
-def test_the_lock_holds_every_package_that_developers_need_within_its_bounds():
-    extras = PROJECT["optional-dependencies"]
-    for text in [*PROJECT["dependencies"], *extras["dev"], *extras["docs"]]:
+def blocks(lock: str) -> list[str]:
+    """Return what a lock says of each package."""
+    text = (ROOT / "requirements" / f"{lock}.lock").read_text(encoding="utf-8")
+    return re.split(r"(?m)^(?=[\w.-]+==)", text)[1:]
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_a_lock_holds_every_package_that_is_needed_within_its_bounds(lock):
+    locked = [
+        Requirement(re.sub(r"\s*\\\n.*", "", block, flags=re.DOTALL)) for block in blocks(lock)
+    ]
+    extras = [PROJECT["optional-dependencies"][name] for name in LOCKS[lock]]
+    for text in [*PROJECT["dependencies"], *(each for extra in extras for each in extra)]:
         wanted = Requirement(text)
         found = [
             next(iter(each.specifier)).version
-            for each in LOCKED
+            for each in locked
             if canonicalize_name(each.name) == canonicalize_name(wanted.name)
         ]
         assert found, f"{wanted.name} is not locked: make lock"
         assert all(wanted.specifier.contains(version) for version in found), wanted.name
 
 
-def test_every_locked_package_has_its_hashes():
-    for block in re.split(r"\n(?=[\w.-]+==)", LOCK)[1:]:
+@pytest.mark.parametrize("lock", LOCKS)
+def test_every_locked_package_has_its_hashes(lock):
+    for block in blocks(lock):
         assert "--hash=sha256:" in block
 
 

@@ -106,11 +106,12 @@ def test_killed_for_real_it_goes_on_to_the_same_dataset(planned, whole, tmp_path
         np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=1e-9)
 
 
-def test_ctrl_c_leaves_the_surface_and_can_be_resumed(planned, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_leaves_the_surface_and_can_be_resumed(planned, tmp_path, number):
     out = tmp_path / "run"
     journal = RunFolder(out).journal
     process = started(planned, out)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     said = process.communicate()[1]
     assert process.returncode == 130, said
     assert "interrupted: " in said

@@ -18,7 +18,7 @@ from elastocal.geometry.positions import LEAST_READINGS, Positions
 from elastocal.robot import Robot, catalogue, other_joint_readings
 from elastocal.wording import counted
 
-LENGTHS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254, "cm": 1e-2}
+LENGTHS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}
 _ANGLES = {"deg": float(np.radians(1.0)), "rad": 1.0}
 _FACTORS = (0.5, 2.0, 0.75, 1.35)
 """What a joint is multiplied by in looking for its scale; the best is then refined."""
@@ -46,8 +46,8 @@ class Undone:
     data: Positions
 
 
-def undone(robot: Robot, data: Positions, score: Score) -> Iterator[Undone]:
-    """Yield positions with each mistake undone.
+def undone_joints(robot: Robot, data: Positions, score: Score) -> Iterator[Undone]:
+    """Yield positions with each mistake with joints undone.
 
     Parameters
     ----------
@@ -63,6 +63,10 @@ def undone(robot: Robot, data: Positions, score: Score) -> Iterator[Undone]:
     for search in (_scaled_joint, _shifted_zero):
         yield search(robot, data, score)
     yield from _late_rows(robot, data)
+
+
+def undone_markers(robot: Robot, data: Positions) -> Iterator[Undone]:
+    """Yield positions with each mistake of trackers, tools and the choice of the robot undone."""
     yield from _trackers(robot, data)
     yield from _markers(robot, data)
     yield from _changes(robot, data)

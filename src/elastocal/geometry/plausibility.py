@@ -17,7 +17,14 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError
-from elastocal.geometry._undone import LENGTHS, Undone, ratios, undone, unit_mistake
+from elastocal.geometry._undone import (
+    LENGTHS,
+    Undone,
+    ratios,
+    undone_joints,
+    undone_markers,
+    unit_mistake,
+)
 from elastocal.geometry.ladder import GeometryLadder, climb
 from elastocal.geometry.position_file import AXES
 from elastocal.geometry.positions import Positions
@@ -55,6 +62,8 @@ _MOST_ORDERS = 24
 """Orders of markers that are tried."""
 _ROWS = 60
 """Rows by which the likeliest are found."""
+_ROBUST_STEPS = 6
+"""Steps of least absolute distances."""
 _STILL = 0.25
 """Part of the rows in which a column must stand still to be named."""
 
@@ -192,27 +201,48 @@ def _as_drawn(robot: Robot, data: Positions) -> float:
     return float(np.median(np.linalg.norm(problem.residual(register(problem)), axis=1)))
 
 
+def _in_any_frame(robot: Robot, data: Positions) -> float:
+    """Return the same as `_as_drawn` of a tracker whose frame may be mirrored, sheared and scaled.
+
+    What a marker's coordinates then are is linear in place and rotation of the tool, so that it
+    takes a hundredth of the time; joints are told from one another by it, not from trackers.
+    """
+    left, T = [], robot.forward(data.q)
+    design = np.column_stack([np.ones(len(T)), T[:, :3, :].reshape(len(T), 12)])
+    marker = int(data.seen.sum(axis=0).argmax())
+    for station in data.stations:
+        own = (data.station == station) & data.seen[:, marker]
+        A, b = design[own], data.markers[own, marker]
+        if not len(A) >= 2 * A.shape[1]:
+            return _as_drawn(robot, data)
+        weight = np.ones(len(A))
+        for _ in range(_ROBUST_STEPS):
+            x = np.linalg.lstsq(A * weight[:, None], b * weight[:, None])[0]
+            distance = np.linalg.norm(b - A @ x, axis=1)
+            weight = 1.0 / np.sqrt(np.maximum(distance, 1e-3))
+        left.append(distance)
+    return float(np.median(np.concatenate(left)))
+
+
 def _explanations(problem: GeometryProblem, limit: float) -> list[tuple[str, float]]:
     """Return mistakes whose undoing leaves an arm, with what it misses by, the best first."""
 
-    def score(each: Undone) -> float:
-        return _as_drawn(each.robot, each.data)
+    def joints(each: Undone) -> float:
+        return _in_any_frame(each.robot, each.data)
 
+    robot, data = problem.robot, problem.data
+    likely = sorted(undone_joints(robot, data, joints), key=joints)[:_TRIED]
+    every = [*likely, *undone_markers(robot, data)]
+    distances = [_as_drawn(each.robot, each.data) for each in every]
     found: list[tuple[str, float]] = []
-    ranked = sorted(
-        ((score(each), number, each) for number, each in enumerate(
-            undone(problem.robot, problem.data, score)
-        )),
-        key=lambda each: each[:2],
-    )  # fmt: skip
     nearest = np.inf
-    for distance, _, each in ranked[:_TRIED]:
-        if distance > _TIE * nearest:
+    for number in np.argsort(distances, kind="stable")[:_TRIED].tolist():
+        if distances[number] > _TIE * nearest:
             break
-        left = _undone_error(each)
+        left = _undone_error(every[number])
         if left <= limit:
-            found.append((each.mistake, left))
-            nearest = min(nearest, distance)
+            found.append((every[number].mistake, left))
+            nearest = min(nearest, distances[number])
     best = min((left for _, left in found), default=0.0)
     return [each for each in found if each[1] <= _TIE * best]
 

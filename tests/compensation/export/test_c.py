@@ -4,12 +4,13 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from elastocal.compensation.export import write_c
-from elastocal.compensation.online import Compensator, Reading, design
+from elastocal.compensation.online import Compensator, Reading, Status, design
 from elastocal.elastic import SpringEntry, axial, custom
 from elastocal.errors import CompensationError
 from elastocal.robot import Robot
@@ -22,6 +23,7 @@ from support.virtual_chain import ARMS
 
 pytestmark = needs_gcc
 STATES = 100_000
+PROCESSOR = Path("/proc/cpuinfo")
 
 
 def random_rows(model, count, seed=0):
@@ -170,6 +172,21 @@ class TestSelfTest:
 
     def test_it_is_zero_with_fused_products_allowed(self, folder):
         assert build(folder, "-O2", "-ffp-contract=fast", name="fused").selftest() == 0
+
+    @pytest.mark.skipif(
+        not PROCESSOR.exists() or " fma " not in PROCESSOR.read_text(), reason="nothing is fused"
+    )
+    @pytest.mark.parametrize("flags", [(), ("-ffp-contract=fast", "-mfma")])
+    def test_what_bends_nothing_but_for_rounding_has_the_flag_of_nothing(self, tmp_path, flags):
+        """Fused products round otherwise: loads that cancel on one processor leave 1e-13 N."""
+        numbers = design(compensated.arm(), compensated.settings(deadband="0 mm", filter={}))
+        n = numbers.joints
+        rows = np.zeros((20, n + 8))
+        rows[:, 0], rows[:, 1 : n + 1], rows[:, -1] = 0.004 * np.arange(1, 21), 0.3, 1.0
+        rows[10:, n + 1 : n + 7] = 1e-13
+        status = build(written(tmp_path, numbers), "-O2", *flags).numbers("steps", rows)[:, 7]
+        assert np.array_equal(status[5:10], status[15:])
+        assert int(status[-1]) & Status.DEADBAND.value
 
     def test_a_change_of_any_one_constant_is_found(self, folder, tmp_path):
         text = (folder / "elastocal_model.c").read_text()

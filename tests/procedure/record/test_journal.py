@@ -1,5 +1,6 @@
 """The journal: on the disk before anything moves on, and readable after any crash."""
 
+import errno
 import json
 import os
 import re
@@ -101,10 +102,24 @@ def test_what_a_full_disk_took_of_a_line_is_given_back(begun):
         assert journal.write(3.0, Event.END).n == 2
 
 
-def test_a_line_that_is_not_whole_is_a_full_disk(begun, monkeypatch):
-    before, write = begun.read_bytes(), os.write
+def test_a_line_that_is_written_in_parts_is_written_whole(begun, monkeypatch):
+    write = os.write
     with Journal(begun) as journal:
         monkeypatch.setattr(os, "write", lambda file, data: write(file, data[:9]))
+        journal.write(3.0, Event.END)
+    assert read_journal(begun)[-1].event is Event.END
+
+
+def test_what_was_written_of_a_line_before_a_disk_was_full_is_given_back(begun, monkeypatch):
+    before, write, left = begun.read_bytes(), os.write, [9]
+
+    def filling(file: int, data: bytes) -> int:
+        if not left:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(file, data[: left.pop()])
+
+    with Journal(begun) as journal:
+        monkeypatch.setattr(os, "write", filling)
         with pytest.raises(FileAccessError, match="No space left on device"):
             journal.write(3.0, Event.END)
     assert begun.read_bytes() == before

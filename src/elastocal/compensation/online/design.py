@@ -31,6 +31,8 @@ _PUSHING = 1e-12
 """Compliance below its smallest by which rounding may have brought it there, in SI."""
 _NEGLIGIBLE = 1e-9
 """Share of the largest standard deviation below which a direction of the draws is left out."""
+_NOTHING = 1e-9
+"""Smaller deflections, in m, are rounding."""
 _Z = float(ndtri(0.975))
 
 
@@ -112,8 +114,12 @@ class Design:
 
     @property
     def deadband_slope(self) -> float:
-        """1 / deadband, in 1/m: from the deadband to twice it the share corrected goes to 1."""
-        return 1.0 / max(self.settings.deadband, 1e-300)
+        """1 / deadband, in 1/m: from the deadband to twice it the share corrected goes to 1.
+
+        Without a deadband it goes there within a nanometre: what is none but for the rounding of a
+        processor then has the same flag on each.
+        """
+        return 1.0 / max(self.settings.deadband, _NOTHING)
 
 
 def design(

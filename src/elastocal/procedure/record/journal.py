@@ -6,7 +6,6 @@ line before it, so that one that a disk or a hand has changed is known, and one 
 """
 
 import contextlib
-import errno
 import hashlib
 import os
 import re
@@ -197,8 +196,9 @@ class Journal:
         line = b'%s,"line_check":"%s"}\n' % (body, check)
         before = self._count, self._size, self._check
         try:
-            if os.write(self._file, line) < len(line):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            rest = line
+            while rest:  # A disk that is full says so when the rest is written.
+                rest = rest[os.write(self._file, rest) :]
             # Counted before the sync: should that be interrupted, the line is there all the same.
             self._count, self._size = self._count + 1, self._size + len(line)
             self._check = check
