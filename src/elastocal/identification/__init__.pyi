@@ -23,7 +23,9 @@ from .calibration import (
     calibrate as calibrate,
 )
 from .conventions import (
+    FORCE_MISTAKES as FORCE_MISTAKES,
     POOR_FIT as POOR_FIT,
+    ForceMistake as ForceMistake,
     check_conventions as check_conventions,
     check_joints as check_joints,
 )

@@ -20,6 +20,12 @@ from elastocal.identification.conventions import POOR_FIT, check_conventions, ch
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
+from elastocal.identification.mistakes import (
+    Suspicion,
+    find_implausible,
+    find_undone,
+    find_wrong_units,
+)
 from elastocal.identification.observability import (
     attainable_rank,
     find_faint,
@@ -132,7 +138,7 @@ def calibrate(
     """
     options = options or FitOptions()
     problem = build(model, readings, options, marker_offset)
-    warnings = _data_warnings(model, readings, problem, options, marker_offset)
+    warnings, mistaken = _data_warnings(model, readings, problem, options, marker_offset)
     screening = screen(problem)
     used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
     kept = problem.take(used)
@@ -157,11 +163,10 @@ def calibrate(
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
-    offset = force_offset(
-        model, readings.take(used), weighted, calibrated.compliance, marker_offset
-    )
+    if not mistaken:
+        offset = force_offset(model, readings.take(used), weighted, compliance, marker_offset)
+        warnings += [offset.message()] if offset else []
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
-    warnings += [offset.message()] if offset else []
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
     return Calibration(
         calibrated=calibrated,
@@ -207,9 +212,11 @@ def _data_warnings(
     problem: Problem,
     options: FitOptions,
     marker_offset: ArrayLike | None,
-) -> list[str]:
-    """Return what is odd about the data before they are fitted, or refuse them."""
-    warnings = list(check_joints(model.robot, readings)) + [
+) -> tuple[list[str], bool]:
+    """Return what is odd about the data, or refuse them; and whether a fit shows a mistake."""
+    seen = find_implausible(model.robot, readings, marker_offset)
+    warnings = _stated(seen, options)
+    warnings += list(check_joints(model.robot, readings)) + [
         phrase(
             "poses {poses} are one configuration: resampled and left out together",
             poses=", ".join(map(str, group)),
@@ -225,18 +232,55 @@ def _data_warnings(
                 gap=gap,
             )
         )
+    named = _fitted_mistakes(model, readings, options, marker_offset, seen)
+    warnings += named
     try:
         left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
-        return [*warnings, phrase("fitted in spite of this: {error}", error=error)]
+        return [*warnings, phrase("fitted in spite of this: {error}", error=error)], True
     if left > POOR_FIT:
         warnings.append(
             phrase(
                 "the springs leave {left} of the median deflection unexplained", left=f"{left:.0%}"
             )
         )
+    return warnings, bool(named)
+
+
+def _fitted_mistakes(
+    model: ElasticModel,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None,
+    seen: Sequence[Suspicion],
+) -> list[str]:
+    """Return mistakes that fits show, beside those that readings show by themselves."""
+    if options.free_frame != "none" or any(each.certain for each in seen):
+        return []
+    found = find_undone(model.robot, readings, marker_offset)
+    if not (seen or found):
+        found = tuple(find_wrong_units(model.robot, readings, marker_offset))
+    return _stated(found, options)
+
+
+def _stated(found: Sequence[Suspicion], options: FitOptions) -> list[str]:
+    """Return mistakes that readings seem to contain as warnings; refuse them where one is certain.
+
+    Raises
+    ------
+    ConventionError
+        With the first that is certain, unless the options trust the conventions.
+    """
+    warnings: list[str] = []
+    for each in found:
+        if not each.certain:
+            warnings.append(each.text)
+        elif options.trust_conventions:
+            warnings.append(phrase("fitted in spite of this: {error}", error=each.text))
+        else:
+            raise ConventionError(each.text)
     return warnings
 
 

@@ -5,8 +5,8 @@ a solvable system; only the fit is worse. So the usual mistakes are undone one b
 data are explained far better without one of them, the fit is refused with that message
 (docs/decisions/0006-conventions-verdict.md).
 
-A new mistake is a function that undoes it and an entry in `_MISTAKES`; of the joints, an entry in
-`elastocal.robot.JOINT_READINGS`.
+A new mistake is a function that undoes it and an entry in `FORCE_MISTAKES`; of the joints, an
+entry in `elastocal.robot.JOINT_READINGS`.
 """
 
 from collections.abc import Callable
@@ -111,7 +111,7 @@ _Undo = Callable[[Robot, Readings], Readings]
 
 
 @dataclass(frozen=True)
-class _Mistake:
+class ForceMistake:
     """A way of reading the data that differs from the conventions."""
 
     message: str
@@ -119,10 +119,12 @@ class _Mistake:
     """Returns the readings as they would be if the mistake had been made."""
 
 
-def _mistakes_of(robot: Robot) -> tuple[_Mistake, ...]:
+def _mistakes_of(robot: Robot) -> tuple[ForceMistake, ...]:
     """Return the mistakes that are possible with a robot, the likeliest first."""
-    joints = (_Mistake(each.message, _reading_joints(each)) for each in other_joint_readings(robot))
-    return (*_MISTAKES, *joints)
+    joints = (
+        ForceMistake(each.message, _reading_joints(each)) for each in other_joint_readings(robot)
+    )
+    return (*FORCE_MISTAKES, *joints)
 
 
 def _turn_force(_: Robot, readings: Readings) -> Readings:
@@ -157,19 +159,21 @@ def _both(first: _Undo, second: _Undo) -> _Undo:
     return lambda robot, readings: second(robot, first(robot, readings))
 
 
-_MISTAKES = (
-    _Mistake(
+FORCE_MISTAKES = (
+    ForceMistake(
         "the force (or the displacement) has its sign turned: elastocal takes the force on the"
         " robot, and deflection = marker minus controller displacement",
         _turn_force,
     ),
-    _Mistake("the forces are in the tcp frame, not in base", _from_tcp_frame),
-    _Mistake(
+    ForceMistake("the forces are in the tcp frame, not in base", _from_tcp_frame),
+    ForceMistake(
         "the forces are in the tcp frame with their sign turned",
         _both(_from_tcp_frame, _turn_force),
     ),
-    _Mistake("the forces are in the sensor (last link) frame, not in base", _from_last_link_frame),
-    _Mistake(
+    ForceMistake(
+        "the forces are in the sensor (last link) frame, not in base", _from_last_link_frame
+    ),
+    ForceMistake(
         "the forces are in the sensor (last link) frame with their sign turned",
         _both(_from_last_link_frame, _turn_force),
     ),

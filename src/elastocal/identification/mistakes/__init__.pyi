@@ -1,0 +1,4 @@
+from ._suspicion import Suspicion as Suspicion
+from .plausibility import find_implausible as find_implausible
+from .sizes import find_wrong_units as find_wrong_units, usual_torques as usual_torques
+from .undoing import find_undone as find_undone

@@ -1,0 +1,86 @@
+"""Common mistakes of shop floors are found and named; sound campaigns pass in silence."""
+
+import numpy as np
+import pytest
+
+from elastocal.elastic import ElasticModel, bearing
+from elastocal.errors import ConventionError
+from elastocal.identification import FitOptions, calibrate
+from support.campaigns import Sound, campaign, sounds
+from support.mistake_table import alarms, outcome, rates, tabulate
+from support.mistakes import MISTAKES, changed
+
+KNOWN = {each.name: each for each in MISTAKES}
+ON_RAIL, SMALL = Sound(poses=15, seed=1), Sound(like="ur20", poses=12, seed=2)
+REFUSED = (
+    "force_x reversed",
+    "force turned by 90 deg about the tool",
+    "forces of the row before",
+    "tracker frame left-handed",
+    "tracker frame called base, turned by 40 deg",
+    "controller displacement reversed",
+    "first joint reversed",
+    "joints of the row before",
+    "zero of the third joint off by 90 deg",
+    "zero of the force taken in contact",
+)
+WARNED = (
+    "force in kgf",
+    "force_x dead",
+    "weight of the tool left in",
+    "marker_z dead",
+    "drift of 1 mm",
+    "station bumped half way, 1 mm",
+    "one pose's rows all the same",
+)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_certain_mistake_is_refused_by_name(name):
+    found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
+    assert found.refused, found.said
+    assert found.named, found.said
+
+
+@pytest.mark.parametrize("name", WARNED)
+def test_a_likely_mistake_is_warned_of_by_name(name):
+    found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
+    assert not found.refused, found.said
+    assert found.named, found.said
+
+
+@pytest.mark.parametrize("sound", [ON_RAIL, SMALL, Sound(poses=8, seed=3, conditioned=True)])
+def test_a_sound_campaign_passes_in_silence(sound):
+    assert alarms(campaign(sound)) == ()
+
+
+def test_conventions_that_are_trusted_turn_a_refusal_into_a_warning():
+    bad = KNOWN["first joint reversed"].make(changed(campaign(ON_RAIL), tcp_position=None))
+    model, rng = ElasticModel(bad.robot, bearing(bad.robot)), np.random.default_rng(0)
+    with pytest.raises(ConventionError, match="joint_a1 turns the other way round"):
+        calibrate(model, bad.readings, rng, FitOptions(draws=40), marker_offset=bad.marker)
+    options = FitOptions(draws=40, trust_conventions=True)
+    found = calibrate(model, bad.readings, rng, options, marker_offset=bad.marker)
+    assert any("fitted in spite of this: joint_a1" in text for text in found.warnings)
+
+
+@pytest.mark.slow
+def test_200_sound_campaigns_of_all_presets_raise_two_alarms_at_most():
+    raised = {sound: alarms(campaign(sound)) for sound in sounds(200)}
+    assert sum(map(bool, raised.values())) <= 2, {k: v for k, v in raised.items() if v}
+
+
+@pytest.mark.slow
+def test_of_the_harmful_mistakes_nine_of_ten_are_found_and_named():
+    chosen = [
+        Sound(like, preset, poses, seed)
+        for like, preset, poses, seed in (
+            ("afp", "kind", 31, 1),
+            ("machining", "typical", 31, 2),
+            ("afp", "harsh", 31, 3),
+        )
+    ]
+    outcomes = [outcome(campaign(each), mistake) for each in chosen for mistake in MISTAKES]
+    found, named = rates(tabulate(outcomes))
+    assert found >= 0.9
+    assert named >= 0.9
