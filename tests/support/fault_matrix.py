@@ -7,8 +7,6 @@ the simulated cell's own, looked at a hundred times a second.
 
 import contextlib
 import json
-import os
-import re
 import socket
 import threading
 import time
@@ -17,9 +15,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import elastocal as ec
-from elastocal.cell import WallClock, load_cell
+from elastocal.cell import load_cell
 from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
 from elastocal.procedure.run import ArmLocation
@@ -32,7 +31,9 @@ from elastocal.sim.wire import (
     rsi_server,
     wire_servers,
 )
-from support.run_cells import PlannedCell
+from elastocal.workflows import _operator_and_devices
+from support.paced_clock import PacedClock
+from support.run_cells import PlannedCell, planned_cell
 from support.wire_faults import (
     Begun,
     DatagramProxy,
@@ -50,8 +51,6 @@ from support.wire_faults import (
     steal,
 )
 
-RATE = min(2.0, max(0.25, 2.0 * (os.cpu_count() or 1) / max(os.getloadavg()[0], 1.0) - 1.0))
-"""Seconds of the cell in a second of the wall: slow motion where the machine is busy."""
 OFF = 10.0
 """Force below which the tool has let go, in N."""
 _SAMPLE = 0.01
@@ -152,7 +151,8 @@ class _Watch:
     _over: threading.Event = field(default_factory=threading.Event)
 
     def run(self) -> None:
-        while not self._over.wait(_SAMPLE):
+        while not self._over.is_set():
+            self.live.clock.sleep(_SAMPLE)
             self.seen.append(self.live.press())
 
     @contextlib.contextmanager
@@ -172,7 +172,20 @@ def _free(kind: socket.SocketKind) -> int:
         return int(line.getsockname()[1])
 
 
-def wired(planned: PlannedCell, name: str, rate: float = RATE) -> tuple[PlannedCell, Callable]:
+def quick_cell(folder: Path) -> PlannedCell:
+    """Return a planned cell whose ways and waits are short: what is tried is what breaks in."""
+    procedure = "approach_speed: 50 mm/s, dwell: 0.2 s, average: 0.2 s, unloaded_average: 0.2 s"
+    return planned_cell(
+        folder,
+        3,
+        "afp",
+        (r'\n  approach_distance: "100 mm"', '\n  approach_distance: "30 mm"'),
+        (r"\n  override: 0.2", "\n  override: 1.0"),
+        (r"\nsimulation:", f"\nprocedure: {{{procedure}}}\nsimulation:\n  sensor: {{rate: 500 Hz}}"),
+    )
+
+
+def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
     """Return a cell whose devices are on the wire, and what opens them."""
     udp, tcp = socket.SOCK_DGRAM, socket.SOCK_STREAM
     heard, page, box, calibration = _free(udp), _free(tcp), _free(udp), _free(tcp)
@@ -181,9 +194,12 @@ def wired(planned: PlannedCell, name: str, rate: float = RATE) -> tuple[PlannedC
     @contextlib.contextmanager
     def opened() -> Iterator[Lines]:
         cell = load_cell(found.cell)
-        live = LiveCell(cell, 0, WallClock(rate=rate))
         servers = wire_servers()
-        with contextlib.ExitStack() as stack:
+        with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
+            clock = PacedClock()
+            stack.callback(clock.close)
+            patch.setattr(_operator_and_devices, "WallClock", clock.shown_from)
+            live = LiveCell(cell, 0, clock)
 
             def closing(made):
                 stack.callback(made.close)
@@ -218,18 +234,8 @@ devices:
   sensor:
     {{driver: net_ft, port: {fronts["box"]}, http_port: {page}, tcp_port: {fronts["calibration"]}}}
   metrology: {{driver: line_stream, port: {fronts["tracker"]}}}
-  clock_rate: {rate:g}
 """
     found = planned.with_text(name, text)
-    found.cell.write_text(
-        re.sub(
-            r"\nsimulation:",
-            "\nsimulation:\n  sensor: {rate: 500 Hz}",
-            found.cell.read_text(encoding="utf-8"),
-            count=1,
-        ),
-        encoding="utf-8",
-    )
     return found, opened
 
 
@@ -265,15 +271,15 @@ def broken(planned: PlannedCell, out: Path, fault: str, phase: str) -> Outcome:
         with watch.watching():
             thread.start()
             while thread.is_alive() and begun(out).count(action) < number:
-                time.sleep(0.01)
+                lines.live.clock.sleep(0.04)
             assert thread.is_alive(), ended
             # Some way into the phase: half of its force, or of its way.
-            time.sleep(0.25 / RATE)
+            lines.live.clock.sleep(0.25)
             at = lines.live.clock.now()
             FAULTS[fault](lines)
             thread.join(_PATIENCE)
             assert not thread.is_alive(), f"{fault} in {phase}: the run does not end"
-            time.sleep(0.5 / RATE)
+            lines.live.clock.sleep(0.5)
     return _outcome(fault, phase, at, *ended[0], watch.seen, normal, _loads(found))
 
 
