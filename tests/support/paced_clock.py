@@ -16,6 +16,10 @@ _PAUSE = 0.5e-3
 """Wall time left to the lines after each step, in s: datagrams go on their way."""
 
 
+class KilledError(BaseException):
+    """Ends every thread of a program that was killed: after it nothing goes out any more."""
+
+
 class PacedClock:
     """See the module; `shown_from` gives the same time with another beginning."""
 
@@ -27,6 +31,7 @@ class PacedClock:
         self._known: set[threading.Thread] = set()
         """Threads that are waited for."""
         self._over = threading.Event()
+        self._shown: list[ShiftedClock] = []
         self._thread = threading.Thread(target=self._go_on, name="paced clock", daemon=True)
         self._thread.start()
 
@@ -49,7 +54,13 @@ class PacedClock:
         self._thread.join(2.0)
 
     def shown_from(self, start: float, _rate: float = 1.0) -> "ShiftedClock":
-        return ShiftedClock(self, start)
+        self._shown.append(ShiftedClock(self, start))
+        return self._shown[-1]
+
+    def kill(self) -> None:
+        """Let every thread die that looks at a clock that was shown so far."""
+        for each in self._shown:
+            each.dead = True
 
     def _all_sleep(self) -> bool:
         self._known = {each for each in self._known if each.is_alive()}
@@ -71,9 +82,15 @@ class ShiftedClock:
 
     def __init__(self, clock: PacedClock, start: float) -> None:
         self._clock, self._shift = clock, start - clock.now()
+        self.dead = False
+        """Whether the program that looks at it was killed."""
 
     def now(self) -> float:
+        if self.dead:
+            raise KilledError
         return self._clock.now() + self._shift
 
     def sleep(self, seconds: float) -> None:
+        self.now()
         self._clock.sleep(seconds)
+        self.now()
