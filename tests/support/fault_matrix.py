@@ -163,7 +163,7 @@ class Outcome:
     """Whether a tool that is said to be off the surface is."""
     resumed: str = ""
     """What the run said that went on from there; empty where it came to its next approach."""
-    pushed: float = np.nan
+    pushed: float = 0.0
     """How far that run moved to the surface before it was away from it."""
     lost: int = 0
     """Committed poses that were lost."""
@@ -396,7 +396,8 @@ class _Story:
         self._normal, self._surface = np.array(pose.normal), np.array(pose.T_base_tcp)[:3, 3]
         # A load that is being built up is part of the fault's beginning: it goes on until it is
         # seen.
-        self._load = _loads(found)[_LOADED.index(phase)] if phase in _LOADED else 0.0
+        self._loads = _loads(found)
+        self._load = self._loads[_LOADED.index(phase)] if phase in _LOADED else 0.0
 
     def _rows(self, seen: list[TruePress]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         times = np.array([each.time for each in seen])
@@ -415,13 +416,15 @@ class _Story:
         low = np.minimum.accumulate(height[after])
         leaves = np.flatnonzero(height[after] - low > _BACK)
         rest = height[after][leaves[0] :] if len(leaves) else height[after][-1:]
+        # A run that goes on goes on pressing.
+        load = self._load if run.message else max(self._loads)
         said = [when for when, _ in run.person.read if when >= at]
         return Outcome(
             fault=fault,
             phase=self._phase,
             message=run.message,
             force=present,
-            added=max(0.0, float(force[after].max()) - max(present, self._load)),
+            added=max(0.0, float(force[after].max()) - max(present, load)),
             released=released,
             said=min([*said, run.end]) - at,
             again=float((np.maximum.accumulate(rest) - rest).max()),
@@ -444,6 +447,47 @@ def _is_true(message: str, let_go: bool) -> bool:
 
 _LOADED = ("press", "lateral load")
 """Phases that build a load up, in the order of the load cases."""
+
+
+STAYS = {
+    "PC: killed": "Nobody sends corrections: the controller stops by its `Timeout`. Free the tool"
+    " with `elastocal release`, or go on with `--resume`, which frees it first.",
+    "arm: silent": "No order reaches the controller, which stops by its `Timeout`. Mend the line,"
+    " start the program, then `elastocal release` or `--resume`.",
+    "arm: answers lost": "The controller hears nothing and stops by its `Timeout`. Mend the line,"
+    " start the program, then `elastocal release` or `--resume`.",
+    "arm: garbage": "No message of the controller can be answered, so it stops by its `Timeout`."
+    " Mend the line, start the program, then `elastocal release` or `--resume`.",
+    "arm: NaN": "A position that is no number is not answered, and the controller stops by its"
+    " `Timeout`. Start the program anew, then `elastocal release` or `--resume`.",
+    "arm: one in ten comes": "The arm is silent for too long between two messages, and is stopped."
+    " Mend the line, start the program, then `elastocal release` or `--resume`.",
+    "arm: metres for millimetres": "The place of the tool is not known, so no retract is begun."
+    " Free the tool with the pendant.",
+}
+"""Faults after which a tool that presses stays, with why, and what a person does."""
+_MOST_ADDED = 100.0
+"""Largest force that a fault may add, in N: the arm's own collision limit."""
+_MOST_WAY = 1e-4
+"""Largest way to the surface after it was begun to leave, or before a resumed run is away, in m."""
+_SOON, _LATER = 1.0, 4.0
+"""Time until a person can read of a fault where the tool may touch, and elsewhere, in s."""
+_MAY_TOUCH = ("contact", "press", "lateral load")
+
+
+def complaints(outcome: Outcome) -> list[str]:
+    """Return what a fault must not come to, in words."""
+    soon = _SOON if outcome.phase in _MAY_TOUCH else _LATER
+    wrong = {
+        "it pushes": not outcome.added <= _MOST_ADDED,
+        "it goes back to the surface": not outcome.again <= _MOST_WAY,
+        "the resumed run pushes": not outcome.pushed <= _MOST_WAY,
+        "a committed pose is lost": outcome.lost > 0,
+        "the message is not true": not outcome.truthful,
+        "the message comes late": bool(outcome.message) and not outcome.said <= soon,
+        "it does not let go": outcome.released is None and outcome.fault not in STAYS,
+    }
+    return [what for what, holds in wrong.items() if holds]
 
 
 def as_rows(outcomes: list[Outcome]) -> list[dict[str, object]]:

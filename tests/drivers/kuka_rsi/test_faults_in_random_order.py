@@ -20,6 +20,8 @@ BEYOND = 1e-4
 """Largest way to the surface after a fault, in m."""
 STALE = 0.3
 """Age from which on a force is not trusted, in s."""
+AWAY = 0.03
+"""Height to which a tool retracts, in m."""
 LARGEST = 400.0
 """Largest load, in N."""
 CALM = (Motion.IDLE, Motion.HOLDING)
@@ -108,13 +110,18 @@ class Supervised:
         else:
             bench.peer.silent = int(rng.integers(1, 60))
 
+    def _retract(self) -> None:
+        """Leave the surface, as far as a run does."""
+        if self.height < AWAY:
+            self.bench.arm.retract(self.bench.place.normal, AWAY - self.height, 0.05)
+
     def back_off(self) -> None:
         """Do what a run does when it has seen a fault: release, retract, stop."""
         self.seen += 1
         self._floor, arm = self.height, self.bench.arm
         for act in (
             lambda: arm.release(2000.0),
-            lambda: arm.retract(self.bench.place.normal, 0.03, 0.05),
+            self._retract,
             arm.stop,
         ):
             with contextlib.suppress(DeviceError):
@@ -136,7 +143,7 @@ class Supervised:
         self.pass_time(8)
         bench.arm.enable()
         self.pass_time(4)
-        bench.arm.retract(bench.place.normal, 0.03, 0.05)
+        self._retract()
         while bench.arm.state().motion is not Motion.IDLE:
             self.pass_time()
         assert self.height > 0.0
@@ -162,7 +169,7 @@ class Supervised:
             bench.arm.release(400.0)
             if not self.wait(Motion.IDLE):
                 return False
-            bench.arm.retract(normal, 0.03, 0.05)
+            self._retract()
             return self.wait(Motion.IDLE)
         return False
 
