@@ -460,6 +460,8 @@ STAYS = {
     " Mend the line, start the program, then `elastocal release` or `--resume`.",
     "arm: NaN": "A position that is no number is not answered, and the controller stops by its"
     " `Timeout`. Start the program anew, then `elastocal release` or `--resume`.",
+    "arm: program restarted": "A program that begins anew forgets its correction, and the arm takes"
+    " no order of the old one. Free the tool with `elastocal release`, or go on with `--resume`.",
     "arm: one in ten comes": "The arm is silent for too long between two messages, and is stopped."
     " Mend the line, start the program, then `elastocal release` or `--resume`.",
     "arm: metres for millimetres": "The place of the tool is not known, so no retract is begun."
@@ -479,12 +481,15 @@ _MOST_WAY = 1e-4
 """Largest way to the surface after it was begun to leave, or before a resumed run is away, in m."""
 _SOON, _LATER = 1.0, 4.0
 """Time until a person can read of a fault where the tool may touch, and elsewhere, in s."""
+_SLOW = ("one in ten comes", "pounds for newtons")
+"""Faults that leave a device, and that are known by its numbers over some time."""
 _MAY_TOUCH = ("contact", "press", "lateral load")
 
 
 def complaints(outcome: Outcome) -> list[str]:
     """Return what a fault must not come to, in words."""
-    soon = _SOON if outcome.phase in _MAY_TOUCH else _LATER
+    slow = outcome.fault.endswith(_SLOW) or outcome.phase not in _MAY_TOUCH
+    soon = _LATER if slow else _SOON
     wrong = {
         "it pushes": not outcome.added <= _MOST_ADDED and outcome.fault not in ADDS,
         "it goes back to the surface": not outcome.again <= _MOST_WAY,

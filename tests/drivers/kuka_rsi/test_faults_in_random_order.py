@@ -1,7 +1,7 @@
 """Random sequences of faults and recoveries: after a fault the tool never moves to the surface.
 
-The bench shares no code with the driver, and its own height of the tool is what is looked at: the commanded one,
-for a contact relaxes, and what was sent before a fault acts some cycles later. Who
+The bench shares no code with the driver. The height of the tool that is looked at is its own, and
+the commanded one: a contact relaxes, and what was sent before a fault acts some cycles later. Who
 supervises the arm here does what a run does: it looks every 48 ms, after a fault it releases and
 retracts, and nothing else before a person says so.
 """
