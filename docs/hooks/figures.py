@@ -26,7 +26,10 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / ".cache" / "figures"
-PROCESSES = (("placement", "notebooks"), ("machining", "small", "budget", "demos", "studio"))
+PROCESSES = (
+    ("placement", "notebooks"),
+    ("machining", "small", "budget", "demos", "faults", "studio"),
+)
 """Modules of ``gallery``, by the process that runs them."""
 TOLD = "told.json"
 _PACKAGES = ("numpy", "scipy", "pin", "matplotlib", "plotly")

@@ -7,19 +7,18 @@ the simulated cell's own, looked at a hundred times a second.
 
 import contextlib
 import json
-import os
-import re
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import elastocal as ec
-from elastocal.cell import WallClock, load_cell
+from elastocal.cell import load_cell
 from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
 from elastocal.procedure.run import ArmLocation
@@ -32,7 +31,10 @@ from elastocal.sim.wire import (
     rsi_server,
     wire_servers,
 )
-from support.run_cells import PlannedCell
+from elastocal.workflows import _operator_and_devices
+from elastocal.workflows._operator_and_devices import Supervision, Unattended
+from support.paced_clock import KilledError, PacedClock
+from support.run_cells import PlannedCell, planned_cell
 from support.wire_faults import (
     Begun,
     DatagramProxy,
@@ -47,11 +49,10 @@ from support.wire_faults import (
     intrude,
     lose,
     not_a_number,
+    pass_on,
     steal,
 )
 
-RATE = min(2.0, max(0.25, 2.0 * (os.cpu_count() or 1) / max(os.getloadavg()[0], 1.0) - 1.0))
-"""Seconds of the cell in a second of the wall: slow motion where the machine is busy."""
 OFF = 10.0
 """Force below which the tool has let go, in N."""
 _SAMPLE = 0.01
@@ -59,8 +60,16 @@ _BEFORE = 0.05
 """Time before a fault over which the force at the fault is taken, in s of the cell."""
 _BACK = 1e-3
 """Way off the surface from which on a tool is on its way back, in m."""
-_PATIENCE = 120.0
+_AWAY = 20e-3
+"""Height above the surface from which on a tool may go anywhere, in m."""
+_INTO = 0.2
+"""Time into a phase at which a fault breaks in, in s."""
+_ENOUGH = 4.0
+"""Time after which a run that goes on in spite of a fault is interrupted, in s."""
+_PATIENCE = 300.0
 """For a run to end, in s of the wall."""
+KILLED = "killed"
+"""Message of a run that was killed: it has none."""
 
 PHASES = {
     "free move": ("move", 1),
@@ -84,6 +93,16 @@ class Lines:
     calibration: StreamProxy
     tracker: StreamProxy
     box_port: int
+    clock: PacedClock
+
+    def mend(self) -> None:
+        """Put everything right, as a person does who has looked at the cell."""
+        for line in (self.arm, self.box):
+            line.from_device = line.to_device = pass_on
+        for stream in (self.calibration, self.tracker):
+            stream.come_back()
+        self.robot.reset()
+        self.clock.sleep(0.2)
 
 
 Break = Callable[[Lines], None]
@@ -94,6 +113,7 @@ def _damage(line: str, damage: Callable[[bytes], list[bytes]], way: str = "from_
 
 
 FAULTS: dict[str, Break] = {
+    "PC: killed": lambda lines: lines.clock.kill(),
     "arm: silent": _damage("arm", lose, "to_device"),
     "arm: answers lost": _damage("arm", lose, "from_device"),
     "arm: garbage": _damage("arm", garble, "to_device"),
@@ -136,11 +156,17 @@ class Outcome:
     released: float | None
     """Until the tool let go for good; None where it did not, 0 where it did not press."""
     said: float
-    """Until the run ended with its message."""
+    """Until a person could read of it."""
     again: float
     """Largest way towards the surface after the tool had begun to leave it."""
     truthful: bool
-    """Whether what the message says of the arm's place is so."""
+    """Whether a tool that is said to be off the surface is."""
+    resumed: str = ""
+    """What the run said that went on from there; empty where it came to its next approach."""
+    pushed: float = 0.0
+    """How far that run moved to the surface before it was away from it."""
+    lost: int = 0
+    """Committed poses that were lost."""
 
 
 @dataclass
@@ -152,7 +178,8 @@ class _Watch:
     _over: threading.Event = field(default_factory=threading.Event)
 
     def run(self) -> None:
-        while not self._over.wait(_SAMPLE):
+        while not self._over.is_set():
+            self.live.clock.sleep(_SAMPLE)
             self.seen.append(self.live.press())
 
     @contextlib.contextmanager
@@ -172,7 +199,27 @@ def _free(kind: socket.SocketKind) -> int:
         return int(line.getsockname()[1])
 
 
-def wired(planned: PlannedCell, name: str, rate: float = RATE) -> tuple[PlannedCell, Callable]:
+def quick_cell(folder: Path) -> PlannedCell:
+    """Return a planned cell whose ways and waits are short: what is tried is what breaks in."""
+    procedure = "approach_speed: 50 mm/s, dwell: 0.2 s, average: 0.2 s, unloaded_average: 0.2 s"
+    return planned_cell(
+        folder,
+        3,
+        "afp",
+        (r'\n  approach_distance: "100 mm"', '\n  approach_distance: "30 mm"'),
+        (r"\n  override: 0.2", "\n  override: 1.0"),
+        (
+            r"\nsimulation:",
+            f"\nprocedure: {{{procedure}}}\nsimulation:\n  sensor: {{rate: 500 Hz}}",
+        ),
+    )
+
+
+def _unless_killed(hook: Callable) -> Callable:
+    return lambda found: None if found.exc_type is KilledError else hook(found)
+
+
+def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
     """Return a cell whose devices are on the wire, and what opens them."""
     udp, tcp = socket.SOCK_DGRAM, socket.SOCK_STREAM
     heard, page, box, calibration = _free(udp), _free(tcp), _free(udp), _free(tcp)
@@ -181,16 +228,23 @@ def wired(planned: PlannedCell, name: str, rate: float = RATE) -> tuple[PlannedC
     @contextlib.contextmanager
     def opened() -> Iterator[Lines]:
         cell = load_cell(found.cell)
-        live = LiveCell(cell, 0, WallClock(rate=rate))
         servers = wire_servers()
-        with contextlib.ExitStack() as stack:
+        with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
+            clock = PacedClock()
+            stack.callback(clock.close)
+            patch.setattr(_operator_and_devices, "WallClock", clock.shown_from)
+            # They look at the wall, and it goes slowly here.
+            patch.setattr("elastocal.sim.wire.net_ft._PAUSE", 8e-3)
+            patch.setattr("elastocal.sim.wire._tcp._TICK", 40e-3)
+            patch.setattr(threading, "excepthook", _unless_killed(threading.excepthook))
+            live = LiveCell(cell, 0, clock)
 
             def closing(made):
                 stack.callback(made.close)
                 return made
 
             arm = closing(DatagramProxy(heard))
-            context = RsiContext(patience=0.2, delay=0.008, timeout=100)
+            context = RsiContext(patience=0.2, delay=0.008, timeout=30)
             robot = closing(rsi_server(live, Told(settings={"port": arm.port}), context))
             server = closing(
                 servers["net_ft"](
@@ -206,6 +260,7 @@ def wired(planned: PlannedCell, name: str, rate: float = RATE) -> tuple[PlannedC
                 closing(StreamProxy(calibration, fronts["calibration"])),
                 closing(StreamProxy(seen, fronts["tracker"])),
                 box,
+                clock,
             )
             for each in (robot, server, points):
                 each.start()
@@ -218,23 +273,13 @@ devices:
   sensor:
     {{driver: net_ft, port: {fronts["box"]}, http_port: {page}, tcp_port: {fronts["calibration"]}}}
   metrology: {{driver: line_stream, port: {fronts["tracker"]}}}
-  clock_rate: {rate:g}
 """
     found = planned.with_text(name, text)
-    found.cell.write_text(
-        re.sub(
-            r"\nsimulation:",
-            "\nsimulation:\n  sensor: {rate: 500 Hz}",
-            found.cell.read_text(encoding="utf-8"),
-            count=1,
-        ),
-        encoding="utf-8",
-    )
     return found, opened
 
 
 def begun(run: Path) -> list[str]:
-    """Return the actuations that a run's journal says have begun, in their order."""
+    """Return the events of a run's journal, with the actuation of those that begin one."""
     journal = run / "journal.jsonl"
     if not journal.is_file():
         return []
@@ -242,39 +287,92 @@ def begun(run: Path) -> list[str]:
     for line in journal.read_text(encoding="utf-8").splitlines():
         with contextlib.suppress(json.JSONDecodeError):
             entries.append(json.loads(line))
-    return [each["action"] for each in entries if each.get("event") == "begin"]
+    return [
+        each.get("action", "") if each["event"] == "begin" else each["event"] for each in entries
+    ]
+
+
+@dataclass
+class _Person(Unattended):
+    """Reads what is said, with the time, and interrupts a run when it is asked to."""
+
+    clock: PacedClock
+    read: list[tuple[float, str]] = field(default_factory=list)
+    enough: Callable[[], bool] = lambda: False
+
+    def warn(self, lines: Sequence[str]) -> None:
+        self.read += [(self.clock.now(), line) for line in lines]
+
+    @contextlib.contextmanager
+    def supervise(self, poses: int) -> Iterator[Supervision]:  # noqa: ARG002 - the protocol's form
+        yield Supervision(lambda _step: None, lambda: self.enough())
+
+
+class _Run:
+    """A run in a thread of its own, with a person beside it."""
+
+    def __init__(self, found: PlannedCell, out: Path, lines: Lines, resume: bool = False) -> None:
+        self._words = {"cell": found.cell, "plan": found.plan, "out": out, "resume": resume}
+        self.person, self.message, self.end = _Person(lines.clock), "", np.nan
+        self._clock, self._thread = lines.clock, threading.Thread(target=self._go, daemon=True)
+        self._thread.start()
+
+    def _go(self) -> None:
+        try:
+            ec.run(**self._words, confirmed=True, operator=self.person)
+        except ElastocalError as error:
+            self.message = str(error)
+        except KilledError:
+            self.message = KILLED
+        self.end = self._clock.now()
+
+    def goes_on(self) -> bool:
+        """Let a moment pass; return whether the run has not ended."""
+        self._clock.sleep(0.02)
+        return self._thread.is_alive()
+
+    def wait(self) -> None:
+        begin = time.monotonic()
+        while self.goes_on():
+            assert time.monotonic() - begin < _PATIENCE, "the run does not end"
 
 
 def broken(planned: PlannedCell, out: Path, fault: str, phase: str) -> Outcome:
-    """Run a cell, let a fault break into a phase of its first pose, and return what came of it."""
+    """Run a cell, let a fault break into a phase of its first pose, mend it, and go on.
+
+    Returns what came of it.
+    """
     found, opened = wired(planned, f"{out.name}.yaml")
     action, number = PHASES[phase]
-    normal = np.array(read_plan(planned.plan).poses[0].normal)
-    ended: list[tuple[float, str]] = []
+    with opened() as lines, _Watch(lines.live).watching() as watch:
+        run, clock = _Run(found, out, lines), lines.clock
+        while run.goes_on() and begun(out).count(action) < number:
+            pass
+        assert not run.message, run.message
+        # Some way into the phase: half of its force, or of its way.
+        clock.sleep(_INTO)
+        at = clock.now()
+        run.person.enough = lambda: clock.now() > at + _ENOUGH
+        FAULTS[fault](lines)
+        run.wait()
+        clock.sleep(0.5)
+        after, kept = len(watch.seen), begun(out).count("commit")
+        lines.mend()
+        again = _Run(found, out, lines, resume=True)
+        again.person.enough = lambda: "approach" in _since_resume(out)
+        again.wait()
+    story = _Story(watch.seen[:after], planned, found, phase, at)
+    return replace(
+        story.outcome(fault, run),
+        resumed=again.message,
+        pushed=story.pushed(watch.seen[after:]),
+        lost=kept - begun(out).count("commit"),
+    )
 
-    def run() -> None:
-        try:
-            ec.run(found.cell, plan=found.plan, out=out, confirmed=True)
-            ended.append((lines.live.clock.now(), ""))
-        except ElastocalError as error:
-            ended.append((lines.live.clock.now(), str(error)))
 
-    with opened() as lines:
-        watch = _Watch(lines.live)
-        thread = threading.Thread(target=run, daemon=True)
-        with watch.watching():
-            thread.start()
-            while thread.is_alive() and begun(out).count(action) < number:
-                time.sleep(0.01)
-            assert thread.is_alive(), ended
-            # Some way into the phase: half of its force, or of its way.
-            time.sleep(0.25 / RATE)
-            at = lines.live.clock.now()
-            FAULTS[fault](lines)
-            thread.join(_PATIENCE)
-            assert not thread.is_alive(), f"{fault} in {phase}: the run does not end"
-            time.sleep(0.5 / RATE)
-    return _outcome(fault, phase, at, *ended[0], watch.seen, normal, _loads(found))
+def _since_resume(run: Path) -> list[str]:
+    events = begun(run)
+    return events[events.index("resume") :] if "resume" in events else []
 
 
 def _loads(found: PlannedCell) -> list[float]:
@@ -282,48 +380,126 @@ def _loads(found: PlannedCell) -> list[float]:
     return [float(np.linalg.norm(force)) for force in cell.file.presses.values()]
 
 
-def _outcome(
-    fault: str,
-    phase: str,
-    at: float,
-    end: float,
-    message: str,
-    seen: list[TruePress],
-    normal: np.ndarray,
-    loads: list[float],
-) -> Outcome:
-    times = np.array([each.time for each in seen])
-    force = np.array([np.linalg.norm(each.force) for each in seen])
-    height = np.array([each.tool @ normal for each in seen])
-    after, before = times >= at, (times >= at - _BEFORE) & (times < at + _BEFORE)
-    # A load that is being built up is part of the fault's beginning: it goes on until it is seen.
-    present = max(float(force[before].max(initial=0.0)), loads[0] if phase in _LOADED else 0.0)
-    pressing = after & (force > OFF)
-    let_go = bool(np.any(after)) and force[after][-1] <= OFF
-    released = 0.0 if not pressing.any() else float(times[pressing][-1] - at) if let_go else None
-    low = np.minimum.accumulate(height[after])
-    leaves = np.flatnonzero(height[after] - low > _BACK)
-    rest = height[after][leaves[0] :] if len(leaves) else height[after][-1:]
-    again = float((np.maximum.accumulate(rest) - rest).max())
-    said_off = any(
-        place.value in message for place in (ArmLocation.APPROACH_POSE, ArmLocation.NEAR_CONTACT)
-    )
-    said_at = ArmLocation.AT_SURFACE.value in message
-    truthful = (not said_off or let_go) and (not said_at or not let_go)
-    return Outcome(
-        fault=fault,
-        phase=phase,
-        message=message,
-        force=float(force[before].max(initial=0.0)),
-        added=max(0.0, float(force[after].max(initial=0.0)) - present),
-        released=released,
-        said=end - at,
-        again=again,
-        truthful=truthful,
-    )
+class _Story:
+    """What the simulated cell knows of the time about a fault."""
+
+    def __init__(
+        self,
+        seen: list[TruePress],
+        planned: PlannedCell,
+        found: PlannedCell,
+        phase: str,
+        at: float,
+    ) -> None:
+        pose = read_plan(planned.plan).poses[0]
+        self._phase, self._at, self._seen = phase, at, seen
+        self._normal, self._surface = np.array(pose.normal), np.array(pose.T_base_tcp)[:3, 3]
+        # A load that is being built up is part of the fault's beginning: it goes on until it is
+        # seen.
+        self._loads = _loads(found)
+        self._load = self._loads[_LOADED.index(phase)] if phase in _LOADED else 0.0
+
+    def _rows(self, seen: list[TruePress]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        times = np.array([each.time for each in seen])
+        force = np.array([np.linalg.norm(each.force) for each in seen])
+        return times, force, np.array([(each.tool - self._surface) @ self._normal for each in seen])
+
+    def outcome(self, fault: str, run: _Run) -> Outcome:
+        """Return what a run did after its fault."""
+        times, force, height = self._rows(self._seen)
+        at, after = self._at, times >= self._at
+        present = float(force[np.abs(times - at) < _BEFORE].max())
+        pressing, let_go = after & (force > OFF), bool(force[-1] <= OFF)
+        released = (
+            0.0 if not pressing.any() else float(times[pressing][-1] - at) if let_go else None
+        )
+        low = np.minimum.accumulate(height[after])
+        leaves = np.flatnonzero(height[after] - low > _BACK)
+        rest = height[after][leaves[0] :] if len(leaves) else height[after][-1:]
+        # A run that goes on goes on pressing.
+        load = self._load if run.message else max(self._loads)
+        said = [when for when, _ in run.person.read if when >= at]
+        return Outcome(
+            fault=fault,
+            phase=self._phase,
+            message=run.message,
+            force=present,
+            added=max(0.0, float(force[after].max()) - max(present, load)),
+            released=released,
+            said=min([*said, run.end]) - at,
+            again=float((np.maximum.accumulate(rest) - rest).max()),
+            truthful=_is_true(run.message, let_go),
+        )
+
+    def pushed(self, seen: list[TruePress]) -> float:
+        """Return how far a run that goes on moves to the surface before it is away from it."""
+        _, _, height = self._rows(seen)
+        away = np.flatnonzero(height > _AWAY)
+        near = height[: away[0] + 1] if len(away) else height
+        return float((np.maximum.accumulate(near) - near).max())
+
+
+def _is_true(message: str, let_go: bool) -> bool:
+    off = (ArmLocation.APPROACH_POSE, ArmLocation.NEAR_CONTACT, ArmLocation.BETWEEN_POSES)
+    said_off = any(place.value in message for place in off)
+    return let_go or not said_off
 
 
 _LOADED = ("press", "lateral load")
+"""Phases that build a load up, in the order of the load cases."""
+
+
+STAYS = {
+    "PC: killed": "Nobody sends corrections: the controller stops by its `Timeout`. Free the tool"
+    " with `elastocal release`, or go on with `--resume`, which frees it first.",
+    "arm: silent": "No order reaches the controller, which stops by its `Timeout`. Mend the line,"
+    " start the program, then `elastocal release` or `--resume`.",
+    "arm: answers lost": "The controller hears nothing and stops by its `Timeout`. Mend the line,"
+    " start the program, then `elastocal release` or `--resume`.",
+    "arm: garbage": "No message of the controller can be answered, so it stops by its `Timeout`."
+    " Mend the line, start the program, then `elastocal release` or `--resume`.",
+    "arm: NaN": "A position that is no number is not answered, and the controller stops by its"
+    " `Timeout`. Start the program anew, then `elastocal release` or `--resume`.",
+    "arm: program restarted": "A program that begins anew forgets its correction, and the arm takes"
+    " no order of the old one. Free the tool with `elastocal release`, or go on with `--resume`.",
+    "arm: one in ten comes": "The arm is silent for too long between two messages, and is stopped."
+    " Mend the line, start the program, then `elastocal release` or `--resume`.",
+    "arm: metres for millimetres": "The place of the tool is not known, so no retract is begun."
+    " Free the tool with the pendant.",
+}
+"""Faults after which a tool that presses stays, with why, and what a person does."""
+ADDS = {
+    "force: pounds for newtons": "Forces that are too small by 4.4 look like forces. Every load is"
+    " pressed with 4.4 times its force, until the sensor is at the end of its range or the tool at"
+    " `travel_limit`. A box that was set to another unit is found by its calibration, looked at"
+    " every 5 s; a box that lies is not. Hold the sensor against a known weight before a run.",
+}
+"""Faults that add more force than the limit, with why."""
+_MOST_ADDED = 100.0
+"""Largest force that a fault may add, in N: the arm's own collision limit."""
+_MOST_WAY = 1e-4
+"""Largest way to the surface after it was begun to leave, or before a resumed run is away, in m."""
+_SOON, _LATER = 1.0, 4.0
+"""Time until a person can read of a fault where the tool may touch, and elsewhere, in s."""
+_SLOW = ("one in ten comes", "pounds for newtons")
+"""Faults that leave a device, and that are known by its numbers over some time."""
+_MAY_TOUCH = ("contact", "press", "lateral load")
+
+
+def complaints(outcome: Outcome) -> list[str]:
+    """Return what a fault must not come to, in words."""
+    slow = outcome.fault.endswith(_SLOW) or outcome.phase not in _MAY_TOUCH
+    soon = _LATER if slow else _SOON
+    wrong = {
+        "it pushes": not outcome.added <= _MOST_ADDED and outcome.fault not in ADDS,
+        "it goes back to the surface": not outcome.again <= _MOST_WAY,
+        "the resumed run pushes": not outcome.pushed <= _MOST_WAY,
+        "a committed pose is lost": outcome.lost > 0,
+        "the message is not true": not outcome.truthful,
+        "the message comes late": bool(outcome.message) and not outcome.said <= soon,
+        "it does not let go": outcome.released is None and outcome.fault not in STAYS,
+    }
+    return [what for what, holds in wrong.items() if holds]
 
 
 def as_rows(outcomes: list[Outcome]) -> list[dict[str, object]]:

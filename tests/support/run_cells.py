@@ -23,8 +23,13 @@ class PlannedCell:
         return PlannedCell(path, self.plan)
 
 
-def planned_cell(folder: Path, poses: int = 4, example: str = "afp") -> PlannedCell:
-    """Write an example's cell, its pool and load cases few and its truth kind; plan it."""
+def planned_cell(
+    folder: Path, poses: int = 4, example: str = "afp", *changes: tuple[str, str]
+) -> PlannedCell:
+    """Write an example's cell, its pool and load cases few and its truth kind; plan it.
+
+    Changes of the cell's text are pairs of a pattern and what takes its place.
+    """
     cell = write_example(folder / "cell", example)[0]
     text = cell.read_text(encoding="utf-8")
     for pattern, replacement in (
@@ -32,6 +37,7 @@ def planned_cell(folder: Path, poses: int = 4, example: str = "afp") -> PlannedC
         (r"\n  pool: .*", "\n  pool: 40"),
         (r"\n  preset: .*", "\n  preset: kind"),
         (r"\n  cases: .*(\n  level: .*\n  check: .*)?", "\n  cases: [normal, north]"),
+        *changes,
     ):
         text, count = re.subn(pattern, replacement, text)
         assert count == 1, pattern

@@ -1,8 +1,8 @@
 """Faults on the lines between a run and its devices, made by whoever stands in between.
 
-A `DatagramProxy` or a `StreamProxy` passes on what it is given. From the moment in which a damage
-is set, it does to the data what a fault does. Neither the product nor its simulators take part:
-what they send is damaged on the way.
+A `DatagramProxy` or a `StreamProxy` passes on what it is given; once a damage is
+set it does to the data what a fault does. Neither the product nor its simulators take part: what
+they send is damaged on the way.
 """
 
 import re
@@ -10,6 +10,7 @@ import select
 import socket
 import struct
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -168,6 +169,15 @@ class StreamProxy:
     def go(self) -> None:
         """Close what is open, and the port."""
         self._gone.set()
+
+    def come_back(self) -> None:
+        """Pass everything on again, at the same port."""
+        self.from_device = pass_on
+        if self._gone.is_set():
+            while self._listener.fileno() >= 0:
+                time.sleep(_LOOK)
+            self._gone.clear()
+            self._listener = socket.create_server(("127.0.0.1", self.port))
 
     def _pump(self) -> None:
         while not self._closed.is_set():
