@@ -1,6 +1,7 @@
 """Edit JSON files by hand and seal them again, as somebody would who renews their hashes."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,3 +23,9 @@ def edit_text(path: Path, old: str, new: str) -> None:
     """Replace a text in a JSON file likewise."""
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     edit(path, lambda _: None)
+
+
+def edit_journal(path: Path, old: str, new: str) -> None:
+    """Replace a text in a journal, as one of before lines had checksums."""
+    text = path.read_text(encoding="utf-8").replace(old, new)
+    path.write_text(re.sub(r',"line_check":"[0-9a-f]+"}', "}", text), encoding="utf-8")

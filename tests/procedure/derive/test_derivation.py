@@ -20,6 +20,7 @@ from elastocal.procedure.record import ReadingStatus, Window
 from elastocal.records import to_data
 from elastocal.robot import Robot
 from support.recorded_runs import Run, Truth, record_run
+from support.sealed import edit_journal
 
 
 @pytest.fixture(scope="module")
@@ -281,7 +282,7 @@ def no_sensor(run: Path) -> None:
     # The run is to have begun with such a cell.
     journal = RunFolder(run).journal
     known = read_journal(journal)[0].run.cell
-    journal.write_text(journal.read_text().replace(known, fingerprint(load_cell(path))))
+    edit_journal(journal, known, fingerprint(load_cell(path)))
 
 
 @pytest.mark.parametrize(
