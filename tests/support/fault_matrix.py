@@ -469,10 +469,10 @@ STAYS = {
 }
 """Faults after which a tool that presses stays, with why, and what a person does."""
 ADDS = {
-    "force: pounds for newtons": "Forces that are too small by 4.4 look like forces. Every load is"
-    " pressed with 4.4 times its force, until the sensor is at the end of its range or the tool at"
-    " `travel_limit`. A box that was set to another unit is found by its calibration, looked at"
-    " every 5 s; a box that lies is not. Hold the sensor against a known weight before a run.",
+    "force: pounds for newtons": "Forces that are too small by 4.4 look like forces. A sudden change"
+    " ends the press at a light load; under the full load it was not seen in this walk: the arm"
+    " pressed harder until the sensor was at the end of its range, and then retracted. Hold the"
+    " sensor against a known weight before a run.",
 }
 """Faults that add more force than the limit, with why."""
 _MOST_ADDED = 100.0

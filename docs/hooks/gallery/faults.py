@@ -15,6 +15,9 @@ from elastocal.report.plots import new_figure, style, write_figure
 
 WALKED = Path(__file__).with_name("fault_matrix.json")
 
+_LIMIT = 100.0
+"""Force that the arm's own collision limit lets be added, in N."""
+
 
 def make(folder: Path) -> dict[str, str]:
     """Make the figure; return what is told of it."""
@@ -25,14 +28,15 @@ def make(folder: Path) -> dict[str, str]:
 
 def told(rows: list[dict[str, Any]]) -> str:
     """Return what the matrix came to, as a sentence."""
-    added, again = (max(row[key] for row in rows) for key in ("added", "again"))
-    let_go = [row["released"] for row in rows if row["message"] and row["released"]]
+    more = {row["fault"] for row in rows if row["added"] > _LIMIT}
+    added = max(row["added"] for row in rows if row["fault"] not in more)
+    back = max(max(row["again"], row["pushed"]) for row in rows)
     held = sum(row["released"] is None for row in rows)
-    return (
-        f"{len(rows)} cells: at most {added:.0f} N added after the fault, at most"
-        f" {1e3 * max(again, *(row['pushed'] for row in rows)):.2f} mm back to the surface, a tool"
-        f" that presses off after at most {max(let_go):.1f} s; in {held} cells it stays"
+    text = (
+        f"{len(rows)} cells of the matrix: at most {added:.0f} N added after a fault, at most"
+        f" {1e3 * back:.2f} mm back to the surface; in {held} cells the tool stays"
     )
+    return f"{text}; more force is added by {', '.join(sorted(more))}" if more else text
 
 
 def _draw(rows: list[dict[str, Any]]) -> Figure:
