@@ -156,15 +156,13 @@ class StreamProxy:
         self._listener = socket.create_server(("127.0.0.1", front))
         self.port = self._listener.getsockname()[1]
         self._pairs: list[tuple[socket.socket, socket.socket]] = []
-        self._closed, self._gone = threading.Event(), threading.Event()
+        self._closed, self._gone, self._hung_up = (threading.Event() for _ in range(3))
         self._thread = threading.Thread(target=self._pump, daemon=True)
         self._thread.start()
 
     def hang_up(self) -> None:
         """Close what is open; who calls again is answered."""
-        for pair in self._pairs:
-            for line in pair:
-                line.shutdown(socket.SHUT_RDWR)
+        self._hung_up.set()
 
     def go(self) -> None:
         """Close what is open, and the port."""
@@ -183,6 +181,9 @@ class StreamProxy:
         while not self._closed.is_set():
             if self._gone.is_set() and self._listener.fileno() >= 0:
                 self._listener.close()
+                self._hung_up.set()
+            if self._hung_up.is_set():
+                self._hung_up.clear()
                 self._drop(self._pairs)
             listening = [self._listener] if self._listener.fileno() >= 0 else []
             ends = [line for pair in self._pairs for line in pair]
