@@ -185,6 +185,7 @@ def test_rows_of_a_visit_share_what_friction_remembers_and_every_row_is_of_one(t
 
 def test_predict_with_a_model_that_does_not_know_its_misfit_says_what_is_missing(folder):
     data = json.loads((folder / "model.json").read_text()) | {"misfit": None}
+    del data["content_sha256"]
     (folder / "older.json").write_text(json.dumps(data))
     out = folder / "older.csv"
     result = elastocal("predict", folder / "older.json", folder / "rows.csv", "--out", out)

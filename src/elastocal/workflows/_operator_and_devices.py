@@ -31,6 +31,7 @@ from elastocal.cell import (
     PathDriver,
     RealArm,
     RigContext,
+    RobotArm,
     WallClock,
 )
 from elastocal.errors import DeviceError, ElastocalError, ProcedureError, nearest
@@ -286,7 +287,7 @@ class ReservedRig:
 
 def arm_devices(
     rig: Rig,
-    devices: Devices,
+    arm: RobotArm,
     operator: Operator,
     confirmed: bool,
     arming: Arming | None = None,
@@ -296,7 +297,7 @@ def arm_devices(
 
     Parameters
     ----------
-    rig, devices : Rig, Devices
+    rig, arm : Rig, RobotArm
         Of the cell.
     operator : Operator
         Is asked, where a real arm is to move and nobody has agreed yet.
@@ -320,12 +321,12 @@ def arm_devices(
     arming.require(rig.cell, rig.real)
     driver = rig.cell.file.devices.arm.driver
     if rig.drivers[driver].real:
-        if not isinstance(devices.arm, RealArm):
+        if not isinstance(arm, RealArm):
             raise DeviceError(
                 f"{rig.cell.path}: devices.arm: driver {driver!r} can hurt, and its arm takes no"
                 " arming (attribute 'arming', see elastocal.cell.RealArm)"
             )
-        devices.arm.arming = arming
+        arm.arming = arming
 
 
 def _close(made: Sequence[DeviceSet]) -> None:

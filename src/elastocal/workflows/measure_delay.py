@@ -116,7 +116,7 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
         settings.operator.warn(
             [f"the tool moves by {settings.amplitude} about where it stands: it must be free there"]
         )
-        arm_devices(rig, devices, settings.operator, settings.confirmed)
+        arm_devices(rig, devices.arm, settings.operator, settings.confirmed)
         arm.enable()
         chirps = []
         for number, axis in enumerate(np.eye(3)):

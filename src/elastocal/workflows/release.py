@@ -32,6 +32,7 @@ from elastocal.workflows._operator_and_devices import (
     Operator,
     ReservedRig,
     Unattended,
+    arm_devices,
     rig_of,
 )
 from elastocal.workflows._workflow import workflow
@@ -165,8 +166,7 @@ def release(settings: ReleaseSettings, progress: Progress) -> ReleaseResult:  # 
         if rig.real and not settings.arm:
             message = "nothing was moved: --arm moves it"
             return ReleaseResult(_figures(bench, way, before, None, message), plan)
-        if rig.real and not settings.confirmed:
-            settings.operator.confirm()
+        arm_devices(rig, bench.arm, settings.operator, settings.confirmed)
         with settings.operator.supervise(0) as supervision:
             message = _move(bench, way, supervision.interrupted)
         after = _beyond(bench)

@@ -397,4 +397,4 @@ def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: Run
     if known is not None:
         settings.operator.warn((*known.lines, contact_sentence(devices.arm.state())))
     asked = settings.operator, settings.confirmed, settings.arming
-    arm_devices(job.rig, devices, *asked, asks=known is not None)
+    arm_devices(job.rig, devices.arm, *asked, asks=known is not None)

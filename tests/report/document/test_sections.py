@@ -352,12 +352,13 @@ def test_a_process_of_another_model_is_not_evidence_for_this_one(parts):
     assert finding.text.startswith("in simulation, which is no evidence")
 
 
-def test_a_model_that_was_changed_is_not_confirmed_by_the_dataset_that_it_names(parts):
-    changed = UsedFile("model.json", "", "", parts.calibrated.sha256, Seal.BROKEN)
+def test_a_codec_that_was_changed_is_not_confirmed_by_the_dataset_that_it_names(parts):
+    name = parts.codecs[0].name or "codec"
+    changed = UsedFile(f"{name}/codec.json", "", "", "", Seal.BROKEN)
     links = verify_chain(replace(parts, files=(changed,)), ChainFiles(None, None, str))
     state = {link.name: link.state for link in links}
-    assert state["model"] is LinkState.UNSTATED
-    assert state["codec"] is LinkState.WHOLE
+    assert state["codec"] is LinkState.UNSTATED
+    assert state["model"] is LinkState.WHOLE
 
 
 def test_what_was_not_verified_is_never_empty(parts):
