@@ -470,8 +470,8 @@ STAYS = {
 """Faults after which a tool that presses stays, with why, and what a person does."""
 ADDS = {
     "force: pounds for newtons": "Forces that are too small by 4.4 look like forces. A sudden"
-    " change ends the press at a light load; under the full load it was not seen in this walk: the arm"
-    " pressed harder until the sensor was at the end of its range, and then retracted. Hold the"
+    " change ends the press at a light load; under the full load it was not seen in this walk:"
+    " the arm pressed harder until the sensor was at the end of its range, and then retracted. Hold the"
     " sensor against a known weight before a run.",
 }
 """Faults that add more force than the limit, with why."""
