@@ -215,6 +215,18 @@ def quick_cell(folder: Path) -> PlannedCell:
     )
 
 
+class _PacedEvent(threading.Event):
+    """Waits by a paced clock, so that a stream keeps up with its time."""
+
+    def __init__(self, clock: PacedClock) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def wait(self, timeout: float | None = None) -> bool:  # noqa: ARG002 - a cycle of the arm's
+        self._clock.sleep(0.004)
+        return self.is_set()
+
+
 def _unless_killed(hook: Callable) -> Callable:
     return lambda found: None if found.exc_type is KilledError else hook(found)
 
@@ -233,8 +245,7 @@ def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
             clock = PacedClock()
             stack.callback(clock.close)
             patch.setattr(_operator_and_devices, "WallClock", clock.shown_from)
-            # They look at the wall, and it goes slowly here.
-            patch.setattr("elastocal.sim.wire.net_ft._PAUSE", 8e-3)
+            # It looks at the wall, which goes slowly here.
             patch.setattr("elastocal.sim.wire._tcp._TICK", 40e-3)
             patch.setattr(threading, "excepthook", _unless_killed(threading.excepthook))
             live = LiveCell(cell, 0, clock)
@@ -251,6 +262,7 @@ def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
                     live, Told(settings={"port": box, "http_port": page, "tcp_port": calibration})
                 )
             )
+            server._closed = _PacedEvent(clock)
             points = closing(servers["line_stream"](live, Told(settings={"port": seen})))
             lines = Lines(
                 live,
@@ -470,9 +482,9 @@ STAYS = {
 """Faults after which a tool that presses stays, with why, and what a person does."""
 ADDS = {
     "force: pounds for newtons": "Forces that are too small by 4.4 look like forces. A sudden"
-    " change ends the press at a light load; under the full load it was not seen in this walk:"
-    " the arm pressed harder until the sensor was at the end of its range, and then retracted. Hold the"
-    " sensor against a known weight before a run.",
+    " change ends the press at a light load; under the full load it was not seen in this walk: the"
+    " arm pressed harder until the sensor was at the end of its range, and then retracted. Hold"
+    " the sensor against a known weight before a run.",
 }
 """Faults that add more force than the limit, with why."""
 _MOST_ADDED = 100.0

@@ -218,6 +218,17 @@ class TestContact:
         assert "within a cycle: contact is lost, or the sensor's scale or zero" in state.fault
         assert np.linalg.norm(bench.force_tcp) <= pressing + 5.0
 
+    def test_a_contact_that_is_lost_at_once_ends_a_release_and_is_no_fault(self, bench):
+        bench.touch()
+        bench.arm.hold(PRESS, 500.0)
+        bench.clock.sleep(1.5)
+        bench.arm.release(500.0)
+        bench.clock.sleep(0.1)
+        assert np.linalg.norm(bench.force_tcp) > 150.0
+        bench.peer.surface = None
+        state = bench.wait(Motion.IDLE)
+        assert state.fault is None
+
     def test_a_feed_that_fails_ends_no_thread_and_the_tool_comes_off(self, bench):
         bench.touch()
         bench.arm.hold(PRESS, 500.0)

@@ -226,7 +226,8 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> Phase:
     before = reader.quick_force_tcp
     while cycle.time < ends:
         require_force(reader, press.force_limit)
-        _require_steady(before, reader.quick_force_tcp)
+        if not releases:  # A release ends with contact that is lost, at once where it was light.
+            _require_steady(before, reader.quick_force_tcp)
         before = reader.quick_force_tcp
         if reader.hesitates:
             if releases:
