@@ -170,13 +170,13 @@ def test_without_agreement_no_arm_is_armed_whoever_asks(planned, fake):
     rig = rig_of(load_cell(planned.with_text("asked.yaml", REAL).cell))
     with rig.reserved("test") as reserved, contextlib.closing(reserved.connect(0, 0.0)) as devices:
         with pytest.raises(ProcedureError, match="a person must confirm"):
-            arm_devices(rig, devices, workflows.Unattended(), confirmed=False)
+            arm_devices(rig, devices.arm, workflows.Unattended(), confirmed=False)
         for arming in (Arming(), Arming(rig.cell.sha256), Arming("0" * 64, real=True)):
             with pytest.raises(DeviceError, match=r"is not armed|has changed"):
-                arm_devices(rig, devices, workflows.Unattended(), True, arming)
+                arm_devices(rig, devices.arm, workflows.Unattended(), True, arming)
             with pytest.raises(DeviceError, match="the arm is not armed: nothing moves"):
                 devices.arm.enable()
-        arm_devices(rig, devices, workflows.Unattended(), confirmed=True)
+        arm_devices(rig, devices.arm, workflows.Unattended(), confirmed=True)
         devices.arm.enable()
     assert fake.enabled == [rig.cell.sha256]
 
@@ -188,7 +188,7 @@ def test_an_arm_that_takes_no_arming_is_refused(planned, fake, monkeypatch):
         with pytest.raises(
             DeviceError, match=r"driver 'fake' can hurt, and its arm takes no arming"
         ):
-            arm_devices(rig, devices, workflows.Unattended(), confirmed=True)
+            arm_devices(rig, devices.arm, workflows.Unattended(), confirmed=True)
 
 
 def test_a_kuka_is_not_enabled_by_the_arming_of_another_file():
