@@ -1,5 +1,6 @@
 """Positions that are mistaken are refused by the mistake; those of sound campaigns are not."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -144,17 +145,20 @@ class Mistake:
     what: str
     change: Change
     says: str
-    """Part of the refusal that names it."""
+    """Pattern in the refusal that names it; sizes to 2 %, zeros to 2 deg: the arm's own are off by
+    up to a degree."""
 
 
 def one_joint(n: int) -> list[Mistake]:
     return [
         Mistake("reversed", joint(n, np.negative), "turns the other way round"),
         Mistake("half", joint(n, lambda q: q / 2.0), "multiply it by 2"),
-        Mistake("scaled", joint(n, lambda q: 1.3 * q), "multiply it by 0.769"),
+        Mistake("scaled", joint(n, lambda q: 1.3 * q), r"has 1\.(28|29|3|31|32)\d* times its size"),
         Mistake("rad as deg", joint(n, np.radians), "is in rad, but its heading says deg"),
-        Mistake("zero at 90", joint(n, lambda q: q + np.pi / 2.0), "add -90 deg"),
-        Mistake("zero at -45", joint(n, lambda q: q - np.pi / 4.0), "add 45 deg"),
+        Mistake("zero at 90", joint(n, lambda q: q + np.pi / 2.0), r"is (88|89|90|91|92) deg off"),
+        Mistake(
+            "zero at -45", joint(n, lambda q: q - np.pi / 4.0), r"is -(43|44|45|46|47) deg off"
+        ),
         Mistake("dead", joint(n, lambda q: 0.0 * q + 0.3), "stays the same"),
         Mistake("dead from a third on", joint(n, _stuck), "stays the same"),
         Mistake("late", joint(n, lambda q: np.roll(q, 1)), "1 row late"),
@@ -179,7 +183,11 @@ COMMON = [
     Mistake("rows late", late(1), "the joints are 1 row late"),
     Mistake("rows early", late(-1), "the joints are 1 row early"),
     Mistake("rows late by two", late(2), "the joints are 2 rows late"),
-    Mistake("all rad as deg", lambda data: replace(data, q=np.radians(data.q)), "rad"),
+    Mistake(
+        "all rad as deg",
+        lambda data: replace(data, q=np.radians(data.q)),
+        "every joint is in rad, but",
+    ),
     Mistake("first swapped", joints(1, 0), "are swapped"),
     Mistake("last swapped", joints(5, 4), "are swapped"),
     Mistake("station moved", from_half_on(moved((0.5, -1.0, 0.1), 0.4)), "stands elsewhere"),
@@ -209,14 +217,16 @@ def refusal(data: Positions, robot: Robot) -> str:
     "mistake",
     [
         Mistake("half", joint(2, lambda q: q / 2.0), "joint_a3 has 0.5 times"),
-        Mistake("dead", joint(4, lambda q: 0.0 * q), "joint_a5 (in 30 rows of 30) stays the same"),
+        Mistake(
+            "dead", joint(4, lambda q: 0.0 * q), r"joint_a5 \(in 30 rows of 30\) stays the same"
+        ),
     ],
     ids=lambda each: each.what,
 )
 def test_a_mistake_is_refused_by_its_name(mistake):
     measured = campaign("kuka", 30, markers=1, stations=1)
     said = refusal(mistake.change(measured.data), measured.robot)
-    assert mistake.says in said
+    assert re.search(mistake.says, said)
     assert "\n" not in said
 
 
@@ -336,7 +346,7 @@ def test_mistakes_are_refused_by_their_name_or_do_no_harm(arm):
         try:
             model = fitted(data, measured.robot)
         except GeometryError as error:
-            if says in str(error):
+            if re.search(says, str(error)):
                 named += 1
             else:
                 unnamed.append((what, str(error)))

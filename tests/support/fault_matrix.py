@@ -504,7 +504,9 @@ def complaints(outcome: Outcome) -> list[str]:
     soon = _LATER if slow else _SOON
     wrong = {
         "it pushes": not outcome.added <= _MOST_ADDED and outcome.fault not in ADDS,
-        "it goes back to the surface": not outcome.again <= _MOST_WAY,
+        # A run that goes on goes to its next press.
+        "it goes back to the surface": bool(outcome.message) and not outcome.again <= _MOST_WAY,
+        "the resumed run does not go on": bool(outcome.resumed),
         "the resumed run pushes": not outcome.pushed <= _MOST_WAY,
         "a committed pose is lost": outcome.lost > 0,
         "the message is not true": not outcome.truthful,

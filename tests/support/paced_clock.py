@@ -10,8 +10,10 @@ import time
 
 _STEP = 0.004
 """Longest step of the time, in s."""
-_PATIENCE = 0.25
+_PATIENCE = 1.0
 """How long a thread that does not sleep is waited for, in s of the wall."""
+_LOOK = 0.25
+"""Between two looks of a thread that sleeps whether the clock was closed, in s of the wall."""
 _PAUSE = 0.5e-3
 """Wall time left to the lines after each step, in s: datagrams go on their way."""
 
@@ -46,7 +48,7 @@ class PacedClock:
             self._known.add(me)
             self._changed.notify_all()
             while self._now < until - 1e-9 and not self._over.is_set():
-                self._changed.wait(_PATIENCE)
+                self._changed.wait(_LOOK)
             self._until.pop(me, None)
 
     def close(self) -> None:

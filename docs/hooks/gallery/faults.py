@@ -30,7 +30,7 @@ def told(rows: list[dict[str, Any]]) -> str:
     """Return what the matrix came to, as a sentence."""
     more = {row["fault"] for row in rows if row["added"] > _LIMIT}
     added = max(row["added"] for row in rows if row["fault"] not in more)
-    back = max(max(row["again"], row["pushed"]) for row in rows)
+    back = max(max(row["again"], row["pushed"]) for row in rows if row["message"])
     held = sum(row["released"] is None for row in rows)
     text = (
         f"{len(rows)} cells of the matrix: at most {added:.0f} N added after a fault, at most"

@@ -80,7 +80,11 @@ def _joint(data: Positions, joint: int, values: FloatArray) -> Positions:
 
 
 def _readings(robot: Robot, data: Positions) -> Iterator[Undone]:
-    """Undo other conventions, and the sense of single joints."""
+    """Undo other conventions, the unit of all joints, and the sense of single ones."""
+    for factor in ratios(_ANGLES):
+        q = data.q * np.where(robot.revolute, factor, 1.0)
+        message = f"every joint {unit_mistake(factor, _ANGLES)}"
+        yield Undone(message, robot, replace(data, q=q))
     for reading in other_joint_readings(robot):
         yield Undone(reading.message, robot, replace(data, q=reading.read(robot, data.q)))
     for joint, name in enumerate(robot.joint_names):

@@ -63,7 +63,7 @@ def test_devices_that_are_up_to_date_pass(watch):
         ({"arm": 1.4}, Fault.CLOCK),
         ({"sensor": 0.6}, Fault.SENSOR_STALE),
         ({"sensor": np.nan}, Fault.CLOCK),
-        ({"sensor": -0.5}, Fault.CLOCK),
+        ({"sensor": -0.5}, Fault.SENSOR_STALE),
         ({"points": 0.6}, Fault.TRACKER_STALE),
         ({"force": 11.0}, Fault.FORCE_LIMIT),
         ({"force": np.nan}, Fault.SENSOR_FAULT),
@@ -71,6 +71,20 @@ def test_devices_that_are_up_to_date_pass(watch):
 )
 def test_each_device_is_watched(watch, what, fault):
     assert fault_of(watch, seen(1.0, **what), Guard(force=10.0, beam=True)) is fault
+
+
+def test_samples_that_go_back_are_a_clock_out_of_order(watch):
+    watch.check(seen(0.5), Guard())
+    assert fault_of(watch, seen(1.0, sensor=0.1)) is Fault.CLOCK
+
+
+def test_samples_of_a_time_in_which_nobody_watched_are_none_too_early(watch):
+    watch.check(seen(0.5), Guard())
+    watch.restart(2.0)
+    late = seen(2.04)
+    times = np.array([0.6, 2.04])
+    both = replace(late.wrenches, time=times, force=np.full((2, 3), 7.0), moment=np.zeros((2, 3)))
+    watch.check(replace(late, wrenches=both), Guard())
 
 
 def test_the_limit_itself_is_allowed(watch):

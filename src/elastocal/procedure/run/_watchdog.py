@@ -81,7 +81,8 @@ class Watchdog:
     ) -> None:
         self.collisions, self._R_tcp_sensor = collisions, R_tcp_sensor
         self._stale, self._beam_timeout = stale, beam_timeout
-        self._sensor_time = self._changed = self._point_time = -np.inf
+        self._sensor_time = self._last_sample = -np.inf
+        self._changed = self._point_time = -np.inf
         self._row: tuple[float, ...] = ()
         self._lost_at: float | None = None
         self._looked_at = -np.inf
@@ -137,10 +138,11 @@ class Watchdog:
             if not math.isfinite(block.moment.sum()):
                 raise FaultError(Fault.SENSOR_FAULT, f"{block.source}: its moment is not finite")
             first = float(block.time[0])
-            if not first >= self._sensor_time - self._stale:
-                text = f"{block.source}: {first:.3f} s after {self._sensor_time:.3f} s"
+            # Samples of a time in which nobody watched, a disk that took long, are none too early.
+            if not first >= self._last_sample - self._stale:
+                text = f"{block.source}: {first:.3f} s after {self._last_sample:.3f} s"
                 raise FaultError(Fault.CLOCK, text)
-            self._sensor_time = float(block.time[-1])
+            self._sensor_time = self._last_sample = float(block.time[-1])
             row = (*block.force[-1].tolist(), *block.moment[-1].tolist())
             if row != self._row:
                 self._row, self._changed = row, now
