@@ -75,6 +75,9 @@ class LineCounts:
 def refused_telegrams(malformed: int, refused: str, foreign: int) -> str:
     """Return in words what came on a line from which nothing could be read.
 
+    >>> refused_telegrams(1600, "RIst.X is '1620,9999', no number: decimal comma", 0)
+    "1600 telegrams refused: RIst.X is '1620,9999', no number: decimal comma"
+
     Parameters
     ----------
     malformed : int
@@ -83,9 +86,6 @@ def refused_telegrams(malformed: int, refused: str, foreign: int) -> str:
         Why.
     foreign : int
         Datagrams of others than the device.
-
-    >>> refused_telegrams(1600, "RIst.X is '1620,9999', no number: decimal comma", 0)
-    "1600 telegrams refused: RIst.X is '1620,9999', no number: decimal comma"
     """
     said = [f"{malformed} telegrams refused: {refused}"] if malformed else []
     said += [f"{foreign} datagrams from elsewhere"] if foreign else []
