@@ -1,5 +1,6 @@
 """Edit JSON files by hand and seal them again, as somebody would who renews their hashes."""
 
+import hashlib
 import json
 import re
 from collections.abc import Callable
@@ -25,7 +26,11 @@ def edit_text(path: Path, old: str, new: str) -> None:
     edit(path, lambda _: None)
 
 
-def edit_journal(path: Path, old: str, new: str) -> None:
-    """Replace a text in a journal, as one of before lines had checksums."""
-    text = path.read_text(encoding="utf-8").replace(old, new)
-    path.write_text(re.sub(r',"line_check":"[0-9a-f]+"}', "}", text), encoding="utf-8")
+def edit_journal(path: Path, change: Callable[[str], str]) -> None:
+    """Change what a journal says; the checksum of every line is renewed over the line before."""
+    check, lines = "", []
+    for line in change(path.read_text(encoding="utf-8")).splitlines():
+        body = re.sub(r',"line_check":"[0-9a-f]+"}$', "", line)
+        check = hashlib.sha256(f"{check}{body}".encode()).hexdigest()[:16]
+        lines.append(f'{body},"line_check":"{check}"}}\n')
+    path.write_text("".join(lines), encoding="utf-8")

@@ -42,6 +42,7 @@ _FILES = (
     ("process.csv", "where production runs: joints and forces of its courses"),
     ("plan/plan.html", "the chosen poses in three dimensions; plan.json holds them for programs"),
     ("run/", "cell and plan as used, journal, raw streams (.mcap), dataset.nc, summary.json"),
+    ("runs.jsonl", "the runs of this cell, in the order in which they began"),
     ("model.json", "the calibrated model: compliances, their bootstrap draws, what is observable"),
     ("tool.json", "mass, centre of mass, sensor bias and rotation, from the unloaded poses"),
     ("codec/", "were there enough poses: one folder a comparison, with codec.html"),

@@ -28,6 +28,7 @@ from elastocal.procedure.run import FaultError, ForceTap, LeavingWatch, ToolLoad
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.wording import mm
 from elastocal.workflows._operator_and_devices import (
     Operator,
     ReservedRig,
@@ -92,7 +93,8 @@ class ReleaseResult(Result):
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know at the end."""
-        return (("tool", self.figures.message),)
+        way = mm(self.figures.distance)
+        return (("way off the surface", way), ("tool", self.figures.message))
 
 
 @dataclass(frozen=True, eq=False)

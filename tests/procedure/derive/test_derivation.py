@@ -282,7 +282,7 @@ def no_sensor(run: Path) -> None:
     # The run is to have begun with such a cell.
     journal = RunFolder(run).journal
     known = read_journal(journal)[0].run.cell
-    edit_journal(journal, known, fingerprint(load_cell(path)))
+    edit_journal(journal, lambda text: text.replace(known, fingerprint(load_cell(path))))
 
 
 @pytest.mark.parametrize(

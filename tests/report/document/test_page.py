@@ -11,7 +11,7 @@ import pytest
 from elastocal import dataset
 from elastocal.codec import read_codec, write_codec
 from elastocal.errors import FileAccessError
-from elastocal.procedure import file_sha256
+from elastocal.procedure import file_sha256, read_journal
 from elastocal.report import language_of, write_plan_page
 from elastocal.report.document import (
     SECTIONS,
@@ -25,6 +25,7 @@ from elastocal.verdict import (
 )
 from support.pages import english_left, texts_of
 from support.reported import MADE
+from support.sealed import edit, edit_journal
 
 LATER = "2027-08-09T10:11:12+00:00"
 MANIFEST = re.compile(r'id="manifest">.*?<')
@@ -103,25 +104,34 @@ def test_certificate_verdict_and_signature_come_before_the_appendix(text):
     assert places == sorted(places)
 
 
-def test_equal_runs_give_equal_reports_but_for_times(text, copied, tmp_path):
+def run_of(folder):
+    """Return the hash that a run is known by; the time at which it began is in it."""
+    return read_journal(folder / "run" / "journal.jsonl")[0].run.identity
+
+
+def test_equal_runs_give_equal_reports_but_for_times(text, finished, copied, tmp_path):
     folder = copied()
-    for name in ("journal.jsonl", "summary.json"):
-        path = folder / "run" / name
-        found = path.read_text()
-        assert STAMP.search(found)
-        path.write_text(STAMP.sub(LATER, found))
+    journal, summary = (folder / "run" / name for name in ("journal.jsonl", "summary.json"))
+    assert all(STAMP.search(path.read_text(encoding="utf-8")) for path in (journal, summary))
+    edit_journal(journal, lambda found: STAMP.sub(LATER, found))
+    history = STAMP.sub(LATER, (finished / "runs.jsonl").read_text(encoding="utf-8"))
+    renamed = history.replace(run_of(finished), run_of(folder))
+    (folder / "runs.jsonl").write_text(renamed, encoding="utf-8")
     data = dataset.read(folder / "run" / "dataset.nc").to_xarray().copy()
     data.attrs["provenance"] = STAMP.sub(LATER, data.attrs["provenance"])
-    sha256 = file_sha256(folder / "run" / "journal.jsonl")
-    data.attrs["made_from"] = json.dumps({"journal.jsonl": sha256})
+    data.attrs["made_from"] = json.dumps({"journal.jsonl": file_sha256(journal)})
     dataset.write(dataset.Dataset.from_xarray(data), folder / "run" / "dataset.nc")
+    summary.write_text(STAMP.sub(LATER, summary.read_text(encoding="utf-8")), encoding="utf-8")
+    rewritten = file_sha256(folder / "run" / "dataset.nc")
+    edit(summary, lambda told: told.update(dataset_sha256=rewritten))
     codec = read_codec(folder / "codec")
     write_codec(folder / "codec", replace(codec, provenance=STAMP.sub(LATER, codec.provenance)))
     again = write_report(tmp_path / "b.html", gather_evidence(EvidenceOptions(folder), LATER))
     other = again.path.read_text(encoding="utf-8")
     assert other != text
+    shown = text.replace(run_of(finished)[:16], run_of(folder)[:16])
     # The manifest has the hashes of files as they are, times included.
-    assert MANIFEST.sub("", STAMP.sub("T", other)) == MANIFEST.sub("", STAMP.sub("T", text))
+    assert MANIFEST.sub("", STAMP.sub("T", other)) == MANIFEST.sub("", STAMP.sub("T", shown))
 
 
 def test_times_are_marked_as_such(page):
