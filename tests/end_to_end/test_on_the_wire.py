@@ -21,6 +21,7 @@ from elastocal.drivers import rtde
 from elastocal.sim.wire import PORTS
 from support import live_bench
 from support.cli import PATIENCE
+from support.live_on_wire import free
 from support.run_cells import PlannedCell, planned_cell
 from support.ur_client import UrClient
 
@@ -33,12 +34,6 @@ NOISE = 16e-6
 of the fibre placement cell and its plan (the UR20: 18e-6 over four); stops, slips, ramps and
 sensors differ."""
 ENTRY = "from elastocal.cli.main import run; run()"
-
-
-def free(kind: socket.SocketKind) -> int:
-    with socket.socket(socket.AF_INET, kind) as line:
-        line.bind(("127.0.0.1", 0))
-        return line.getsockname()[1]
 
 
 def devices() -> str:

@@ -33,6 +33,7 @@ from elastocal.sim.wire import (
 )
 from elastocal.workflows import _operator_and_devices
 from elastocal.workflows._operator_and_devices import Supervision, Unattended
+from support.live_on_wire import free
 from support.paced_clock import KilledError, PacedClock
 from support.run_cells import PlannedCell, planned_cell
 from support.wire_faults import (
@@ -193,12 +194,6 @@ class _Watch:
             thread.join(5.0)
 
 
-def _free(kind: socket.SocketKind) -> int:
-    with socket.socket(socket.AF_INET, kind) as line:
-        line.bind(("127.0.0.1", 0))
-        return int(line.getsockname()[1])
-
-
 def quick_cell(folder: Path) -> PlannedCell:
     """Return a planned cell whose ways and waits are short: what is tried is what breaks in."""
     procedure = "approach_speed: 50 mm/s, dwell: 0.2 s, average: 0.2 s, unloaded_average: 0.2 s"
@@ -234,8 +229,8 @@ def _unless_killed(hook: Callable) -> Callable:
 def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
     """Return a cell whose devices are on the wire, and what opens them."""
     udp, tcp = socket.SOCK_DGRAM, socket.SOCK_STREAM
-    heard, page, box, calibration = _free(udp), _free(tcp), _free(udp), _free(tcp)
-    seen = _free(tcp)
+    heard, page, box, calibration = free(udp), free(tcp), free(udp), free(tcp)
+    seen = free(tcp)
 
     @contextlib.contextmanager
     def opened() -> Iterator[Lines]:
@@ -278,7 +273,7 @@ def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
                 each.start()
             yield lines
 
-    fronts = {"box": _free(udp), "calibration": _free(tcp), "tracker": _free(tcp)}
+    fronts = {"box": free(udp), "calibration": free(tcp), "tracker": free(tcp)}
     text = f"""
 devices:
   arm: {{driver: kuka_rsi, mode: contact, port: {heard}, delay: "8 ms", ptp_percent: 30}}
