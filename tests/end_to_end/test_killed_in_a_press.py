@@ -15,12 +15,12 @@ from elastocal.errors import ProcedureError
 from elastocal.procedure import RunEnd
 from elastocal.workflows import Supervision, Unattended, release
 from support.cli import PATIENCE
-from support.fault_matrix import RATE as FAST, Lines, _Watch, begun, wired
+from support.fault_matrix import Lines, _Watch, begun, wired
 from support.run_cells import planned_cell
 
 pytestmark = [pytest.mark.slow, pytest.mark.end_to_end]
 ENTRY = "from elastocal.cli.main import run; run()"
-RATE = 0.5 * FAST
+RATE = 0.5
 """Two processes speak here, and one of them begins while the other presses."""
 NOISE = 10.0
 """Force that a standing arm may seem to gain, in N."""

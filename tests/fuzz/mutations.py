@@ -25,6 +25,9 @@ from mcap.reader import make_reader
 from mcap.records import Metadata
 from mcap.writer import CompressionType, Writer
 
+from elastocal.records import SEAL, json_sha256
+from support.sealed import chained
+
 Mutation = Callable[[bytes, random.Random], bytes]
 Tree = Any
 """Whatever JSON or YAML holds."""
@@ -303,8 +306,18 @@ TREES: dict[str, Callable[[Tree, random.Random], Tree]] = {
 }
 
 
+_UNSEALED = 0.1
+"""How often a hash is left as it was; it is then all that a reader finds."""
+
+
 def _json(change: Callable[[Tree, random.Random], Tree]) -> Mutation:
-    return lambda data, rng: json.dumps(change(json.loads(data), rng)).encode()
+    def mutate(data: bytes, rng: random.Random) -> bytes:
+        tree = change(json.loads(data), rng)
+        if isinstance(tree, dict) and SEAL in tree and rng.random() > _UNSEALED:
+            tree[SEAL] = json_sha256(tree)
+        return json.dumps(tree).encode()
+
+    return mutate
 
 
 _SLOW_YAML = 300_000
@@ -334,8 +347,9 @@ def _line(change: Callable[[Tree, random.Random], Tree]) -> Mutation:
     def mutate(data: bytes, rng: random.Random) -> bytes:
         lines = data.splitlines()
         at = rng.choice((0, rng.randrange(len(lines))))
-        lines[at] = json.dumps(change(json.loads(lines[at]), rng)).encode()
-        return b"\n".join(lines) + b"\n"
+        lines[at] = json.dumps(change(json.loads(lines[at]), rng), separators=(",", ":")).encode()
+        changed = b"\n".join(lines) + b"\n"
+        return changed if rng.random() < _UNSEALED else chained(changed.decode()).encode()
 
     return mutate
 

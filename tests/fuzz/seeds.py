@@ -1,7 +1,6 @@
 """Valid files of every kind that commands read, and the commands that read them."""
 
 import importlib.resources
-import json
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -40,6 +39,7 @@ from support.cli import elastocal
 from support.compensated import calibrated
 from support.foreign_bags import write_bag
 from support.measured_arms import measure, write_positions
+from support.sealed import edit
 
 
 @dataclass(frozen=True)
@@ -434,12 +434,15 @@ def make_seeds(folder: Path) -> None:
     _write_geometry(folder)
     _write_study(folder / "study")
     _write_keys(folder)
-    old = json.loads((folder / "model.json").read_text())
-    old["compliance"] = [1.02 * value for value in old["compliance"]]
-    (folder / "old.json").write_text(json.dumps(old))
+    shutil.copy(folder / "model.json", folder / "old.json")
+    edit(folder / "old.json", _soften)
     _done(
         "compare", folder / "old.json", folder / "model.json", "--out", folder / "comparison.json"
     )
+
+
+def _soften(model: dict) -> None:
+    model["compliance"] = [1.02 * value for value in model["compliance"]]
 
 
 def _write_kuka(folder: Path, cell: str) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import elastocal as ec
-from elastocal.cell import load_cell
+from elastocal.cell import WallClock, load_cell
 from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
 from elastocal.procedure.run import ArmLocation
@@ -94,7 +94,7 @@ class Lines:
     calibration: StreamProxy
     tracker: StreamProxy
     box_port: int
-    clock: PacedClock
+    clock: PacedClock | WallClock
 
     def mend(self) -> None:
         """Put everything right, as a person does who has looked at the cell."""
@@ -226,8 +226,23 @@ def _unless_killed(hook: Callable) -> Callable:
     return lambda found: None if found.exc_type is KilledError else hook(found)
 
 
-def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
-    """Return a cell whose devices are on the wire, and what opens them."""
+def _paced(stack: contextlib.ExitStack, patch: pytest.MonkeyPatch) -> PacedClock:
+    clock = PacedClock()
+    stack.callback(clock.close)
+    patch.setattr(_operator_and_devices, "WallClock", clock.shown_from)
+    # It looks at the wall, which goes slowly here.
+    patch.setattr("elastocal.sim.wire._tcp._TICK", 40e-3)
+    patch.setattr(threading, "excepthook", _unless_killed(threading.excepthook))
+    return clock
+
+
+def wired(
+    planned: PlannedCell, name: str, rate: float | None = None
+) -> tuple[PlannedCell, Callable]:
+    """Return a cell whose devices are on the wire, and what opens them.
+
+    They go by a paced clock, or at a rate by the wall's, which other processes see too.
+    """
     udp, tcp = socket.SOCK_DGRAM, socket.SOCK_STREAM
     heard, page, box, calibration = free(udp), free(tcp), free(udp), free(tcp)
     seen = free(tcp)
@@ -237,12 +252,7 @@ def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
         cell = load_cell(found.cell)
         servers = wire_servers()
         with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
-            clock = PacedClock()
-            stack.callback(clock.close)
-            patch.setattr(_operator_and_devices, "WallClock", clock.shown_from)
-            # It looks at the wall, which goes slowly here.
-            patch.setattr("elastocal.sim.wire._tcp._TICK", 40e-3)
-            patch.setattr(threading, "excepthook", _unless_killed(threading.excepthook))
+            clock = _paced(stack, patch) if rate is None else WallClock(rate=rate)
             live = LiveCell(cell, 0, clock)
 
             def closing(made):
@@ -257,7 +267,8 @@ def wired(planned: PlannedCell, name: str) -> tuple[PlannedCell, Callable]:
                     live, Told(settings={"port": box, "http_port": page, "tcp_port": calibration})
                 )
             )
-            server._closed = _PacedEvent(clock)
+            if rate is None:
+                server._closed = _PacedEvent(clock)
             points = closing(servers["line_stream"](live, Told(settings={"port": seen})))
             lines = Lines(
                 live,

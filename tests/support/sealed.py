@@ -28,9 +28,14 @@ def edit_text(path: Path, old: str, new: str) -> None:
 
 def edit_journal(path: Path, change: Callable[[str], str]) -> None:
     """Change what a journal says; the checksum of every line is renewed over the line before."""
+    path.write_text(chained(change(path.read_text(encoding="utf-8"))), encoding="utf-8")
+
+
+def chained(journal: str) -> str:
+    """Return lines with checksums over the lines before; those that have none stay as they are."""
     check, lines = "", []
-    for line in change(path.read_text(encoding="utf-8")).splitlines():
-        body = re.sub(r',"line_check":"[0-9a-f]+"}$', "", line)
-        check = hashlib.sha256(f"{check}{body}".encode()).hexdigest()[:16]
-        lines.append(f'{body},"line_check":"{check}"}}\n')
-    path.write_text("".join(lines), encoding="utf-8")
+    for line in journal.splitlines(keepends=True):
+        body, found = re.subn(r',"line_check":"[0-9a-f]+"}\s*$', "", line)
+        check = hashlib.sha256(f"{check}{body}".encode()).hexdigest()[:16] if found else check
+        lines.append(f'{body},"line_check":"{check}"}}\n' if found else line)
+    return "".join(lines)

@@ -194,6 +194,7 @@ class WrenchFeed(Protocol):
         """Return the newest sample, whoever has seen it before; None before the first."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class RigContext:
     """What all drivers of a rig share."""

@@ -135,6 +135,7 @@ class ContextObject:
         return [(k, *e.source) for k, e in enumerate(self.inputs, start=1) if e.source is not None]
 
 
+@brief_repr
 @dataclass(frozen=True)
 class ContextEntry:
     """What a file says of one object; all numbers from 1."""

@@ -13,6 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Clock, ForceSensor, Motion, RobotArm, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.procedure.run.steps import Fault, FaultError
+from elastocal.results import brief_repr
 
 _WRONG_WEIGHT = 0.35
 """Part of the weight that may be missing: a mass a quarter off, with a tool turned by 90 deg."""
@@ -22,6 +23,7 @@ _BIAS = 0.1
 """Bias of a sensor that is let pass, as a part of the force limit."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolLoad:
     """How to tell what presses on the tool from its weight."""

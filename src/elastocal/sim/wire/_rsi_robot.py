@@ -16,6 +16,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import Motion, RobotArm
 from elastocal.errors import DeviceError
+from elastocal.results import brief_repr
 from elastocal.sim.wire._pos_corr import PosCorr, PosCorrLimits, RsiStopError
 from elastocal.sim.wire._rsi_messages import Channel
 from elastocal.sim.wire.live_cell import LiveCell
@@ -89,6 +90,7 @@ def corrected_program(robot: "RsiRobot") -> Steps:
     yield from robot.move_corr()
 
 
+@brief_repr
 @dataclass(frozen=True)
 class RsiContext:
     """How the controller is set up, and how patient the simulation is."""
