@@ -20,8 +20,6 @@ from support.run_cells import planned_cell
 
 pytestmark = [pytest.mark.slow, pytest.mark.end_to_end]
 ENTRY = "from elastocal.cli.main import run; run()"
-RATE = 0.5
-"""Two processes speak here, and one of them begins while the other presses."""
 NOISE = 10.0
 """Force that a standing arm may seem to gain, in N."""
 
@@ -49,7 +47,7 @@ def planned(tmp_path_factory):
 @contextmanager
 def killed(planned, folder):
     """Yield the lines, the cell and the run's folder, its process killed while it held a load."""
-    found, opened = wired(planned, f"{folder.name}.yaml", RATE)
+    found, opened = wired(planned, f"{folder.name}.yaml", by_the_wall=True)
     out, text = folder / "run", found.cell.read_text(encoding="utf-8")
     # A machine at work lets a cycle wait; what is tested here is force and place, not time.
     found.cell.write_text(f'{text}\nprocedure: {{stale: "1 s"}}\n', encoding="utf-8")
@@ -63,7 +61,7 @@ def killed(planned, folder):
             assert process.poll() is None, process.communicate()[1].decode()
             assert time.monotonic() < end
             time.sleep(0.05)
-        time.sleep(2.0 / RATE)
+        time.sleep(2.0)
         # Where it goes on by itself it does so for a hundred hours without an answer.
         lines.robot._context = replace(lines.robot._context, timeout=10**8)
         process.kill()
@@ -74,7 +72,7 @@ def killed(planned, folder):
 def restart(lines: Lines) -> None:
     """Start the program anew where the arm stands, as an operator does after a stop."""
     lines.robot.inject("restart")
-    time.sleep(1.0 / RATE)
+    time.sleep(1.0)
 
 
 def force(lines: Lines) -> float:

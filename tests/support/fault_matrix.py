@@ -237,11 +237,11 @@ def _paced(stack: contextlib.ExitStack, patch: pytest.MonkeyPatch) -> PacedClock
 
 
 def wired(
-    planned: PlannedCell, name: str, rate: float | None = None
+    planned: PlannedCell, name: str, *, by_the_wall: bool = False
 ) -> tuple[PlannedCell, Callable]:
     """Return a cell whose devices are on the wire, and what opens them.
 
-    They go by a paced clock, or at a rate by the wall's, which other processes see too.
+    They go by a paced clock, or by the wall's, which another process sees too.
     """
     udp, tcp = socket.SOCK_DGRAM, socket.SOCK_STREAM
     heard, page, box, calibration = free(udp), free(tcp), free(udp), free(tcp)
@@ -252,7 +252,7 @@ def wired(
         cell = load_cell(found.cell)
         servers = wire_servers()
         with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
-            clock = _paced(stack, patch) if rate is None else WallClock(rate=rate)
+            clock = WallClock() if by_the_wall else _paced(stack, patch)
             live = LiveCell(cell, 0, clock)
 
             def closing(made):
@@ -267,7 +267,7 @@ def wired(
                     live, Told(settings={"port": box, "http_port": page, "tcp_port": calibration})
                 )
             )
-            if rate is None:
+            if not by_the_wall:
                 server._closed = _PacedEvent(clock)
             points = closing(servers["line_stream"](live, Told(settings={"port": seen})))
             lines = Lines(
