@@ -486,13 +486,6 @@ STAYS = {
     " Free the tool with the pendant.",
 }
 """Faults after which a tool that presses stays, with why, and what a person does."""
-ADDS = {
-    "force: pounds for newtons": "Forces that are too small by 4.4 look like forces. A sudden"
-    " change ends the press at a light load; under the full load it was not seen in this walk: the"
-    " arm pressed harder until the sensor was at the end of its range, and then retracted. Hold"
-    " the sensor against a known weight before a run.",
-}
-"""Faults that add more force than the limit, with why."""
 _MOST_ADDED = 100.0
 """Largest force that a fault may add, in N: the arm's own collision limit."""
 _MOST_WAY = 1e-4
@@ -509,7 +502,7 @@ def complaints(outcome: Outcome) -> list[str]:
     slow = outcome.fault.endswith(_SLOW) or outcome.phase not in _MAY_TOUCH
     soon = _LATER if slow else _SOON
     wrong = {
-        "it pushes": not outcome.added <= _MOST_ADDED and outcome.fault not in ADDS,
+        "it pushes": not outcome.added <= _MOST_ADDED,
         # A run that goes on goes to its next press.
         "it goes back to the surface": bool(outcome.message) and not outcome.again <= _MOST_WAY,
         "the resumed run does not go on": bool(outcome.resumed),

@@ -15,9 +15,6 @@ from elastocal.report.plots import new_figure, style, write_figure
 
 WALKED = Path(__file__).with_name("fault_matrix.json")
 
-_LIMIT = 100.0
-"""Force that the arm's own collision limit lets be added, in N."""
-
 
 def make(folder: Path) -> dict[str, str]:
     """Make the figure; return what is told of it."""
@@ -28,15 +25,13 @@ def make(folder: Path) -> dict[str, str]:
 
 def told(rows: list[dict[str, Any]]) -> str:
     """Return what the matrix came to, as a sentence."""
-    more = {row["fault"] for row in rows if row["added"] > _LIMIT}
-    added = max(row["added"] for row in rows if row["fault"] not in more)
+    added = max(row["added"] for row in rows)
     back = max(max(row["again"], row["pushed"]) for row in rows if row["message"])
     held = sum(row["released"] is None for row in rows)
-    text = (
+    return (
         f"{len(rows)} cells of the matrix: at most {added:.0f} N added after a fault, at most"
         f" {1e3 * back:.2f} mm back to the surface; in {held} cells the tool stays"
     )
-    return f"{text}; more force is added by {', '.join(sorted(more))}" if more else text
 
 
 def _draw(rows: list[dict[str, Any]]) -> Figure:

@@ -7,6 +7,7 @@ looked at then: an answer that was lost has taken its part of the movement with 
 """
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -41,7 +42,12 @@ _RELEASED = 0.02
 _LEAST_FORCE = 3.0
 """Force that counts as none at the end of a release, in N."""
 _JUMP = 100.0
-"""Change of the force within a cycle, in N, that is looked into; noise and ramps are below it."""
+"""Change of the force, in N, that is looked into; noise and ramps are below it."""
+_JUMP_SHARE = 0.25
+"""The same as a part of the force: another unit changes the tool's weight too, which may take away
+from what a load alone would show."""
+_JUMP_CYCLES = 4
+"""Cycles in which a force changes at once: a sample may be the mean of both sides of a jump."""
 _RELEASE_SETTLINGS = 3.0
 """Settling times of the force control that a release waits for the last of the force."""
 
@@ -223,12 +229,12 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> Phase:
     reader, reference = press.reader, press.reader.force_tcp
     releases = not np.any(press.wanted)
     gone = max(_RELEASED * float(np.linalg.norm(reference)), _LEAST_FORCE)
-    before = reader.quick_force_tcp
+    recent = deque([reader.quick_force_tcp], maxlen=_JUMP_CYCLES)
     while cycle.time < ends:
         require_force(reader, press.force_limit)
         if not releases:  # A release ends with contact that is lost, at once where it was light.
-            _require_steady(before, reader.quick_force_tcp)
-        before = reader.quick_force_tcp
+            _require_steady(recent[0], reader.quick_force_tcp)
+        recent.append(reader.quick_force_tcp)
         if reader.hesitates:
             if releases:
                 break  # in position control, from where it can be retracted without a force
@@ -250,10 +256,10 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> Phase:
 
 
 def _require_steady(before: FloatArray, force: FloatArray) -> None:
-    """Refuse a force that half of it, or more, has left or joined since the cycle before, in N.
+    """Refuse a force of which much has left, or that much has joined, within some cycles, in N.
 
-    Force control presses the harder the less it feels, and no ramp does that within a cycle:
-    contact is lost, or the sensor measures in another unit or from another zero than before.
+    Force control presses the harder the less it feels, and no ramp does that so quickly: contact
+    is lost, or the sensor measures in another unit or from another zero than before.
 
     Raises
     ------
@@ -261,9 +267,9 @@ def _require_steady(before: FloatArray, force: FloatArray) -> None:
         With both forces.
     """
     size, change = float(np.linalg.norm(before)), float(np.linalg.norm(force - before))
-    if change > max(_JUMP, 0.5 * size):
+    if change > max(_JUMP, _JUMP_SHARE * size):
         raise DeviceError(
-            f"the force changed by {change:.0f} N from {size:.0f} N within a cycle: contact is"
+            f"the force changed by {change:.0f} N from {size:.0f} N at once: contact is"
             " lost, or the sensor's scale or zero has changed"
         )
 
