@@ -4,10 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from elastocal import locks
 from support import bare
+from support.processors import imitate_one
 
 bare.forbid()
+CORE_TYPE = imitate_one()
+
+from elastocal import locks  # noqa: E402 - NumPy comes with it
 
 TESTS = Path(__file__).parent
 # A program of its own, which ends where Atheris is not installed.
@@ -44,3 +47,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("browser")
         elif any(place.is_relative_to(part) for part in END_TO_END):
             item.add_marker("end_to_end")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item):
+    """Say with a failure whose rounding it met."""
+    report = yield
+    if report.failed and CORE_TYPE:
+        report.sections.append(("processor", f"{item.nodeid}: OPENBLAS_CORETYPE={CORE_TYPE}"))
+    return report
