@@ -1,4 +1,5 @@
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from elastocal.robot import Robot, catalogue, with_tool
 from support.cli import elastocal
 from support.compensated import calibrated
 from support.exported import build, needs_gcc
+from support.sealed import edit
 from support.static_postures import GRAVITY, PlantedTool, turned
 from support.summaries import made_up_summary
 
@@ -135,11 +137,10 @@ def test_check_knows_tool_files_and_settings(tmp_path, tool):
 
 
 def test_a_model_that_leaves_more_than_half_unexplained_is_refused(tmp_path, model):
-    data = json.loads(model.read_text())
-    data["calibration"] = to_data(made_up_summary(1e-3))
-    data["calibration"]["held_out"]["mean"] = 0.7e-3
-    bad = tmp_path / "bad.json"
-    bad.write_text(json.dumps(data))
+    calibration = to_data(made_up_summary(1e-3))
+    calibration["held_out"]["mean"] = 0.7e-3
+    bad = shutil.copy(model, tmp_path / "bad.json")
+    edit(bad, lambda data: data.update(calibration=calibration))
     result = elastocal("export", bad, "--c", tmp_path / "c")
     assert result.code == 1
     assert "leaves 70% of the deflection unexplained" in result.reason

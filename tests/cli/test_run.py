@@ -393,7 +393,7 @@ def test_a_soft_collision_on_the_way_to_the_next_pose_ends_the_run(planned, tmp_
     result = run(cell, tmp_path / "run")
     last = result.err.strip().splitlines()[-1]
     assert last.startswith("elastocal: pose 1, attempt 1, move: hit something on the way: ")
-    assert last.endswith("limit 168 N. The arm is on its way between poses, off every surface")
+    assert "limit 168 N. The arm is on its way between poses; whether the tool touches" in last
 
 
 def test_files_above_the_cell_file_keep_their_places(planned, tmp_path):

@@ -8,6 +8,7 @@ from elastocal import workflows
 from elastocal.compensation.conditioning import read_tool
 from support.cli import elastocal
 from support.recorded_runs import record_run
+from support.sealed import edit
 from support.static_postures import PlantedTool, posture_table, turned
 
 TOOL = PlantedTool()
@@ -96,10 +97,9 @@ def test_a_run_is_derived_with_the_matrix_of_its_tool_file(tmp_path):
     run = record_run(tmp_path / "run", poses=8)
     out = tmp_path / "tool.json"
     assert elastocal("tool", run.path, "--out", out).code == 0
-    contents = json.loads(out.read_text())
     plain = workflows.derive(run.path).dataset
     gain = np.diag([1.02, 1.02, 1.02, 1.0, 1.0, 1.0]).tolist()
-    out.write_text(json.dumps(contents | {"matrix": gain}))
+    edit(out, lambda contents: contents.update(matrix=gain))
     corrected = workflows.derive(run.path, tool=out).dataset
     lengths = [np.linalg.norm(data.force, axis=-1) for data in (corrected, plain)]
     np.testing.assert_allclose(lengths[0], 1.02 * lengths[1], rtol=2e-3)

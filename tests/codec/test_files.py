@@ -20,6 +20,7 @@ from elastocal.codec import (
     write_codec_summary,
 )
 from elastocal.errors import CodecError, SchemaError
+from elastocal.records import SEAL
 from support.cells import Cell, linear_truth, robot
 
 
@@ -79,8 +80,9 @@ def test_arrays_are_labelled_for_any_reader_of_netcdf(tmp_path, data):
 def test_a_damaged_file_is_refused_by_name(tmp_path, data, change, words):
     path = write_codec(tmp_path, data)
     with xr.open_dataset(path, engine="h5netcdf") as opened:
-        changed = change(opened.load())
-    changed.to_netcdf(path, engine="h5netcdf")
+        found = opened.load()
+    del found.attrs[SEAL]
+    change(found).to_netcdf(path, engine="h5netcdf")
     with pytest.raises(SchemaError, match=words):
         read_codec(path)
 

@@ -5,7 +5,6 @@ import json
 import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from elastocal import dataset
@@ -284,10 +283,15 @@ def test_a_difference_below_rounding_is_none(copied):
     path = folder / "run" / "dataset.nc"
     data = dataset.read(path).to_xarray().copy(deep=True)
     data["marker_displacement"] = data["marker_displacement"] * (1.0 + 1e-9)
+    x, y, z = (float(each.removesuffix(" m")) for each in data.attrs["marker"].split(", "))
+    data.attrs["marker"] = f"{x * (1.0 + 1e-12)!r} m, {y!r} m, {z!r} m"
     dataset.write(dataset.Dataset.from_xarray(data), path)
     # As a machine that rounds otherwise derives it.
     summary = folder / "run" / "summary.json"
     sealed.edit(summary, lambda record: record.update(dataset_sha256=file_sha256(path)))
     links = {link.name: link.state for link in gathered(folder).chain}
     assert links["dataset"] is LinkState.WHOLE
-    assert np.isfinite(data["marker_displacement"]).all()
+    data.attrs["marker"] = f"{x + 1e-4!r} m, {y!r} m, {z!r} m"
+    dataset.write(dataset.Dataset.from_xarray(data), path)
+    texts = [link.text for link in gathered(folder).chain]
+    assert any("its attribute marker is another" in text for text in texts)

@@ -1,5 +1,7 @@
 """How a dataset or a summary that was made again differs from the one that is stated."""
 
+import re
+
 import numpy as np
 
 from elastocal.dataset import Dataset, content_sha256
@@ -7,15 +9,30 @@ from elastocal.dataset import Dataset, content_sha256
 _SAME = 1e-4
 """Difference, by the largest number of its kind, below which two derivations are one: versions and
 machines round differently, and what is smaller changes no verdict."""
+_SAME_PLACE = 1e-6
+"""The same of numbers in a text, such as the place of the marker."""
+_FRACTION = re.compile(r"[-+]?\d+\.\d+(?:e[-+]?\d+)?")
 
 
 def changed_text(stated: Dataset, found: Dataset) -> str:
     """Return which text of a dataset is not that of the one made again; empty where none is."""
     told = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
     for name in told:
-        if stated.attributes.get(name) != found.attributes.get(name):
+        if not _is_same_text(stated.attributes.get(name), found.attributes.get(name)):
             return f"its attribute {name} is another"
     return ""
+
+
+def _is_same_text(stated: object, found: object) -> bool:
+    """Return whether two texts are the same but for the rounding of the fractions in them."""
+    if stated == found or not (isinstance(stated, str) and isinstance(found, str)):
+        return stated == found
+    a, b = (np.array(_FRACTION.findall(text), dtype=float) for text in (stated, found))
+    return (
+        _FRACTION.sub("", stated) == _FRACTION.sub("", found)
+        and a.shape == b.shape
+        and bool(np.all(np.abs(a - b) <= _SAME_PLACE * np.max(np.abs(b), initial=0.0)))
+    )
 
 
 def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> str:

@@ -86,7 +86,7 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
     """
     folder = RunFolder(Path(settings.run))
     derived = derive_run(folder.path, _sensor(folder, settings.tool), settings.tool)
-    write_derived(folder.path, derived)
+    derived = write_derived(folder.path, derived)
     return DeriveResult(folder, derived.dataset, derived.summary)
 
 

@@ -317,8 +317,7 @@ def _derived(job: _Job, result: procedure.SessionResult) -> RunResult:
     if result.end is RunEnd.DONE:
         try:
             derived = procedure.derive_run(job.folder.path)
-            procedure.write_derived(job.folder.path, derived)
-            summary = derived.summary
+            summary = procedure.write_derived(job.folder.path, derived).summary
         except ElastocalError as error:
             problem = error
     return RunResult(_figures(job, result, summary, problem), result.end, summary, problem)

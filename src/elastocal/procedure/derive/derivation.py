@@ -191,8 +191,13 @@ def derive_run(run: Path, sensor: SensorLoad | None = None, tool: Path | None = 
     )
 
 
-def write_derived(run: Path, derived: DerivedRun) -> None:
+def write_derived(run: Path, derived: DerivedRun) -> DerivedRun:
     """Write ``dataset.nc`` and ``summary.json`` of a run, each whole or not at all.
+
+    Returns
+    -------
+    DerivedRun
+        The same with a summary that states the hash of the dataset's file.
 
     Raises
     ------
@@ -201,8 +206,9 @@ def write_derived(run: Path, derived: DerivedRun) -> None:
     """
     folder = RunFolder(Path(run))
     write(derived.dataset, folder.dataset)
-    stated = replace(derived.summary, dataset_sha256=file_sha256(folder.dataset))
-    write_json(folder.summary, stated)
+    summary = replace(derived.summary, dataset_sha256=file_sha256(folder.dataset))
+    write_json(folder.summary, summary)
+    return replace(derived, summary=summary)
 
 
 def derive_poses(
