@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from elastocal.cell import SensorStatus
+from elastocal.compensation.online import every_sample
 from elastocal.drivers.net_ft import CountScale, NetFtSensor
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell import SimClock
@@ -221,6 +222,18 @@ def test_a_stream_that_was_silent_has_a_hole_for_a_run_and_goes_on_for_a_correct
     assert stream.sensor.newest().time == pytest.approx(6.002, abs=0.06)
     with pytest.raises(DeviceError, match=r"no record for 0\.25 s"):
         stream.sensor.read()
+
+
+def test_a_bad_record_costs_a_correction_at_the_sensors_rate_one_cycle(stream):
+    read = every_sample(stream.sensor)
+    stream.send()
+    stream.send(status=0x80004000)
+    with pytest.raises(DeviceError, match="watchdog"):
+        read()
+    stream.send()
+    (sample,) = read()
+    assert sample.ok
+    assert sample.time == stream.sensor.newest().time
 
 
 def test_what_is_wrong_with_the_stream_is_counted(stream):

@@ -105,10 +105,10 @@ class NetFtSensor:
             self._failure = self._failure or why
 
     def leave_hole(self, why: str) -> None:
-        """Refuse every further `read`: samples are missing in the stream, or bad.
+        """Refuse the next `read`: samples are missing in the stream, or bad.
 
         `newest` goes on. Its time says how old it is; where the stream comes again by itself, who
-        corrects a process may go on, whereas readings of a procedure have a hole.
+        corrects a process goes on, whereas the readings of a procedure end with the refusal.
         """
         with self._lock:
             self.hole = self.hole or why
@@ -208,12 +208,15 @@ class NetFtSensor:
         Raises
         ------
         DeviceError
-            If the stream cannot be trusted: why.
+            If the stream cannot be trusted: why. A hole in it is told once, and what was measured
+            before its end is forgotten.
         """
         self._require()
-        if self.hole:
-            raise DeviceError(f"{self.source}: {self.hole}")
         with self._lock:
+            hole, self.hole = self.hole, ""
+            if hole:
+                self._rows.clear()
+                raise DeviceError(f"{self.source}: {hole}")
             rows, saturated = list(self._rows), self._saturated
             self._rows.clear()
             self._saturated = False
