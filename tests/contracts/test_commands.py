@@ -107,6 +107,7 @@ def lines(tmp_path_factory) -> dict[str, tuple[object, ...]]:
         "report": (run, "-o", out / "report.html"),
         "compare": (model, out / "other.json"),
         "verify": (run,),
+        "watch": (cell, "--for", "0.5 s"),
     }
 
 

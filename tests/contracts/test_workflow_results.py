@@ -35,6 +35,7 @@ WITHOUT = {
     "StudioResult",
     "ToolResult",
     "VerifyResult",
+    "WatchResult",
 }
 """Results that no picture shows."""
 
@@ -88,6 +89,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.studio(cell, while_open=lambda _: None),
         workflows.tool(run),
         workflows.verify(run),
+        workflows.watch(cell, duration=0.3),
     )
     return {type(each).__name__: each for each in made}
 

@@ -7,6 +7,7 @@
 `motion`      HOME, axis speeds, positions of the external axes
 `simulation`  the hidden truth of the simulated cell, and the faults that it injects
 `devices`     protocols of arm, force sensor, tracker and clock
+`reading`     what one device shows to a person who only looks
 `rig`         which driver makes each device, and what a driver has to do
 `examples`    the cells that ``elastocal init`` writes
 ============  =================================================================================

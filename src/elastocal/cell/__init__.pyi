@@ -138,6 +138,12 @@ from .production import (
     process_forces as process_forces,
     read_production as read_production,
 )
+from .reading import (
+    DeviceReading as DeviceReading,
+    Three as Three,
+    polled_readings as polled_readings,
+    three as three,
+)
 from .rig import (
     KINDS as KINDS,
     LOOPBACK as LOOPBACK,

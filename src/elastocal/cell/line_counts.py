@@ -48,10 +48,14 @@ class LineCounts:
 
     def sentence(self) -> str:
         """Return what was counted, in words; what did not happen is left out."""
+        return f"{self.device}: {self.figures()}"
+
+    def figures(self) -> str:
+        """Return the same without the device."""
         counts = [(name, getattr(self, key)) for key, name in COUNTED]
         wrong = [f"{count} {name}" for name, count in counts if count] + [*self.status]
         wrong += [f"refused: {self.refused}"] if self.refused else []
-        text = f"{self.device}: {self.received} received, {', '.join(wrong) or 'none lost'}"
+        text = f"{self.received} received, {', '.join(wrong) or 'none lost'}"
         if self.answer is None:
             return text
         times = " / ".join(f"{1e3 * each:.2f}" for each in self.answer)

@@ -5,6 +5,7 @@ sensor and metrology of different drivers make one rig. What stands under a devi
 is checked by the driver's own settings; which drivers there are is known to `elastocal run`.
 """
 
+import math
 import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -32,6 +33,7 @@ from elastocal.cell.devices import (
     require_duration,
 )
 from elastocal.cell.line_counts import LineCounts, no_lines
+from elastocal.cell.reading import DeviceReading
 from elastocal.errors import DeviceError
 from elastocal.records import StrictModel
 from elastocal.results import brief_repr
@@ -211,6 +213,13 @@ class RigContext:
 
     arming: Arming = Arming()  # noqa: RUF009 - frozen
     """Of an arm that moves as soon as its path is corrected, see `elastocal.cell.PathDriver`."""
+    watches: bool = False
+    """Whether somebody only looks (`elastocal watch`): a driver then commands no arm, waits for
+    nobody, and goes on to listen whatever it hears."""
+
+    def patience(self, seconds: float) -> float:
+        """Return how long a device may be away, in s: for ever where it is only watched."""
+        return math.inf if self.watches else seconds
 
     def listener(self, port: LocalPort) -> socket.socket:
         """Return a socket for a port, to be closed by whoever asked.
@@ -240,6 +249,9 @@ class DeviceSet:
     """Gives lines and threads back; called once."""
     lines: Callable[[], tuple[LineCounts, ...]] = no_lines
     """What was counted on its lines so far; called at any time until `close`, never raises."""
+    readings: Callable[[], tuple[DeviceReading, ...]] | None = None
+    """What the devices show, where `RigContext.watches`; a `DeviceError` of it lets them be closed
+    and connected anew. None: arm, sensor and metrology are asked."""
 
 
 class Driver(Protocol):

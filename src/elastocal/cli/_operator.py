@@ -15,16 +15,19 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import Self
 
 import typer
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.live import Live
+from rich.table import Table
 from rich.text import Text
 
-from elastocal.cell import read_statements
+from elastocal.cell import DeviceReading, read_statements
+from elastocal.cli import output
 from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure import Progress
-from elastocal.workflows import LiveReport, Supervision
+from elastocal.workflows import LiveReport, Supervision, WatchResult
 
 REFRESH = 0.1
 """Shortest time between two changes of the line, in s of the wall."""
@@ -271,8 +274,8 @@ class TerminalOperator:
             yield Supervision(show, interrupted)
 
 
-class LiveView:
-    """Shows how a live compensation is going: a line that changes, a line each 10 s elsewhere.
+class _View:
+    """Shows something that changes in place, where there is a terminal; one that is gone is left.
 
     Parameters
     ----------
@@ -281,22 +284,46 @@ class LiveView:
     """
 
     def __init__(self, console: Console) -> None:
-        self._console, self._shown = console, -math.inf
+        self._console = console
         self._live = Live(console=console, transient=True, auto_refresh=False)
 
-    def __enter__(self) -> "LiveView":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         with contextlib.suppress(OSError, ValueError):
             self._live.stop()
 
+    def _update(self, shown: RenderableType) -> None:
+        self._live.start()
+        self._live.update(shown, refresh=True)
+
+
+class LiveView(_View):
+    """Shows how a live compensation is going: a line that changes, a line each 10 s elsewhere."""
+
+    _shown = -math.inf
+
     def tell(self, report: LiveReport) -> None:
-        """Show a report; a terminal that is gone is left alone."""
+        """Show a report."""
         with contextlib.suppress(OSError, ValueError):
             if self._console.is_terminal:
-                self._live.start()
-                self._live.update(Text(report.sentence()), refresh=True)
+                self._update(Text(report.sentence()))
             elif report.seconds >= self._shown + _LIVE_LINES:
                 self._shown = report.seconds
                 self._console.print(report.sentence(), soft_wrap=True)
+
+
+class DevicesView(_View):
+    """Shows the devices of a cell as a table that changes; nothing where there is no terminal."""
+
+    def tell(self, result: WatchResult) -> None:
+        """Show the devices."""
+        if not self._console.is_terminal:
+            return
+        table = Table("device", *DeviceReading.COLUMNS, expand=True)
+        for each in result.figures.devices:
+            mark = output.red("●") if each.problem else output.green("●")
+            table.add_row(f"{mark} {each.kind} {each.device}", *each.cells())
+        with contextlib.suppress(OSError, ValueError):
+            self._update(table)

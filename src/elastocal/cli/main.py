@@ -86,7 +86,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _GROUPS = {
-    "Prepare": ("robots", "new", "init", "check", "studio", "plan", "study"),
+    "Prepare": ("robots", "new", "init", "check", "watch", "studio", "plan", "study"),
     "Measure": ("run", "release", "simulate", "krc_config", "measure_delay", "derive", "import_"),
     "Identify": ("tool", "geometry", "calibrate", "codec"),
     "Use": ("predict", "compensate", "live", "stiffness", "simulate_process", "export"),

@@ -7,6 +7,7 @@ Everything here is verified against simulators and public layouts, not against h
 ==============  ===============================================================================
 `device_clock`  the time stamps of a device, translated to the clock of the rig
 `stations`      points of trackers between the thread of a line and the supervision cycle
+`station_link`  the thread of a line to a tracker
 ==============  ===============================================================================
 """
 

@@ -51,6 +51,17 @@ class DeviceClock:
         self.drift = 0.0
         """How much faster the rig's clock runs, without dimension; within `MOST_DRIFT`."""
 
+    def against_the_pc(self) -> tuple[float, float | None] | tuple[None, None]:
+        """Return the device's time less the rig's, in s, and how much faster its clock runs.
+
+        None before the first stamp; the drift is None where it is not known yet.
+        """
+        if self._window is None:
+            return None, None
+        passed = self._newest - self._first
+        drift = -self.drift if len(self._least) >= _LEAST_WINDOWS else None
+        return -(self.offset + self.drift * passed), drift
+
     def rig_time(self, stamp: float, arrival: float) -> float:
         """Return when a sample was taken by the rig's clock, in s; later than those before it.
 

@@ -7,24 +7,28 @@ of the station in the cell file, a bound on what is kept.
 """
 
 import threading
-from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import BeamState, Cell, Clock, DeviceSet, LineCounts, PointBlock, Tracker
+from elastocal.cell import (
+    BeamState,
+    Cell,
+    Clock,
+    DeviceReading,
+    LineCounts,
+    PointBlock,
+    Tracker,
+    three,
+)
 from elastocal.drivers.device_clock import DeviceClock
 from elastocal.errors import DeviceError, nearest
 from elastocal.units import factor
 
 NEWEST = 500
 """Points that are kept for a caller that does not look; older ones are lost."""
-RECEIVED = 65536
-"""Bytes that are read at once."""
-WAKE = 0.05
-"""How often a thread looks whether it is to end, in s of the wall."""
 _OUTSIDE = 10
 """Points one after another outside the station's range: no blunder, but another unit or frame."""
 _ROUGHLY = 2.0
@@ -70,6 +74,8 @@ class StationFeed:
         self._heard = -np.inf
         self._outside = 0
         self._points = self._breaks = 0
+        self.connected = False
+        """Whether its line has said anything yet."""
 
     @property
     def counts(self) -> LineCounts:
@@ -128,12 +134,10 @@ class StationFeed:
         DeviceError
             If something is wrong with the station or its line.
         """
-        now = self._clock.now()
         with self._lock:
             if self._fault:
                 raise DeviceError(self._fault)
-            if self._beam is BeamState.LOCKED and not now - self._heard <= self._silence:
-                self._break_beam("it says nothing")
+            self._require_points()
             beam, note = self._beam, self._note
             rows = np.array(self._rows, dtype=float).reshape(-1, 7)
             self._rows.clear()
@@ -148,6 +152,34 @@ class StationFeed:
             source=self.source,
             note=note,
         )
+
+    def reading(self) -> DeviceReading:
+        """Return what the station shows; a fault is shown once, and what comes next is taken."""
+        with self._lock:
+            self._require_points()
+            fault, self._fault = self._fault, ""
+            if fault:
+                self._stamps = DeviceClock(f"{self.source}: {self.tracker.name}")
+            locked, newest = self._beam is BeamState.LOCKED, self._rows[-1] if self._rows else None
+            note, counts = self._note, self.counts
+            offset, drift = self._stamps.against_the_pc()
+        return DeviceReading(
+            kind="metrology",
+            device=counts.device,
+            heard=self.connected,
+            problem=fault or ("" if self.connected else note),
+            state="locked" if locked else f"not locked: {note}" if self.connected else "",
+            counts=counts,
+            offset=offset,
+            drift=drift,
+            position=three(np.array(newest[1:4])) if locked and newest is not None else None,
+        )
+
+    def _require_points(self) -> None:
+        """Take a station that is silent for too long for one whose beam is broken."""
+        silent = self._clock.now() - self._heard
+        if self._beam is BeamState.LOCKED and not silent <= self._silence:
+            self._break_beam("it says nothing")
 
     def _break_beam(self, why: str) -> None:
         self._breaks += self._beam is BeamState.LOCKED
@@ -226,91 +258,13 @@ class StationsMetrology:
         """
         return self._feeds[self._station].take()
 
+    def readings(self) -> tuple[DeviceReading, ...]:
+        """Return what each station shows."""
+        return tuple(feed.reading() for feed in self._feeds.values())
+
     def lines(self) -> tuple[LineCounts, ...]:
         """Return what was counted of each station."""
         return tuple(feed.counts for feed in self._feeds.values())
-
-
-class StationLink(threading.Thread, ABC):
-    """Keeps one connection up until it is closed; what it hears fills the feeds of its stations.
-
-    Parameters
-    ----------
-    name : str
-        Of the thread.
-    feeds : sequence of StationFeed
-        Told when the connection is gone.
-    clock : Clock
-        Of the rig.
-    patience : float
-        How long a connection may be gone before that is a fault, in s.
-    """
-
-    def __init__(
-        self, name: str, feeds: Sequence[StationFeed], clock: Clock, patience: float
-    ) -> None:
-        super().__init__(name=name, daemon=True)
-        self.clock, self.patience = clock, patience
-        self.done = threading.Event()
-        """Set when it is to end."""
-        self._told = feeds
-
-    @abstractmethod
-    def hear(self) -> bool:
-        """Connect and take what comes until the connection ends; False: nobody has come yet.
-
-        Raises
-        ------
-        DeviceError
-            If what came ends the run.
-        OSError
-            If the line does not carry.
-        """
-
-    def close(self) -> None:
-        """End the thread."""
-        self.done.set()
-        if self.is_alive():
-            self.join()
-
-    def run(self) -> None:
-        """Connect, hear, connect again."""
-        gone = self.clock.now()
-        while not self.done.is_set():
-            try:
-                if self.hear():
-                    gone = self.clock.now()
-                    self._broken("the connection has ended")
-            except DeviceError as error:
-                self._failed(str(error))
-                return
-            except OSError as error:
-                self._broken(f"no connection: {error.strerror or error}")
-            if not self.clock.now() - gone <= self.patience:
-                self._failed(f"no connection for {self.clock.now() - gone:.0f} s")
-                return
-            self.done.wait(WAKE)
-
-    def _broken(self, why: str) -> None:
-        for feed in self._told:
-            feed.beam_broken(why)
-
-    def _failed(self, why: str) -> None:
-        for feed in self._told:
-            feed.fail(why)
-
-
-def metrology_set(metrology: StationsMetrology, links: Iterable[StationLink]) -> DeviceSet:
-    """Begin to connect; return the stations with what closes their links."""
-    started = tuple(links)
-    for link in started:
-        link.start()
-
-    def close() -> None:
-        for link in started:
-            link.close()
-
-    return DeviceSet(metrology=metrology, close=close, lines=metrology.lines)
 
 
 def require_station(station: str, stations: tuple[str, ...]) -> None:

@@ -27,6 +27,7 @@ __all__ = [
     "study",
     "tool",
     "verify",
+    "watch",
 ]  # the commands: what the package itself exports of these
 
 from ._file_kinds import FileDescription as FileDescription
@@ -216,4 +217,10 @@ from .verify import (
     VerifyResult as VerifyResult,
     VerifySettings as VerifySettings,
     verify as verify,
+)
+from .watch import (
+    WatchFigures as WatchFigures,
+    WatchResult as WatchResult,
+    WatchSettings as WatchSettings,
+    watch as watch,
 )

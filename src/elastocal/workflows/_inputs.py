@@ -42,7 +42,7 @@ from elastocal.robot import (
     tool_link,
     with_tool,
 )
-from elastocal.units import parse_point, parse_quantity
+from elastocal.units import parse_number, parse_point, parse_quantity
 from elastocal.wording import listed
 
 _LONGEST_TOOL = 10.0
@@ -349,3 +349,22 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except OSError:  # a name that is too long for a file
         return False
+
+
+def seconds_of(duration: str | float | None) -> float:
+    """Return a duration in s; a number alone is in s, none is without end.
+
+    Raises
+    ------
+    UnitError
+        If it is none above 0.
+    """
+    if duration is None:
+        return float("inf")
+    try:
+        found = parse_number(str(duration))
+    except ValueError:
+        found = parse_quantity(duration, "time")
+    if not 0.0 < found < float("inf"):
+        raise UnitError(f"duration {duration!r} must be a time above 0, such as '60 s'")
+    return found

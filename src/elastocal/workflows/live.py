@@ -12,19 +12,19 @@ from elastocal.cell import Arming, Cell, CycleStatistics, PathLimits, load_cell
 from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.online import LiveCounts, design
-from elastocal.errors import CompensationError, DeviceError, UnitError
+from elastocal.errors import CompensationError, DeviceError
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel
 from elastocal.procedure.derive import sensor_load
 from elastocal.progress import Progress
 from elastocal.records import record, validate, write_json
 from elastocal.results import Result
-from elastocal.units import parse_number, parse_quantity
 from elastocal.workflows._inputs import (
     NewTool,
     coverage_notes,
     require_model_of_arm,
     require_same_robot,
+    seconds_of,
 )
 from elastocal.workflows._live_session import (
     LiveEnd,
@@ -193,7 +193,7 @@ def _result(settings: LiveSettings, ready: Prepared, end: LiveEnd, started: str)
 
 def _prepare(settings: LiveSettings) -> Prepared:
     """Read and check everything that needs no device."""
-    cell, duration = load_cell(Path(settings.cell)), _seconds(settings.duration)
+    cell, duration = load_cell(Path(settings.cell)), seconds_of(settings.duration)
     rig = rig_of(cell)
     driver, arm = rig.path_arm()
     limits = driver.path_limits(cell, arm)
@@ -217,25 +217,6 @@ def _prepare(settings: LiveSettings) -> Prepared:
         tares=settings.tool is None,
         notes=_notes(settings, cell, calibrated),
     )
-
-
-def _seconds(duration: str | float | None) -> float:
-    """Return a duration in s; a number alone is in s.
-
-    Raises
-    ------
-    UnitError
-        If it is none above 0.
-    """
-    if duration is None:
-        return float("inf")
-    try:
-        found = parse_number(str(duration))
-    except ValueError:
-        found = parse_quantity(duration, "time")
-    if not 0.0 < found < float("inf"):
-        raise UnitError(f"duration {duration!r} must be a time above 0, such as '60 s'")
-    return found
 
 
 def settings_within(file: Path | None, limits: PathLimits, cell: Cell) -> CompensatorSettings:

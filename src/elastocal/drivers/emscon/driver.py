@@ -7,13 +7,10 @@ from collections.abc import Mapping
 from elastocal.cell import Cell, Clock, DeviceSet, DeviceSettings, RigContext, Tracker
 from elastocal.drivers.emscon.dialogue import Dialogue, EmsconSettings, EmsconStation
 from elastocal.drivers.emscon.packets import Code, PacketReader, command
+from elastocal.drivers.station_link import WAKE, StationLink, metrology_set
 from elastocal.drivers.stations import (
-    RECEIVED,
-    WAKE,
     StationFeed,
-    StationLink,
     StationsMetrology,
-    metrology_set,
     require_station,
     require_trackers,
 )
@@ -52,9 +49,8 @@ class _Station(StationLink):
                 self._to_look.clear()
                 dialogue.look()
             connection.sendall(dialogue.due())
-            try:
-                data = connection.recv(RECEIVED)
-            except TimeoutError:
+            data = self.receive(connection)
+            if data is None:
                 continue
             if not data:
                 return
@@ -86,6 +82,9 @@ class EmsconDriver:
         """
         settings = wanted["metrology"]
         assert isinstance(settings, EmsconSettings)
+        if context.watches:
+            # A head that turns for a minute is nothing that somebody expects who only looks.
+            settings = settings.model_copy(update={"initialize": False, "bird_bath": False})
         places = _places(require_trackers(cell), settings)
         feeds = {
             tracker.name: StationFeed(
@@ -101,7 +100,7 @@ class EmsconDriver:
             for tracker, place in places
         }
         metrology = StationsMetrology(feeds, settings.rate, lambda name: stations[name].look())
-        return metrology_set(metrology, stations.values())
+        return metrology_set(metrology, stations.values(), context)
 
 
 def _places(

@@ -14,6 +14,7 @@ from elastocal.cell import (
     RigContext,
     refused_telegrams,
 )
+from elastocal.drivers.kuka_rsi._listener import KukaListener
 from elastocal.drivers.kuka_rsi.arm import KukaArm
 from elastocal.drivers.kuka_rsi.corrections import CorrectedKuka
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
@@ -82,6 +83,8 @@ class KukaRsiDriver:
         """Return the arm."""
         settings = wanted["arm"]
         assert isinstance(settings, RsiSettings)
+        if context.watches:
+            return KukaListener(cell, settings, context).devices()
         arm = connect_arm(cell, settings, context)
         link = arm.link
         assert link is not None

@@ -163,6 +163,19 @@ class RsiLink:
         return counts.statistics(lost=max(self._ipoc.lost - counts.skipped, 0))
 
     @property
+    def silent(self) -> float | None:
+        """Time since the last message that could be read, in s of the wall; None before the first.
+
+        Read and used by the thread that watches; the link's own thread writes it.
+        """
+        return None if self._came is None else self._timer() - self._came
+
+    @property
+    def between(self) -> list[float]:
+        """Times between messages that could be read, in s of the wall; the newest some thousand."""
+        return list(self._counts.between)
+
+    @property
     def times(self) -> AnswerTimes:
         """Times of the answers so far, from datagram in to datagram out."""
         return self._counts.took
@@ -198,6 +211,9 @@ class RsiLink:
         except DeviceError as error:
             counts.refuse(str(error).removeprefix("RSI datagram: "))
             return None
+        if self._came is not None:
+            counts.between.append(came - self._came)
+        self._came = came
         reply = self._reply(message)
         if reply is None or not self._place.answers:
             return None
@@ -236,9 +252,6 @@ class RsiLink:
 
     def _note_time(self, came: float) -> None:
         counts = self._counts
-        if self._came is not None:
-            counts.between.append(came - self._came)
-        self._came = came
         took = self._timer() - came
         counts.answered += 1
         counts.took.add(took)

@@ -37,13 +37,10 @@ from elastocal.drivers.line_stream.lines import (
     LineReader,
     columns_of,
 )
+from elastocal.drivers.station_link import WAKE, StationLink, metrology_set
 from elastocal.drivers.stations import (
-    RECEIVED,
-    WAKE,
     StationFeed,
-    StationLink,
     StationsMetrology,
-    metrology_set,
     require_station,
     require_trackers,
 )
@@ -204,9 +201,8 @@ class _Line(StationLink):
             if self._to_look.is_set():
                 self._to_look.clear()
                 connection.sendall(f"look {self._looked}\n".encode())
-            try:
-                data = connection.recv(RECEIVED)
-            except TimeoutError:
+            data = self.receive(connection)
+            if data is None:
                 continue
             if not data:
                 return
@@ -324,7 +320,7 @@ class LineStreamDriver:
             _Line(address, settings, feeds, context.clock, listener)
             for address, listener in zip_longest(addresses, listeners)
         ]
-        return metrology_set(LineMetrology(feeds, settings.rate, lines), lines)
+        return metrology_set(LineMetrology(feeds, settings.rate, lines), lines, context)
 
 
 DRIVER = LineStreamDriver()

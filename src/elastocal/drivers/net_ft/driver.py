@@ -10,12 +10,20 @@ import http.client
 import socket
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, TypeVar
 
 from pydantic import Field, FiniteFloat
 
-from elastocal.cell import LOOPBACK, Cell, Clock, DeviceSet, DeviceSettings, RigContext
+from elastocal.cell import (
+    LOOPBACK,
+    Cell,
+    Clock,
+    DeviceReading,
+    DeviceSet,
+    DeviceSettings,
+    RigContext,
+)
 from elastocal.drivers.net_ft.protocol import (
     ASK_CALIBRATION,
     MOST_PAGE,
@@ -39,6 +47,9 @@ _REQUESTS = 4
 _CALIBRATION_BYTES = 24
 _LOOK_AGAIN = 5.0
 """Between two looks at the calibration of a box that streams, in s of the wall."""
+_NO_RECORD = f"no record for {_SILENCE:g} s"
+_OFF = ", and its page does not answer: is it off, or the cable unplugged?"
+_TAKEN = ", though its page answers: another client has taken the stream"
 
 _Answer = TypeVar("_Answer")
 _Port = Annotated[int, Field(ge=1, le=65535)]
@@ -124,6 +135,23 @@ class BoxLine:
         for thread in self._threads:
             thread.start()
 
+    def reading(self) -> DeviceReading:
+        """Return what the box shows.
+
+        A stream that another client has taken is not taken back; it may come again by itself.
+
+        Raises
+        ------
+        DeviceError
+            If the box does not answer, or its counts mean something else.
+        """
+        shown = self.sensor.reading()
+        if shown.state:
+            return shown
+        if not self._answers():
+            raise DeviceError(f"{self.source}: {_NO_RECORD}{_OFF}")
+        return replace(shown, problem=shown.problem or f"{_NO_RECORD}{_TAKEN}")
+
     def close(self) -> None:
         """End stream and threads."""
         self._closed.set()
@@ -153,12 +181,14 @@ class BoxLine:
                 self.sensor.leave_hole(why)
 
     def _why_silent(self) -> str:
-        text = f"no record for {_SILENCE:g} s"
+        return f"{_NO_RECORD}{_TAKEN if self._answers() else _OFF}"
+
+    def _answers(self) -> bool:
         try:
             self._page()
         except (DeviceError, OSError):
-            return f"{text}, and its page does not answer: is it off, or the cable unplugged?"
-        return f"{text}, though its page answers: another client has taken the stream"
+            return False
+        return True
 
     def _watch(self) -> None:
         """See that a count goes on to mean the same."""
@@ -262,7 +292,10 @@ class NetFtDriver:
         assert isinstance(settings, NetFtSettings)
         line = BoxLine(settings, context.clock)
         sensor = line.sensor
-        return DeviceSet(sensor=sensor, feed=sensor, close=line.close, lines=sensor.lines)
+        readings = (lambda: (line.reading(),)) if context.watches else None
+        return DeviceSet(
+            sensor=sensor, feed=sensor, close=line.close, lines=sensor.lines, readings=readings
+        )
 
 
 DRIVER = NetFtDriver()

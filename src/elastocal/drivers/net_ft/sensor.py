@@ -6,7 +6,15 @@ from collections import deque
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Clock, LineCounts, SensorStatus, WrenchBlock, WrenchSample
+from elastocal.cell import (
+    Clock,
+    DeviceReading,
+    LineCounts,
+    SensorStatus,
+    WrenchBlock,
+    WrenchSample,
+    three,
+)
 from elastocal.drivers.net_ft.protocol import (
     CountScale,
     RdtRecord,
@@ -33,6 +41,8 @@ _FOLLOWS = 1e-3
 """How fast the way from the box to here may grow, in s a second: beyond is a slower quartz."""
 _LONGEST_WAY = 0.05
 """In s: a sample is never taken for older."""
+_SILENT = 0.5
+"""Age of the newest record from which on none comes any more, in s."""
 _WRAP = 1 << 32
 _BACK = 1 << 31
 
@@ -230,6 +240,35 @@ class NetFtSensor:
             moment_sigma=np.nan,
             status=SensorStatus.SATURATED if saturated else SensorStatus.OK,
             source=self.source,
+        )
+
+    def reading(self) -> DeviceReading:
+        """Return what the stream shows; without a state where no record comes.
+
+        Raises
+        ------
+        DeviceError
+            If the stream cannot be trusted.
+        """
+        newest, (counts,) = self.newest(), self.lines()
+        silent = newest is None or not self._clock.now() - newest.time <= _SILENT
+        state, problem = "", ""
+        if newest is not None and not silent:
+            assert self._last is not None
+            state = f"status {status_names(self._last.status)}"
+            if newest.status is not SensorStatus.OK:
+                state, problem = "not to be trusted", state
+            elif self.hole:
+                state = f"{state}; a run would have ended: {self.hole}"
+        return DeviceReading(
+            kind="sensor",
+            device=self.source,
+            heard=newest is not None,
+            problem=problem,
+            state=state,
+            counts=counts,
+            force=None if newest is None else three(newest.force),
+            moment=None if newest is None else three(newest.moment),
         )
 
     def lines(self) -> tuple[LineCounts, ...]:

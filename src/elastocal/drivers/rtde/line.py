@@ -3,18 +3,27 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Clock, LineCounts, SensorStatus, WrenchBlock, WrenchSample
+from elastocal.cell import (
+    Clock,
+    DeviceReading,
+    LineCounts,
+    SensorStatus,
+    WrenchBlock,
+    WrenchSample,
+    three,
+)
 from elastocal.drivers.device_clock import DeviceClock
 from elastocal.drivers.rtde._ur_rtde import UrReceive
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
+from elastocal.robot import xyzabc_from_T
 
 _KEPT = 500
 """Samples of the sensor that wait for a reader; older ones are lost."""
@@ -120,6 +129,34 @@ class UrLine:
             device="rtde", received=self._received, lost=self._skipped, status=tuple(self._faults)
         )
         return (counts,)
+
+    def readings(self, kinds: Iterable[str]) -> tuple[DeviceReading, ...]:
+        """Return what the controller shows, a reading for each kind of device.
+
+        Raises
+        ------
+        DeviceError
+            If it is lost.
+        """
+        sample, wrench = self.sample(), self.newest()
+        offset, drift = self._stamps.against_the_pc()
+        (counts,) = self.lines()
+        whole = DeviceReading(
+            kind="",
+            device="rtde",
+            heard=True,
+            problem=sample.fault or "",
+            state="" if sample.fault else "running",
+            counts=counts,
+            offset=offset,
+            drift=drift,
+        )
+        pose = xyzabc_from_T(sample.T_base_tcp)
+        arm = replace(whole, kind="arm", position=three(pose[:3]), turn=three(pose[3:]))
+        assert wrench is not None
+        force, moment = three(wrench.force), three(wrench.moment)
+        sensor = replace(whole, kind="sensor", force=force, moment=moment)
+        return tuple(each for each in (arm, sensor) if each.kind in kinds)
 
     def _count(self, stamp: float, fault: str | None) -> None:
         if self._received:
