@@ -10,7 +10,9 @@ from support.processors import imitate_one
 bare.forbid()
 CORE_TYPE = imitate_one()
 
-from elastocal import locks  # noqa: E402 - NumPy comes with it
+# NumPy comes with these.
+from elastocal import locks  # noqa: E402
+from support import remembered  # noqa: E402
 
 TESTS = Path(__file__).parent
 # A program of its own, which ends where Atheris is not installed.
@@ -35,6 +37,13 @@ def _locks_of_this_process(tmp_path_factory):
     """Keep the locks of devices apart from those of other suites on this machine."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(locks, "SHARED", tmp_path_factory.mktemp("locks") / "shared")
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _what_verdicts_make_again():
+    with pytest.MonkeyPatch.context() as patch:
+        remembered.remember(patch)
         yield
 
 
