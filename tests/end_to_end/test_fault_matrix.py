@@ -23,7 +23,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 WALKED = DOCS / "hooks" / "gallery" / "fault_matrix.json"
 FIRST = [
     ("PC: killed", "lateral load"),
-    ("arm: silent", "press"),
     ("force: bad status", "press"),
 ]
 """Those that run in `make test`, some 10 s of processor each; every night all of them."""

@@ -16,15 +16,13 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def test_three_core_types_decide_alike_on_published_and_simulated_readings():
-    # The published readings of a FANUC (-1), and campaigns of few and of many poses, one with
-    # bounds that leave the data no part, one cross-validated.
-    numbers = (-1, 3, 9, 33, 51)
-    first = under("Prescott", numbers)
-    for core_type in ("Haswell", "Zen"):
-        other = under(core_type, numbers)
-        assert list(differences(first, other)) == []
-        assert furthest(first, other)[0] < 0.05
+def test_two_core_types_decide_alike_on_published_and_simulated_readings():
+    """Every other test meets three, one in each process; see `support.processors`."""
+    # The published readings of a FANUC (-1), and a campaign with bounds that leave them no part.
+    numbers = (-1, 33)
+    first, other = under("Prescott", numbers), under("Haswell", numbers)
+    assert list(differences(first, other)) == []
+    assert furthest(first, other)[0] < 0.05
 
 
 @pytest.mark.slow
