@@ -36,7 +36,9 @@ def decimal_comma(data: bytes) -> list[bytes]:
 @pytest.fixture
 def wired():
     """A cell whose three devices are on the wire, a proxy on each line, and what opens them."""
-    return fault_matrix.wired(PlannedCell(example_cell("afp").path, None), "wired.yaml", 1.0)
+    return fault_matrix.wired(
+        PlannedCell(example_cell("afp").path, None), "wired.yaml", by_the_wall=True
+    )
 
 
 class Watching:
