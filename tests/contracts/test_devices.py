@@ -2,6 +2,7 @@
 
 import importlib
 import itertools
+import json
 import pkgutil
 import struct
 import tomllib
@@ -12,11 +13,18 @@ import numpy as np
 import pytest
 
 from elastocal import drivers
-from elastocal.cell import KINDS, LOOPBACK, SIMULATED, DeviceSettings
+from elastocal.cell import (
+    KINDS,
+    LOOPBACK,
+    SIMULATED,
+    DeviceSet,
+    DeviceSettings,
+    polled_readings,
+)
 from elastocal.cell.devices import BeamState, Devices, Motion, SensorStatus
 from elastocal.drivers.net_ft import CountScale, NetFtSensor
 from elastocal.errors import DeviceError, ElastocalError
-from elastocal.records import validate
+from elastocal.records import to_data, validate
 from elastocal.sim.wire import NetFtBox
 from elastocal.workflows import GROUP, driver_names, find_driver
 from support.simulated import CYCLE, Place, Session, example_cell, places
@@ -311,6 +319,20 @@ class TestEveryMetrology:
     def test_an_unknown_station_is_refused_with_those_there_are(self, devices):
         with pytest.raises(DeviceError, match=devices.metrology.stations[0]):
             devices.metrology.look("station_9")
+
+
+class TestEveryReading:
+    def test_a_person_sees_a_row_a_device_whose_numbers_are_numbers(self, devices):
+        look = polled_readings(DeviceSet(devices.arm, devices.sensor, devices.metrology))
+        devices.clock.sleep(0.1)
+        arm, sensor, metrology = shown = look()
+        assert tuple(each.kind for each in shown) == KINDS
+        assert all(each.heard and not each.problem for each in shown)
+        assert arm.position == tuple(devices.arm.state().T_base_tcp[:3, 3])
+        assert sensor.force is not None
+        assert metrology.state == "locked"
+        assert all(len(each.cells()) == len(each.COLUMNS) for each in shown)
+        json.dumps(to_data(shown), allow_nan=False)
 
 
 class TestEveryClock:

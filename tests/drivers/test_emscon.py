@@ -5,7 +5,7 @@ import socket
 import numpy as np
 import pytest
 
-from elastocal.cell import BeamState
+from elastocal.cell import BeamState, RigContext
 from elastocal.drivers import StationFeed
 from elastocal.drivers.emscon import (
     DRIVER,
@@ -76,6 +76,23 @@ def test_points_are_those_of_the_simulated_tracker(clock, live, server, opened, 
     np.testing.assert_allclose(block.position[-1], truth.read().position[-1], atol=1e-9)
     assert block.source == f"emScon 127.0.0.1:{server.ports['tcp']}"
     assert np.all(block.time <= clock.now() + 1e-6)
+
+
+def test_a_tracker_that_is_only_watched_is_not_initialised_and_says_so(clock, live, server, opened):
+    cell, settings = example_cell(simulation=QUIET), {"port": server.ports["tcp"], **QUICK}
+    wanted = {"metrology": EmsconSettings.model_validate(settings)}
+    found = DRIVER.connect(cell, wanted, RigContext(clock, 0, 0.0, None, watches=True))
+    opened.append(found)
+
+    def shown():
+        return found.readings()[0]
+
+    eventually(lambda: "the tracker is not initialised" in shown().state)
+    assert shown().heard
+    assert not server._initialized
+    server._initialized = True  # by the maker's own program
+    eventually(lambda: (clock.sleep(0.02), shown().state == "locked")[1])
+    assert shown().offset is not None
 
 
 def test_a_point_of_a_probe_is_turned_with_it(clock, live, opened):

@@ -7,10 +7,11 @@ from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import ConventionError
 from elastocal.identification import FitOptions, calibrate
 from support.campaigns import Sound, campaign, sounds
+from support.further_mistakes import FURTHER
 from support.mistake_table import alarms, outcome, rates, tabulate
 from support.mistakes import MISTAKES, changed
 
-KNOWN = {each.name: each for each in MISTAKES}
+KNOWN = {each.name: each for each in (*MISTAKES, *FURTHER)}
 ON_RAIL, SMALL = Sound(poses=15, seed=1), Sound(like="ur20", poses=12, seed=2)
 REFUSED = (
     "force_x reversed",
@@ -23,6 +24,14 @@ REFUSED = (
     "joints of the row before",
     "zero of the third joint off by 90 deg",
     "zero of the force taken in contact",
+    "sensor mounted upside down, turned by 90 deg",
+    "deflection in the marker's column",
+    "marker counted from the load case before",
+    "third joint half its size",
+    "zero of the second joint off by 10 deg",
+    "zero of the third joint off, controller displacement computed",
+    "tcp 100 mm off along z",
+    "all of another base, upside down",
 )
 WARNED = (
     "force in kgf",
@@ -32,6 +41,9 @@ WARNED = (
     "drift of 1 mm",
     "station bumped half way, 1 mm",
     "one pose's rows all the same",
+    "forces read before they settled",
+    "station moved in the middle third",
+    "forces in lbf from half way on",
 )
 
 

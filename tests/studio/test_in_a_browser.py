@@ -101,7 +101,16 @@ def told(cell):
     def while_open(found):
         with open_tab(browser) as tab:
             page = Page(tab, found.figures.address)
-            for part in (look_at_it, drag_it, edit_it, survey_it, compare_it, plan_it, run_it):
+            for part in (
+                look_at_it,
+                drag_it,
+                edit_it,
+                survey_it,
+                compare_it,
+                plan_it,
+                watch_it,
+                run_it,
+            ):
                 part(page, cell, told)
             told["complaints"] = complaints_of(tab.events)
             told["foreign"] = [
@@ -204,8 +213,17 @@ def plan_it(page, cell, told):
     page.keep("plan")
 
 
-def run_it(page, cell, told):
+def watch_it(page, cell, told):
     page.click("#tab-run")
+    page.click("#watch")
+    page.wait("document.getElementById('devices').textContent.includes('locked')")
+    told["devices"] = page.text("devices")
+    page.keep("devices")
+    page.click("#work-stop")
+    page.wait("document.documentElement.dataset.work === 'watch stopped'")
+
+
+def run_it(page, cell, told):
     page.wait("document.getElementById('run-plan').options.length > 0")
     page.get("document.getElementById('run-form').elements.rate.value = '20'")
     page.click("#run-form button")
@@ -280,6 +298,11 @@ def test_a_plan_is_made_and_its_poses_are_shown(told):
     assert summary.startswith("3 poses by ")
     assert poses == "012"
     assert "on the tooling" in told["at a pose"]
+
+
+def test_the_devices_are_shown_live(told):
+    shown = told["devices"]
+    assert [each in shown for each in ("arm simulated", "sensor simulated", " N")] == [True] * 3
 
 
 def test_a_run_is_watched_and_stopped_in_position_control_and_can_be_gone_on_with(told, cell):

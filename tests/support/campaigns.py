@@ -5,6 +5,7 @@ import tempfile
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,6 +55,19 @@ class Made:
     readings: Readings
     tool_weight: float
     """Weight of all that hangs on the sensor, in N."""
+    sound: Sound
+    """How it was made."""
+
+
+class Truth(NamedTuple):
+    """What the simulator knows of poses that a campaign does not hold."""
+
+    q: np.ndarray
+    """Joints under load, shape (reading, joint), in rad or m."""
+    force: np.ndarray
+    """Force on the robot in base, shape (reading, 3), in N."""
+    deflection: np.ndarray
+    """Deflection of the tool in base, shape (reading, 3), in m."""
 
 
 @cache
@@ -90,10 +104,7 @@ def campaign(sound: Sound) -> Made:
     cell = cell_of(sound.like, sound.preset)
     rng = np.random.default_rng([sound.seed, 7])
     (q, normal), stations = _places(sound.like)
-    chosen = np.sort(rng.choice(len(q), min(sound.poses, len(q)), replace=False))
-    if cell.robot.external_axes and not sound.rail:
-        near = np.argsort(np.abs(q[:, 0] - np.median(q[:, 0])), kind="stable")
-        chosen = np.sort(near[: min(sound.poses, len(q))])
+    chosen = _chosen(sound, rng)
     presses = dict(cell.file.presses)
     presses.pop(cell.file.load_cases.check_case, None)
     names, force = list(presses), list(sound.level * np.array(list(presses.values())))
@@ -104,8 +115,7 @@ def campaign(sound: Sound) -> Made:
         light = np.array([0.0, 0.0, -60.0 if full[2] < -300.0 else -10.0])
         force = [1.05 * full, light, *force]
         reference = 1
-    truth = CampaignSimulator.of(cell)
-    truth = truth.stiffened(np.exp(rng.normal(0.0, 0.15, truth.springs)))
+    truth = _arm(sound, rng)
     places = ContactPoses(q[chosen], normal[chosen])
     settled = truth.settle(places, np.array(force), seed=sound.seed, reference=reference)
     cases = tuple(name for name in names if name != LIGHT_CONTACT)
@@ -118,7 +128,40 @@ def campaign(sound: Sound) -> Made:
     assert cell.file.tool is not None
     assert cell.file.marker is not None
     weight = 9.81 * float(cell.file.tool.mass)
-    return Made(cell.robot, np.array(cell.file.marker.position_tcp), readings, weight)
+    return Made(cell.robot, np.array(cell.file.marker.position_tcp), readings, weight, sound)
+
+
+def _chosen(sound: Sound, rng: np.random.Generator) -> np.ndarray:
+    """Return which of the planned poses a campaign holds."""
+    q = _places(sound.like)[0].q
+    chosen = rng.choice(len(q), min(sound.poses, len(q)), replace=False)
+    if cell_of(sound.like, sound.preset).robot.external_axes and not sound.rail:
+        near = np.argsort(np.abs(q[:, 0] - np.median(q[:, 0])), kind="stable")
+        chosen = near[: min(sound.poses, len(q))]
+    return np.sort(chosen)
+
+
+def _arm(sound: Sound, rng: np.random.Generator) -> CampaignSimulator:
+    """Return the truth of a cell, with springs that differ from arm to arm."""
+    truth = CampaignSimulator.of(cell_of(sound.like, sound.preset))
+    return truth.stiffened(np.exp(rng.normal(0.0, 0.15, truth.springs)))
+
+
+@cache
+def unseen(sound: Sound) -> Truth:
+    """Return the truth at planned poses that a campaign does not hold, at most ten."""
+    cell, rng = cell_of(sound.like, sound.preset), np.random.default_rng([sound.seed, 7])
+    (q, normal), _ = _places(sound.like)
+    left = np.setdiff1d(np.arange(len(q)), _chosen(sound, rng))[:10]
+    presses = dict(cell.file.presses)
+    presses.pop(cell.file.load_cases.check_case, None)
+    force = np.array(list(presses.values()))
+    places = ContactPoses(q[left], normal[left])
+    found = _arm(sound, rng).settle(places, force, seed=sound.seed)
+    n = found.q.shape[-1]
+    return Truth(
+        found.q.reshape(-1, n), found.force.reshape(-1, 3), found.deflection.reshape(-1, 3)
+    )
 
 
 def sounds(count: int, seed: int = 0) -> list[Sound]:

@@ -346,7 +346,7 @@ MISTAKES = (
     Mistake("force in lbf", forces(lambda f: f / POUND), ("lbf",)),
     Mistake("force in kN", forces(lambda f: f / 1e3), ("kn",)),
     Mistake("force in daN", forces(lambda f: f / 10.0), ("dan",)),
-    Mistake("force in counts", forces(lambda f: f * 1e6), ("counts",)),
+    Mistake("force in counts", forces(lambda f: f * 1e6), ("counts", "finite", "mN")),
     Mistake("force in counts of 1/16 N", forces(lambda f: f * 16.0), ("counts",)),
     Mistake("gain of force_x 30 % high", forces(times(1.3, 1, 1), "tcp"), ("force_x",)),
     Mistake("gain of force_z 30 % low", forces(times(1, 1, 0.7), "tcp"), ("force_z",)),

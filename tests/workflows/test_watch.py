@@ -15,7 +15,7 @@ from elastocal.drivers.kuka_rsi._listener import KukaListener
 from elastocal.drivers.rtde import RtdeDriver, RtdeSettings
 from elastocal.errors import DeviceError
 from elastocal.sim.wire import PORTS, LiveCell, NetFtServer, RtdeServer
-from elastocal.workflows import WatchResult, rig_of, watch
+from elastocal.workflows import WatchResult, rig_of, studio, watch
 from support import fault_matrix
 from support.cli import elastocal
 from support.kuka_peer import KukaPeer
@@ -36,7 +36,9 @@ def decimal_comma(data: bytes) -> list[bytes]:
 @pytest.fixture
 def wired():
     """A cell whose three devices are on the wire, a proxy on each line, and what opens them."""
-    return fault_matrix.wired(PlannedCell(example_cell("afp").path, None), "wired.yaml", 1.0)
+    return fault_matrix.wired(
+        PlannedCell(example_cell("afp").path, None), "wired.yaml", by_the_wall=True
+    )
 
 
 class Watching:
@@ -266,3 +268,27 @@ def test_a_watch_of_a_cell_that_names_no_driver_is_refused(tmp_path):
     cell = example_cell("afp").path.with_name("other.yaml")
     cell.write_text(yaml.safe_dump(data))
     assert "devices.arm: 'kuka' is not configured" in elastocal("watch", cell).reason
+
+
+def test_the_studio_shows_the_same_rows_and_ends_the_watch():
+    told = []
+
+    def look(found):
+        session = found.session
+        session.actions["watch"]({})
+        end, number = time.monotonic() + PATIENCE, -1
+        while time.monotonic() < end:
+            number, news = session.news(number, 1.0)
+            rows = news["work"]["live"].get("devices", ())
+            if [each["wrong"] for each in rows] == [False] * 3:
+                told.append(rows)
+                session.actions["stop"]({})
+            if news["work"]["state"] != "busy":
+                break
+        told.append(news["work"]["state"])
+
+    studio(example_cell("afp").path, while_open=look)
+    *_, rows, state = told
+    assert state == "stopped"
+    assert [each["device"].split()[0] for each in rows] == ["arm", "sensor", "metrology"]
+    assert "disarmed" in rows[0]["cells"][0]

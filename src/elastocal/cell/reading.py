@@ -105,10 +105,10 @@ class DeviceReading:
         return f"{'no time of day' if own else f'{self.offset:+.3f} s'}{drift}"
 
 
-def three(values: FloatArray) -> Three:
-    """Return three numbers of an array, shape (3,)."""
+def three(values: FloatArray) -> Three | None:
+    """Return the numbers of an array, shape (3,); None where one of them is none."""
     x, y, z = map(float, values)
-    return x, y, z
+    return (x, y, z) if np.isfinite(values).all() else None
 
 
 def polled_readings(found: "DeviceSet") -> Callable[[], tuple[DeviceReading, ...]]:

@@ -21,6 +21,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.mistakes import name_joint_mistake, still
 from elastocal.identification.options import FitOptions, FreeFrame
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
@@ -251,5 +252,27 @@ def _positions(robot: Robot, readings: Readings) -> list[str]:
         tip=repr(robot.tip),
     )
     if median > _TCP_WRONG:
-        raise DatasetError(f"{message}: another tcp, joint signs, joint order or base frame?")
+        raise DatasetError(f"{message}: {_cause(robot, readings, recorded, median)}")
     return [message] if median > _TCP_OFF else []
+
+
+def _cause(robot: Robot, readings: Readings, recorded: FloatArray, median: float) -> str:
+    """Return why recorded positions are elsewhere than those of the joints, as far as is known."""
+
+    def left(read: Callable[[FloatArray], FloatArray]) -> float:
+        place = robot.forward(read(readings.joint_position))[:, :3, 3]
+        return float(np.median(np.linalg.norm(place - recorded, axis=1)))
+
+    enough = min(_TCP_OFF, _LEFT_BY_UNDOING * median)
+    if named := name_joint_mistake(robot, left, enough):
+        return named
+    T = robot.forward(readings.joint_position)
+    own = np.einsum("rji,rj->ri", T[:, :3, :3], recorded - T[:, :3, 3])
+    tcp = np.median(own, axis=0)
+    if float(np.median(np.linalg.norm(own - tcp, axis=1))) < enough:
+        x, y, z = 1e3 * tcp
+        return f"the tcp that the controller uses is ({x:.0f}, {y:.0f}, {z:.0f}) mm from it"
+    return (
+        "another tcp, joint signs, joint order or base frame?"
+        f"{still(robot, readings.joint_position)}"
+    )

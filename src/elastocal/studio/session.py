@@ -115,6 +115,9 @@ class StudioWork(Protocol):
     def run(self, cell: Path, message: RunMessage, arming: Arming) -> Callable[[Outbox], Data]:
         """Return the work of a run; it can be pickled."""
 
+    def watch(self, cell: Path) -> Callable[[Outbox], Data]:
+        """Return the work of watching the devices, which moves nothing; it can be pickled."""
+
     def is_real(self, cell: Cell) -> bool:
         """Return whether something moves that can hurt."""
 
@@ -167,6 +170,7 @@ class Session:
             (Nothing, self._compare),
             (Nothing, self._survey),
             (RunMessage, self._run),
+            (Nothing, self._watch),
             (Nothing, self._stop),
             (Nothing, self._folders),
             (FolderMessage, self._record),
@@ -316,6 +320,10 @@ class Session:
         # The worker reads the file anew: it must be this one.
         arming = Arming(cell.sha256, real)
         self.worker.begin("run", self._work.run(self._path, message, arming))
+        return {}
+
+    def _watch(self, _: Nothing) -> Mapping[str, object]:
+        self.worker.begin("watch", self._work.watch(self._path))
         return {}
 
     def _stop(self, _: Nothing) -> Mapping[str, object]:

@@ -44,7 +44,7 @@ class WorkNews:
     """What is known of the work that was begun last."""
 
     kind: str = ""
-    """plan, compare, survey or run."""
+    """plan, compare, survey, watch or run."""
     state: WorkState = WorkState.NONE
     stage: str = ""
     done: int = 0

@@ -13,7 +13,7 @@ from functools import partial
 from os import PathLike
 from pathlib import Path
 
-from elastocal.cell import LOOPBACK, SIMULATED, Arming, Cell, load_cell
+from elastocal.cell import LOOPBACK, SIMULATED, Arming, Cell, DeviceReading, load_cell
 from elastocal.errors import DeviceError
 from elastocal.planning import read_plan
 from elastocal.procedure import Progress as RunProgress, RunEnd
@@ -39,6 +39,7 @@ from elastocal.workflows._workflow import workflow
 from elastocal.workflows.check import describe_file
 from elastocal.workflows.plan import plan
 from elastocal.workflows.run import RunSettings, dry_run, run
+from elastocal.workflows.watch import WatchResult, watch
 
 _REDIRECT = """<!doctype html>
 <meta charset="utf-8"><meta name="referrer" content="no-referrer">
@@ -179,6 +180,9 @@ class _Commands:
     def run(self, cell: Path, message: RunMessage, arming: Arming) -> Callable[[Outbox], Data]:
         return partial(_run, cell, message, arming)
 
+    def watch(self, cell: Path) -> Callable[[Outbox], Data]:
+        return partial(_watch, cell)
+
     def is_real(self, cell: Cell) -> bool:
         try:
             return rig_of(cell).real
@@ -215,6 +219,21 @@ def _run(cell: Path, message: RunMessage, arming: Arming, outbox: Outbox) -> Dat
     found = run(settings, progress=outbox.progress, operator=operator)
     ended = found.end is RunEnd.INTERRUPTED
     return {"folder": message.folder, "figures": to_data(found.figures), "interrupted": ended}
+
+
+def _watch(cell: Path, outbox: Outbox) -> Data:
+    """Watch the devices, in the worker's process."""
+
+    def show(result: WatchResult) -> None:
+        rows = [
+            {"device": f"{each.kind} {each.device}", "wrong": bool(each.problem), "cells": cells}
+            for each in result.figures.devices
+            for cells in [each.cells()]
+        ]
+        outbox.tell({"columns": DeviceReading.COLUMNS, "devices": rows})
+
+    watch(cell, show=show, interrupted=outbox.stopped)
+    return {}
 
 
 class _PageOperator(Unattended):

@@ -164,10 +164,7 @@ class RsiLink:
 
     @property
     def silent(self) -> float | None:
-        """Time since the last message that could be read, in s of the wall; None before the first.
-
-        Read and used by the thread that watches; the link's own thread writes it.
-        """
+        """Time since the last readable message, in s of the wall; None before the first."""
         return None if self._came is None else self._timer() - self._came
 
     @property

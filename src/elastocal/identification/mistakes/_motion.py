@@ -9,12 +9,14 @@ the agreement is named. No spring has a part in that.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
-from elastocal.identification.mistakes._suspicion import Suspicion, median_norm
+from elastocal.identification.mistakes._suspicion import AXES, Suspicion, median_norm
 from elastocal.robot import Robot, other_joint_readings
 from elastocal.wording import phrase
 
@@ -24,6 +26,10 @@ _CLOSE = 0.01
 """Part of its motion below which controller and joints agree on where the tcp is."""
 _LEFT = 0.3
 """Part of their difference which undoing a mistake may leave."""
+_ALONG = 0.95
+"""Cosine from which on an axis lies along another."""
+_LEAST_ZERO = 1.0
+"""Angle in deg by which the zero of a joint has to be off to be worth naming."""
 _FINE = 1e-5
 """Difference in m that is no more than a reading of a tracker."""
 _APART = 0.1
@@ -52,10 +58,7 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
     apart = _apart(robot, readings, offset)
     if not apart > max(_CLOSE * size, _FINE):
         return
-    left, message = min(
-        (_relative(robot, each.undo(readings), offset), each.message)
-        for each in _motion_mistakes(robot)
-    )
+    left, message = _likeliest(robot, readings, offset, moved)
     values = {"apart": f"{1e3 * apart:.2f}", "size": f"{1e3 * size:.2f}"}
     if left < _LEFT * min(apart / max(size, _FINE), 1.0):
         yield Suspicion(
@@ -81,11 +84,32 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
         yield Suspicion(
             phrase(
                 "joints and controller displacement contradict each other: {apart} mm apart, of"
-                " {size} mm; another robot of the family, joints of other rows, or a displacement"
-                " in another frame?",
+                " {size} mm{still}; another robot of the family, joints of other rows, or a"
+                " displacement in another frame?",
+                still=still(robot, readings.joint_position),
                 **values,
             )
         )
+
+
+def _likeliest(
+    robot: Robot, readings: Readings, offset: FloatArray, moved: FloatArray
+) -> tuple[float, str]:
+    """Return what undoing the mistake that explains most leaves, and its name."""
+    mistakes = [
+        ReadingMistake(each.message, partial(_read, each.read))
+        for each in joint_mistakes(
+            robot, lambda read: _relative(robot, _read(read, readings), offset)
+        )
+    ]
+    # Of two that restore the agreement alike, the first is said.
+    return min(
+        (
+            (round(_relative(robot, each.undo(readings), offset), 3), each.message)
+            for each in (*mistakes, *_motion_mistakes(robot, readings, moved))
+        ),
+        key=itemgetter(0),
+    )
 
 
 def _moved(robot: Robot, readings: Readings, offset: FloatArray) -> FloatArray | None:
@@ -129,6 +153,9 @@ def _relative(robot: Robot, readings: Readings, offset: FloatArray) -> float:
     return _apart(robot, readings, offset) / told if told > 0.0 else np.inf
 
 
+JointRead = Callable[[FloatArray], FloatArray]
+
+
 @dataclass(frozen=True)
 class ReadingMistake:
     """A mistake in recorded motion, and how it is undone."""
@@ -137,12 +164,19 @@ class ReadingMistake:
     undo: Callable[[Readings], Readings]
 
 
-_JointRead = Callable[[FloatArray], FloatArray]
+@dataclass(frozen=True)
+class JointMistake:
+    """A mistake in recorded joints."""
+
+    message: str
+    read: JointRead
+    """From joints as recorded, shape (row, joint), to those of the URDF."""
 
 
-def _motion_mistakes(robot: Robot) -> Iterator[ReadingMistake]:
-    """Yield every mistake in joints or controller displacement, the likeliest first."""
-    yield from joint_mistakes(robot)
+def _motion_mistakes(
+    robot: Robot, readings: Readings, moved: FloatArray
+) -> Iterator[ReadingMistake]:
+    """Yield every mistake in the controller displacement, the likeliest first."""
     yield ReadingMistake(
         "controller_displacement is reversed", lambda r: _told(r, -r.controller_displacement)
     )
@@ -159,6 +193,33 @@ def _motion_mistakes(robot: Robot) -> Iterator[ReadingMistake]:
         "controller_displacement is in the tcp frame, not in base",
         lambda r: _told(r, _in_base(robot, r, r.controller_displacement)),
     )
+    U, _, Vt = np.linalg.svd(moved.T @ _counted(readings.controller_displacement, readings))
+    turn = U @ Vt
+    yield ReadingMistake(_of_turn(turn), lambda r: _told(r, r.controller_displacement @ turn.T))
+    for axis, letter in enumerate(AXES):
+        yield ReadingMistake(
+            f"controller_displacement_{letter} is dead or in another unit",
+            partial(_with_axis, axis, moved),
+        )
+
+
+def _of_turn(turn: FloatArray) -> str:
+    """Return what it means that a turned controller displacement agrees with the joints."""
+    if np.abs(turn).max(axis=1).min() > _ALONG:
+        read = ", ".join(
+            f"{'-' if row.sum() < 0.0 else ''}{AXES[int(np.abs(row).argmax())]}" for row in turn
+        )
+        return f"x, y, z of controller_displacement are mixed up, or of another base: read {read}"
+    if np.linalg.det(turn) < 0.0:
+        return "the frame of controller_displacement is left-handed"
+    angle = np.degrees(np.linalg.norm(Rotation.from_matrix(turn).as_rotvec()))
+    return f"controller_displacement is in another frame than base, turned by {angle:.0f} deg"
+
+
+def _with_axis(axis: int, moved: FloatArray, readings: Readings) -> Readings:
+    own = readings.controller_displacement.copy()
+    own[:, axis] = moved[:, axis]
+    return _told(readings, own)
 
 
 def _told(readings: Readings, displacement: FloatArray) -> Readings:
@@ -174,19 +235,69 @@ def _in_base(robot: Robot, readings: Readings, own: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("rij,rj->ri", R, own))
 
 
-def joint_mistakes(robot: Robot) -> Iterator[ReadingMistake]:
+def joint_mistakes(robot: Robot, left: Callable[[JointRead], float]) -> Iterator[JointMistake]:
     """Yield every mistake in joints that is known, the likeliest first.
 
     Parameters
     ----------
     robot : Robot
         The robot.
+    left : callable
+        What stays unexplained with the joints read otherwise; by it the zero of each joint is
+        estimated.
     """
     for message, read in _other_joints(robot):
-        yield ReadingMistake(message, partial(_read, read))
+        yield JointMistake(message, read)
+    for joint in range(robot.external_axes, len(robot.joint_names)):
+        angle = _zero(robot, joint, left)
+        if abs(angle) > np.radians(_LEAST_ZERO):
+            base = ", or all else is of another base" if joint == robot.external_axes else ""
+            yield JointMistake(
+                f"the zero of {robot.joint_names[joint]} is {-np.degrees(angle):.3g} deg from the"
+                f" URDF's{base}",
+                partial(_turned, robot, joint, angle),
+            )
 
 
-def _read(read: _JointRead, readings: Readings) -> Readings:
+def _zero(robot: Robot, joint: int, left: Callable[[JointRead], float]) -> float:
+    """Return the angle in rad that, added to a joint, leaves least."""
+    step, best = np.radians(15.0), 0.0
+    tried = step * np.arange(-11, 13)
+    while step > np.radians(0.05):
+        best = min(tried, key=lambda angle: left(partial(_turned, robot, joint, angle)))
+        step /= 4.0
+        tried = best + step * np.arange(-3, 4)
+    return float(best)
+
+
+def _turned(robot: Robot, joint: int, angle: float, q: FloatArray) -> FloatArray:
+    return q + np.where(np.arange(len(robot.joint_names)) == joint, angle, 0.0)
+
+
+def still(robot: Robot, q: FloatArray) -> str:
+    """Return which joints never move, as the end of a sentence; nothing where all do."""
+    names = [robot.joint_names[i] for i in np.flatnonzero(np.ptp(q, axis=0) == 0.0)]
+    return f" ({', '.join(names)} stays the same in all rows)" if names else ""
+
+
+def name_joint_mistake(robot: Robot, left: Callable[[JointRead], float], enough: float) -> str:
+    """Return the mistake in joints whose undoing leaves least; nothing where it leaves too much.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    left : callable
+        What stays unexplained with the joints read otherwise.
+    enough : float
+        What may stay.
+    """
+    found = [(left(each.read), each.message) for each in joint_mistakes(robot, left)]
+    least, message = min(found, key=itemgetter(0))
+    return message if least < enough else ""
+
+
+def _read(read: JointRead, readings: Readings) -> Readings:
     zero = readings.reference_joint_position
     return replace(
         readings,
@@ -203,7 +314,7 @@ def _rolled(rows: int, q: FloatArray) -> FloatArray:
     return np.roll(q, rows, axis=0)
 
 
-def _other_joints(robot: Robot) -> Iterator[tuple[str, _JointRead]]:
+def _other_joints(robot: Robot) -> Iterator[tuple[str, JointRead]]:
     """Yield what joints may be, as a sentence without its end, and how they are read then."""
     for reading in other_joint_readings(robot):
         yield (reading.message, partial(reading.read, robot))
@@ -217,12 +328,9 @@ def _other_joints(robot: Robot) -> Iterator[tuple[str, _JointRead]]:
             partial(np.multiply, signs),
         )
     for joint in arm:
-        for angle in (90.0, -90.0, 180.0):
-            shift = np.where(np.arange(width) == joint, np.radians(angle), 0.0)
-            yield (
-                f"the zero of {names[joint]} is {-angle:.0f} deg from the URDF's",
-                partial(np.add, shift),
-            )
+        for factor, size in ((2.0, "half"), (0.5, "twice")):
+            gain = np.where(np.arange(width) == joint, factor, 1.0)
+            yield f"{names[joint]} has {size} its size", partial(np.multiply, gain)
     for joint in arm:
         for other in range(joint + 1, width):
             order = np.arange(width)

@@ -16,6 +16,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, ModelPosture, bearing
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.problem import Problem, build
+from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.robot import Robot
 
@@ -38,6 +39,8 @@ class OtherReading:
     """Whether data are refused for it where nothing else explains them as well."""
     louder: float = 1.0
     """By how much the noise of the marker is made smaller."""
+    estimated: bool = False
+    """Whether numbers were estimated for it, which explain part of what the springs miss."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,9 @@ class Rows:
     """The same at the joints of the reference."""
     rest: FloatArray
     """Rows of what no force makes: moments and the arm's weight, shape (reading, 3, spring)."""
+    lever: FloatArray
+    """Rows per metre by which the marker sits elsewhere along each axis of the tcp frame, shape
+    (reading, 3, axis, spring)."""
     kept: BoolArray
     """Readings that are no blunders, shape (reading,)."""
 
@@ -77,7 +83,10 @@ class Rows:
         light = readings.reference_force
         reference = unit(before) if light is not None else np.zeros(0)
         kept = ~screen(problem).blunder
-        bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), kept)
+        place = np.zeros(3) if marker_offset is None else np.asarray(marker_offset, dtype=float)
+        moved = [build(model, readings, None, place + e).O - problem.O for e in np.eye(3)]
+        lever = np.stack(moved, axis=2)
+        bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), lever, kept)
         return replace(bare, rest=problem.O - bare.blocks(readings.force, light))
 
     def blocks(self, force: FloatArray, light: FloatArray | None) -> FloatArray:
@@ -102,12 +111,19 @@ class Rows:
         R = robot.forward(self.readings.joint_position)[:, :3, :3]
         last = robot.chain.T_last_tip[:3, :3]
         found = {"tcp": R, "base": np.broadcast_to(np.eye(3), R.shape)}
-        if not np.allclose(last, np.eye(3), atol=_PARALLEL):
+        # Axes that lie along those of the tcp, in whatever order, are among its other readings.
+        if not np.allclose(np.abs(last).max(axis=0), 1.0, atol=_PARALLEL):
             found["last link"] = R @ last.T
         return found
 
     def read(self, reading: OtherReading) -> Problem:
         return replace(self.problem, O=reading.blocks, d=reading.d).take(self.kept)
+
+
+def fitted(problem: Problem) -> FloatArray:
+    """Return the bounded compliances of a problem by one Gram matrix, which is quick."""
+    whole = replace(problem, block=np.zeros_like(problem.block))
+    return np.asarray(PoseGrams.of(whole).refit(np.ones((1, 1)))[0])
 
 
 def beside(problem: Problem, columns: FloatArray) -> Problem:
@@ -124,4 +140,21 @@ def beside(problem: Problem, columns: FloatArray) -> Problem:
         upper=np.concatenate([problem.upper, free]),
         prior_rows=np.zeros((0, problem.columns + count + 1)),
         size=np.concatenate([np.broadcast_to(problem.size, problem.lower.shape), size]),
+    )
+
+
+def apart(problem: Problem, late: BoolArray) -> Problem:
+    """Return a problem with springs of their own for late readings, shape (reading,)."""
+
+    def twice(values: FloatArray | float) -> FloatArray:
+        return np.tile(np.broadcast_to(values, problem.lower.shape), 2)
+
+    part = late[:, None, None]
+    return replace(
+        problem,
+        O=np.concatenate([np.where(part, 0.0, problem.O), np.where(part, problem.O, 0.0)], axis=2),
+        lower=twice(problem.lower),
+        upper=twice(problem.upper),
+        prior_rows=np.zeros((0, 2 * problem.columns + 1)),
+        size=twice(problem.size),
     )

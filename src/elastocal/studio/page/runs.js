@@ -3,7 +3,7 @@
 import { $, ask, attempt, element, fill, move, say, showPosture, state, view } from "./studio.js";
 
 const REFUSED = ["#7b3294", "#c2571a", "#8c8c8c", "#b8860b", "#a6324a", "#3b6ea8", "#6b6b2f", "#555555"];
-const KINDS = { plan: "Planning", compare: "Comparing", survey: "Trying points", run: "Run" };
+const KINDS = { plan: "Planning", compare: "Comparing", survey: "Trying points", watch: "Watching the devices", run: "Run" };
 let seen = "", curves = null, record = null;
 
 export function showWork(work) {
@@ -12,10 +12,11 @@ export function showWork(work) {
   $("work-kind").textContent = KINDS[work.kind] || "";
   $("work-stage").textContent = work.total > 1 ? `${work.stage}: ${work.done} of ${work.total}` : work.stage;
   $("work-bar").value = work.total ? work.done / work.total : 0;
-  for (const id of ["survey", "compare"]) $(id).disabled = busy;
+  for (const id of ["survey", "compare", "watch"]) $(id).disabled = busy;
   for (const id of ["plan-form", "run-form"]) $(id).querySelector("button").disabled = busy;
   $("live").hidden = !(busy && work.kind === "run");
   if (busy && work.kind === "run") showLive(work.live);
+  if (work.kind === "watch") showDevices(work.live);
   const now = `${work.kind} ${work.state}`, before = seen;
   seen = now;
   document.documentElement.dataset.work = now;
@@ -35,6 +36,17 @@ function ended({ kind, state: how, result, message }) {
     say(interrupted ? `The run was stopped: ${poses}, the arm is ${figures.arm}. It can be gone on with.` : `The run is ${figures.state}: ${poses}, the arm is ${figures.arm}.`, true);
     showFolders().then(() => openRecord(result.folder));
   }
+}
+
+function showDevices({ columns, devices }) {
+  if (!devices) return;
+  $("devices").hidden = false;
+  $("devices").tHead.rows[0].replaceChildren(...["device", ...columns].map((text) => element("th", text, { scope: "col" })));
+  $("devices").tBodies[0].replaceChildren(...devices.map(({ device, wrong, cells }) => {
+    const row = element("tr");
+    row.append(element("td", `${wrong ? "\u2717" : "\u2713"} ${device}`), ...cells.map((text) => element("td", text)));
+    return row;
+  }));
 }
 
 function showSurvey({ points, refused, summary }) {
@@ -228,6 +240,7 @@ export function openRuns() {
   const begin = (action, message = {}) => attempt(() => ask(action, message));
   $("survey").addEventListener("click", () => begin("survey"));
   $("compare").addEventListener("click", () => begin("compare"));
+  $("watch").addEventListener("click", () => begin("watch"));
   $("work-stop").addEventListener("click", () => begin("stop"));
   $("run-stop").addEventListener("click", () => begin("stop"));
   $("plan-form").addEventListener("submit", (event) => {
