@@ -35,6 +35,8 @@ _TRIMMED = 0.9
 """Part of the readings, those with the smallest residuals, that rank readings of the data."""
 _FEWEST = 6
 """With fewer poses another reading may fit better by chance."""
+_FEWEST_ESTIMATED = 8
+"""With fewer poses an estimated number explains what the springs miss of a sound arm."""
 _FEWEST_PARTED = 12
 _PARTS = (0.33, 0.5, 0.67)
 _LEFT_APART = 0.85
@@ -66,7 +68,8 @@ def find_undone(
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
     """
-    if len(np.unique(readings.pose)) < _FEWEST:
+    poses = len(np.unique(readings.pose))
+    if poses < _FEWEST:
         return ()
     try:
         rows = Rows.of(robot, readings, marker_offset)
@@ -80,6 +83,7 @@ def find_undone(
     ranked = [
         (_residual(rows.read(each)) * max(each.louder, 1.0) / before, number, each)
         for number, each in enumerate(other_readings(rows, compliance))
+        if poses >= _FEWEST_ESTIMATED or not each.estimated
     ]
     possible = sorted(each for each in ranked if each[0] < each[2].least)[:_TRIED]
     tried = (_plainest(possible[number:]) for number in range(len(possible)))
