@@ -39,13 +39,16 @@ _FEWEST_ESTIMATED = 8
 """With fewer poses an estimated number explains what the springs miss of a sound arm."""
 _FEWEST_PARTED = 12
 _PARTS = (0.33, 0.5, 0.67)
-_LEFT_APART = 0.85
+_LEFT_APART = 0.55
+"""Part of the error that springs of both parts may leave: regions of the tooling differ, too."""
 _TRIED = 5
 """Readings that are judged at left-out poses, the best first."""
 _SURE = ((0.75, 2e-3), (1.0, 1e-4))
 """Part that is left of the error, and likelihood that the gain is chance below which it counts.
 Estimated numbers explain part of what springs miss, in sound data too: the less they explain, the
 surer it has to be. Without estimated numbers the first holds for every gain."""
+_MATTERS = 0.03
+"""Part of the deflections that an estimated number has to move to be worth a word."""
 _CERTAIN = 0.5
 _FITS_WELL = 0.2
 _EQUAL = 1.1
@@ -123,6 +126,8 @@ def _judged(
     left, chance = _left(stated, before, after)
     if not (left < reading.least and chance < _believed(left, reading.estimated)):
         return None
+    if reading.estimated and not _change(stated, undone) > _MATTERS:
+        return None
     deflection = float(np.linalg.norm(undone.d, axis=1).mean()) * max(reading.louder, 1.0)
     certain = reading.certain and left < _CERTAIN and float(after.mean()) < _FITS_WELL * deflection
     text = phrase(
@@ -132,6 +137,13 @@ def _judged(
         after=f"{1e3 * after.mean() / max(reading.louder, 1.0):.3f}",
     )
     return _Found(left, Suspicion(text, certain))
+
+
+def _change(stated: Problem, undone: Problem) -> float:
+    """Return how far the springs of the other reading move the deflections, over their size."""
+    before, after = fitted(stated), fitted(undone)
+    moved = np.linalg.norm(stated.O @ (after - before), axis=1).mean()
+    return float(moved / max(np.linalg.norm(stated.O @ before, axis=1).mean(), 1e-12))
 
 
 def _believed(left: float, estimated: bool) -> float:
