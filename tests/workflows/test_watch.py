@@ -115,6 +115,28 @@ def test_each_device_is_heard_one_that_fails_stops_no_other_and_the_arm_stands(w
         np.testing.assert_allclose(lines.live.press().tool, before, atol=1e-9)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", sorted(fault_matrix.FAULTS.keys() - {"PC: killed"}))
+def test_no_fault_moves_the_arm_or_hides_another_device_and_mended_it_is_heard(wired, fault):
+    found, opened = wired
+    kinds = {"arm": "arm", "force": "sensor", "tracker": "metrology"}
+    broken = kinds[fault.split(":")[0]]
+    with opened() as lines, Watching(found.cell) as watching:
+        before = lines.live.press().tool
+        for kind in kinds.values():
+            watching.until(kind, sound)
+        seconds = watching.shown.figures.seconds
+        fault_matrix.FAULTS[fault](lines)
+        watching.until("arm", lambda _: watching.shown.figures.seconds > seconds + 2.0)
+        for kind in set(kinds.values()) - {broken}:
+            watching.until(kind, sound)
+        lines.mend()
+        if fault != "force: second client":  # a stream that was taken is left to whoever took it
+            watching.until(broken, sound)
+        assert {each.correction for each in lines.robot.taken} == {(0.0, 0.0, 0.0)}
+        np.testing.assert_allclose(lines.live.press().tool, before, atol=1e-9)
+
+
 def test_a_stream_that_another_client_has_taken_is_left_to_it(wired, monkeypatch):
     found, opened = wired
     asked, obey = [], NetFtServer._obey
