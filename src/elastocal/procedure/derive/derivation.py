@@ -194,10 +194,7 @@ def derive_run(run: Path, sensor: SensorLoad | None = None, tool: Path | None = 
 def write_derived(run: Path, derived: DerivedRun) -> DerivedRun:
     """Write ``dataset.nc`` and ``summary.json`` of a run, each whole or not at all.
 
-    Returns
-    -------
-    DerivedRun
-        The same with a summary that states the hash of the dataset's file.
+    What is returned states in its summary the hash of the dataset's file.
 
     Raises
     ------
