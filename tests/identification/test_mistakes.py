@@ -96,3 +96,12 @@ def test_of_the_harmful_mistakes_nine_of_ten_are_found_and_named():
     found, named = rates(tabulate(outcomes))
     assert found >= 0.9
     assert named >= 0.9
+
+
+def test_a_tool_weight_is_named_once():
+    made = KNOWN["weight of the tool left in"].make(campaign(ON_RAIL))
+    model, rng = ElasticModel(made.robot, bearing(made.robot)), np.random.default_rng(0)
+    found = calibrate(
+        model, made.readings, rng, FitOptions(draws=40), marker_offset=made.marker
+    ).warnings
+    assert sum("seem to contain a constant" in text for text in found) == 1

@@ -174,9 +174,7 @@ from .spring_sums import (
 )
 from .suspicious import (
     BLUNDER_SCORE as BLUNDER_SCORE,
-    ForceOffset as ForceOffset,
     Screening as Screening,
-    force_offset as force_offset,
     leverage as leverage,
     screen as screen,
 )

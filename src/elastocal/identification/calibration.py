@@ -34,7 +34,7 @@ from elastocal.identification.observability import (
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
-from elastocal.identification.suspicious import Screening, force_offset, screen
+from elastocal.identification.suspicious import Screening, screen
 from elastocal.identification.uncertainty import (
     MOST_UNEXPLAINED,
     Coverage,
@@ -138,7 +138,7 @@ def calibrate(
     """
     options = options or FitOptions()
     problem = build(model, readings, options, marker_offset)
-    warnings, mistaken = _data_warnings(model, readings, problem, options, marker_offset)
+    warnings = _data_warnings(model, readings, problem, options, marker_offset)
     screening = screen(problem)
     used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
     kept = problem.take(used)
@@ -163,9 +163,6 @@ def calibrate(
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
     )
-    if not mistaken:
-        offset = force_offset(model, readings.take(used), weighted, compliance, marker_offset)
-        warnings += [offset.message()] if offset else []
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
     return Calibration(
@@ -212,8 +209,8 @@ def _data_warnings(
     problem: Problem,
     options: FitOptions,
     marker_offset: ArrayLike | None,
-) -> tuple[list[str], bool]:
-    """Return what is odd about the data, or refuse them; and whether a fit shows a mistake."""
+) -> list[str]:
+    """Return what is odd about the data, or refuse them."""
     seen = find_implausible(model.robot, readings, marker_offset)
     warnings = _stated(seen, options)
     warnings += list(check_joints(model.robot, readings)) + [
@@ -232,21 +229,20 @@ def _data_warnings(
                 gap=gap,
             )
         )
-    named = _fitted_mistakes(model, readings, options, marker_offset, seen)
-    warnings += named
+    warnings += _fitted_mistakes(model, readings, options, marker_offset, seen)
     try:
         left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
-        return [*warnings, phrase("fitted in spite of this: {error}", error=error)], True
+        return [*warnings, phrase("fitted in spite of this: {error}", error=error)]
     if left > POOR_FIT:
         warnings.append(
             phrase(
                 "the springs leave {left} of the median deflection unexplained", left=f"{left:.0%}"
             )
         )
-    return warnings, bool(named)
+    return warnings
 
 
 def _fitted_mistakes(
