@@ -1,5 +1,8 @@
 """Common mistakes of shop floors are found and named; sound campaigns pass in silence."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,8 +11,11 @@ from elastocal.errors import ConventionError
 from elastocal.identification import FitOptions, calibrate
 from support.campaigns import Sound, campaign, sounds
 from support.further_mistakes import FURTHER
-from support.mistake_table import alarms, outcome, rates, tabulate
+from support.mistake_table import HARMFUL, alarms, outcome, rates, tabulate
 from support.mistakes import MISTAKES, changed
+from support.walk_mistakes import MADE_IN, title
+
+TRIED = Path(__file__).parents[2] / "docs" / "hooks" / "gallery" / "mistakes.json"
 
 KNOWN = {each.name: each for each in (*MISTAKES, *FURTHER)}
 ON_RAIL, SMALL = Sound(poses=15, seed=1), Sound(like="ur20", poses=12, seed=2)
@@ -83,19 +89,22 @@ def test_200_sound_campaigns_of_all_presets_raise_two_alarms_at_most():
 
 
 @pytest.mark.slow
-def test_of_the_harmful_mistakes_nine_of_ten_are_found_and_named():
-    chosen = [
-        Sound(like, preset, poses, seed)
-        for like, preset, poses, seed in (
-            ("afp", "kind", 31, 1),
-            ("machining", "typical", 31, 2),
-            ("afp", "harsh", 31, 3),
-        )
-    ]
-    outcomes = [outcome(campaign(each), mistake) for each in chosen for mistake in MISTAKES]
+@pytest.mark.parametrize("sound", MADE_IN, ids=title)
+def test_of_the_harmful_mistakes_nine_of_ten_are_found_and_named(sound):
+    outcomes = [outcome(campaign(sound), mistake) for mistake in (*MISTAKES, *FURTHER)]
     found, named = rates(tabulate(outcomes))
     assert found >= 0.9
     assert named >= 0.9
+
+
+def test_the_table_of_the_documentation_holds_what_it_promises():
+    rows = json.loads(TRIED.read_text(encoding="utf-8"))["mistakes"]
+    harmful = [row for row in rows if row["harm"] is None or row["harm"] > HARMFUL]
+    found = [row for row in harmful if row["found"]]
+    assert {row["mistake"] for row in rows} <= set(KNOWN)
+    assert len({row["mistake"] for row in rows}) >= 60
+    assert len(found) >= 0.9 * len(harmful)
+    assert sum(row["named"] for row in found) >= 0.9 * len(found)
 
 
 def test_a_tool_weight_is_named_once():
