@@ -3,7 +3,7 @@ import inspect
 import pytest
 
 from elastocal import errors
-from elastocal.errors import ElastocalError, nearest
+from elastocal.errors import ElastocalError, InternalError, nearest, of_kind, present
 
 CLASSES = [
     kind
@@ -35,3 +35,12 @@ def test_nearest_names_only_what_is_near(name, expected):
 
 def test_nearest_of_nothing_is_empty():
     assert nearest("bearing", []) == ""
+
+
+def test_what_elastocal_makes_sure_of_is_an_error_where_it_is_not_so():
+    assert present(0.0, "force") == 0.0
+    assert of_kind(True, int, "count") is True
+    with pytest.raises(InternalError, match=r"^force: missing, which is a mistake in elastocal"):
+        present(None, "force")
+    with pytest.raises(InternalError, match=r"^count is a str, not a int, which is a mistake"):
+        of_kind("1", int, "count")

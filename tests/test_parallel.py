@@ -165,6 +165,37 @@ def test_workers_end_when_their_parent_is_killed(tmp_path):
     pytest.fail(f"{workers} outlive their parent")
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at /dev/shm")
+@pytest.mark.parametrize("group", [True, False], ids=["terminated_group", "killed_parent"])
+def test_a_pool_that_is_ended_leaves_nothing_in_shared_memory(group):
+    code = (
+        "import numpy as np, os, time\n"
+        "from elastocal.parallel import process_pool\n"
+        "def told(many):\n"
+        "    time.sleep(0.2)\n"
+        "    return len(many)\n"
+        "with process_pool(2, int) as pool:\n"
+        "    for _ in pool.map(told, (np.ones(400_000) for _ in range(500))):\n"
+        "        print(os.getpid(), flush=True)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, start_new_session=True
+    ) as begun:
+        assert begun.stdout is not None
+        assert begun.stdout.readline().split() == [str(begun.pid).encode()]
+        shared = Path("/dev/shm")
+        assert [*shared.glob(f"*{begun.pid}*")]
+        if group:
+            os.killpg(begun.pid, signal.SIGTERM)
+        else:
+            begun.kill()
+    for _ in range(100):
+        if not [*shared.glob(f"*[_-]{begun.pid}[_-]*")]:
+            return
+        time.sleep(0.1)
+    pytest.fail(f"{[*shared.glob(f'*{begun.pid}*')]} are left")
+
+
 def spin() -> None:
     while True:
         pass

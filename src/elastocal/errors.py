@@ -7,6 +7,9 @@ line can print it as it stands. Each error is also the builtin that a caller wou
 
 import difflib
 from collections.abc import Iterable
+from typing import TypeVar
+
+_T = TypeVar("_T")
 
 
 class ElastocalError(Exception):
@@ -87,6 +90,42 @@ class VerificationError(ElastocalError, ValueError):
 
 class FileAccessError(ElastocalError, OSError):
     """A file that cannot be read or written."""
+
+
+class InternalError(ElastocalError, RuntimeError):
+    """Something that elastocal itself makes sure of is not so: a mistake in elastocal."""
+
+
+def present(value: _T | None, name: str) -> _T:
+    """Return a value that its caller has made sure of.
+
+    Raises
+    ------
+    InternalError
+        If it is None.
+
+    >>> present(2.0, "force")
+    2.0
+    """
+    if value is None:
+        raise InternalError(f"{name}: missing, which is a mistake in elastocal: please report it")
+    return value
+
+
+def of_kind(value: object, kind: type[_T], name: str) -> _T:
+    """Return a value whose kind its caller has made sure of.
+
+    Raises
+    ------
+    InternalError
+        If it is of another kind.
+    """
+    if not isinstance(value, kind):
+        raise InternalError(
+            f"{name} is a {type(value).__name__}, not a {kind.__name__},"
+            " which is a mistake in elastocal: please report it"
+        )
+    return value
 
 
 def nearest(name: str, allowed: Iterable[str]) -> str:

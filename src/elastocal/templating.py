@@ -4,6 +4,8 @@ import unicodedata
 from functools import cache
 from typing import TYPE_CHECKING
 
+from elastocal.errors import ReportError
+
 if TYPE_CHECKING:
     from jinja2 import Environment
 
@@ -19,22 +21,41 @@ def templates(package: str, markup: bool = False) -> "Environment":
     package : str
         Its full name.
     markup : bool
-        Whether they are pages, of which every value is escaped, else texts with their last line
-        end and the filter `plain`.
+        Whether they are pages, of which every value is escaped; else texts with their last line
+        end, in which every value stays within its line, and the filter `plain`.
+
+    Raises
+    ------
+    ReportError
+        On rendering a text, if a value has a line end or another control sign: it could begin a
+        statement of the program that the text is.
     """
     # Takes long to import, and few commands fill templates.
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader(package),
-        autoescape=markup,
+        autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=not markup,
+        finalize=None if markup else _one_line,
     )
     environment.filters["plain"] = plain
     return environment
+
+
+def _one_line(value: object) -> object:
+    """Return a value as it stands in a program: what a macro made, or one line of text."""
+    from markupsafe import Markup
+
+    if isinstance(value, Markup):
+        return value
+    text = str(value)
+    if not text.isprintable():
+        raise ReportError(f"{text[:_LONGEST_TEXT]!r} cannot stand in a program: give one line")
+    return Markup(text)
 
 
 def plain(text: str) -> str:

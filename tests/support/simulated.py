@@ -27,9 +27,10 @@ QUIET = {
 
 
 @cache
-def _folder(like: str) -> Path:
-    folder = Path(tempfile.mkdtemp(prefix=f"elastocal_{like}_"))
-    write_example(folder, like)
+def _folder(like: str) -> tempfile.TemporaryDirectory[str]:
+    """Return an example in a folder that goes when the process ends; a killed one leaves it."""
+    folder = tempfile.TemporaryDirectory(prefix=f"elastocal_{like}_")
+    write_example(Path(folder.name), like)
     return folder
 
 
@@ -42,7 +43,7 @@ def example_cell(like: str = "afp", **sections: object) -> Cell:
     simulation = sections.get("simulation", {})
     if isinstance(simulation, dict):
         sections = sections | {"simulation": {"preset": "kind"} | simulation}
-    folder = _folder(like)
+    folder = Path(_folder(like).name)
     data = yaml.safe_load((folder / "cell.yaml").read_text()) | sections
     path = folder / f"changed_{abs(hash(repr(sections)))}.yaml"
     path.write_text(yaml.safe_dump(data))

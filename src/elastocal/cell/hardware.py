@@ -26,6 +26,7 @@ from elastocal.cell._quantities import (
     unit_vector,
     vector,
 )
+from elastocal.errors import present
 from elastocal.records import StrictModel
 from elastocal.units import factor
 
@@ -93,9 +94,10 @@ class Shape(StrictModel):
     @property
     def solid(self) -> Box | Cylinder | Sphere | MeshFile:
         """The one that is given."""
-        found = self.box or self.cylinder or self.sphere or self.mesh
-        assert found is not None
-        return found
+        found: Box | Cylinder | Sphere | MeshFile | None = (
+            self.box or self.cylinder or self.sphere or self.mesh
+        )
+        return present(found, "form of a body")
 
 
 class RegionBox(StrictModel):
@@ -159,10 +161,10 @@ class RegionEntry(StrictModel):
         if self.box is not None:
             inside = (own >= self.box.min) & (own <= self.box.max)
             return np.asarray(inside.all(axis=1))
-        assert self.polygon is not None
-        low, high = self.polygon.height or (-math.inf, math.inf)
+        polygon = present(self.polygon, "polygon")
+        low, high = polygon.height or (-math.inf, math.inf)
         between = (own[:, 2] >= low) & (own[:, 2] <= high)
-        return between & _in_polygon(own[:, :2], np.array(self.polygon.corners))
+        return between & _in_polygon(own[:, :2], np.array(polygon.corners))
 
 
 class SurfaceEntry(MeshFile):

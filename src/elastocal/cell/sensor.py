@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import CompensationError
+from elastocal.errors import CompensationError, present
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY
 from elastocal.units import impossible
@@ -135,8 +135,7 @@ class SensorLoad:
 
     def weight(self, R_base_sensor: FloatArray) -> FloatArray:
         """Return the corrected reading of the weight, ``K g``, shape (..., 6), sensor frame."""
-        assert self.response is not None
-        return (self.gravity @ R_base_sensor) @ self.response.T
+        return (self.gravity @ R_base_sensor) @ present(self.response, "response").T
 
     @property
     def has_matrix(self) -> bool:
@@ -151,8 +150,7 @@ class SensorLoad:
     @property
     def response_tcp(self) -> FloatArray:
         """Corrected reading of the weight per gravity, both in tcp axes, shape (6, 3)."""
-        assert self.response is not None
-        return self._turn @ self.response @ self.T_tcp_sensor[:3, :3].T
+        return self._turn @ present(self.response, "response") @ self.T_tcp_sensor[:3, :3].T
 
     @property
     def _turn(self) -> FloatArray:

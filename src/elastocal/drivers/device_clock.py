@@ -15,7 +15,7 @@ from collections import deque
 
 import numpy as np
 
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, present
 
 _WINDOW = 2.0
 """Length of a window, in s of arrival."""
@@ -83,8 +83,7 @@ class DeviceClock:
             self.offset = arrival - stamp
         self._require_going_on(stamp, arrival)
         self._newest, self._arrived = stamp, arrival
-        assert self._window is not None
-        self._window = min(self._window, (arrival - stamp, stamp))
+        self._window = min(present(self._window, "window"), (arrival - stamp, stamp))
         self.offset = min(self.offset, arrival - stamp - self.drift * (stamp - self._first))
         if arrival >= self._window_end:
             self._least.append(self._window)

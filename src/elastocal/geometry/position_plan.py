@@ -16,7 +16,7 @@ import numpy as np
 from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, fingerprint
-from elastocal.errors import PlanningError
+from elastocal.errors import PlanningError, present
 from elastocal.geometry.arm import ArmErrors
 from elastocal.geometry.positions import Payload, Positions
 from elastocal.geometry.problem import GeometryProblem, State
@@ -297,8 +297,7 @@ def _choose(
 
 def _marker(cell: Cell) -> FloatArray:
     """Return the marker in the tcp, shape (3,), in m."""
-    marker = cell.file.marker
-    assert marker is not None
+    marker = present(cell.file.marker, "marker")
     return marker.position_tcp
 
 

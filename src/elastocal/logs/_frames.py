@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import LogError
+from elastocal.errors import LogError, present
 from elastocal.logs.map import LogEntry, MarkerColumns, Site, ToolPose, Vector
 from elastocal.logs.table import LogTable
 from elastocal.procedure import PoseReadings
@@ -71,9 +71,9 @@ def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) 
     LogError
         If they are too far from those of its joints.
     """
-    assert entry.pose is not None
-    position = vectors(table, entry.pose.position, "length")
-    stated = _stated_turns(table, entry.pose)
+    pose = present(entry.pose, "pose")
+    position = vectors(table, pose.position, "length")
+    stated = _stated_turns(table, pose)
     known = np.asarray(np.isfinite(position).all(axis=1) & np.isfinite(stated).all(axis=1))
     if not known.any():
         raise LogError(f"{table.name}: no row states the whole tool frame")
@@ -84,7 +84,7 @@ def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) 
         T_joints, whole = robot.forward(q[rows]), np.flatnonzero(known[rows]) + start
         R_joints = T_joints[known[rows], :3, :3]
         T[whole, 3] = (0.0, 0.0, 0.0, 1.0)
-        T[whole, :3, :3] = _rotations(entry.pose, stated[whole], R_joints)
+        T[whole, :3, :3] = _rotations(pose, stated[whole], R_joints)
         T[rows, :3, 3] = position[rows]
         gap[rows] = np.linalg.norm(position[rows] - T_joints[:, :3, 3], axis=1)
         relative = np.swapaxes(R_joints, 1, 2) @ T[whole, :3, :3]

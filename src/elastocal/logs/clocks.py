@@ -23,7 +23,7 @@ from scipy.signal import correlate, find_peaks
 from scipy.stats import theilslopes
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.errors import LogError
+from elastocal.errors import LogError, present
 from elastocal.logs.streams import LogStreams
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -246,8 +246,7 @@ def _values(log: LogStreams, lever: FloatArray) -> FloatArray:
         return T[:, :3, 3] + T[:, :3, :3] @ lever
     if log.points is not None:
         return log.points.position
-    assert log.wrench is not None
-    return log.wrench.force
+    return present(log.wrench, "wrench").force
 
 
 def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArray]:
@@ -279,8 +278,8 @@ def _weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> floa
     of what is left.
     """
     arm, wrench = reference.arm, log.wrench
-    assert arm is not None
-    assert wrench is not None
+    arm = present(arm, "arm")
+    wrench = present(wrench, "wrench")
     time, place = arm.time, arm.T_base_tcp[:, :3, 3]
     speed = np.linalg.norm(np.gradient(place, axis=0), axis=1) / np.maximum(np.gradient(time), 1e-9)
     own = time[speed > _TRAVELLING] - shift

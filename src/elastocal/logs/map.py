@@ -44,7 +44,7 @@ from elastocal.cell import (
     load_cell,
     mounted_robot,
 )
-from elastocal.errors import ElastocalError, SchemaError
+from elastocal.errors import ElastocalError, SchemaError, present
 from elastocal.records import StrictModel, read_yaml
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot, inverse_transform, with_tool_mass
@@ -220,11 +220,11 @@ class LogMap(StrictModel):
     def _whole(self) -> "LogMap":
         if (self.cell is None) == (self.robot is None):
             raise ValueError("give cell or robot, one of them")
-        for name, present in (
+        for name, stated in (
             ("joints", any(each.joints for each in self.logs)),
             ("force", any(each.force for each in self.logs)),
         ):
-            if not present:
+            if not stated:
                 raise ValueError(f"no log holds {name}")
         if self.check is not None and self.check not in self.load_cases:
             raise ValueError(f"check {self.check!r} is none of the load cases")
@@ -286,13 +286,13 @@ def site(path: Path, log_map: LogMap) -> Site:
         T_flange_sensor = file.sensor.T_flange_sensor if file.sensor else np.eye(4)
         marker = file.marker.position if file.marker else log_map.marker
         return _site(cell.robot, file.robot, file.tcp, file.tool, T_flange_sensor, marker)
-    assert log_map.robot is not None
+    entry = present(log_map.robot, "robot")
     try:
-        robot = mounted_robot(path, log_map.robot, log_map.tcp)
+        robot = mounted_robot(path, entry, log_map.tcp)
     except ElastocalError as error:
         raise SchemaError(f"{path}: robot: {error}") from error
     T_flange_sensor = log_map.sensor.T
-    return _site(robot, log_map.robot, log_map.tcp, log_map.tool, T_flange_sensor, log_map.marker)
+    return _site(robot, entry, log_map.tcp, log_map.tool, T_flange_sensor, log_map.marker)
 
 
 def _site(

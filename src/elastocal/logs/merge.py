@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
-from elastocal.errors import LogError
+from elastocal.errors import LogError, present
 from elastocal.files import sha256
 from elastocal.logs._frames import sensor_doubts
 from elastocal.logs.clocks import ClockFit, align, handshake_spans
@@ -166,8 +166,7 @@ def _chained(streams: Sequence[Stream]) -> Stream:
 
 def _in_sensor(log: LogStreams, arm: ArmStream, site: Site) -> WrenchStream:
     """Return wrenches in the frame and about the origin of the sensor."""
-    wrench = log.wrench
-    assert wrench is not None
+    wrench = present(log.wrench, "wrench")
     if log.entry.frame == "sensor":
         return wrench
     T = site.sensor.T_tcp_sensor

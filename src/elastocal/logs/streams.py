@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.errors import LogError, UnitError
+from elastocal.errors import LogError, UnitError, present
 from elastocal.logs._frames import ROWS_AT_A_TIME, stated_poses, vectors
 from elastocal.logs.map import Joints, LogEntry, LogMap, MarkerColumns
 from elastocal.logs.recordings import is_recording, read_recording, read_workbook
@@ -280,9 +280,8 @@ def _require_within_limits(name: str, q: FloatArray, robot: Robot) -> None:
 
 
 def _wrench(entry: LogEntry, table: LogTable, time: FloatArray) -> WrenchStream:
-    assert entry.force is not None
     sign = 1.0 if entry.acts_on == "robot" else -1.0
-    force = sign * vectors(table, entry.force, "force")
+    force = sign * vectors(table, present(entry.force, "force"), "force")
     moment = np.zeros_like(force)
     if entry.moment is not None:
         moment = sign * vectors(table, entry.moment, "moment")

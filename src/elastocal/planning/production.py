@@ -17,6 +17,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
+from elastocal.errors import present
 from elastocal.identification import (
     LEVEL_REACH,
     CalibratedLoads,
@@ -144,8 +145,7 @@ def covering_candidates(cell: Cell, q: FloatArray) -> IndexArray:
     q : ndarray, shape (candidate, joint)
         Postures in contact, in rad or m.
     """
-    assert cell.process is not None
-    rows = cell.process.joint_position
+    rows = present(cell.process, "process").joint_position
     some = rows[np.unique(np.linspace(0, len(rows) - 1, _MOST_ROWS).astype(int))]
     near = near_postures(cell.robot, some, q).T
     left, chosen = near.any(axis=0), []

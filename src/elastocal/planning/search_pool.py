@@ -9,7 +9,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
-from elastocal.errors import PlanningError
+from elastocal.errors import PlanningError, present
 from elastocal.identification import RUNGS
 from elastocal.planning.checks import REGISTRATION_POSES, SightCheck, assign_stations
 from elastocal.planning.near_production import NearProduction
@@ -198,8 +198,8 @@ class SearchPool:
         search = cell.file.search
         most = min(search.poses or _MOST_POSES, len(left))
         table = expected_errors(cell, self.information.take(left), left[:0], most)
-        assert search.accuracy is not None
-        enough = (each.poses for each in table if each.error <= search.accuracy)
+        accuracy = present(search.accuracy, "search.accuracy")
+        enough = (each.poses for each in table if each.error <= accuracy)
         return next(enough, most)
 
     def _for_production(

@@ -12,6 +12,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import TOOLING, Cell, RegionEntry
+from elastocal.errors import present
 from elastocal.planning import CollisionScene
 from elastocal.planning.surface import Surface
 from elastocal.records import record
@@ -158,10 +159,10 @@ def _region_corners(region: RegionEntry, surface: Surface, T: FloatArray) -> Flo
         (x0, y0, z0), (x1, y1, z1) = region.box.min, region.box.max
         flat, heights = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)], (z0, z1)
     else:
-        assert region.polygon is not None
+        polygon = present(region.polygon, "region.polygon")
         own = (surface.mesh.vertices - T[:3, 3]) @ T[:3, :3]
-        heights = region.polygon.height or (float(own[:, 2].min()), float(own[:, 2].max()))
-        flat = list(region.polygon.corners)
+        heights = polygon.height or (float(own[:, 2].min()), float(own[:, 2].max()))
+        flat = list(polygon.corners)
     return np.array([(*corner, height) for height, corner in product(heights, flat)])
 
 

@@ -15,7 +15,7 @@ from enum import Enum
 from multiprocessing.connection import Connection
 from types import FrameType
 
-from elastocal.errors import ElastocalError, ProcedureError
+from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.results import brief_repr
 
 _GRACE = 5.0
@@ -163,16 +163,16 @@ class Worker:
 
     def _read(self) -> None:
         """Take in what the worker says until it has ended."""
-        assert self._line is not None
-        assert self._process is not None
+        line = present(self._line, "line to the worker")
+        process = present(self._process, "worker")
         with contextlib.suppress(EOFError, OSError):
             while True:
-                self._take(self._line.recv())
-        self._process.join(_GRACE)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
-        self._line.close()
+                self._take(line.recv())
+        process.join(_GRACE)
+        if process.is_alive():
+            process.kill()
+            process.join()
+        line.close()
         if self.news.state is WorkState.BUSY:
             state = WorkState.STOPPED if self._asked_to_stop else WorkState.FAILED
             reason = "stopped" if self._asked_to_stop else "the worker ended without a word"

@@ -14,7 +14,7 @@ from pathlib import Path
 from elastocal.cell import SENSOR_CORRECTED, SensorLoad
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.dataset import Dataset, content_sha256, read_made_from
-from elastocal.errors import ElastocalError, SchemaError
+from elastocal.errors import ElastocalError, SchemaError, present
 from elastocal.files import read_text, sha256
 from elastocal.logs import import_streams, log_sha256, read_map, site
 from elastocal.procedure import (
@@ -165,9 +165,9 @@ def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
 def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
     """Yield cell, plan, streams and the journal itself."""
     run, record, entries = files.run, evidence.run_record, evidence.journal
-    assert run is not None
-    assert record is not None
-    assert entries is not None
+    run = present(run, "run")
+    record = present(record, "record")
+    entries = present(entries, "entries")
     try:
         cell, _ = read_copies(run, record)
         # The fingerprint leaves out the tolerance, by which the light is given.
@@ -282,8 +282,7 @@ def _derive(
         path, *logs = evidence.logs
         log_map = read_map(path)
         return import_streams(log_map, site(path, log_map), logs, silent).dataset, None
-    assert files.run is not None
-    again = derive_run(files.run.path, _sensor(evidence, dataset, files))
+    again = derive_run(present(files.run, "run").path, _sensor(evidence, dataset, files))
     return again.dataset, again.summary
 
 
@@ -296,8 +295,7 @@ def _sensor(evidence: Evidence, dataset: Dataset, files: ChainFiles) -> SensorLo
     if at_hand is None or (stated and at_hand not in stated.values()):
         name = next(iter(stated), "a tool file")
         raise SchemaError(f"it was derived with {name}, which is not here as it was then")
-    assert evidence.cell is not None
-    return read_sensor_load(files.tool, evidence.cell.robot)
+    return read_sensor_load(files.tool, present(evidence.cell, "cell").robot)
 
 
 def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:

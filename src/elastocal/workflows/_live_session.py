@@ -37,7 +37,7 @@ from elastocal.compensation.online import (
     every_sample,
     newest_sample,
 )
-from elastocal.errors import CompensationError, DeviceError
+from elastocal.errors import CompensationError, DeviceError, present
 from elastocal.identification import CalibratedModel
 from elastocal.workflows._operator_and_devices import ReservedRig, Rig
 
@@ -262,8 +262,8 @@ class LiveSession:
 
     def _loop(self, devices: DeviceSet) -> tuple[Tare | None, LiveLoop]:
         numbers, feed, sensor = self._ready.numbers, devices.feed, devices.sensor
-        assert feed is not None
-        assert sensor is not None
+        feed = present(feed, "feed")
+        sensor = present(sensor, "sensor")
         cycle, sample = numbers.settings.cycle, numbers.filters.sample
         if sample > cycle or (sample < cycle and abs(sensor.rate * sample - 1.0) > _SAME_RATE):
             raise CompensationError(

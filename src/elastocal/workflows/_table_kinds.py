@@ -8,7 +8,7 @@ from pathlib import Path
 
 from elastocal import dataset
 from elastocal.dataset import PathTable, guess_columns, in_file
-from elastocal.errors import SchemaError, UnitError
+from elastocal.errors import SchemaError, UnitError, present
 from elastocal.tables import opened_table
 from elastocal.units import split_column
 
@@ -87,10 +87,10 @@ def _loads(path: Path, names: tuple[str, ...]) -> TableDescription | None:
     """Describe rows with forces; every number that a command would read is read."""
     table = PathTable.open(path, guess_columns)
     columns = table.columns
-    assert columns.force is not None
+    force = present(columns.force, "columns of the force")
     if columns.by_pose:
         kind = "programmed path of tool poses (PATH.csv)"
-    elif columns.orientation and columns.moment is not None and not columns.force.in_tcp:
+    elif columns.orientation and columns.moment is not None and not force.in_tcp:
         kind = "table of static postures of a tool"
     elif not columns.joints:
         return None
@@ -103,7 +103,7 @@ def _loads(path: Path, names: tuple[str, ...]) -> TableDescription | None:
     return kind, {
         "rows": sum(map(len, table.blocks(_ROWS_AT_A_TIME))),
         "joints": [column.name for column in columns.joints],
-        "force_in": "tcp" if columns.force.in_tcp else "base",
+        "force_in": "tcp" if force.in_tcp else "base",
         "moment": columns.moment is not None,
         "columns": list(table.layout.header),
     }

@@ -12,7 +12,7 @@ from elastocal import identification
 from elastocal.cell import ProcessFile, ProductionPath, read_production
 from elastocal.dataset import Dataset, content_sha256, merge, read, without
 from elastocal.elastic import known_springs
-from elastocal.errors import DatasetError, ElastocalError
+from elastocal.errors import DatasetError, ElastocalError, present
 from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
@@ -151,8 +151,7 @@ def _as_built(
     """
     from elastocal.geometry import read_geometry
 
-    assert settings.geometry is not None
-    found = read_geometry(settings.geometry)
+    found = read_geometry(present(settings.geometry, "geometry"))
     built = found.as_built(arm)
     markers = found.markers_on(built)
     if settings.marker is None and measured.marker is not None:

@@ -12,7 +12,7 @@ from typing import Any, Protocol, TextIO
 from elastocal import __version__
 from elastocal.cell import PROCESS_FILE, require_example
 from elastocal.compensation.process import SimulateProcessResult
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, of_kind
 from elastocal.files import write_text
 from elastocal.parallel import process_count, process_pool
 from elastocal.procedure import RunEnd
@@ -203,8 +203,7 @@ def demo(settings: DemoSettings, progress: Progress) -> DemoResult:
             _require_finished(result)
             results[chapter.words[0]] = result
     finish(out, settings.kind, settings.seed, [chapter.line for chapter in story])
-    process = results.get("simulate-process")
-    assert isinstance(process, SimulateProcessResult)
+    process = of_kind(results.get("simulate-process"), SimulateProcessResult, "last result")
     return DemoResult(out, process)
 
 

@@ -14,7 +14,7 @@ from elastocal.drivers.kuka_rsi import (
     controller_files,
     write_controller_files,
 )
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, present
 from elastocal.files import read_text
 from elastocal.progress import Progress
 from elastocal.records import record, validate
@@ -92,13 +92,13 @@ def krc_config(settings: KrcConfigSettings, progress: Progress) -> KrcConfigResu
     if (settings.out is None) is (settings.check is None):
         raise DeviceError("krc-config: give either a folder to write into, or a file to check")
     if settings.out is None:
-        assert settings.check is not None
-        text = read_text(settings.check)
+        checked = present(settings.check, "file to check")
+        text = read_text(checked)
         try:
             check_controller_file(text, cell, arm)
         except DeviceError as error:
-            raise DeviceError(f"{settings.check}: {error}") from error
-        files: tuple[str, ...] = (settings.check.name,)
+            raise DeviceError(f"{checked}: {error}") from error
+        files: tuple[str, ...] = (checked.name,)
     else:
         files = write_controller_files(settings.out, controller_files(cell, arm), settings.force)
     return KrcConfigResult(

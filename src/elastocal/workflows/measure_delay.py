@@ -17,7 +17,7 @@ from elastocal.drivers.kuka_rsi import (
     chirp,
     estimate_delay,
 )
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, of_kind, present
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result
@@ -111,8 +111,7 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
         rig.reserved("measure-delay") as reserved,
         contextlib.closing(reserved.connect(cell.file.simulation.seed, 0.0)) as devices,
     ):
-        arm = devices.arm
-        assert isinstance(arm, KukaArm)
+        arm = of_kind(devices.arm, KukaArm, "arm")
         settings.operator.warn(
             [f"the tool moves by {settings.amplitude} about where it stands: it must be free there"]
         )
@@ -150,7 +149,6 @@ def _record(
     amplitude: float,
     chirps: list[DelayEstimate],
 ) -> CommissioningRecord:
-    assert arm.link is not None
     return CommissioningRecord(
         cell=cell.name,
         robot=cell.robot.name,
@@ -160,5 +158,5 @@ def _record(
         delay=max(each.delay for each in chirps),
         amplitude=amplitude,
         chirps=tuple(chirps),
-        link=arm.link.statistics(),
+        link=present(arm.link, "link").statistics(),
     )

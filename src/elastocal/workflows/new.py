@@ -13,7 +13,7 @@ import numpy as np
 from elastocal import planning
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
-from elastocal.errors import ElastocalError, PlanningError, SchemaError
+from elastocal.errors import ElastocalError, PlanningError, SchemaError, of_kind
 from elastocal.files import replacing
 from elastocal.planning.checks import TorqueCheck
 from elastocal.planning.motion import Mover, mover_for
@@ -122,8 +122,7 @@ def _prepared(cell: Cell) -> tuple[Surface, FloatArray]:
 
 def _findings(path: Path, cell: Cell, surface: Surface) -> tuple[str, ...]:
     """Return what ``check`` finds in the file, and what the joints do not bear; or refuse it."""
-    found = cell_file(path)[1]["findings"]
-    assert isinstance(found, list)
+    found = of_kind(cell_file(path)[1]["findings"], list, "findings")
     return (*found, *_unbearable(cell, surface))
 
 

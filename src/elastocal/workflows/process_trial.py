@@ -14,6 +14,7 @@ from elastocal.cell import Cell, SensorLoad
 from elastocal.compensation import CompensatorSettings, process
 from elastocal.compensation.online import Compensator
 from elastocal.compensation.process import Course, CourseRun
+from elastocal.errors import present
 from elastocal.identification import CalibratedModel
 from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
@@ -289,8 +290,7 @@ def _compensator(trial: ProcessTrial, truth: ProcessCell, zeroed_at: FloatArray)
 
 def _zeroed(cell: Cell, truth: ProcessCell, q: FloatArray) -> SensorLoad:
     """Return the cell file's tool with the bias that the sensor shows in the air."""
-    T_sensor_tcp = cell.T_sensor_tcp
-    assert T_sensor_tcp is not None
+    T_sensor_tcp = present(cell.T_sensor_tcp, "T_sensor_tcp")
     T = inverse_transform(T_sensor_tcp)
     centre = T_sensor_tcp[:3, :3] @ cell.tool_centre_tcp + T_sensor_tcp[:3, 3]
     truth.lift("zeroing", q)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from elastocal import procedure, verdict
 from elastocal.cell import Arming, Cell, Devices, LineCounts, certificate_of, load_cell, unstated
-from elastocal.errors import ElastocalError, ProcedureError
+from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
 from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.planning.export import pose_lines
@@ -375,8 +375,7 @@ def _check_folder(job: _Job, entries: tuple[procedure.Entry, ...], resume: bool)
             raise ProcedureError(f"{out} holds no run to go on with: leave --resume out")
         procedure.refuse_foreign_files(job.folder)
         return
-    started = entries[0].run
-    assert started is not None
+    started = present(entries[0].run, "started")
     procedure.check_same_run(started, job.record, str(out))
     if not resume:
         known, count = procedure.last_known(entries), len(job.plan.poses)

@@ -17,7 +17,7 @@ from elastocal.compensation import CompensatorSettings, process, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.process import Course, ProcessRun, SimulateProcessResult
 from elastocal.dataset import joint_dimensions
-from elastocal.errors import CompensationError
+from elastocal.errors import CompensationError, present
 from elastocal.files import filling, read_text, sha256
 from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
 from elastocal.progress import Progress
@@ -269,17 +269,16 @@ class _SeedRuns:
 def _built_in_courses(
     settings: SimulateProcessSettings, cell: Cell, seed: int
 ) -> tuple[Course, ...]:
-    assert settings.kind is not None
-    return process.process_courses(settings.kind, cell, seed, settings.courses)
+    return process.process_courses(present(settings.kind, "process"), cell, seed, settings.courses)
 
 
 def _own_courses(
     settings: SimulateProcessSettings, cell: Cell, compensator: CompensatorSettings
 ) -> tuple[Course, ...]:
-    assert settings.path is not None
+    path = present(settings.path, "path")
     start = parse_posture(cell.robot, settings.start)
     timing = process.PathTiming(settings.speed, compensator.cycle, start)
-    return process.read_programmed_path(settings.path, cell.robot, timing, settings.direction)
+    return process.read_programmed_path(path, cell.robot, timing, settings.direction)
 
 
 def _require_one_process(settings: SimulateProcessSettings) -> None:

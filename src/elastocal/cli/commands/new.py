@@ -2,7 +2,7 @@
 
 import sys
 import webbrowser
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -123,9 +123,7 @@ def _new(  # noqa: PLR0913 - one parameter an option
 
 def _asked(settings: "NewSettings") -> "NewSettings":
     """Return settings with the answers of a person; an empty answer takes what is offered."""
-    known = {each.name for each in fields(settings)}
     for name, question in _QUESTIONS.items():
-        assert name in known
         if getattr(settings, name) is not None or _needless(settings, name):
             continue
         answer: dict[str, Any] = {name: _answer(settings, name, question)}

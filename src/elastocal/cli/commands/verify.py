@@ -7,6 +7,7 @@ import typer
 
 from elastocal import workflows
 from elastocal.cli import output
+from elastocal.errors import present
 
 
 def _verify(
@@ -49,7 +50,7 @@ def _verify(
             soft_wrap=True,
         )
         return
-    assert target is not None
+    target = present(target, "target")
     found = workflows.verify(target, key=key, run=run, expect=expect)
     if as_json:
         output.print_json({"whole": found.broken is None, "links": found.links})

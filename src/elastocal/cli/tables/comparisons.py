@@ -16,6 +16,7 @@ from elastocal.cli.output import bold, green, print_remarks, red, yellow
 from elastocal.codec import CodecSummary
 from elastocal.codec.study import Share, StudySummary, micrometres, value_text
 from elastocal.elastic import unit_of
+from elastocal.errors import present
 
 if TYPE_CHECKING:
     from elastocal.identification.recertification import (
@@ -94,7 +95,7 @@ def _study_table(summary: StudySummary) -> Table:
 
 
 def _share(share: Share | None) -> str:
-    assert share is not None
+    share = present(share, "share")
     return f"{share.share:.0%} [{100 * share.low:.0f}, {100 * share.high:.0f}]"
 
 

@@ -10,7 +10,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.codec.study.conditions import Condition
 from elastocal.codec.variants import training_cases
-from elastocal.errors import CodecError
+from elastocal.errors import CodecError, present
 from elastocal.planning import SearchPool, cell_surface, sample_pool
 from elastocal.planning.checks import SightCheck
 from elastocal.planning.search import Candidates, RandomChoice, technique
@@ -94,8 +94,7 @@ def study_poses(cell: Cell, verification: int, jobs: int | None) -> StudyPoses:
         )
     aside = np.sort(for_verification.choice(len(postures), verification, replace=False))
     left = np.setdiff1d(np.arange(len(postures)), aside)
-    check = SightCheck.of(cell, surface)
-    assert check is not None  # a cell without tracker has been refused
+    check = present(SightCheck.of(cell, surface), "tracker of the cell")
     places = {each.name: each.position_base for each in cell.file.trackers}
     station = np.array([places[str(name)] for name in check.seen_by(postures)])
     pool = StudyPool(postures.q, postures.normal, station, left, aside)
@@ -140,7 +139,7 @@ def _choice(cell: Cell, poses: StudyPoses, condition: Condition) -> PoseChoice:
 def _under(cell: Cell, candidates: Candidates, load_cases: str) -> Candidates:
     """Return candidates that are observed under some load cases."""
     rows, known = candidates.observation, cell.file.load_cases.cases
-    assert rows is not None
+    rows = present(rows, "observation of the candidates")
     # Without a process the whole pool under all loads stands for it.
     process = rows.reshape(-1, rows.shape[2]) if candidates.process is None else candidates.process
     loads = [known.index(case) for case in training_cases(load_cases, known)]

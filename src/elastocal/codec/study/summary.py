@@ -9,7 +9,7 @@ from scipy.special import bdtr, ndtri
 from elastocal.arrays import FloatArray
 from elastocal.codec.study.conditions import FACTORS, Condition, value_text
 from elastocal.codec.study.samples import SampleResult, StudyDesign
-from elastocal.errors import CodecError
+from elastocal.errors import CodecError, present
 from elastocal.identification import CONFIDENCE
 from elastocal.records import read_json, record, write_json
 from elastocal.results import brief_repr
@@ -282,8 +282,7 @@ def advice(conditions: Sequence[ConditionSummary], target: float | None) -> str:
     good = [c for c in conditions if c.mean_reaches and c.mean_reaches.low >= _RELIABLE]
     if good:
         best = min(good, key=lambda c: (c.factors.poses, -c.mean_reaches.low))  # type: ignore[union-attr]
-        reached = best.mean_reaches
-        assert reached is not None
+        reached = present(best.mean_reaches, "share of the arms that reach the target")
         return (
             f"{best.factors.poses} poses are the fewest tried that bring {_RELIABLE:.0%} of the"
             f" arms to {wanted} ({best.name}: {reached.share:.0%} of {best.n}, 95 % interval"

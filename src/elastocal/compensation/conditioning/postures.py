@@ -12,7 +12,7 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import PathTable, find_posture_columns, in_file
-from elastocal.errors import CompensationError, PathError
+from elastocal.errors import CompensationError, PathError, present
 from elastocal.files import Limit
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot
@@ -151,7 +151,7 @@ def read_postures(
             )
         T = rows.T_base_tcp
         if T is None:
-            assert robot is not None
+            robot = present(robot, "robot")
             T = robot.forward(rows.joints)
     try:
         postures = static_postures(T[:, :3, :3], rows.force, rows.moment, gravity)

@@ -23,7 +23,7 @@ from elastocal.dataset import (
     find_columns,
     in_file,
 )
-from elastocal.errors import PathError
+from elastocal.errors import PathError, present
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import InverseKinematics, check_limits, inverse_for
@@ -195,8 +195,8 @@ def _times(stretch: _Stretch, T_base_tcp: FloatArray, speed: float | None) -> Fl
         time = arc_length(T_base_tcp[:, :3, 3]) / speed
         problem = "does not move on: a path without --speed may stand, with column time[s]"
     else:
-        assert stretch.time is not None
-        time = stretch.time - stretch.time[0]
+        stated = present(stretch.time, "time")
+        time = stated - stated[0]
         problem = "time does not advance from the row before"
     back = ~(np.diff(time) > 0.0)
     if back.any():

@@ -14,7 +14,7 @@ from elastocal.drivers.stations import (
     require_station,
     require_trackers,
 )
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, of_kind
 
 
 class _Station(StationLink):
@@ -80,8 +80,7 @@ class EmsconDriver:
         DeviceError
             If stations and settings do not match.
         """
-        settings = wanted["metrology"]
-        assert isinstance(settings, EmsconSettings)
+        settings = of_kind(wanted["metrology"], EmsconSettings, "settings")
         if context.watches:
             # A head that turns for a minute is nothing that somebody expects who only looks.
             settings = settings.model_copy(update={"initialize": False, "bird_bath": False})

@@ -31,7 +31,7 @@ from elastocal.drivers.kuka_rsi._contact import ContactMemory, feeling
 from elastocal.drivers.kuka_rsi._cycle import EXACT, Cycle, Motion, Pace, Step
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
-from elastocal.drivers.kuka_rsi.force_control import ForceLaw
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
 from elastocal.drivers.kuka_rsi.link import RsiLink
 from elastocal.drivers.kuka_rsi.messages import (
     Arrival,
@@ -44,7 +44,7 @@ from elastocal.drivers.kuka_rsi.messages import (
 from elastocal.drivers.kuka_rsi.motions import ContactGuard, Press
 from elastocal.drivers.kuka_rsi.posture import PostureReader
 from elastocal.drivers.kuka_rsi.settings import RsiSettings, bounds_of
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, present
 
 _EDGE_AGAIN = 25
 """Cycles for which a program stays guided against its order before STOP rises again."""
@@ -180,9 +180,8 @@ class KukaArm:
             if float(np.linalg.norm(cycle.offset)) <= EXACT:
                 return
             if self._contact.is_zero_free(cycle):
-                assert self._reader is not None
                 limits = (self._settings.collision_force, self.bounds.force)
-                guard = ContactGuard(self._reader, None, *limits)
+                guard = ContactGuard(self._sensed(), None, *limits)
                 # As slow as an approach in which contact is expected: it is a short way.
                 speed = min(self.bounds.speed, self._cell.file.procedure.contact_speed)
                 back = partial(motions.take_back, guard=guard, speed=speed, pace=self._pace)
@@ -209,8 +208,7 @@ class KukaArm:
             self._rules.require_room("approach", cycle.offset + way, speed)
             self._rules.require_bent_wrist(cycle.q)
             self._rules.require_gentle(speed, contact_force)
-            assert self._reader is not None
-            guard = ContactGuard(self._reader, direction, contact_force, self.bounds.force)
+            guard = ContactGuard(self._sensed(), direction, contact_force, self.bounds.force)
             motion = partial(motions.approach, way=way, speed=speed, guard=guard, pace=self._pace)
             felt = partial(self._contact.approached, guard)
             self._start(_Task(MotionState.APPROACHING, motion, felt))
@@ -327,9 +325,9 @@ class KukaArm:
         elif cycle.state in OUT:
             self._break_down("the program elcal_run on the controller is not in its loop any more")
         elif self._state is MotionState.MOVING and self._watch is not None:
-            assert self._reader is not None
-            R_base_sensor = cycle.T_base_tcp[:3, :3] @ self._reader.R_tcp_sensor
-            hit = self._watch.look(cycle.time, self._reader.raw, R_base_sensor)
+            reader = self._sensed()
+            R_base_sensor = cycle.T_base_tcp[:3, :3] @ reader.R_tcp_sensor
+            hit = self._watch.look(cycle.time, reader.raw, R_base_sensor)
             if hit is not None:
                 self._break_down(f"collision: {hit}")
 
@@ -356,9 +354,11 @@ class KukaArm:
             self._drop(MotionState.STOPPED)
 
     def _press(self, wanted: FloatArray, rate: float) -> Press:
-        assert self._reader is not None
         limits = (self._contact.touched_at, self.bounds.travel, self.bounds.force)
-        return Press(self._reader, self.law, wanted, rate, *limits)
+        return Press(self._sensed(), self.law, wanted, rate, *limits)
+
+    def _sensed(self) -> ForceReader:
+        return present(self._reader, "sensor of an arm that presses")
 
     def _require_link(self) -> None:
         if self.link is not None:

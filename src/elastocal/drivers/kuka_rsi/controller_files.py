@@ -20,6 +20,7 @@ from elastocal.drivers.kuka_rsi.context_reader import check_context
 from elastocal.drivers.kuka_rsi.ethernet_file import MODES, EthernetFile, check_ethernet_file
 from elastocal.drivers.kuka_rsi.force_control import ForceLaw, overshoot
 from elastocal.drivers.kuka_rsi.settings import Bounds, RsiSettings, bounds_of
+from elastocal.errors import DeviceError
 from elastocal.files import filling
 from elastocal.robot import xyzabc_from_T
 from elastocal.templating import templates
@@ -73,7 +74,9 @@ def controller_files(cell: Cell, settings: RsiSettings) -> dict[str, bytes]:
         for suffix in ("src", "dat"):
             text = _render(f"{each.name}.{suffix}", each=each, settings=settings)
             files[f"{each.name}.{suffix}"] = _controller_bytes(text)
-    assert all(len(name) <= LONGEST_NAME for name in files)
+    longest = max(files, key=len)
+    if not len(longest) <= LONGEST_NAME:
+        raise DeviceError(f"{longest}: must be at most {LONGEST_NAME} signs")
     files[SHEET] = _sheet(cell, settings, sets, files).encode("utf-8")
     return files
 

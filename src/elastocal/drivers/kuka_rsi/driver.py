@@ -19,7 +19,7 @@ from elastocal.drivers.kuka_rsi.arm import KukaArm
 from elastocal.drivers.kuka_rsi.corrections import CorrectedKuka
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.drivers.kuka_rsi.settings import RsiSettings, bounds_of
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, of_kind, present
 from elastocal.results import brief_repr
 
 _TO_THE_LOOP = 1.0
@@ -81,13 +81,11 @@ class KukaRsiDriver:
         self, cell: Cell, wanted: Mapping[str, DeviceSettings], context: RigContext
     ) -> DeviceSet:
         """Return the arm."""
-        settings = wanted["arm"]
-        assert isinstance(settings, RsiSettings)
+        settings = of_kind(wanted["arm"], RsiSettings, "settings")
         if context.watches:
             return KukaListener(cell, settings, context).devices()
         arm = connect_arm(cell, settings, context)
-        link = arm.link
-        assert link is not None
+        link = present(arm.link, "link")
 
         def lines() -> tuple[LineCounts, ...]:
             return (link.statistics().counts(arm.guard.saturated, link.source),)
@@ -96,7 +94,7 @@ class KukaRsiDriver:
 
     def path_limits(self, cell: Cell, settings: DeviceSettings) -> PathLimits:
         """Return the limits of corrections; see `elastocal.cell.PathDriver`."""
-        assert isinstance(settings, RsiSettings)
+        settings = of_kind(settings, RsiSettings, "settings")
         place = f"{cell.path}: devices.arm"
         if settings.mode != "compensation":
             raise DeviceError(
@@ -116,7 +114,7 @@ class KukaRsiDriver:
         self, cell: Cell, settings: DeviceSettings, context: RigContext, source: PathSource
     ) -> CorrectedKuka:
         """Return the arm, listened to and answered; see `elastocal.cell.PathDriver`."""
-        assert isinstance(settings, RsiSettings)
+        settings = of_kind(settings, RsiSettings, "settings")
         return CorrectedKuka(cell, settings, context, source)
 
 

@@ -30,7 +30,7 @@ from elastocal.drivers.kuka_rsi.messages import (
     read_rob,
     write_sen,
 )
-from elastocal.errors import DeviceError, ElastocalError
+from elastocal.errors import DeviceError, ElastocalError, present
 
 _PATIENCE = 0.1
 """How long the thread waits for a datagram before it looks whether it is to end, in s."""
@@ -267,7 +267,7 @@ class RsiLink:
 
     def _serve(self) -> None:
         """Answer the newest datagram; those of others do not hide it."""
-        assert self._socket is not None
+        line = present(self._socket, "socket")
         try:
             waiting = self._receive()
         except TimeoutError:
@@ -279,13 +279,13 @@ class RsiLink:
                 continue
             # An answer that cannot be sent is a lost one: the controller says so.
             with contextlib.suppress(OSError):
-                self._socket.sendto(data, sender)
+                line.sendto(data, sender)
                 self._note_time(came)
 
     def _receive(self) -> _Arrived:
         """Return a datagram; where the kernel stamps them, time that it had to wait counts too."""
-        assert self._socket is not None
-        datagram, stamps, _, sender = self._socket.recvmsg(MOST_BYTES + 1, 64)
+        line = present(self._socket, "socket")
+        datagram, stamps, _, sender = line.recvmsg(MOST_BYTES + 1, 64)
         for level, kind, data in stamps:
             if (level, kind) == (socket.SOL_SOCKET, _STAMP) and len(data) == _STAMPED.size:
                 seconds, rest = _STAMPED.unpack(data)
@@ -295,16 +295,15 @@ class RsiLink:
 
     def _newest(self, first: _Arrived) -> list[_Arrived]:
         """Return what is waiting, of the controller the newest alone."""
-        assert self._socket is not None
-        waiting = [first]
-        self._socket.setblocking(False)
+        line, waiting = present(self._socket, "socket"), [first]
+        line.setblocking(False)
         try:
             while len(waiting) < _MOST_BACKLOG:
                 waiting.append(self._receive())
         except BlockingIOError:
             pass
         finally:
-            self._socket.settimeout(_PATIENCE)
+            line.settimeout(_PATIENCE)
         known = (self._place.robot, self._from)
         ours = [each for each in waiting if each[1] == known]
         self._counts.skipped += max(len(ours) - 1, 0)

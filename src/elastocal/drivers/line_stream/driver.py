@@ -44,7 +44,7 @@ from elastocal.drivers.stations import (
     require_station,
     require_trackers,
 )
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, of_kind
 from elastocal.records import StrictModel
 
 _Port = Annotated[int, Field(ge=0, le=65535)]
@@ -297,8 +297,7 @@ class LineStreamDriver:
         DeviceError
             If the cell has no such station, or a port cannot be bound.
         """
-        settings = wanted["metrology"]
-        assert isinstance(settings, LineStreamSettings)
+        settings = of_kind(wanted["metrology"], LineStreamSettings, "settings")
         trackers = {tracker.name: tracker for tracker in require_trackers(cell)}
         for name in settings.stations:
             require_station(name, tuple(trackers))

@@ -135,7 +135,8 @@ def _column(text: str) -> Column:
 
 
 def _checked(column: Column) -> Column:
-    assert column.scale > 0.0
+    if not column.scale > 0.0:
+        raise UnitError(f"its unit scales by {column.scale:g}: must be above 0")
     return column
 
 

@@ -36,7 +36,7 @@ from elastocal.drivers.net_ft.protocol import (
     request,
 )
 from elastocal.drivers.net_ft.sensor import NetFtSensor
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, of_kind, present
 
 _SILENCE = 0.25
 """A stream that says nothing for so long, in s of the wall, has ended."""
@@ -226,8 +226,8 @@ class BoxLine:
 
     def _calibration(self) -> CountScale:
         settings = self._settings
-        assert settings.tcp_port is not None
-        with socket.create_connection((settings.address, settings.tcp_port), _PATIENCE) as line:
+        port = present(settings.tcp_port, "sensor.tcp_port")
+        with socket.create_connection((settings.address, port), _PATIENCE) as line:
             line.sendall(ASK_CALIBRATION)
             reply = b""
             while len(reply) < _CALIBRATION_BYTES and (more := line.recv(_CALIBRATION_BYTES)):
@@ -288,8 +288,7 @@ class NetFtDriver:
         DeviceError
             If the box does not answer, or must not be used as it is set up.
         """
-        settings = wanted["sensor"]
-        assert isinstance(settings, NetFtSettings)
+        settings = of_kind(wanted["sensor"], NetFtSettings, "settings")
         line = BoxLine(settings, context.clock)
         sensor = line.sensor
         readings = (lambda: (line.reading(),)) if context.watches else None

@@ -22,7 +22,7 @@ from elastocal.drivers.net_ft.protocol import (
     status_names,
     status_of,
 )
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, present
 
 _NEWEST = 1000
 """Samples that are kept for a caller that does not look; older ones are lost."""
@@ -254,8 +254,7 @@ class NetFtSensor:
         silent = newest is None or not self._clock.now() - newest.time <= _SILENT
         state, problem = "", ""
         if newest is not None and not silent:
-            assert self._last is not None
-            state = f"status {status_names(self._last.status)}"
+            state = f"status {status_names(present(self._last, 'last record').status)}"
             if newest.status is not SensorStatus.OK:
                 state, problem = "not to be trusted", state
             elif self.hole:

@@ -26,7 +26,7 @@ from elastocal.cell import (
     RigContext,
 )
 from elastocal.drivers.stations import require_station, require_trackers
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, of_kind
 from elastocal.units import factor, parse_number
 
 LEAST_BEAM_TIMEOUT = 30.0
@@ -250,8 +250,7 @@ class OperatorEntryDriver:
         DeviceError
             If the procedure leaves a person no time.
         """
-        settings = wanted["metrology"]
-        assert isinstance(settings, OperatorEntrySettings)
+        settings = of_kind(wanted["metrology"], OperatorEntrySettings, "settings")
         given = cell.file.procedure.beam_timeout
         if not given >= LEAST_BEAM_TIMEOUT:
             raise DeviceError(

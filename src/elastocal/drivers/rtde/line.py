@@ -21,7 +21,7 @@ from elastocal.cell import (
 )
 from elastocal.drivers.device_clock import DeviceClock
 from elastocal.drivers.rtde._ur_rtde import UrReceive
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, present
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
 
@@ -153,7 +153,7 @@ class UrLine:
         )
         pose = xyzabc_from_T(sample.T_base_tcp)
         arm = replace(whole, kind="arm", position=three(pose[:3]), turn=three(pose[3:]))
-        assert wrench is not None
+        wrench = present(wrench, "wrench")
         force, moment = three(wrench.force), three(wrench.moment)
         sensor = replace(whole, kind="sensor", force=force, moment=moment)
         return tuple(each for each in (arm, sensor) if each.kind in kinds)

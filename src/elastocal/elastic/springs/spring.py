@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic.springs.expression import Quantity
-from elastocal.errors import SpringError, nearest
+from elastocal.errors import SpringError, nearest, present
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import ChainJoint
@@ -71,8 +71,7 @@ def require_possible(parameters: Sequence[Parameter], rows: FloatArray, what: st
         With the first that is none.
     """
     for parameter, low, high in zip(parameters, rows.min(axis=0), rows.max(axis=0), strict=True):
-        dimension = dimension_of(f"1 {parameter.unit.si}")
-        assert dimension is not None, parameter
+        dimension = present(dimension_of(f"1 {parameter.unit.si}"), "dimension of a spring")
         problem = impossible(dimension, float(low), float(high))
         if problem is not None:
             raise SpringError(f"{what} of spring {parameter.name} is {problem}")

@@ -369,16 +369,14 @@ def _given_rows(
     rows: ComparedRows | None,
 ) -> ComparedRows | None:
     """Return the rows that matter, or refuse them by shape or value; None: there are none."""
-    if rows is None and q is None:
-        return None
-    if rows is None and force is None:
-        raise SpringError("rows have joint positions q but no force")
     if rows is not None:
         q, force, moment = rows.q, rows.force, rows.moment
         if rows.arm is not None:
             check_same_robot(rows.arm, robot, ("the robot of the rows", "that of the new model"))
-    assert q is not None
-    assert force is not None
+    elif q is None:
+        return None
+    elif force is None:
+        raise SpringError("rows have joint positions q but no force")
     joints, forces, moments = check_rows(robot, q, force, moment)
     if not len(joints):
         raise SpringError(f"force {forces.shape} does not have a row for each of q {joints.shape}")

@@ -17,7 +17,7 @@ import trimesh
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.errors import RobotError
+from elastocal.errors import RobotError, of_kind
 from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures
 from elastocal.planning.scene import CollisionScene, fixture_bodies, tool_bodies
@@ -144,8 +144,8 @@ class SightCheck(PostureCheck):
             for tracker in trackers
         )
         standing = [surface.rays, *(body.triangulated() for body in fixture_bodies(cell))]
-        obstacles = trimesh.util.concatenate(standing)
-        assert isinstance(obstacles, trimesh.Trimesh)
+        joined = trimesh.util.concatenate(standing)
+        obstacles = of_kind(joined, trimesh.Trimesh, "what stands still")
         return cls(
             stations,
             marker.position_tcp,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.errors import PlanningError
+from elastocal.errors import PlanningError, present
 from elastocal.planning.motion.mover import Mover
 from elastocal.planning.motion.tour import _Cuts, shortest_tour
 from elastocal.planning.postures import Postures, read_only
@@ -119,9 +119,7 @@ class _Roadmap:
         first, last = min(start, end), max(start, end)
         if (first, last) not in self._known:
             self._known[first, last] = self._find(first, last)
-        known = self.known(start, end)
-        assert known is not None
-        return known
+        return present(self.known(start, end), "transfer")
 
     def _find(self, first: int, last: int) -> _Transfer:
         straight = self._first_free(first, last, [self._none()])

@@ -14,6 +14,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import LIGHT_CONTACT, Motion
+from elastocal.errors import present
 from elastocal.procedure.record import Action, ReadingStatus
 from elastocal.procedure.run._attempt import (
     Attempt,
@@ -134,13 +135,13 @@ def load(a: Attempt) -> StepResult:
     """Ramp to the present load case."""
     s, (name, force) = a.supervisor, a.load
     ramp = a.settings.procedure.ramp
-    present = s.cycle(a.guard()).force_tcp
-    change = force - present[-1] if len(present) else force
+    felt = s.cycle(a.guard()).force_tcp
+    change = force - felt[-1] if len(felt) else force
     # Set before the command, not after: should the command fail half way, the force is released.
     a.in_force_control = True
-    assert a.slip_reference is not None
-    a.slide = SlideDetector(a.slip_reference)
-    a.jump = SlideDetector(a.slip_reference, along=True)
+    reference = present(a.slip_reference, "slip reference")
+    a.slide = SlideDetector(reference)
+    a.jump = SlideDetector(reference, along=True)
     with s.actuation(Action.HOLD, name):
         s.devices.arm.hold(force, ramp)
         for seen in s.stay(a.guard(), float(np.linalg.norm(change)) / ramp):
@@ -290,9 +291,9 @@ def _repeat(a: Attempt, status: ReadingStatus, note: str) -> StepResult:
 def _why_slipped(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
     """Return how the marker slipped during a window or on the way to it; empty: it did not."""
     reference, slide, jump, procedure = a.slip_reference, a.slide, a.jump, a.settings.procedure
-    assert reference is not None
-    assert slide is not None
-    assert jump is not None
+    reference = present(reference, "reference")
+    slide = present(slide, "slide")
+    jump = present(jump, "jump")
     a.slip = reference.so_far(positions)
     if a.load[0] == LIGHT_CONTACT:
         # The zero is read here: where the marker stands now is where it counts from.

@@ -12,7 +12,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import LIGHT_CONTACT, Cell, CollisionWatch, ProcedureSettings
-from elastocal.errors import ProcedureError
+from elastocal.errors import ProcedureError, present
 from elastocal.planning import PlanResult
 from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
 from elastocal.planning.motion import AxisMotion
@@ -172,7 +172,7 @@ def _force_limit(
 ) -> float:
     """Return the force limit; it stays within the sensor's range in the direction of each load."""
     sensor, asked = cell.file.sensor, cell.file.procedure.force_limit
-    assert sensor is not None
+    sensor = present(sensor, "sensor")
     norms = [float(np.linalg.norm(force)) for _, force in loads]
     largest = max(norms)
     within = min(

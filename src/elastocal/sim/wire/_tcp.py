@@ -96,8 +96,10 @@ class TcpServer(ABC):
                 if isinstance(key.data, Peer):
                     self._receive(key.data)
                 else:
-                    line, _ = self._listeners[key.data].accept()
-                    self._add(Peer(key.data, line))
+                    # A client that has gone again, or one too many for the process, is left out.
+                    with contextlib.suppress(OSError):
+                        line, _ = self._listeners[key.data].accept()
+                        self._add(Peer(key.data, line))
             self.tick()
         for peer in list(self.peers):
             self.drop(peer)

@@ -247,7 +247,8 @@ class EmsconServer(TcpServer):
 def _port(told: Told) -> int:
     """Return the port of the only station."""
     stations = told.settings.get("stations") or {}
-    assert isinstance(stations, Mapping)
+    if not isinstance(stations, Mapping):
+        raise DeviceError(f"stations is {stations!r}: must be a table of stations by name")
     if len(stations) > 1:
         raise DeviceError(f"one emScon station is simulated, not {', '.join(stations)}")
     return next((int(each.port) for each in stations.values()), told.port())

@@ -125,7 +125,8 @@ class LineStreamServer(TcpServer):
 def _places(told: Told) -> Mapping[str, tuple[str, int]]:
     """Return address and port by station, or of the port that all share."""
     stations = told.settings.get("stations") or {}
-    assert isinstance(stations, Mapping)
+    if not isinstance(stations, Mapping):
+        raise DeviceError(f"stations is {stations!r}: must be a table of stations by name")
     if not stations:
         return {_ALL: (told.address, told.port())}
     return {name: (told.address, int(station.port)) for name, station in stations.items()}

@@ -12,6 +12,7 @@ import http.server
 import math
 import socket
 import struct
+import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -307,6 +308,13 @@ class _PageServer(http.server.ThreadingHTTPServer):
         self.socket, self.box_server = line, server
         self.server_address = line.getsockname()
         self.server_activate()
+
+    def handle_error(
+        self, request: socket.socket | tuple[bytes, socket.socket], client_address: object
+    ) -> None:
+        """Say nothing of a client that hangs up in the middle; what else fails is ours."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _PageHandler(http.server.BaseHTTPRequestHandler):

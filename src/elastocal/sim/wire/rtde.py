@@ -136,7 +136,8 @@ class RtdeServer:
     def _accept(self, line: socket.socket, serve: Callable[[socket.socket], None]) -> None:
         line.settimeout(_LISTEN)
         while not self._closed.is_set():
-            with contextlib.suppress(TimeoutError):
+            # A client that has gone again, or one too many for the process, is left out.
+            with contextlib.suppress(OSError):
                 client, _ = line.accept()
                 if not self._clients.acquire(blocking=False):
                     client.close()

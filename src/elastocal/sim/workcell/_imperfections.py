@@ -12,6 +12,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Geometry
+from elastocal.errors import present
 from elastocal.results import brief_repr
 from elastocal.sim.arm import Linkage, Screws, motions
 from elastocal.sim.workcell._timeline import generator
@@ -180,8 +181,8 @@ class SensorHysteresis:
 
     def _follow(self, load: FloatArray) -> FloatArray:
         """Go on along a way that does not turn back, and return what the axes read beside it."""
-        assert self._state is not None
-        moved = np.clip(self._state + (load - self._load)[..., None], -self._limit, self._limit)
+        state = present(self._state, "state of the sensor's hysteresis")
+        moved = np.clip(state + (load - self._load)[..., None], -self._limit, self._limit)
         self._state, self._load = moved[-1], load[-1]
         lag: FloatArray = -self._eta * moved.sum(axis=-1)
         return lag

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import BeamState, Cell, PointBlock, SensorStatus, WrenchBlock
-from elastocal.errors import DeviceError, nearest
+from elastocal.errors import DeviceError, nearest, present
 from elastocal.sim.workcell._imperfections import ForceGain, SensorHysteresis
 from elastocal.sim.workcell._plant import Plant
 from elastocal.sim.workcell._timeline import MICROSECONDS, Segment, generator
@@ -360,7 +360,7 @@ def sensor_matrix(cell: Cell, seed: int) -> FloatArray:
 def force_gain(cell: Cell, seed: int) -> ForceGain:
     """Return what the sensor's force axes read."""
     matrix, T_sensor_tcp = sensor_matrix(cell, seed), cell.T_sensor_tcp
-    assert T_sensor_tcp is not None
+    T_sensor_tcp = present(T_sensor_tcp, "T_sensor_tcp")
     moment = np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T
     return ForceGain(matrix[:3, :3] + matrix[:3, 3:] @ moment, matrix[:3, 3:])
 

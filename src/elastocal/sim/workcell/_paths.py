@@ -14,7 +14,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Fault, Motion
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, of_kind, present
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._imperfections import ForceGain
 from elastocal.sim.workcell._plant import Plant
@@ -318,8 +318,7 @@ class ForceControl:
         slip = plant.slip(self.load) * contact.law.slip_sigma(wanted_tcp)
         segment = self._press(slip)
         if slides:
-            ramp = segment.law
-            assert isinstance(ramp, SettlingRamp)
+            ramp = of_kind(segment.law, SettlingRamp, "law of the ramp")
             after = segment.begin + round(1e6 * (ramp.ramp + 5.0 * ramp.tau))
             plant.later(after, lambda: self._slide(segment))
 
@@ -343,7 +342,7 @@ class ForceControl:
     def _press(self, slip: FloatArray, least: float = 0.0) -> Segment:
         """Go for the wanted force, the contact slipping meanwhile; tcp frame, shape (2,), in m."""
         plant, contact = self._plant, self._plant.contact
-        assert contact is not None
+        contact = present(contact, "contact")
         start = plant.robot_state()
         contact = replace(contact.slipped(slip), chance=plant.chance.load(self.load))
         end = self._equilibrium(start, contact)

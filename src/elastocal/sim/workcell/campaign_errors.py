@@ -15,6 +15,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, load_case_time
 from elastocal.dataset import Readings
+from elastocal.errors import present
 from elastocal.results import brief_repr
 from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
 from elastocal.sim.workcell.campaign import TrueReadings
@@ -183,8 +184,7 @@ class CampaignErrors:
 
 def _gain(cell: Cell, ranges: FloatArray) -> FloatArray:
     """Return d gain / d cross-talk; see `force_gain`. Shape (3, 3, 6, 6)."""
-    T_sensor_tcp = cell.T_sensor_tcp
-    assert T_sensor_tcp is not None
+    T_sensor_tcp = present(cell.T_sensor_tcp, "T_sensor_tcp")
     wrench = np.vstack([np.eye(3), np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T])
     ratio = np.divide.outer(ranges, ranges)
     gain: FloatArray = np.einsum("ik,kl,lj->ijkl", np.eye(3, 6), ratio, wrench)

@@ -25,6 +25,7 @@ from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, Devices
+from elastocal.errors import present
 from elastocal.results import brief_repr
 from elastocal.sim.arm import Reaction
 from elastocal.sim.workcell._controller import SimulatedArm
@@ -177,15 +178,14 @@ class ProcessCell:
         q : ndarray, shape (..., joint)
             In rad or m; rows of a single course, or a row for each of the runs.
         """
-        assert self._state is not None, "lift comes first"
         state = self._statics.free(q, np.zeros(3), None)
         cold = replace(self._statics, warmth=np.zeros_like(self._statics.warmth))
         return self._left(cold.deviation(q, state.sag))[..., :3]
 
     def _left(self, twist: FloatArray) -> FloatArray:
         """Take out what the controller does of the sag, as it was where the course began."""
-        assert self._state is not None, "lift comes first"
-        return twist - self._statics.compensation * self._state.sag
+        start = present(self._state, "state of a lifted arm")
+        return twist - self._statics.compensation * start.sag
 
     def press(
         self,
@@ -209,9 +209,9 @@ class ProcessCell:
             Unit normal of the surface, out of the part, in base, along which the force reacts; the
             tool's axis where it is not known.
         """
-        assert self._state is not None, "lift comes first"
         statics = self._statics
-        state = replace(self._state, theta=self._pressed.next())
+        start = present(self._state, "state of a lifted arm")
+        state = replace(start, theta=self._pressed.next())
         R = statics.robot.forward(q)[..., :3, :3]
         force_tcp = (force_base[..., None, :] @ R)[..., 0, :]
         attack = self._law.attack(force_tcp, self._chance.load(0))
