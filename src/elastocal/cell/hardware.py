@@ -94,10 +94,7 @@ class Shape(StrictModel):
     @property
     def solid(self) -> Box | Cylinder | Sphere | MeshFile:
         """The one that is given."""
-        found: Box | Cylinder | Sphere | MeshFile | None = (
-            self.box or self.cylinder or self.sphere or self.mesh
-        )
-        return present(found, "form of a body")
+        return self.box or self.cylinder or self.sphere or present(self.mesh, "form of a body")
 
 
 class RegionBox(StrictModel):
