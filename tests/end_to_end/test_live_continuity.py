@@ -145,6 +145,7 @@ def running(program):
             process.kill()
 
 
+@pytest.mark.slow
 @pytest.mark.end_to_end
 @needs_gcc
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not on this machine")
@@ -160,6 +161,7 @@ def test_the_c_program_takes_no_larger_step_whatever_happens_to_the_line(files, 
     assert 1e3 * found["largest_step"] <= STEP + ROUNDED
 
 
+@pytest.mark.slow
 @pytest.mark.end_to_end
 @needs_gcc
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not on this machine")

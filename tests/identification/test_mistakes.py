@@ -53,14 +53,20 @@ WARNED = (
 )
 
 
-@pytest.mark.parametrize("name", REFUSED)
+def _by_day(names, few):
+    """Return names of which all but the first few are tried at night."""
+    later = [pytest.param(name, marks=pytest.mark.slow) for name in names[few:]]
+    return [*names[:few], *later]
+
+
+@pytest.mark.parametrize("name", _by_day(REFUSED, 6))
 def test_a_certain_mistake_is_refused_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
     assert found.refused, found.said
     assert found.named, found.said
 
 
-@pytest.mark.parametrize("name", WARNED)
+@pytest.mark.parametrize("name", _by_day(WARNED, 4))
 def test_a_likely_mistake_is_warned_of_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
     assert not found.refused, found.said
