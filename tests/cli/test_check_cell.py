@@ -12,6 +12,7 @@ from elastocal.planning import write_plan
 from elastocal.robot import catalogue
 from elastocal.workflows import describe_file
 from support import plans
+from support.by_day import some_by_day
 from support.cli import elastocal
 
 
@@ -107,17 +108,19 @@ def test_what_check_refuses_plan_refuses_in_the_same_words(folder, changes, word
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        lambda _: {},
-        # Limits of the URDF alone are not judged on an arm without masses.
-        lambda folder: without_masses(folder) | {"limits__torque": {}},
-        lambda _: {"sensor": None},
-        lambda _: {"trackers": [], "marker": None},
-        lambda _: {"load_cases__cases": ["normal"], "search__technique": "i_optimal"},
-        lambda _: {"search__metric": "geodesic", "search__technique": "ioops"},
-        lambda _: {"search__poses": 1, "search__technique": "random"},
-        lambda _: {"search__d_max": "200 mm", "search__poses": None},
-    ],
+    some_by_day(
+        [
+            lambda _: {},
+            # Limits of the URDF alone are not judged on an arm without masses.
+            lambda folder: without_masses(folder) | {"limits__torque": {}},
+            lambda _: {"sensor": None},
+            lambda _: {"trackers": [], "marker": None},
+            lambda _: {"load_cases__cases": ["normal"], "search__technique": "i_optimal"},
+            lambda _: {"search__metric": "geodesic", "search__technique": "ioops"},
+            lambda _: {"search__poses": 1, "search__technique": "random"},
+            lambda _: {"search__d_max": "200 mm", "search__poses": None},
+        ]
+    ),
 )
 def test_what_check_passes_plan_accepts(folder, changes):
     changes = {"search__pool": 60, "search__poses": 4} | changes(folder)

@@ -176,6 +176,7 @@ def test_what_does_not_go_with_a_path_is_refused(folder, arguments, reason):
     assert not (folder / "refused").exists()
 
 
+@pytest.mark.slow
 def test_the_stiffest_posture_is_stiffer_than_the_programmed_one_and_is_compared_with_it(folder):
     result = elastocal(
         "simulate-process", example_cell("machining").path, "--process", "machining",
@@ -197,6 +198,7 @@ def test_an_unknown_posture_is_refused(folder):
     assert "--posture 'laziest' is not one of programmed, stiffest" in result.reason
 
 
+@pytest.mark.slow
 def test_over_several_seeds_means_have_an_interval(folder):
     result = run(folder, "seeds", "--seed", 2, "--seed", 3, "--json")
     assert result.code == 0, result.err

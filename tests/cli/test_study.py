@@ -127,6 +127,7 @@ def test_only_random_chooses_anew_for_every_sample():
     assert not np.array_equal(*(drawn.of(rng) for rng in rngs))
 
 
+@pytest.mark.slow
 def test_conditions_of_a_sample_share_arm_and_noise():
     one = prepared("poses=12").simulate(Sample(0, 4)).outcomes[0]
     two = prepared("poses=6,12").simulate(Sample(0, 4)).outcomes[1]
@@ -134,6 +135,7 @@ def test_conditions_of_a_sample_share_arm_and_noise():
     assert one.error_mean == pytest.approx(two.error_mean, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_more_noise_of_either_instrument_is_worse():
     for factor in ("tracker_noise", "force_noise"):
         found = errors(prepared("poses=6", f"{factor}=0,30").simulate, 4)
@@ -146,6 +148,7 @@ def test_arms_of_no_spread_are_the_cell_files():
     assert np.ptp(found[:, 1]) > 1e-5
 
 
+@pytest.mark.slow
 def test_loads_that_press_only_show_less():
     found = errors(prepared("poses=12", "load_cases=normal,all").simulate, 4)
     assert found[:, 0].mean() > found[:, 1].mean()
@@ -176,6 +179,7 @@ def test_more_verification_poses_than_the_pool_holds_are_refused(tmp_path):
     assert "60 verification poses: must be at least 1, and fewer than the 60" in found.reason
 
 
+@pytest.mark.slow
 def test_another_truth_in_the_same_folder_is_refused(tmp_path):
     options = ("--samples", 2, "--vary", "poses=5", "--jobs", 1)
     assert study(tmp_path / "s", *options).code == 0

@@ -100,6 +100,7 @@ class TestEverySection:
         assert re.search(r"[a-z]{2}.*[.:]", page.text)
 
     @pytest.mark.usefixtures("undrawn")
+    @pytest.mark.slow
     def test_it_copes_with_up_to_two_parts_and_without_up_to_two(self, section, whole):
         for few in (*combinations(NAMES, 1), *combinations(NAMES, 2)):
             check(section.body(only(whole, few)))

@@ -23,6 +23,7 @@ cp "$0/run/dataset.nc" "$4"
 """A pose takes some 400 kB: the disk has room for two of three."""
 
 
+@pytest.mark.slow
 def test_a_run_whose_disk_is_full_goes_on_when_there_is_room(tmp_path):
     if shutil.which("unshare") is None:
         pytest.skip("unshare is not on this machine")

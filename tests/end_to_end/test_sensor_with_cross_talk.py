@@ -114,6 +114,7 @@ def left(tmp_path_factory):
     return {key: np.array(values) for key, values in found.items()}
 
 
+@pytest.mark.slow
 def test_a_path_is_not_worse_with_the_tool_file_than_without(left):
     assert left["file", False].mean() <= 1.03 * left["no file", False].mean()
     assert np.all(left["file", False] <= 1.2 * left["no file", False])

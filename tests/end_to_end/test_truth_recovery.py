@@ -70,6 +70,7 @@ def test_the_truth_that_was_planted_is_never_reproduced_exactly():
 
 
 @pytest.mark.parametrize("arm", [linear_truth, rich_truth])
+@pytest.mark.slow
 def test_intervals_of_a_measurement_hold_what_is_measured_at_poses_of_another_campaign(arm):
     inside = []
     for seed in range(4):

@@ -16,6 +16,7 @@ from elastocal.geometry import (
 )
 from elastocal.progress import silent
 from elastocal.robot import Robot, catalogue
+from support.by_day import some_by_day
 from support.measured_arms import Measured, measure
 
 
@@ -38,11 +39,19 @@ def coupled(q: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("recorded", "message"),
-    [
-        (coupled, "the third joint is coupled to the second as on FANUC controllers"),
-        (lambda q: q * [1, 1, 1, -1, 1, 1], "joint_a4 turns the other way round than in the URDF"),
-        (lambda q: q * [-1, 1, 1, -1, 1, -1], "joints 1, 4 and 6 of the arm turn the other way"),
-    ],
+    some_by_day(
+        [
+            (coupled, "the third joint is coupled to the second as on FANUC controllers"),
+            (
+                lambda q: q * [1, 1, 1, -1, 1, 1],
+                "joint_a4 turns the other way round than in the URDF",
+            ),
+            (
+                lambda q: q * [-1, 1, 1, -1, 1, -1],
+                "joints 1, 4 and 6 of the arm turn the other way",
+            ),
+        ]
+    ),
 )
 def test_joints_of_another_convention_are_refused_by_it(recorded, message):
     data = measure(kuka(), 60).data

@@ -101,6 +101,7 @@ def test_too_few_poses_are_said_to_be_few(cell):
     assert "at least" in found
 
 
+@pytest.mark.slow
 def test_one_campaign_has_presses_and_positions_in_one_program(tmp_path, cell):
     out = tmp_path / "plan"
     both = ("plan", cell.path, "--for", "both", "--poses", 4, "--positions", 8, "--compare", "none")

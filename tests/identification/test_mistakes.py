@@ -9,6 +9,7 @@ import pytest
 from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import ConventionError
 from elastocal.identification import FitOptions, calibrate
+from support.by_day import some_by_day
 from support.campaigns import Sound, campaign, sounds
 from support.further_mistakes import FURTHER
 from support.mistake_table import HARMFUL, alarms, outcome, rates, tabulate
@@ -53,20 +54,14 @@ WARNED = (
 )
 
 
-def _by_day(names, few):
-    """Return names of which all but the first few are tried at night."""
-    later = [pytest.param(name, marks=pytest.mark.slow) for name in names[few:]]
-    return [*names[:few], *later]
-
-
-@pytest.mark.parametrize("name", _by_day(REFUSED, 6))
+@pytest.mark.parametrize("name", some_by_day(REFUSED))
 def test_a_certain_mistake_is_refused_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
     assert found.refused, found.said
     assert found.named, found.said
 
 
-@pytest.mark.parametrize("name", _by_day(WARNED, 4))
+@pytest.mark.parametrize("name", some_by_day(WARNED))
 def test_a_likely_mistake_is_warned_of_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
     assert not found.refused, found.said

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+@pytest.mark.slow
 def test_two_core_types_decide_alike_on_published_and_simulated_readings():
     """Every other test meets three, one in each process; see `support.processors`."""
     # The published readings of a FANUC (-1), and a campaign with bounds that leave them no part.

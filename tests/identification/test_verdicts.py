@@ -136,6 +136,7 @@ def test_how_much_is_unexplained_is_read_back_from_the_model_file():
     assert np.isnan(CalibrateResult.of(found.calibrated).calibrated.unexplained)
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_measurement_covers_what_it_claims():
     shares = []
     for seed in range(8):

@@ -22,9 +22,10 @@ from elastocal.planning import (
 )
 from elastocal.planning.checks import registration_shortages
 from elastocal.workflows import init
+from support.by_day import some_by_day
 
 
-@pytest.fixture(scope="module", params=["afp", "machining"])
+@pytest.fixture(scope="module", params=some_by_day(["afp", "machining"]))
 def kind(request) -> str:
     """Return each example."""
     return request.param

@@ -11,6 +11,7 @@ import pytest
 import elastocal
 from elastocal.errors import SchemaError
 from elastocal.records import parse_json, read_json, record, write_json
+from support.by_day import some_by_day
 
 SOURCES = Path(elastocal.__file__).parent
 _READERS = {"loads", "load", "JSONDecoder", "model_validate_json", "validate_json", "raw_decode"}
@@ -117,13 +118,16 @@ def hostile(kind: str) -> bytes:
     raise ValueError(kind)
 
 
-@pytest.mark.parametrize("kind", ["page of objects", "page of texts", "page of brackets"])
+@pytest.mark.parametrize(
+    "kind", some_by_day(["page of objects", "page of texts", "page of brackets"])
+)
 def test_a_page_of_ninety_megabytes_takes_less_than_a_gigabyte(tmp_path, kind):
     memory, told = peak(tmp_path / "a.html", hostile(kind))
     assert "a.html" in told
     assert memory < 1e9
 
 
+@pytest.mark.slow
 def test_a_table_of_empty_runs_takes_less_than_a_gigabyte(tmp_path):
     memory, told = peak(tmp_path / "a.json", hostile("table of objects"))
     assert "key 'cell' is missing" in told

@@ -26,6 +26,7 @@ from elastocal.verdict import (
 )
 from elastocal.verdict._files import read_seal
 from support import sealed
+from support.by_day import some_by_day
 from support.cli import elastocal
 from support.reported import MADE
 
@@ -154,7 +155,7 @@ def test_a_whole_chain_is_green(parts):
     assert judged(parts).light is Light.GREEN
 
 
-@pytest.mark.parametrize("name", BROKEN)
+@pytest.mark.parametrize("name", some_by_day(BROKEN))
 def test_what_is_broken_is_named_and_costs_the_green(copied, name):
     folder = copied()
     damage, told = BROKEN[name]

@@ -20,6 +20,7 @@ from elastocal.verdict import (
     write_signature,
 )
 from support import forged, sealed
+from support.by_day import some_by_day
 from support.forged import CLOSED, OPENED, PAGE, RUN, refusal
 
 _DERIVED = {}
@@ -265,7 +266,7 @@ def test_what_nobody_touched_is_whole(tmp_path):
     assert refusal(folder / RUN) == ""
 
 
-@pytest.mark.parametrize("kind", OF_THE_PAGE)
+@pytest.mark.parametrize("kind", some_by_day(OF_THE_PAGE, 2))
 def test_a_forged_page_is_refused(tmp_path, kind):
     folder = forged.copied(tmp_path / "all")
     before = (folder / PAGE).read_bytes()
@@ -279,7 +280,7 @@ def test_a_forged_page_is_refused(tmp_path, kind):
     assert refusal(folder / PAGE)
 
 
-@pytest.mark.parametrize("kind", OF_THE_RUN)
+@pytest.mark.parametrize("kind", some_by_day(OF_THE_RUN))
 def test_a_forged_run_is_refused(tmp_path, kind):
     folder = forged.copied(tmp_path / "all")
     (folder / "model.json").unlink()
@@ -287,7 +288,7 @@ def test_a_forged_run_is_refused(tmp_path, kind):
     assert refusal(folder / RUN)
 
 
-@pytest.mark.parametrize("kind", OF_WHAT_IS_SHOWN)
+@pytest.mark.parametrize("kind", some_by_day(OF_WHAT_IS_SHOWN, 2))
 def test_what_a_report_shows_is_held_against_it(tmp_path, kind):
     folder = forged.copied(tmp_path / "all")
     OF_WHAT_IS_SHOWN[kind](folder)
@@ -354,6 +355,7 @@ def test_every_single_change_of_a_page_is_refused(tmp_path):
     assert refuse_pages(tmp_path, 1, 140) > 440
 
 
+@pytest.mark.slow
 def test_a_single_change_of_any_file_of_a_run_is_refused(tmp_path):
     folder = forged.copied(tmp_path / "all")
     assert refuse_runs(folder, 2, 0) == len(files_of_a_run(folder)) > 10

@@ -77,6 +77,7 @@ def after(springs: str, softer: float) -> tuple[CalibratedModel, Readings]:
 
 
 @pytest.mark.parametrize("springs", ["gears", "bearing"])
+@pytest.mark.slow
 def test_an_unchanged_robot_on_other_poses_and_loads_is_the_same(springs):
     model, readings = after(springs, 1.0)
     found = recertify(before(springs), model, rows=ComparedRows.of(readings), limit=LIMIT).summary

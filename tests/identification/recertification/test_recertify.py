@@ -39,6 +39,7 @@ def test_a_gear_that_became_softer_by_a_fifth_is_found_named_and_measured(loads)
         assert truth.mean() in found.deflection.mean
 
 
+@pytest.mark.slow
 def test_it_is_found_on_an_arm_that_no_springs_express(loads):
     softer = softened(rich_truth())
     found = compare(calibrated(rich_truth(), 0), calibrated(softer, 50_000), *loads)
@@ -47,6 +48,7 @@ def test_it_is_found_on_an_arm_that_no_springs_express(loads):
 
 
 @pytest.mark.parametrize("arm", [linear_truth, rich_truth])
+@pytest.mark.slow
 def test_of_unchanged_cells_few_are_called_moved(arm, loads):
     """At a rate of 5 %, more than 1 of 3 pairs would be called so once in 138 times.
 

@@ -31,6 +31,7 @@ def test_without_noise_station_and_lever_arm_are_found_to_a_micrometre(rng):
     assert (found.moves, found.blunders, found.undetermined_lever) == ((), (), ())
 
 
+@pytest.mark.slow
 def test_errors_are_within_the_sigmas_that_are_stated():
     """Over thirty seeds the squared errors over variances average one a coordinate."""
     squares = []
@@ -49,6 +50,7 @@ def test_the_scatter_is_that_of_the_noise(rng):
     assert found.stations[0].residual.std() == pytest.approx(0.2e-3, rel=0.15)
 
 
+@pytest.mark.slow
 def test_undisturbed_runs_show_neither_moves_nor_blunders():
     for seed in range(20):
         found = register(made(np.random.default_rng(seed), noise=0.1e-3).readings, ROUGH)

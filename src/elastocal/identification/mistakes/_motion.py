@@ -26,6 +26,8 @@ _CLOSE = 0.01
 """Part of its motion below which controller and joints agree on where the tcp is."""
 _LEFT = 0.3
 """Part of their difference which undoing a mistake may leave."""
+_ALIKE = 1.2
+"""Ratio of two rests, beside `_CLOSE`, that says nothing: a later mistake may have more numbers."""
 _ALONG = 0.95
 """Cosine from which on an axis lies along another."""
 _LEAST_ZERO = 1.0
@@ -102,14 +104,13 @@ def _likeliest(
             robot, lambda read: _relative(robot, _read(read, readings), offset)
         )
     ]
-    # Of two that restore the agreement alike, the first is said.
-    return min(
-        (
-            (round(_relative(robot, each.undo(readings), offset), 3), each.message)
-            for each in (*mistakes, *_motion_mistakes(robot, readings, moved))
-        ),
-        key=itemgetter(0),
-    )
+    tried = [
+        (_relative(robot, each.undo(readings), offset), each.message)
+        for each in (*mistakes, *_motion_mistakes(robot, readings, moved))
+    ]
+    least = min(left for left, _ in tried)
+    # Of those that restore the agreement alike, the first is said.
+    return next(each for each in tried if each[0] <= _ALIKE * least + _CLOSE)
 
 
 def _moved(robot: Robot, readings: Readings, offset: FloatArray) -> FloatArray | None:
