@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from elastocal.report.plots import new_figure, style, write_figure
 
 WALKED = Path(__file__).with_name("fault_matrix.json")
+_LEAST_FORCE = 1.0
+"""Force added that is written into a cell, in N."""
 
 
 def make(folder: Path) -> dict[str, str]:
@@ -38,23 +41,28 @@ def _draw(rows: list[dict[str, Any]]) -> Figure:
     faults, phases = (list(dict.fromkeys(row[key] for row in rows)) for key in ("fault", "phase"))
     figure = new_figure(8.0, 0.26 * len(faults) + 1.2)
     axes = figure.subplots()
-    added = np.full((len(faults), len(phases)), np.nan)
+    time = np.full((len(faults), len(phases)), np.nan)
     for row in rows:
         y, x = faults.index(row["fault"]), phases.index(row["phase"])
-        added[y, x] = row["added"]
-        axes.text(x, y, _word(row), ha="center", va="center", fontsize=7, color=style.INK)
-    shown = axes.imshow(added, aspect="auto", cmap="YlOrRd", vmin=0.0, vmax=200.0, alpha=0.7)
+        word, colour = _said(row)
+        if colour is None:
+            time[y, x] = row["released"]
+        else:
+            axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, color=colour, linewidth=0.0))
+        added = f" +{row['added']:.0f} N" if row["added"] >= _LEAST_FORCE else ""
+        axes.text(x, y, word + added, ha="center", va="center", fontsize=7, color=style.INK)
+    shown = axes.imshow(time, aspect="auto", cmap="Blues", vmin=0.0, vmax=8.0)
     axes.set_xticks(range(len(phases)), phases, fontsize=8)
     axes.set_yticks(range(len(faults)), faults, fontsize=8)
-    figure.colorbar(shown, ax=axes, label="force added after the fault, N")
+    figure.colorbar(shown, ax=axes, label="time until the tool let go, s")
     figure.subplots_adjust(left=0.27, right=1.0, top=0.97, bottom=0.08)
     return figure
 
 
-def _word(row: dict[str, Any]) -> str:
-    """Return the time until the tool let go, or what it did instead."""
+def _said(row: dict[str, Any]) -> tuple[str, str | None]:
+    """Return the time until the tool let go, or what it did instead, and the colour of that."""
     if not row["message"]:
-        return "goes on"
+        return "goes on", "#eeeeee"
     if row["released"] is None:
-        return "stays"
-    return f"{row['released']:.2f} s" if row["released"] else "free"
+        return "stays", "#f6cf9a"
+    return (f"{row['released']:.2f} s", None) if row["released"] else ("free", "#ffffff")
