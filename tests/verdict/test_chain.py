@@ -296,3 +296,10 @@ def test_a_difference_below_rounding_is_none(copied):
     dataset.write(dataset.Dataset.from_xarray(data), path)
     texts = [link.text for link in gathered(folder).chain]
     assert any("its attribute marker is another" in text for text in texts)
+    # What is not fitted is the same to the letter.
+    urdf = re.sub(r"\d\.\d+", lambda found: f"{found[0]}1", data.attrs["robot_urdf"], count=1)
+    assert urdf != data.attrs["robot_urdf"]
+    data.attrs |= {"marker": f"{x!r} m, {y!r} m, {z!r} m", "robot_urdf": urdf}
+    dataset.write(dataset.Dataset.from_xarray(data), path)
+    texts = [link.text for link in gathered(folder).chain]
+    assert any("its attribute robot_urdf is another" in text for text in texts)
