@@ -187,11 +187,10 @@ class NetFtSensor:
     def _count_lost(self, lost: int) -> None:
         self.lost += lost
         self._window, self._window_lost = self._window + lost + 1, self._window_lost + lost
-        if self._window >= _WINDOW:
-            if self._window_lost > _MOST_LOST * self._window:
-                self.leave_hole(
-                    f"{self._window_lost} of {self._window} records were lost on the way"
-                )
+        # Not at the end of the window only: of a stream that thins out it is said at once.
+        if self._window_lost > _MOST_LOST * _WINDOW:
+            self.leave_hole(f"{self._window_lost} of {self._window} records were lost on the way")
+        if self._window >= _WINDOW or self._window_lost > _MOST_LOST * _WINDOW:
             self._window = self._window_lost = 0
 
     def _wrenches(self, counts: FloatArray) -> tuple[FloatArray, FloatArray]:
