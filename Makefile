@@ -11,6 +11,9 @@ SHARED_OUT := -n $(WORKERS) --dist worksteal
 # What is compiled is kept, whatever the shell says: commands that tests start need it at once.
 export PYTHONDONTWRITEBYTECODE :=
 
+# Processes share the processors; threads of each of them would wait for one another.
+tests units end-to-end browser slow: export OMP_NUM_THREADS := 1
+
 .PHONY: demo test checks lint tests units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
 
 demo: $(VENV)/installed

@@ -8,6 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_limits
 
 from elastocal import parallel
 from elastocal.errors import ElastocalError
@@ -22,6 +23,14 @@ from elastocal.parallel import (
 )
 from support.cli import PATIENCE
 from support.tasks import blas_threads, die, here, nothing, square, threads
+
+
+@pytest.fixture(autouse=True)
+def _more_threads_than_one(monkeypatch):
+    """Let libraries of algebra take two unless they are told otherwise, as on a user's machine."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    with threadpool_limits(2, "blas"):
+        yield
 
 
 def interrupt(results):

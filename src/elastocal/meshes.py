@@ -57,7 +57,9 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
         # Old Macs, and some exporters since, end lines by a carriage return alone.
         data = data.translate(_ASCII).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
-        mesh: object = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
+        # A float that is no number is refused by who uses the mesh.
+        with np.errstate(invalid="ignore"):
+            mesh: object = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
     # What the readers of trimesh raise on bad contents is not documented; these were seen, or their
     # like.
     except (

@@ -56,7 +56,7 @@ def test_five_core_types_judge_a_demo_alike(kind, tmp_path):
         ]
         chosen = [each["springs"] for each in calibrated["ladder"] if each["chosen"]]
         verdict = judged["verdict"]
-        said = (verdict["light"], len(verdict["reasons"]), len(verdict["notes"]))
+        said = verdict
         found.append((chosen, springs, calibrated["rank"], said))
     assert all(each == found[0] for each in found)
 

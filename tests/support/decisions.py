@@ -116,6 +116,8 @@ def decisions(case: Case) -> dict[str, Any]:
 
 
 _ENDS = ("compliance", "low", "high")
+_DUST = 1e-14
+"""A compliance below it, in rad/(N·m), is none: no arm has any as small."""
 
 
 def _words(text: str) -> str:
@@ -156,8 +158,9 @@ def furthest(one: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, s
     for number, found in one.items():
         for name, value in found["figures"].items():
             against = other[number]["figures"].get(name)
-            if value and against is not None:
-                worst = max(worst, (abs(against / value - 1.0), f"campaign {number}: {name}"))
+            if value is not None and against is not None:
+                apart = abs(against - value) / max(abs(value), _DUST)
+                worst = max(worst, (apart, f"campaign {number}: {name}"))
     return worst
 
 

@@ -78,15 +78,19 @@ def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArr
 
 
 def _eliminated(null_space: FloatArray) -> Iterator[FloatArray]:
-    """Yield a basis by Gauss-Jordan elimination with full pivoting."""
-    work = null_space.T.copy()
-    for row in range(len(work)):
-        below, column = divmod(int(np.abs(work[row:]).argmax()), work.shape[1])
-        work[[row, row + below]] = work[[row + below, row]]
-        work[row] /= work[row, column]
-        others = np.arange(len(work)) != row
-        work[others] -= np.outer(work[others, column], work[row])
-    yield from (_normalised(vector) for vector in work)
+    """Yield the basis that is one at one of ``k`` springs each and zero at the others of them.
+
+    The springs are taken in the order of how much of them is in the null space and not in the
+    vectors of those before, the first of equal ones: by its projector, which is the same for every
+    basis, so that no rounding chooses.
+    """
+    projector, pivots = null_space @ null_space.T, list[int]()
+    for _ in range(null_space.shape[1]):
+        left = np.diag(projector)
+        pivot = int(np.flatnonzero(left > left.max() - _ZERO)[0])
+        pivots.append(pivot)
+        projector = projector - np.outer(projector[:, pivot], projector[pivot]) / left[pivot]
+    yield from map(_normalised, np.linalg.solve(null_space[pivots].T, null_space.T))
 
 
 def _normalised(vector: FloatArray) -> FloatArray:
