@@ -485,8 +485,6 @@ STAYS = {
     " `Timeout`. Start the program anew, then `elastocal release` or `--resume`.",
     "arm: program restarted": "A program that begins anew forgets its correction, and the arm takes"
     " no order of the old one. Free the tool with `elastocal release`, or go on with `--resume`.",
-    "arm: one in ten comes": "The arm is silent for too long between two messages, and is stopped."
-    " Mend the line, start the program, then `elastocal release` or `--resume`.",
     "arm: metres for millimetres": "The place of the tool is not known, so no retract is begun."
     " Free the tool with the pendant.",
 }
