@@ -24,6 +24,7 @@ from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
 
 ROOT = Path(__file__).parents[1]
+FANUC = ROOT / "examples" / "fanuc_r2000ic"
 FACE = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
 """What docs/hooks/faces.py fills with the names that a package exports."""
 TOUR = (ROOT / "README.md").read_text(encoding="utf-8").split("## Five-minute tour")[1]
@@ -124,8 +125,12 @@ def test_the_page_on_the_table_quotes_what_the_tour_prints(toured):
         bearing = elastocal(
             "calibrate", "demo/run/dataset.nc", "--out", "b.json", "--springs", "bearing"
         )
+        fanuc = elastocal(
+            "calibrate", FANUC / "measurements.csv", "--robot", FANUC / "fanuc_r2000ic.urdf",
+            "--tcp", "link_6", "--springs", "bearing", "--out", "f.json",
+        )  # fmt: skip
     auto = toured.results["elastocal calibrate demo/run/dataset.nc --out model.json"]
-    for number, told in ((0, auto), (1, auto), (3, bearing), (4, auto)):
+    for number, told in ((0, auto), (1, auto), (3, bearing), (4, auto), (6, fanuc)):
         words = re.sub(r"\d{5,}", "many", told.err).split()
         for part in re.split(r"^…$", quoted[number], flags=re.MULTILINE):
             words = words[after(re.sub(r"\d{5,}", "many", part).split(), words) :]

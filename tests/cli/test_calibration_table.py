@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.cli.output import bold, console, visible, yellow
-from elastocal.cli.tables.calibration import _known, _spring_table, _springs
-from elastocal.identification import SpringSummary
+from elastocal.cli.output import bold, console, table_of, visible
+from elastocal.identification import SpringSummary, show_calibration, spring_table
 from support.summaries import made_up_summary
 
 NAME = "joint_2.axial with a long name, slip 3"
@@ -21,7 +20,7 @@ ROWS = (
 def test_a_name_is_shown_as_it_is_in_lines_and_tables(name):
     screen = console(stderr=False, file=io.StringIO(), width=200)
     screen.print(f"{bold(name)} {name}")
-    screen.print(_spring_table(replace(made_up_summary(), springs=(replace(ROWS[0], name=name),))))
+    screen.print(table_of(spring_table([replace(ROWS[0], name=name)])))
     assert screen.file.getvalue().count(visible(name)) == 3
     assert "\x1b" not in screen.file.getvalue()
 
@@ -29,7 +28,7 @@ def test_a_name_is_shown_as_it_is_in_lines_and_tables(name):
 @pytest.mark.parametrize("width", [80, 120])
 def test_no_number_is_cut(width):
     screen = console(stderr=False, file=io.StringIO(), width=width)
-    screen.print(_spring_table(replace(made_up_summary(), springs=ROWS)))
+    screen.print(table_of(spring_table(ROWS)))
     shown = screen.file.getvalue()
     for number in ("0.1235", "-0.025 … 1.250", "8.100", "0.1447 µm/N", "6.911 MN/m"):
         assert number in shown
@@ -49,7 +48,7 @@ def test_every_spring_of_a_rich_model_has_one_line_of_80_columns():
         SpringSummary("joint_a5.x", "hinge", "rad/(N*m)", 1e-7, 0.0, 1.15e-7, False, group=1),
     )
     screen = console(stderr=False, file=io.StringIO(), width=80)
-    screen.print(_spring_table(replace(made_up_summary(), springs=springs)))
+    screen.print(table_of(spring_table(springs)))
     _, _, *rows = screen.file.getvalue().splitlines()
     assert [row.split("  ")[0].strip() or row.strip()[:11] for row in rows] == [
         gear,
@@ -62,16 +61,33 @@ def test_every_spring_of_a_rich_model_has_one_line_of_80_columns():
     assert rows[4].rstrip().endswith("in group 1")
 
 
+def known(value, low, high, **more):
+    """Return what the last cell of a spring's row says."""
+    spring = SpringSummary(
+        "joint_1.x", "hinge", "rad/(N*m)", 1e-6 * value, 1e-6 * low, 1e-6 * high, True, **more
+    )
+    cell = spring_table([spring]).rows[0][-1]
+    return getattr(cell, "text", cell)
+
+
 def test_a_negative_value_is_at_no_bound_unless_the_fit_says_so():
-    assert "bound" not in _known(-1.0, -1.1, -0.9, at_bound=False)
-    assert "±10%" in _known(-1.0, -1.1, -0.9, at_bound=False)
-    assert _known(0.0, 0.0, 0.5, at_bound=True) == yellow("below 0.500")
-    assert _known(2.0, 1.5, 2.0, at_bound=True) == yellow("above 1.500")
-    assert _known(0.0, 0.0, 0.0, at_bound=True) == yellow("at bound")
-    assert "bound" not in _known(0.0, -0.5, 0.5, at_bound=False)
+    assert known(-1.0, -1.1, -0.9) == "±10%"
+    assert known(0.0, 0.0, 0.5, at_bound=True) == "below 0.500"
+    assert known(2.0, 1.5, 2.0, at_bound=True) == "above 1.500"
+    assert known(0.0, 0.0, 0.0, at_bound=True) == "at bound"
+    assert known(0.0, -0.5, 0.5) == ""
+
+
+def test_what_is_hardly_known_or_outside_its_interval_is_said_so():
+    assert known(0.01, 0.0, 5.0) == "more than ±1000%"
+    assert known(3.0, 1.0, 2.0) == "outside its interval: do not use, was the file changed?"
+    assert known(1.0, 0.9, 1.1, prior=True) == "±10%, prior"
 
 
 def test_parameters_are_counted_beside_springs_where_they_differ():
-    assert _springs(replace(made_up_summary(), springs_total=6)) == "6 springs"
     found = replace(made_up_summary(), springs_total=11, spring_count=9)
-    assert _springs(found) == "9 springs with 11 parameters"
+    for summary, said in (
+        (replace(made_up_summary(), springs_total=6), ": 6 springs, "),
+        (found, ": 9 springs with 11 parameters, "),
+    ):
+        assert said in next(iter(show_calibration(summary))).text

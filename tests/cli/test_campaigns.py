@@ -72,7 +72,7 @@ def test_people_see_the_frames(folder):
         "calibrate", folder / "monday.nc", folder / "moved.nc", "--springs", "actuated",
         "--free-frame", "campaign", "--out", folder / "shown.json",
     ).err  # fmt: skip
-    for text in ("frame of", "tracker shift", "marker in tcp frame", "monday", "moved"):
+    for text in ("Frame of", "tracker shift", "marker in tcp frame", "monday", "moved"):
         assert text in shown
 
 

@@ -184,7 +184,7 @@ def test_calibrate_prints_it_on_demand_and_keeps_it(tmp_path):
     assert json.loads(elastocal(*command, "--json").out)["budget"] is None
     printed = elastocal(*command, "--budget")
     assert printed.code == 0, printed.err
-    assert "error budget" in printed.out + printed.err
+    assert "Error budget" in printed.out + printed.err
     kept = json.loads(out.read_text())["calibration"]["budget"]
     assert [term["term"] for term in kept["terms"]][:2] == ["bearings", "gears"]
     assert kept["total"]["error"] > 0.0

@@ -35,11 +35,13 @@ from .output import (
     console as console,
     dim as dim,
     green as green,
+    print_blocks as print_blocks,
     print_json as print_json,
     print_lines as print_lines,
     print_remarks as print_remarks,
     progress_bars as progress_bars,
     red as red,
+    table_of as table_of,
     visible as visible,
     yellow as yellow,
 )

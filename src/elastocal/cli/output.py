@@ -21,6 +21,9 @@ from elastocal.results import counted_alike
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table as RichTable
+
+    from elastocal.blocks import Block, Cell, Table
 
 
 _STYLES = ("bold", "dim", "red", "yellow", "green")
@@ -107,6 +110,78 @@ def print_remarks(screen: "Console", label: str, texts: Iterable[str]) -> None:
     """Print warnings or notes, a line each; many of one kind are one line with their number."""
     for text in counted_alike(texts):
         screen.print(f"{yellow(f'{label}:')} {text}", soft_wrap=True)
+
+
+def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
+    """Print blocks; pictures, scenes and what may be opened are left to pages.
+
+    Parameters
+    ----------
+    screen : Console
+        From `console`.
+    shown : iterable of Block
+        In the order in which they are read.
+    """
+    from elastocal.blocks import Table
+
+    before: Block | None = None
+    for block in shown:
+        if isinstance(before, Table) or (before and isinstance(block, Table)):
+            screen.print()
+        before = block
+        if isinstance(block, Table):
+            screen.print(table_of(block))
+        for line in _lines(block):
+            screen.print(line, soft_wrap=True)
+
+
+def _lines(block: "Block") -> list[str]:
+    """Return the lines of a block that is no table."""
+    from elastocal import blocks
+
+    match block:
+        case blocks.Paragraph(text) | blocks.Verbatim(text):
+            return [text]
+        case blocks.Heading(text):
+            return ["", bold(text)]
+        case blocks.Bullets(items):
+            return [f"   {item}" for item in items]
+        case blocks.Facts(pairs):
+            return [f"{name}: {value}" for name, value in pairs]
+    return []
+
+
+def table_of(block: "Table") -> "RichTable":
+    """Return a table for a terminal: numbers whole, words folded where the terminal is narrow."""
+    from rich.table import Table as RichTable
+
+    table = RichTable(box=None, pad_edge=False)
+    last = len(block.heads) - 1
+    for number, head in enumerate(block.heads):
+        # A number that is cut would be another number.
+        is_text = number < block.texts or _are_words(block, number)
+        # A unit stands below what it is of.
+        table.add_column(
+            head.replace(", ", "\n"),
+            justify="left" if is_text else "right",
+            no_wrap=not is_text,
+            overflow="fold" if is_text or number == last else "crop",
+        )
+    for row in block.rows:
+        table.add_row(*map(_cell, row))
+    return table
+
+
+def _are_words(block: "Table", column: int) -> bool:
+    """Return whether no cell of a column has a figure at its head."""
+    texts = [str(getattr(row[column], "text", row[column])) for row in block.rows]
+    return not any(text[:1].isdigit() or text[:1] in "(-+" for text in texts if text)
+
+
+def _cell(value: "Cell") -> str:
+    grade = {"good": green, "fair": yellow, "poor": red}.get(getattr(value, "grade", ""))
+    text = str(getattr(value, "text", getattr(value, "pose", value)))
+    return grade(text) if grade else text
 
 
 @contextmanager

@@ -157,6 +157,14 @@ from .rungs import (
     low_loads as low_loads,
     rung_of as rung_of,
 )
+from .show import (
+    show_budget as show_budget,
+    show_calibration as show_calibration,
+    show_ladder as show_ladder,
+    show_unseen as show_unseen,
+    spring_table as spring_table,
+    suspicious_table as suspicious_table,
+)
 from .solve import (
     Factored as Factored,
     PoseGrams as PoseGrams,

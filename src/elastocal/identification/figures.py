@@ -4,7 +4,6 @@ One record, so that no two places can disagree. All numbers are SI.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -203,18 +202,13 @@ def summary(
     known: Sequence[KnownSpring] = (),
 ) -> CalibrationSummary:
     """Return the figures of a calibration that was made with these settings, and this knowledge."""
-    # That a spring is of no more than its drive's size is no stiffness known of it.
-    expected = {each.name for each in known if each.compliance}
     calibrated = calibration.calibrated
     seen = calibrated.observability
     residual, deflection = calibration.residual_norm, calibration.deflection_norm
     rms = np.sqrt(np.mean(np.square(calibration.residual[calibration.used]), axis=0))
     return CalibrationSummary(
         robot=calibrated.model.robot.name,
-        springs=tuple(
-            replace(each, prior=each.name in expected)
-            for each in spring_summaries(calibrated, settings)
-        ),
+        springs=spring_summaries(calibrated, settings, known),
         rank=seen.rank,
         rank_attainable=calibration.attainable_rank,
         springs_total=seen.parameters,
@@ -244,7 +238,9 @@ def summary(
 
 
 def spring_summaries(
-    calibrated: CalibratedModel, settings: FitSettings | None = None
+    calibrated: CalibratedModel,
+    settings: FitSettings | None = None,
+    known: Sequence[KnownSpring] = (),
 ) -> tuple[SpringSummary, ...]:
     """Return what tables show of each spring: its characteristics, with their intervals.
 
@@ -254,7 +250,11 @@ def spring_summaries(
         The model.
     settings : FitSettings, optional
         Of its fit, whose bounds count; by default those that make sense to each spring.
+    known : sequence of KnownSpring, optional
+        What was known of springs before the fit.
     """
+    # That a spring is of no more than its drive's size is no stiffness known of it.
+    expected = {each.name for each in known if each.compliance}
     seen, natural = calibrated.observability, [p.lower for p in calibrated.model.parameters]
     options = settings.options() if settings else FitOptions()
     lower, upper = bounds(options, len(natural), natural)
@@ -288,6 +288,7 @@ def spring_summaries(
                     group=group,
                     at_bound=bool(np.all(at_bound[own][weights != 0.0])),
                     too_weak=group is None and reach is not None,
+                    prior=each.name in expected,
                 )
             )
     return tuple(rows)

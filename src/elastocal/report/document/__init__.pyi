@@ -1,23 +1,3 @@
-from .blocks import (
-    Block as Block,
-    Bullets as Bullets,
-    Cell as Cell,
-    Code as Code,
-    Content as Content,
-    Details as Details,
-    Facts as Facts,
-    Heading as Heading,
-    Paragraph as Paragraph,
-    Picture as Picture,
-    PlanScene as PlanScene,
-    PoseButton as PoseButton,
-    Row as Row,
-    Section as Section,
-    Stamp as Stamp,
-    Table as Table,
-    Verbatim as Verbatim,
-    flattened as flattened,
-)
 from .certificate import (
     BeforeAfter as BeforeAfter,
     Certificate as Certificate,
@@ -43,5 +23,11 @@ from .page import (
     WrittenReport as WrittenReport,
     verdict_html as verdict_html,
     write_report as write_report,
+)
+from .section import (
+    Content as Content,
+    PlanScene as PlanScene,
+    Section as Section,
+    flattened as flattened,
 )
 from .workbook import require_excel as require_excel, write_tables as write_tables

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.blocks import Stamp
 from elastocal.cell import Equipment, SensorIdentity, TrackerIdentity
 from elastocal.identification import JOINT_REACH, RAIL_REACH, ProductionCoverage
-from elastocal.report.document.blocks import Stamp
 from elastocal.results import brief_repr
 from elastocal.verdict import (
     Evidence,

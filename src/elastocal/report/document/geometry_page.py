@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal import __version__
+from elastocal import __version__, blocks
 from elastocal.arrays import FloatArray
 from elastocal.files import write_text
 from elastocal.geometry import GeometryAccuracy, GeometryModel, LinkNumber, PoseAccuracy
-from elastocal.report.document import blocks
 from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages import render
 from elastocal.report.plots import MANY_POSITIONS, error_maps, parameter_figure

@@ -9,8 +9,8 @@ from markupsafe import Markup
 from elastocal import __version__
 from elastocal.files import replacing
 from elastocal.report.document import sections as exported
-from elastocal.report.document.blocks import Section
 from elastocal.report.document.certificate import certificate_of_evidence
+from elastocal.report.document.section import Section
 from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages import render, view_data
 from elastocal.verdict import (

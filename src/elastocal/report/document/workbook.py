@@ -4,17 +4,18 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from elastocal.errors import ReportError
-from elastocal.files import replacing
-from elastocal.report.document.blocks import (
+from elastocal.blocks import (
     Block,
     Code,
     Details,
     Facts,
+    Graded,
     PoseButton,
     Stamp,
     Table,
 )
+from elastocal.errors import ReportError
+from elastocal.files import replacing
 from elastocal.report.document.page import SECTIONS
 from elastocal.report.language import Language
 from elastocal.verdict import Evidence
@@ -119,7 +120,7 @@ def _value(value: object, language: Language) -> str | float:
             return value
         case PoseButton(pose):
             return pose
-        case Stamp(text) | Code(text):
+        case Stamp(text) | Code(text) | Graded(text, _):
             return _text(text, language)
     text = str(value)
     # What is a figure by itself can be reckoned with; with its unit it is a text.

@@ -5,10 +5,11 @@ from functools import partial
 
 import numpy as np
 
+from elastocal import blocks
 from elastocal.cell import Cell, Limits
 from elastocal.compensation.conditioning import ToolResult
 from elastocal.procedure.derive import RegistrationSummary, RunSummary, ToolSummary
-from elastocal.report.document import blocks
+from elastocal.report.document.section import Section
 from elastocal.report.plots import StationResiduals, station_figure
 from elastocal.results import counted_alike
 from elastocal.verdict import Evidence
@@ -147,7 +148,7 @@ def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
     yield phrase("Torques that may be used, in N·m"), torques or phrase("not known")
 
 
-CELL = blocks.Section("cell", phrase("The cell"), phrase("What was measured with what?"), 10, _cell)
+CELL = Section("cell", phrase("The cell"), phrase("What was measured with what?"), 10, _cell)
 
 
 def _stations_sensor_tool(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -328,7 +329,7 @@ def _or_unknown(value: float | None, written: Callable[[float], str]) -> str:
     return phrase("not known") if value is None else written(value)
 
 
-INSTRUMENTS = blocks.Section(
+INSTRUMENTS = Section(
     "instruments",
     phrase("Stations, sensor and tool"),
     phrase("Can the instruments be trusted?"),

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import PurePath
 
+from elastocal import blocks
 from elastocal.codec import PairedDifference, Saturation, Variant
-from elastocal.report.document import blocks
+from elastocal.report.document.section import Section
 from elastocal.report.plots import ErrorCurve, error_curves, pose_count_figure
 from elastocal.verdict import CodecEvidence, Evidence
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
@@ -186,6 +187,4 @@ def _pair(pair: PairedDifference, most: float) -> Phrase:
 _MOST_APART = 10.0
 """Width of an interval by the largest error that is left, from which on some fits broke down."""
 
-CODECS = blocks.Section(
-    "codecs", phrase("Number of poses"), phrase("Were there enough poses?"), 60, _body
-)
+CODECS = Section("codecs", phrase("Number of poses"), phrase("Were there enough poses?"), 60, _body)

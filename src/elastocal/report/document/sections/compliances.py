@@ -3,18 +3,26 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal import blocks
 from elastocal.elastic import unit_of
-from elastocal.identification import CalibrationSummary, describe_briefly
+from elastocal.identification import (
+    CalibrationSummary,
+    show_budget,
+    show_ladder,
+    show_unseen,
+    spring_summaries,
+    spring_table,
+)
 from elastocal.identification.recertification import (
     CompareSummary,
     DeflectionChange,
     Estimate,
     Verdict,
 )
-from elastocal.report.document import blocks
-from elastocal.report.plots import SpringBar, recertification_figure, spring_bars, spring_figure
+from elastocal.report.document.section import Section
+from elastocal.report.plots import recertification_figure, spring_bars, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
-from elastocal.wording import Phrase, lengths_with_interval, mm, phrase, phrases, sentences
+from elastocal.wording import Phrase, mm, phrase, phrases, sentences
 
 
 def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -40,36 +48,13 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
             " told by itself; the number is the smallest one that explains the readings."
         ),
     )
-    heads = phrases("Spring", "Known?", "Compliance", "95 % interval", "Unit", "Stiffness")
-    yield blocks.Table(phrase("Compliances"), heads, tuple(map(_row, springs)), texts=2)
-    yield from _not_told_apart(found, springs)
-    yield from _budget(found.figures)
-
-
-def _row(spring: SpringBar) -> blocks.Row:
-    name, unit, value = spring.name, spring.unit, spring.value
-    if spring.group is not None:
-        known: str = phrase("not by itself, group {group}", group=spring.group)
-        return name, known, f"({value:.4f})", _NONE, unit.shown, _NONE
-    if spring.too_weak:
-        return name, phrase("too weak to see"), f"({value:.4f})", _NONE, unit.shown, _NONE
-    stiff = f"{1.0 / value:.3f} {unit.stiffness}" if value > 0.0 else phrase("rigid")
-    if not unit.stiffness or value < 0.0:
-        stiff = _NONE
-    known = phrase("at its bound") if spring.at_bound else phrase("zero")
-    if not (spring.low <= value <= spring.high or spring.at_bound):
-        known = phrase("outside its interval: do not use, the file may have been changed")
-    elif value != 0.0 and not spring.at_bound:
-        half = (spring.high - spring.low) / 2 / abs(value)
-        known = (
-            phrase("{share}", share=f"±{half:.0%}")
-            if half <= 1.0
-            else phrase("hardly: ±{share}", share=f"{half:.0%}")
-            if half <= _MOST_SAID
-            else phrase("hardly: more than ±{share}", share=f"{_MOST_SAID:.0%}")
-        )
-    span = phrase("{low} to {high}", low=f"{spring.low:.3f}", high=f"{spring.high:.3f}")
-    return name, known, f"{value:.4f}", span, unit.shown, stiff
+    known = found.figures.known if found.figures else ()
+    rows, seen = spring_summaries(found.model, settings, known), found.model.observability
+    yield spring_table(rows)
+    attainable = found.figures.rank_attainable if found.figures else seen.rank
+    ranks = seen.rank, attainable, seen.parameters
+    yield from show_unseen(rows, seen.unobservable, ranks, seen.condition)
+    yield from show_budget(found.figures.budget if found.figures else None)
 
 
 def _head(found: ModelEvidence, observable: int, values: int) -> blocks.Block:
@@ -102,29 +87,7 @@ def _ladder(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
     if figures is None or len(figures.ladder) < 2:
         return
     yield blocks.Heading(phrase("Which model the readings carry"))
-    yield blocks.Table(
-        phrase("Models at the same left-out poses"),
-        (
-            *phrases("Springs", "Numbers", "Error at left-out poses"),
-            phrase("Worse than the best by (95 %)"),
-            "",
-        ),
-        tuple(
-            (
-                rung.springs,
-                str(rung.parameters),
-                mm(rung.held_out),
-                phrase(
-                    "{value} ({low} to {high})",
-                    value=mm(rung.difference.mean),
-                    low=mm(rung.difference.low),
-                    high=mm(rung.difference.high),
-                ),
-                phrase("taken") if rung.chosen else "",
-            )
-            for rung in figures.ladder
-        ),
-    )
+    yield from show_ladder(figures.ladder)
     yield blocks.Paragraph(
         phrase(
             "By how much one is worse is the mean over poses of paired differences; poses far from"
@@ -135,74 +98,7 @@ def _ladder(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
     )
 
 
-def _budget(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
-    """Yield what the error at left-out poses is made of, where ``calibrate`` was asked."""
-    if figures is None or figures.budget is None:
-        return
-    yield blocks.Heading(phrase("What the error is made of"))
-    yield blocks.Table(
-        phrase("Parts of the root mean square error at left-out poses, which add up in quadrature"),
-        phrases("Part", "Error", "95 % interval in mm", "Known from"),
-        tuple(
-            (name, *lengths_with_interval(part.error, part.low, part.high), part.source)
-            for name, part in figures.budget.parts
-        ),
-    )
-    yield blocks.Table(
-        phrase("What each term takes away, likewise; below zero where it adds"),
-        (*phrases("Term", "In the model", "Takes away", "95 % interval in mm"), ""),
-        tuple(
-            (
-                term.label,
-                phrase("yes") if term.taken else phrase("no"),
-                *lengths_with_interval(term.worth, term.low, term.high),
-                term.reason or "",
-            )
-            for term in figures.budget.terms
-        ),
-    )
-
-
-def _not_told_apart(found: ModelEvidence, springs: list[SpringBar]) -> Iterator[blocks.Block]:
-    seen = found.model.observability
-    yield blocks.Paragraph(
-        phrase(
-            "{own} of {all} values have an interval of their own, {bound} of these lie at their"
-            " bound; {weak} are too weak to see. Do not use single values: what they predict"
-            " together was tested, and nothing else.",
-            own=sum(each.is_own for each in springs),
-            all=len(springs),
-            bound=sum(each.at_bound for each in springs if each.is_own),
-            weak=sum(each.too_weak for each in springs),
-        )
-    )
-    if not seen.unobservable:
-        return
-    attainable = found.figures.rank_attainable if found.figures else seen.rank
-    missing = attainable - seen.rank
-    yield blocks.Heading(phrase("What cannot be told apart"))
-    yield blocks.Paragraph(
-        phrase(
-            "These combinations change no deflection under a force, so their springs have no value"
-            " of their own. Predictions do not need one."
-        )
-        if missing <= 0
-        else phrase(
-            "{missing} more directions could be seen with other poses or load cases, so that not"
-            " all of these combinations are harmless.",
-            missing=missing,
-        )
-    )
-    groups = enumerate(map(describe_briefly, seen.unobservable), start=1)
-    yield blocks.Bullets(
-        tuple(phrase("Group {number}: {springs}", number=n, springs=each) for n, each in groups)
-    )
-
-
-_NONE = phrase("none")
-_MOST_SAID = 10.0
-"""Half an interval by its value, from which on its size says nothing more."""
-COMPLIANCES = blocks.Section(
+COMPLIANCES = Section(
     "compliances",
     phrase("Compliances"),
     phrase("How soft is the robot, and what can be told apart?"),
@@ -300,7 +196,7 @@ def _span(found: Estimate) -> Phrase:
     )
 
 
-RECERTIFICATION = blocks.Section(
+RECERTIFICATION = Section(
     "recertification",
     phrase("Change since the last calibration"),
     phrase("What changed since last time?"),

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 
+from elastocal import blocks
 from elastocal.identification import UnseenErrors
-from elastocal.report.document import blocks
+from elastocal.report.document.section import Section
 from elastocal.verdict import (
     Evidence,
     UncertaintySource,
@@ -68,7 +69,7 @@ def _unseen(unseen: UnseenErrors) -> Iterator[blocks.Block]:
     )
 
 
-FINDINGS = blocks.Section(
+FINDINGS = Section(
     "findings", phrase("The verdict in full"), phrase("Why, and what next?"), 1, _findings
 )
 
@@ -188,7 +189,7 @@ def _traceability(evidence: Evidence) -> Iterator[blocks.Block]:
     )
 
 
-UNCERTAINTY = blocks.Section(
+UNCERTAINTY = Section(
     "uncertainty",
     phrase("Uncertainty"),
     phrase("How sure is a predicted deflection?"),
@@ -248,7 +249,7 @@ def _always(evidence: Evidence) -> Iterator[Phrase]:
         )
 
 
-NOT_VERIFIED = blocks.Section(
+NOT_VERIFIED = Section(
     "not-verified",
     phrase("What was not verified"),
     phrase("What does this report not say?"),

@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 from functools import partial
 
+from elastocal import blocks
 from elastocal.planning import PlanResult
-from elastocal.report.document import blocks
+from elastocal.report.document.section import PlanScene, Section
 from elastocal.report.pages import expected_table, key_figures
 from elastocal.report.plots import plan_figure, plan_view
 from elastocal.verdict import Evidence
@@ -52,7 +53,7 @@ def _pictures(evidence: Evidence, plan: PlanResult) -> Iterator[blocks.Block]:
             " of each candidate from its nearest chosen pose."
         ),
     )
-    yield blocks.PlanScene(plan_view(cell, surface, plan, pool), plan, pool)
+    yield PlanScene(plan_view(cell, surface, plan, pool), plan, pool)
 
 
 def _poses(plan: PlanResult, buttons: bool) -> blocks.Block:
@@ -123,6 +124,4 @@ def _notes(plan: PlanResult) -> Iterator[blocks.Block]:
 
 _BY_PRODUCTION = "i_optimal"
 
-POSES = blocks.Section(
-    "poses", phrase("Surface and poses"), phrase("Where was measured?"), 20, _body
-)
+POSES = Section("poses", phrase("Surface and poses"), phrase("Where was measured?"), 20, _body)

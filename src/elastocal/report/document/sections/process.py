@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from elastocal import blocks
 from elastocal.compensation.process import (
     CourseDeviation,
     DeviationComparison,
@@ -15,7 +16,7 @@ from elastocal.compensation.process import (
     SimulatedProcess,
     SimulateProcessResult,
 )
-from elastocal.report.document import blocks
+from elastocal.report.document.section import Section, flattened
 from elastocal.report.plots import course_figure, process_maps
 from elastocal.verdict import Evidence, has_own_process
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
@@ -92,7 +93,7 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
     )
     if record.table.budget:
         yield blocks.Details(phrase("Error budget"), (_budget(record.table.budget),))
-    rows = tuple(blocks.flattened(record.table.settings))
+    rows = tuple(flattened(record.table.settings))
     settings = blocks.Table(phrase("Settings, SI units"), phrases("Key", "Value"), rows, 2)
     yield blocks.Details(phrase("Settings of the compensator"), (settings,))
 
@@ -266,7 +267,7 @@ def _mm(values: DeviationStatistics) -> tuple[str, ...]:
     return tuple(f"{1e3 * value:.3f}" for value in _three(values))
 
 
-PROCESS = blocks.Section(
+PROCESS = Section(
     "process",
     phrase("The process path"),
     phrase("What does the correction bring?"),

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import PurePath
 
-from elastocal import __version__
+from elastocal import __version__, blocks
 from elastocal.records import to_data
-from elastocal.report.document import blocks
+from elastocal.report.document.section import Section, flattened
 from elastocal.verdict import BYTES, Evidence, LinkState
 from elastocal.wording import counted, phrase, phrases
 
@@ -45,7 +45,7 @@ def _provenance(evidence: Evidence) -> Iterator[blocks.Block]:
     if evidence.cell is not None:
         values = tuple(
             (key, _of_plan(evidence, key, value))
-            for key, value in sorted(blocks.flattened(evidence.cell.file.model_dump(mode="json")))
+            for key, value in sorted(flattened(evidence.cell.file.model_dump(mode="json")))
         )
         yield blocks.Details(
             phrase(
@@ -158,7 +158,7 @@ def _settings(evidence: Evidence) -> Iterator[blocks.Block]:
             phrase("The model file does not tell the settings of its calibration.")
         )
         return
-    rows = tuple((key, _setting(key, value)) for key, value in blocks.flattened(to_data(settings)))
+    rows = tuple((key, _setting(key, value)) for key, value in flattened(to_data(settings)))
     caption = phrase("Settings of the calibration")
     table = blocks.Table(caption, phrases("Key", "Value"), rows, texts=2)
     yield blocks.Details(caption, (table,))
@@ -171,7 +171,7 @@ def _setting(key: str, value: str) -> str:
     return phrase("that of the dataset") if key == "marker" and value == "none" else value
 
 
-PROVENANCE = blocks.Section(
+PROVENANCE = Section(
     "provenance",
     phrase("Provenance"),
     phrase("Where do the figures come from?"),

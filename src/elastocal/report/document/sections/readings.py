@@ -5,12 +5,19 @@ from functools import partial
 
 import numpy as np
 
+from elastocal import blocks
 from elastocal.arrays import FloatArray
 from elastocal.cell import COUNTED, LineCounts
 from elastocal.dataset import Dataset
-from elastocal.identification import Calibration, CalibrationSummary, Reproduction, UnseenErrors
+from elastocal.identification import (
+    Calibration,
+    CalibrationSummary,
+    Reproduction,
+    UnseenErrors,
+    suspicious_table,
+)
 from elastocal.procedure.derive import RunSummary
-from elastocal.report.document import blocks
+from elastocal.report.document.section import Section
 from elastocal.report.plots import displacement_figure, pose_grid
 from elastocal.verdict import Evidence
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
@@ -192,18 +199,7 @@ def _suspicious(evidence: Evidence) -> Iterator[blocks.Block]:
         look = [alone, phrase("Look at that pose.")] if alone else []
         yield blocks.Paragraph(sentences([nothing, *look, below]))
         return
-    rows = tuple(
-        (
-            _reading(each.pose, each.load_case),
-            mm(each.residual),
-            f"{each.score:.1f}",
-            f"{each.leverage:.2f}",
-            phrase("set aside as a blunder") if each.set_aside else phrase("kept in the fit"),
-        )
-        for each in figures.suspicious
-    )
-    heads = phrases("Reading", "Off by", "Robust score", "Leverage", "What was done")
-    yield blocks.Table(phrase("Readings that look wrong"), heads, rows)
+    yield suspicious_table(figures.suspicious)
 
 
 def _worst(unseen: UnseenErrors) -> blocks.Block:
@@ -254,7 +250,7 @@ def _load_check(figures: CalibrationSummary | None) -> Iterator[blocks.Block]:
     )
 
 
-READINGS = blocks.Section(
+READINGS = Section(
     "readings",
     phrase("Readings"),
     phrase("What was measured, and how well does it fit?"),

@@ -1,4 +1,4 @@
-"""Blocks: the pieces that every section of the report is made of; ``blocks.html`` shows them.
+"""Sections: what the report shows of the evidence; ``blocks.html`` shows their blocks.
 
 A section chooses what to show and never writes markup: texts are said in the language of the
 report and escaped where they are shown, and figures drawn there.
@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from matplotlib.figure import Figure
-
+from elastocal.blocks import Block
 from elastocal.planning import PlanResult, PoolData
 from elastocal.report.pages import render
 from elastocal.report.plots import PlanView
@@ -18,120 +17,14 @@ from elastocal.verdict import Evidence
 from elastocal.wording import Phrase, phrase
 
 
-@dataclass(frozen=True)
-class Stamp:
-    """A time of day; nothing else differs between reports of equal runs."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class Code:
-    """A text in a table that is read letter by letter, such as a hash."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class PoseButton:
-    """A button in a table that shows a pose in the scene."""
-
-    pose: int
-
-
-Cell = str | int | Stamp | Code | PoseButton
-Row = tuple[Cell, ...]
-
-
-@dataclass(frozen=True)
-class Paragraph:
-    """A paragraph; its kind is its class in the style sheet."""
-
-    text: str
-    kind: str = ""
-
-
-@dataclass(frozen=True)
-class Heading:
-    """A heading below that of the section."""
-
-    text: str
-
-
 @brief_repr
 @dataclass(frozen=True)
-class Bullets:
-    """A list; nothing without items."""
-
-    items: tuple[str, ...]
-    kind: str = ""
-    code: bool = False
-    """Whether parts in backticks are commands."""
-
-
-@brief_repr
-@dataclass(frozen=True)
-class Facts:
-    """Key figures: name, and value with its unit."""
-
-    pairs: tuple[tuple[str, str | int], ...]
-
-
-@brief_repr
-@dataclass(frozen=True)
-class Table:
-    """A table that scrolls by itself where the page is narrow."""
-
-    caption: str
-    heads: tuple[str, ...]
-    rows: tuple[Row, ...]
-    """The first cell of each names the row."""
-    texts: int = 1
-    """Columns that hold text and stand to the left; the others hold numbers."""
-    name: str = ""
-    """Identifier, where a script looks for the table."""
-
-
-@brief_repr
-@dataclass(frozen=True)
-class Picture:
-    """A printed figure."""
-
-    draw: Callable[[], Figure]
-    """Returns it; called with the settings of print."""
-    alt: str
-    """Words for readers that cannot see it."""
-    caption: str
-
-
-@dataclass(frozen=True)
-class Verbatim:
-    """A text as it stands."""
-
-    text: str
-
-
-@brief_repr
-@dataclass(frozen=True)
-class PlanScene:
+class PlanScene(Block):
     """The view of a plan in three dimensions."""
 
     view: PlanView
     plan: PlanResult
     pool: PoolData
-
-
-@brief_repr
-@dataclass(frozen=True)
-class Details:
-    """Blocks that a reader may open; of the kind ``long``, they stay folded on paper."""
-
-    summary: str
-    blocks: tuple["Block", ...]
-    kind: str = ""
-
-
-Block = Paragraph | Heading | Bullets | Facts | Table | Picture | Verbatim | PlanScene | Details
 
 
 @brief_repr
