@@ -98,7 +98,7 @@ def decisions(case: Case) -> dict[str, Any]:
         "taken": choice.taken,
         "rank": figures.rank,
         "springs": {
-            each.name: [each.observable, each.group, each.at_bound, each.too_weak, each.low > 0.0]
+            each.name: [each.observable, each.group, each.at_bound, each.too_weak, each.low > _SHOWN]
             for each in figures.springs
         },
         "set aside": np.flatnonzero(~found.used).tolist(),
@@ -116,6 +116,9 @@ def decisions(case: Case) -> dict[str, Any]:
 
 
 _ENDS = ("compliance", "low", "high")
+_SHOWN = 5e-10
+"""Compliances below it, in rad/(N·m), are 0.000 in every table: whether an interval begins there or
+at zero nobody can see."""
 _DUST = 1e-14
 """A compliance below it, in rad/(N·m), is none: no arm has any as small."""
 
