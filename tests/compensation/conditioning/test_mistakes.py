@@ -105,3 +105,12 @@ def test_moments_in_another_unit_are_named(postures):
 def test_equal_postures_with_a_bias_upward_are_undetermined_and_no_mistake():
     tool, rng = PlantedTool(force_bias=np.array([0.0, 0.0, -900.0])), np.random.default_rng(3)
     check(tool.raw(np.repeat(turned(1, rng), 5, axis=0), rng))
+
+
+@pytest.mark.parametrize(("axis", "gain"), [(0, 0.0), (2, 0.0), (0, 1.4), (2, 0.7)])
+def test_a_dead_or_scaled_force_axis_is_named(postures, axis, gain):
+    force = postures.force.copy()
+    force[:, axis] *= gain
+    wrong = postures.read_as(force=force)
+    with pytest.raises(CompensationError, match=f"force_{'xyz'[axis]} shows .* kg of the tool"):
+        refuse_mistakes(wrong, fit_tool(wrong, TOOL.R_flange_sensor), TOOL.R_flange_sensor)

@@ -110,6 +110,8 @@ def _refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray
         _refuse_rotation(postures, fit, left)
     # Without weight, or turned too little, noise is all that changes: undetermined, no misfit.
     if postures.spread > _TURNED and _weight(postures, fit) > left[0]:
+        if fit.rotation_known:
+            _refuse_axis(postures, fit, left)
         which = int(np.argmax(left / _allowed(postures)))
         unit = _UNITS[which]
         raise CompensationError(
@@ -157,6 +159,21 @@ def _refuse_rotation(postures: StaticPostures, fit: ToolFit, left: FloatArray) -
             f" component, {found[0]:.3g} N if it sits {angle:.1f} deg from there; correct"
             " it, or give --free-rotation"
         )
+
+
+def _refuse_axis(postures: StaticPostures, fit: ToolFit, left: FloatArray) -> None:
+    """Refuse a force axis that is dead or scaled: each axis feels a weight, and not the same."""
+    gravity = postures.gravity @ postures.R_base_flange @ fit.R_flange_sensor
+    gravity, force = (part - part.mean(axis=0) for part in (gravity, postures.force))
+    mass = (gravity * force).sum(axis=0) / np.maximum((gravity**2).sum(axis=0), 1e-12)
+    if not _rms(force - mass * gravity) < _MUCH_BETTER * left[0]:
+        return
+    axis = int(np.argmax(np.abs(mass - np.median(mass))))
+    raise CompensationError(
+        f"force_{'xyz'[axis]} shows {mass[axis]:.3g} kg of the tool, the other axes"
+        f" {float(np.delete(mass, axis).mean()):.3g} kg: is its channel dead, its gain or unit"
+        " another?"
+    )
 
 
 def _left(postures: StaticPostures, fit: ToolFit) -> FloatArray:
