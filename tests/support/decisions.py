@@ -98,7 +98,13 @@ def decisions(case: Case) -> dict[str, Any]:
         "taken": choice.taken,
         "rank": figures.rank,
         "springs": {
-            each.name: [each.observable, each.group, each.at_bound, each.too_weak, each.low > _SHOWN]
+            each.name: [
+                each.observable,
+                each.group,
+                each.at_bound,
+                each.too_weak,
+                each.low > _SHOWN,
+            ]
             for each in figures.springs
         },
         "set aside": np.flatnonzero(~found.used).tolist(),

@@ -194,10 +194,11 @@ class BoxLine:
         """See that a count goes on to mean the same."""
         look = self._page_scale if self._settings.tcp_port is None else self._calibration
         while not self._closed.wait(_LOOK_AGAIN) and not self.sensor.failed:
-            # A box that does not answer is known by its stream.
-            with contextlib.suppress(OSError):
+            # A box that does not answer, or whose answer is cut off, is known by its stream.
+            with contextlib.suppress(OSError, DeviceError):
+                scale = look()
                 try:
-                    self._require_same(look())
+                    self._require_same(scale)
                 except DeviceError as error:
                     self.sensor.fail(str(error).removeprefix(f"{self.source}: "))
 
