@@ -2,7 +2,7 @@
 
 from mkdocs.structure.pages import Page
 
-from elastocal.cell import PRESET_FIGURES, PRESETS
+from elastocal.sim import PRESET_FIGURES, PRESETS
 
 _MARK = "<!-- presets -->"
 _PAGE = "explanation/simulated-cell.md"

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from elastocal.cell import SCHEMA, CellFile, Limits, fingerprint, load_cell, named_files
+from elastocal.cell import SCHEMA, Limits, cell_file_model, fingerprint, load_cell, named_files
 from elastocal.cell.examples import write_example
 from elastocal.errors import FileAccessError
 from elastocal.records import read_yaml
@@ -70,7 +70,7 @@ class LaterLimits(Limits):
     reach: float | None = None
 
 
-class LaterCellFile(CellFile):
+class LaterCellFile(cell_file_model()):
     limits: LaterLimits = LaterLimits()
 
 

@@ -5,7 +5,6 @@
 `hardware`    robot, tool, sensor, marker, trackers; tooling surface and other solids
 `procedure`   load cases, limits, search for poses, Procedure 1, what its result is held against
 `motion`      HOME, axis speeds, positions of the external axes
-`simulation`  the hidden truth of the simulated cell, and the faults that it injects
 `devices`     protocols of arm, force sensor, tracker and clock
 `reading`     what one device shows to a person who only looks
 `rig`         which driver makes each device, and what a driver has to do

@@ -1,8 +1,12 @@
 from ._quantities import (
     IDENTITY as IDENTITY,
     Angle as Angle,
+    AngleUpToPi as AngleUpToPi,
     Distance as Distance,
+    Force as Force,
     Length as Length,
+    Mass as Mass,
+    Moment as Moment,
     Name as Name,
     Point as Point,
     Pose as Pose,
@@ -11,16 +15,24 @@ from ._quantities import (
     PositiveMoment as PositiveMoment,
     PositiveSpeed as PositiveSpeed,
     PositiveTime as PositiveTime,
+    RotationalStiffness as RotationalStiffness,
     SampleRate as SampleRate,
+    Scale as Scale,
+    Share as Share,
+    ShareBelowHalf as ShareBelowHalf,
     SignedForce as SignedForce,
+    StiffnessOrNone as StiffnessOrNone,
+    Time as Time,
     TranslationalStiffness as TranslationalStiffness,
 )
 from .arming import Arming as Arming, RealArm as RealArm
 from .cell import (
     SCHEMA as SCHEMA,
+    SECTIONS_OF_OTHERS as SECTIONS_OF_OTHERS,
     TOOLING as TOOLING,
     Cell as Cell,
     CellFile as CellFile,
+    cell_file_model as cell_file_model,
     load_cell as load_cell,
     mounted_robot as mounted_robot,
 )
@@ -111,14 +123,6 @@ from .path_arm import (
     PathSource as PathSource,
     Shift as Shift,
 )
-from .presets import (
-    PRESET_FIGURES as PRESET_FIGURES,
-    PRESETS as PRESETS,
-    Preset as Preset,
-    PresetFigure as PresetFigure,
-    kind_default as kind_default,
-    with_preset as with_preset,
-)
 from .procedure import (
     CONDITIONING as CONDITIONING,
     DEFAULT_POSES as DEFAULT_POSES,
@@ -164,25 +168,6 @@ from .sensor import (
     SENSOR_CORRECTED as SENSOR_CORRECTED,
     SensorLoad as SensorLoad,
     weight_response as weight_response,
-)
-from .simulation import (
-    Balancer as Balancer,
-    Bearings as Bearings,
-    ContactTruth as ContactTruth,
-    ControllerTruth as ControllerTruth,
-    EndEffector as EndEffector,
-    ExternalAxes as ExternalAxes,
-    Fault as Fault,
-    FaultKind as FaultKind,
-    Floor as Floor,
-    Gears as Gears,
-    Geometry as Geometry,
-    Links as Links,
-    SensorTruth as SensorTruth,
-    Simulation as Simulation,
-    Thermal as Thermal,
-    TrackerTruth as TrackerTruth,
-    TruthScale as TruthScale,
 )
 from .visit import (
     VisitStep as VisitStep,

@@ -1,14 +1,16 @@
 """The cell file, validated, and the cell ready to compute with: robot made, files found."""
 
 import contextlib
+import importlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_origin
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, create_model, field_validator
 
 from elastocal.arrays import FloatArray
 from elastocal.cell._quantities import IDENTITY, OptionalName, Pose
@@ -43,7 +45,6 @@ from elastocal.cell.procedure import (
 )
 from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.rig import DeviceChoices
-from elastocal.cell.simulation import Fault, Simulation
 from elastocal.dataset import require_joint_names
 from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import read_text, sha256
@@ -64,12 +65,21 @@ from elastocal.robot import (
 )
 
 SCHEMA = "elastocal.cell/1"
+_Section = TypeVar("_Section")
 TOOLING = "tooling"
 """Name of the surface among the solids of the cell; no fixture may have it."""
 
 
+SECTIONS_OF_OTHERS = {
+    "simulation": ("elastocal.sim", "Simulation"),
+    "faults": ("elastocal.sim", "Faults"),
+}
+"""Sections that the packages read that own them, and that nothing here knows: module and name of
+their type. Each can be left out."""
+
+
 class CellFile(StrictModel):
-    """All keys of a cell file but ``schema``."""
+    """All keys of a cell file but ``schema`` and the sections of others (`cell_file_model`)."""
 
     name: OptionalName = ""
     robot: RobotEntry
@@ -95,10 +105,6 @@ class CellFile(StrictModel):
     """Serials, certificates and names for the first page of the report."""
     procedure: ProcedureSettings = Field(default_factory=ProcedureSettings)
     devices: DeviceChoices = Field(default_factory=DeviceChoices)
-    simulation: Simulation = Field(default_factory=Simulation)
-    """Truth of the simulated devices; the calibration never reads it."""
-    faults: tuple[Fault, ...] = ()
-    """Faults of the simulated devices, and when."""
 
     def __repr__(self) -> str:
         return "\n  ".join([f"CellFile {self.name!r}", *self.summary()])
@@ -141,7 +147,22 @@ class CellFile(StrictModel):
             f" fx {loads.fx:g} N, fy {loads.fy:g} N, fz {loads.fz:g} N",
             f"search: {self.search.technique}, {self.search.pose_limit or 'any number of'} poses",
         ]
-        return lines + ([f"faults: {len(self.faults)}"] if self.faults else [])
+        others = ((name, getattr(self, name, ())) for name in SECTIONS_OF_OTHERS)
+        lists = ((name, found) for name, found in others if isinstance(found, tuple) and found)
+        return lines + [f"{name}: {len(found)}" for name, found in lists]
+
+    def section(self, name: str, kind: type[_Section]) -> _Section:
+        """Return a section of others (`SECTIONS_OF_OTHERS`).
+
+        Raises
+        ------
+        TypeError
+            If it is of another type.
+        """
+        found = getattr(self, name)
+        if not isinstance(found, kind):
+            raise TypeError(f"section {name} is {type(found).__name__}, not {kind.__name__}")
+        return found
 
     @field_validator("trackers")
     @classmethod
@@ -168,6 +189,20 @@ class CellFile(StrictModel):
         if payload is not None and not mass <= payload:
             raise ValueError(f"payload {payload:g} kg is below the tool's mass, {mass:g} kg")
         return limits
+
+
+@cache
+def cell_file_model() -> type[CellFile]:
+    """Return the model of a whole cell file, with the sections of others."""
+    types: dict[str, Any] = {
+        name: getattr(importlib.import_module(module), kind)
+        for name, (module, kind) in SECTIONS_OF_OTHERS.items()
+    }
+    fields: dict[str, Any] = {
+        name: (kind, Field(default_factory=get_origin(kind) or kind))
+        for name, kind in types.items()
+    }
+    return create_model("CellFile", __base__=CellFile, __module__=__name__, **fields)
 
 
 _TCP = "tcp"
@@ -304,7 +339,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     """
     path = Path(path)
     text = read_text(path)
-    file = from_data(CellFile, parse_yaml(text, path), str(path), SCHEMA)
+    file = from_data(cell_file_model(), parse_yaml(text, path), str(path), SCHEMA)
     robot = _at(f"{path}: robot", lambda: mounted_robot(path, file.robot, file.tcp))
     margins = _at(str(path), lambda: joint_margins(robot, file.limits))
     positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))

@@ -6,11 +6,11 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-from elastocal.cell.cell import Cell
+from elastocal.cell.cell import SECTIONS_OF_OTHERS, Cell
 from elastocal.files import read_bytes
 from elastocal.robot import is_relative
 
-RUN_SECTIONS = ("acceptance", "certificate", "procedure", "devices", "simulation", "faults")
+RUN_SECTIONS = ("acceptance", "certificate", "procedure", "devices", *SECTIONS_OF_OTHERS)
 """Sections of the cell file that say how a plan is carried out and its result is judged; a plan
 does not depend on them."""
 

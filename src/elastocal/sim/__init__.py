@@ -7,6 +7,7 @@ It is made by other equations than the estimator's: no Pinocchio, no `elastocal.
               paper records on them
 `workcell`    a whole cell in time: robot controller, force sensor, tracker, clock, faults
 `wire`        the cell speaking as controllers, sensors and trackers do, over sockets
+`truth`       the sections `simulation` and `faults` of the cell file; their `presets`
 `driver`      the simulated devices, as `elastocal.workflows.run` finds them
 ============  =================================================================================
 """

@@ -21,6 +21,7 @@ from elastocal.errors import DeviceError, of_kind, present
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result
+from elastocal.sim import truth_of
 from elastocal.units import parse_quantity
 from elastocal.workflows._operator_and_devices import Operator, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
@@ -109,7 +110,7 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
     rig = rig_of(cell)
     with (
         rig.reserved("measure-delay") as reserved,
-        contextlib.closing(reserved.connect(cell.file.simulation.seed, 0.0)) as devices,
+        contextlib.closing(reserved.connect(truth_of(cell).seed, 0.0)) as devices,
     ):
         arm = of_kind(devices.arm, KukaArm, "arm")
         settings.operator.warn(

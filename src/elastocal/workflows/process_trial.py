@@ -20,6 +20,7 @@ from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
+from elastocal.sim import truth_of
 from elastocal.sim.workcell import ProcessCell
 
 __all__ = ["ProcessTrial", "TrialRuns", "run_budget", "run_loads"]
@@ -83,7 +84,7 @@ class _Effect:
 
     def changed(self, cell: Cell) -> Cell:
         """Return the cell with those parts of its simulated truth switched off."""
-        simulation = cell.file.simulation
+        simulation = truth_of(cell)
         for parts in self.off:
             update = {
                 part: getattr(simulation, part).model_copy(update=dict(figures))

@@ -28,6 +28,7 @@ from elastocal.procedure.run import FaultError, ForceTap, LeavingWatch, ToolLoad
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.sim import truth_of
 from elastocal.wording import mm
 from elastocal.workflows._operator_and_devices import (
     Operator,
@@ -185,7 +186,7 @@ def _connected(cell: Cell, reserved: ReservedRig) -> Iterator[_Bench]:
         for name, driver in rig.drivers.items():
             wanted = {k: each for k, each in rig.wanted[name].items() if k != "metrology"}
             feed = next((each.feed for each in made if each.feed is not None), _NoForce())
-            context = RigContext(clock, cell.file.simulation.seed, 0.0, feed, reserved.ports)
+            context = RigContext(clock, truth_of(cell).seed, 0.0, feed, reserved.ports)
             if not wanted:
                 continue
             try:

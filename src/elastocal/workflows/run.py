@@ -24,6 +24,7 @@ from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.sim import truth_of
 from elastocal.workflows._contact_lines import contact_sentence, tell_at_once
 from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
@@ -250,7 +251,7 @@ def _prepare(settings: RunSettings) -> _Job:
     loaded, read = load_cell(Path(settings.cell)), read_plan(plan)
     folder = plan if plan.is_dir() else plan.parent
     key = None if settings.sign is None else verdict.read_private_key(settings.sign)
-    seed = loaded.file.simulation.seed if settings.seed is None else settings.seed
+    seed = truth_of(loaded).seed if settings.seed is None else settings.seed
     stated = procedure.run_record(
         loaded,
         read,

@@ -12,6 +12,7 @@ from elastocal.errors import DeviceError, nearest
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
 from elastocal.results import Result, brief_repr
+from elastocal.sim import truth_of
 from elastocal.sim.wire import LiveCell, Told, WireServer, suited_servers, wire_servers
 from elastocal.workflows._device_locks import devices_to_oneself
 from elastocal.workflows._operator_and_devices import Rig, rig_of
@@ -108,7 +109,7 @@ def simulate(
     rate = cell.file.devices.clock_rate if settings.rate is None else settings.rate
     if not 0.0 < rate <= 1000.0:
         raise DeviceError(f"rate is {rate:g}: must be above 0, at most 1000")
-    seed = cell.file.simulation.seed if settings.seed is None else settings.seed
+    seed = truth_of(cell).seed if settings.seed is None else settings.seed
     live = LiveCell(cell, seed, WallClock(rate=rate))
     makers = wire_servers()
     servers = dict[str, WireServer]()

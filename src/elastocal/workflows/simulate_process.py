@@ -22,6 +22,7 @@ from elastocal.files import filling, read_text, sha256
 from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
+from elastocal.sim import truth_of
 from elastocal.wording import phrase
 from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
@@ -217,7 +218,7 @@ class _SeedRuns:
 
     def table(self) -> SimulateProcessResult:
         """Return the record of all seeds."""
-        settings, simulation, usual = self.settings, self.cell.file.simulation, self.loads[1.0]
+        settings, simulation, usual = self.settings, truth_of(self.cell), self.loads[1.0]
         name = _direction_name(settings)
         covered, doubt = _on_production(self.trials[0].model, self.programmed)
         return SimulateProcessResult(

@@ -23,6 +23,7 @@ from elastocal.errors import ElastocalError
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.sim import truth_of
 from elastocal.workflows._inputs import seconds_of
 from elastocal.workflows._operator_and_devices import ReservedRig, Rig, rig_of
 from elastocal.workflows._workflow import workflow
@@ -172,7 +173,7 @@ class _Line(threading.Thread):
 
     def _look(self, reserved: ReservedRig) -> None:
         """Show the devices until it is over."""
-        rig, seed = self._rig, self._rig.cell.file.simulation.seed
+        rig, seed = self._rig, truth_of(self._rig.cell).seed
         context = RigContext(
             self._clock, seed, self._clock.now(), None, reserved.ports, watches=True
         )

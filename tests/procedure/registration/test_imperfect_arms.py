@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.cell import PRESETS
 from elastocal.procedure.derive import robot_errors
 from elastocal.procedure.registration import Registration, UnloadedReadings, register
 from elastocal.procedure.registration._fit import fit
+from elastocal.sim import PRESETS
 from elastocal.sim.workcell import CampaignSimulator, ContactPoses
 from support.simulated import example_cell, places
 from support.stations import SIGMA, made, station

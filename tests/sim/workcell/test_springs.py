@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.cell import Gears
+from elastocal.sim import Gears
 from elastocal.sim.arm import BalancerSpring, GearLaws, RobotSprings
 
 K = np.array([2e6, 1e6, 5e5])

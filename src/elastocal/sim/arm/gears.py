@@ -38,10 +38,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Gears
 from elastocal.errors import SpringError
 from elastocal.results import brief_repr
 from elastocal.sim.arm.springs import SpringResponse
+from elastocal.sim.truth import Gears
 
 _STOPS = 4
 """Number of sliders of a gear's friction."""

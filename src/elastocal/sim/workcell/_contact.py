@@ -28,6 +28,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import SchemaError
 from elastocal.meshes import load_triangles
+from elastocal.sim.truth import truth_of
 
 LIMIT = 0.999
 """Part of the friction limit that a sliding contact keeps up: its shear is finite."""
@@ -59,7 +60,7 @@ class ContactLaw:
     @classmethod
     def of(cls, cell: Cell) -> "ContactLaw":
         """Return the contact of a cell."""
-        entry = cell.file.simulation.contact
+        entry = truth_of(cell).contact
         friction = entry.friction
         return cls(
             entry.normal_stiffness,
@@ -188,7 +189,7 @@ class TrueSurface:
             If the mesh cannot be read.
         """
         T = cell.T_base_surface
-        offset = np.array(cell.file.simulation.contact.surface_offset)
+        offset = np.array(truth_of(cell).contact.surface_offset)
         corners = cell.file.surface.metres * _triangles(cell.surface_path)
         return cls(corners @ T[:3, :3].T + T[:3, 3] + offset)
 

@@ -10,8 +10,9 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, CommandChecks, Fault, Motion
+from elastocal.cell import ArmState, CommandChecks, Motion
 from elastocal.errors import DeviceError
+from elastocal.sim.truth import Fault, truth_of
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._paths import ForceControl, guarded_move, joint_path, retract_path
 from elastocal.sim.workcell._plant import FOREVER, Plant
@@ -134,7 +135,7 @@ class SimulatedArm:
         _CHECKS.require(
             wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press"
         )
-        most = self._plant.cell.file.simulation.controller.collision_force
+        most = truth_of(self._plant.cell).controller.collision_force
         size = float(np.linalg.norm(wanted))
         _CHECKS.require(size <= most, "force", size, f"at most {most:g} N, what the drives give")
         _CHECKS.require(0.0 < rate < math.inf, "force rate", rate, "above 0 N/s and finite")

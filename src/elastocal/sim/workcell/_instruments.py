@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import BeamState, Cell, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError, nearest, present
+from elastocal.sim.truth import truth_of
 from elastocal.sim.workcell._imperfections import ForceGain, SensorHysteresis
 from elastocal.sim.workcell._plant import Plant
 from elastocal.sim.workcell._timeline import MICROSECONDS, Segment, generator
@@ -144,7 +145,7 @@ class SimulatedForceSensor(_SimulatedInstrument):
 
     def __init__(self, plant: Plant) -> None:
         """Put the cell's sensor between flange and tool."""
-        cell, entry = plant.cell, plant.cell.file.simulation.sensor
+        cell, entry = plant.cell, truth_of(plant.cell).sensor
         self._entry, self.range = entry, sensor_range(cell)
         self.matrix, self.zero = sensor_matrix(cell, plant.seed), sensor_zero(cell, plant.seed)
         self.sigma = np.repeat([entry.force_noise, entry.moment_noise], 3)
@@ -245,7 +246,7 @@ class SimulatedTracker(_SimulatedInstrument):
         DeviceError
             If the cell has no station.
         """
-        cell, entry = plant.cell, plant.cell.file.simulation.tracker
+        cell, entry = plant.cell, truth_of(plant.cell).tracker
         if not cell.file.trackers:
             raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
         self._entry = entry
@@ -347,12 +348,12 @@ def sensor_range(cell: Cell) -> FloatArray:
 def sensor_zero(cell: Cell, seed: int) -> FloatArray:
     """Return what the sensor reads under nothing, shape (6,), in N and N·m."""
     zero = generator(seed, "sensor", "zero").standard_normal(6)
-    return cell.file.simulation.sensor.bias * sensor_range(cell) * zero
+    return truth_of(cell).sensor.bias * sensor_range(cell) * zero
 
 
 def sensor_matrix(cell: Cell, seed: int) -> FloatArray:
     """Return what the sensor reads per true wrench, shape (6, 6)."""
-    scale, share = sensor_range(cell), cell.file.simulation.sensor.cross_talk
+    scale, share = sensor_range(cell), truth_of(cell).sensor.cross_talk
     talk = share * generator(seed, "sensor", "cross-talk").standard_normal((6, 6))
     return np.eye(6) + talk * np.divide.outer(scale, scale)
 

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Fault, Motion
+from elastocal.cell import Motion
 from elastocal.errors import DeviceError, of_kind, present
+from elastocal.sim.truth import Fault, truth_of
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._imperfections import ForceGain
 from elastocal.sim.workcell._plant import Plant
@@ -118,7 +119,7 @@ def guarded_move(
         end = _moved(plant, start, distance * direction, error)
         return GuardedMove(straight_path(statics, [start, end]), None, False, distance)
     contact, touch = found
-    entry = plant.cell.file.simulation.controller
+    entry = truth_of(plant.cell).controller
     speed, limit = guard[0], min(guard[1], entry.collision_force)
 
     def press(force: float) -> RobotState:
@@ -348,13 +349,13 @@ class ForceControl:
         end = self._equilibrium(start, contact)
         plant.contact = contact
         ramp = max(float(np.linalg.norm(end.force - start.force)) / self._rate, least)
-        law: TimeLaw = SettlingRamp(ramp, plant.cell.file.simulation.controller.settling)
+        law: TimeLaw = SettlingRamp(ramp, truth_of(plant.cell).controller.settling)
         path, holding = plant.statics.path(start, end), (Motion.HOLDING, Motion.HOLDING)
         return plant.run(path, law, holding, ripple=self._ripple())
 
     def _slide(self, held: Segment) -> None:
         """Slide at a steady speed until the controller has had enough."""
-        plant, entry = self._plant, self._plant.cell.file.simulation
+        plant, entry = self._plant, truth_of(self._plant.cell)
         contact = plant.contact
         if plant.segment is not held or contact is None:
             return
@@ -391,7 +392,7 @@ class ForceControl:
 
     def _ripple(self) -> Ripple:
         plant = self._plant
-        amplitude, frequency = plant.cell.file.simulation.controller.ripple, _UNREST
+        amplitude, frequency = truth_of(plant.cell).controller.ripple, _UNREST
         for fault in plant.schedule.at(plant.visit):
             if fault.kind == "never_stable" and fault.load == self.load:
                 amplitude, frequency = fault.amplitude, _NEVER_AT_REST

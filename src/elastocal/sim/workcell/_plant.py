@@ -7,9 +7,10 @@ from typing import Protocol
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell, Fault, Motion
+from elastocal.cell import Cell, Motion
 from elastocal.errors import DeviceError, nearest
 from elastocal.robot import inverse_transform
+from elastocal.sim.truth import Fault, faults_of, truth_of
 from elastocal.sim.workcell._contact import Contact, ContactLaw, TrueSurface
 from elastocal.sim.workcell._imperfections import DRAWS, VisitChance
 from elastocal.sim.workcell._quasistatics import Quasistatics
@@ -70,13 +71,13 @@ class FaultSchedule:
             If a fault names a tracker station that is not there.
         """
         names = [tracker.name for tracker in cell.file.trackers]
-        for fault in cell.file.faults:
+        for fault in faults_of(cell):
             if fault.station is not None and fault.station not in names:
                 raise DeviceError(
                     f"fault {fault.kind}: there is no tracker station {fault.station!r}"
                     f"{nearest(fault.station, names)} (stations: {', '.join(names)})"
                 )
-        self._faults = cell.file.faults
+        self._faults = faults_of(cell)
         self.active: list[FaultSpan] = []
 
     def begin(self, step: str, visit: int, load: int, now: int) -> list[tuple[int, Fault]]:
@@ -87,7 +88,7 @@ class FaultSchedule:
         Parameters
         ----------
         step : str
-            See `elastocal.cell.simulation.Fault.step`.
+            See `elastocal.sim.truth.Fault.step`.
         visit : int
             Number of the visit.
         load : int
@@ -218,7 +219,7 @@ class Plant:
         self._restart_instruments("from")
 
     def _draw(self) -> None:
-        entry = self.cell.file.simulation.controller
+        entry = truth_of(self.cell).controller
         stops = generator(self.seed, "stops", self.key).standard_normal((DRAWS, 3))
         self._stops = entry.repeatability * stops
         self._slips = generator(self.seed, "slips", self.key).standard_normal((DRAWS, 2))

@@ -16,6 +16,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
 from elastocal.robot import inverse_transform
+from elastocal.sim.truth import truth_of
 from elastocal.sim.workcell._imperfections import Growth, VisitChance
 from elastocal.sim.workcell._robot import RobotEquilibrium, TrueRobot
 from elastocal.sim.workcell._timeline import Knots, RobotPath, RobotState
@@ -45,7 +46,7 @@ class Quasistatics:
     def of(cls, cell: Cell, robot: TrueRobot) -> "Quasistatics":
         """Return the statics of a cell, its arm cold and its gears without strain."""
         marker = np.zeros(3) if cell.file.marker is None else cell.file.marker.position_tcp
-        simulation = cell.file.simulation
+        simulation = truth_of(cell)
         drift, external = simulation.thermal.drift, robot.external
         growth = None
         if drift > 0.0:

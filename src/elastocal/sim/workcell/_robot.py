@@ -44,6 +44,7 @@ from elastocal.sim.arm import (
     solve_inverse,
     tilt_springs,
 )
+from elastocal.sim.truth import truth_of
 from elastocal.sim.workcell._imperfections import built
 
 ARM_JOINTS = 6
@@ -133,7 +134,7 @@ class TrueRobot:
                 f"the simulated arm needs six joints; {linkage.name} has"
                 f" {len(linkage.joint_names)} ({', '.join(linkage.joint_names)})"
             )
-        simulation = cell.file.simulation
+        simulation = truth_of(cell)
         real = built(linkage, simulation.geometry, external, simulation.seed)
         chain, springs = _springs(cell, real, external)
         return cls(
@@ -257,7 +258,7 @@ class TrueRobot:
 
 def _springs(cell: Cell, linkage: Linkage, external: int) -> tuple[SpringChain, RobotSprings]:
     """Return where the springs of a cell's robot sit, and their laws."""
-    truth, scale = cell.file.simulation, cell.file.simulation.truth
+    truth, scale = truth_of(cell), truth_of(cell).truth
     size = _size(linkage, external)
     usual = size * HIGH_TORQUE * np.array(AXIAL_STIFFNESS)
     stiffness = scale.gears * np.array(truth.gears.stiffness or usual)
@@ -295,7 +296,7 @@ def _size(linkage: Linkage, external: int) -> float:
 
 
 def _drives(cell: Cell, linkage: Linkage, external: int) -> list[TruthSpring]:
-    entry, scale = cell.file.simulation.external, cell.file.simulation.truth.external
+    entry, scale = truth_of(cell).external, truth_of(cell).truth.external
     stiffness = {True: scale * entry.turning, False: scale * entry.linear}
     return [
         axial_spring(linkage, joint, stiffness[linkage.revolute[joint]])
@@ -325,7 +326,7 @@ def _bending(linkage: Linkage, joint: int, stiffness: float) -> list[TruthSpring
 
 def _end_effector(cell: Cell, linkage: Linkage) -> list[TruthSpring]:
     """Return three turns and three shifts at the sensor, last of all springs."""
-    entry, scale = cell.file.simulation.end_effector, cell.file.simulation.truth.end_effector
+    entry, scale = truth_of(cell).end_effector, truth_of(cell).truth.end_effector
     T = inverse_transform(linkage.T_base_joint[-1]) @ linkage.T_base_tip @ _sensor_frame(cell)
     at, name = as_triple(T[:3, 3]), linkage.joint_names[-1]
     kinds = ((True, scale * entry.turn), (False, scale * entry.shift))
@@ -348,7 +349,7 @@ def _balancer(cell: Cell, linkage: Linkage, size: float) -> BalancerSpring | Non
     Upright is where the link behind axis 2 points along axis 1 against gravity. Without a link,
     or with axis 1 level (a robot on a wall), no spring balances the arm.
     """
-    entry, scale = cell.file.simulation.balancer, cell.file.simulation.truth.balancer
+    entry, scale = truth_of(cell).balancer, truth_of(cell).truth.balancer
     first = len(linkage.joint_names) - ARM_JOINTS
     screws, arm = linkage.screws, linkage.T_base_joint[first + 2, :3, 3]
     up = -screws.axis[first] * (screws.axis[first] @ cell.gravity_base)

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
+from elastocal.sim.truth import truth_of
 from elastocal.sim.workcell._contact import Contact, ContactLaw
 from elastocal.sim.workcell._imperfections import SensorHysteresis, VisitChance
 from elastocal.sim.workcell._instruments import sensor_range
@@ -101,8 +102,8 @@ class CampaignSimulator:
             Quasistatics.of(cell, TrueRobot.of(cell)),
             ContactLaw.of(cell),
             cell.file.engagement.near_contact,
-            np.array(cell.file.simulation.contact.surface_offset),
-            (cell.file.simulation.sensor.hysteresis, sensor_range(cell)),
+            np.array(truth_of(cell).contact.surface_offset),
+            (truth_of(cell).sensor.hysteresis, sensor_range(cell)),
         )
 
     @property

@@ -17,6 +17,7 @@ from elastocal.cell import Cell, load_case_time
 from elastocal.dataset import Readings
 from elastocal.errors import present
 from elastocal.results import brief_repr
+from elastocal.sim.truth import truth_of
 from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
 from elastocal.sim.workcell.campaign import TrueReadings
 
@@ -94,7 +95,7 @@ class CampaignErrors:
         DeviceError
             If the cell has no force sensor.
         """
-        entry, procedure = cell.file.simulation, cell.file.procedure
+        entry, procedure = truth_of(cell), cell.file.procedure
         tracker, sensor, ranges = entry.tracker, entry.sensor, sensor_range(cell)
         times = (procedure.unloaded_average, procedure.average)
         averages = [averaged_noise(tracker.turbulence, time, tracker.rate) for time in times]

@@ -28,6 +28,7 @@ from elastocal.cell import Cell, Devices
 from elastocal.errors import present
 from elastocal.results import brief_repr
 from elastocal.sim.arm import Reaction
+from elastocal.sim.truth import truth_of
 from elastocal.sim.workcell._controller import SimulatedArm
 from elastocal.sim.workcell._imperfections import SensorHysteresis, VisitChance
 from elastocal.sim.workcell._instruments import (
@@ -133,7 +134,7 @@ class ProcessCell:
         DeviceError
             If the cell has no sensor or no tracker, or its robot fewer than six joints.
         """
-        run, simulation = SimulatedCell.of(cell, seed), cell.file.simulation
+        run, simulation = SimulatedCell.of(cell, seed), truth_of(cell)
         self._statics, self._sensor, self._seed = run.plant.statics, run.sensor, seed
         self._law, self._chance = run.plant.contact_law, run.plant.chance
         self._repeatability = simulation.controller.repeatability

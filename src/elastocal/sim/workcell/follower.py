@@ -24,7 +24,8 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Fault, Motion
+from elastocal.cell import Motion
+from elastocal.sim.truth import Fault
 from elastocal.sim.workcell._contact import LIMIT, Contact, Hit
 from elastocal.sim.workcell._plant import Plant
 from elastocal.sim.workcell._tangent import GearCurves, Tangent, View, contact_compliance, cross

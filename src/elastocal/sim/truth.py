@@ -1,16 +1,16 @@
-"""The hidden truth of the simulated cell, the figures of its devices, and the faults it injects.
+"""The sections `simulation` and `faults` of a cell file: the hidden truth of the simulated cell.
 
-Only the simulation reads this; nothing here is known to planning, procedure or calibration. What
-makes one cell harder than another is in the table of `presets`, each figure with its source; all
-other defaults are assumptions of a plausible size.
+Planning, procedure and calibration do not know them; `elastocal.cell` finds them by name
+(`SECTIONS_OF_OTHERS`). What makes one cell harder than another is in the table of `presets`, each
+figure with its source; all other defaults are assumptions of a plausible size.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import Field, FiniteFloat, field_validator, model_validator
 
-from elastocal.cell._quantities import (
+from elastocal.cell import (
     AngleUpToPi,
     Distance,
     Force,
@@ -30,8 +30,11 @@ from elastocal.cell._quantities import (
     Time,
     TranslationalStiffness,
 )
-from elastocal.cell.presets import PRESETS, Preset, kind_default, with_preset
 from elastocal.records import StrictModel
+from elastocal.sim.presets import PRESETS, Preset, kind_default, with_preset
+
+if TYPE_CHECKING:
+    from elastocal.cell import Cell
 
 _SIX = Field(min_length=6, max_length=6)
 _SmallAngle = Annotated[AngleUpToPi, Field(le=0.01)]
@@ -248,7 +251,7 @@ class Simulation(StrictModel):
     """Section ``simulation`` of the cell file."""
 
     preset: Preset = "typical"
-    """Gives the figures that the file leaves out; see `elastocal.cell.presets`."""
+    """Gives the figures that the file leaves out; see `elastocal.sim.presets`."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of everything random in the simulated devices."""
     truth: TruthScale = TruthScale()
@@ -354,3 +357,17 @@ class Fault(StrictModel):
                         f" (its keys: {', '.join(sorted(allowed)) or 'none'})"
                     )
         return data
+
+
+Faults = tuple[Fault, ...]
+"""Section ``faults``: in any order."""
+
+
+def truth_of(cell: "Cell") -> Simulation:
+    """Return the section ``simulation`` of a cell's file."""
+    return cell.file.section("simulation", Simulation)
+
+
+def faults_of(cell: "Cell") -> Faults:
+    """Return the section ``faults`` of a cell's file."""
+    return cast("Faults", cell.file.section("faults", tuple))
