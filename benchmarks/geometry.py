@@ -13,7 +13,11 @@ from time import perf_counter
 import numpy as np
 from scipy.optimize import least_squares
 
-from elastocal.geometry import GeometryProblem, State, climb, fit, frames, register, told_apart
+from elastocal.geometry import GeometryProblem
+from elastocal.geometry.arm import frames
+from elastocal.geometry.ladder import climb
+from elastocal.geometry.problem import State
+from elastocal.geometry.solve import fit, register, told_apart
 from elastocal.progress import silent
 from elastocal.robot import catalogue
 

@@ -25,7 +25,6 @@ from elastocal.identification import RUNGS, Calibration, FitOptions, calibrate, 
 from elastocal.identification.mistakes import find_undone
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.arm import (
-    GRAVITY,
     LOAD_CASES,
     SHOP_FLOOR,
     Linkage,
@@ -34,6 +33,7 @@ from elastocal.sim.arm import (
     press_forces,
     press_poses,
 )
+from elastocal.sim.arm.elastic_arm import GRAVITY
 
 POSES, COUNTED = 31, 40
 

@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from elastocal import workflows  # noqa: E402 - the path comes first
 from elastocal.cell import SensorStatus, WrenchBlock, load_cell  # noqa: E402
 from elastocal.robot import xyzabc_from_T  # noqa: E402
-from elastocal.sim.wire import NetFtServer  # noqa: E402
+from elastocal.sim.wire.net_ft import NetFtServer  # noqa: E402
 from support.live_on_wire import LiveFiles  # noqa: E402
 
 CYCLE, LATE = 0.004, 0.0035

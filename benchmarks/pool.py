@@ -19,7 +19,8 @@ import numpy as np
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.parallel import core_count
-from elastocal.planning import SampledPool, cell_surface, sample_pool
+from elastocal.planning import cell_surface, sample_pool
+from elastocal.planning.pool_sampling import SampledPool
 from elastocal.robot.inverse import inverse_for
 
 SIZES = (1000, 3000, 10_000)

@@ -13,19 +13,19 @@ from timing import seconds
 from elastocal.elastic import ElasticModel, layout
 from elastocal.planning.search import (
     CRITERIA,
-    EPSILON,
     Candidates,
     Cover,
     ExchangeSearch,
-    ExchangeSelection,
     Information,
-    PlainField,
     build_information,
     covering_radius,
     nearest_neighbour,
     o1,
     technique,
 )
+from elastocal.planning.search.cover import PlainField
+from elastocal.planning.search.exchange import ExchangeSelection
+from elastocal.planning.search.information import EPSILON
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.arm import (
     Linkage,

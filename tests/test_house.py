@@ -40,18 +40,20 @@ def test_what_a_face_exports_is_there(faces):
         assert missing == [], package
 
 
-def test_every_public_name_of_a_plain_module_is_exported(measured):
-    assert house.forgotten_names(measured) == []
+def test_what_a_face_exports_somebody_else_uses(measured):
+    assert house.idle_exports(measured, [ROOT / "docs", ROOT / "examples"]) == []
 
 
-def test_a_public_name_that_no_face_exports_is_seen(tmp_path):
-    package = tmp_path / "top" / "package"
-    package.mkdir(parents=True)
-    for folder in (package.parent, package):
+def test_an_export_that_nobody_uses_is_seen(tmp_path):
+    package, other = tmp_path / "top" / "package", tmp_path / "top" / "other"
+    for folder in (package.parent, package, other):
+        folder.mkdir()
         (folder / "__init__.py").touch()
-    (package / "__init__.pyi").write_text("from .module import (shown as shown)")
-    (package / "module.py").write_text("shown, forgotten, _own = 1, 2, 3\n")
-    assert house.forgotten_names(house.measure(tmp_path)) == ["top.package.module.forgotten"]
+    (package / "__init__.pyi").write_text("from .module import (shown as shown, idle as idle)")
+    (package / "module.py").write_text("shown, idle = 1, 2\n")
+    (package / "inside.py").write_text("from top.package import idle\n")
+    (other / "user.py").write_text("from top import package\n\nprint(package.shown)\n")
+    assert house.idle_exports(house.measure(tmp_path), []) == ["top.package.idle"]
 
 
 def test_no_module_hides_what_its_face_exports_under_the_same_name(measured, faces):

@@ -15,11 +15,13 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from typer.main import get_command
 
-from elastocal.cell import RUN_SECTIONS, ProcedureSettings, cell_file_model
+from elastocal.cell import ProcedureSettings
+from elastocal.cell.cell import cell_file_model
+from elastocal.cell.identity import RUN_SECTIONS
 from elastocal.cli.main import app
 from elastocal.procedure.run.steps import Fault
-from elastocal.sim import FaultKind
-from elastocal.workflows import chapters
+from elastocal.sim.truth import FaultKind
+from elastocal.workflows.demo import chapters
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
 

@@ -5,17 +5,18 @@ table "Measures of the good houses" that the project holds itself to:
 
 * code lines: neither blank, nor comment, nor docstring;
 * an importer is another module that imports a name of this one, directly or through the face of a
-  package; a module that a face exports has users outside and is not counted among those with one;
+  package;
 * a face is the ``__init__`` of a package: a module goes round it when it imports from a module of
   a package that it does not live in.
 """
 
 import ast
+import re
 import statistics
 import sys
 import tokenize
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -195,6 +196,189 @@ def _goes_round(module: Module, target: Module) -> bool:
     return not target.is_face and not top_level and not f"{module.name}.".startswith(f"{home}.")
 
 
+def used_exports(house: House, faces: dict[str, dict[str, str]]) -> set[tuple[str, str]]:
+    """Return the names of faces that a module outside the face's package uses, with the face.
+
+    A name that one face takes from another is used there when it is used here.
+    """
+    used = {
+        (package, name)
+        for module in house.modules.values()
+        for package, name in names_used(module, faces)
+        if not f"{module.name}.".startswith(f"{package}.")
+    }
+    return with_sources(used, house)
+
+
+def with_sources(used: set[tuple[str, str]], house: House) -> set[tuple[str, str]]:
+    """Return names of faces with those that they are taken from."""
+    taken = {
+        (module.name, alias.asname or alias.name): (_absolute(node, module.name), alias.name)
+        for module in house.modules.values()
+        if module.is_face and module.path.with_suffix(".pyi").is_file()
+        for node in ast.parse(module.path.with_suffix(".pyi").read_text("utf-8")).body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    found, new = set(used), set(used)
+    while new:
+        new = {taken[each] for each in new if each in taken} - found
+        found |= new
+    return found
+
+
+def names_used(module: Module, faces: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
+    """Yield the names of faces that a module uses, by import or behind the name of a package."""
+    yield from (
+        (named, alias.name)
+        for named, alias in _taken(module)
+        if named in faces and f"{named}.{alias.name}" not in faces
+    )
+    local = {
+        alias.asname or alias.name: f"{named}.{alias.name}".removeprefix(".")
+        for named, alias in _taken(module)
+        if f"{named}.{alias.name}".removeprefix(".") in faces
+    }
+    for node in ast.walk(module.tree):
+        # An annotation in quotes names what it needs, too.
+        written = node.value if isinstance(node, ast.Constant) else None
+        if isinstance(node, ast.Attribute):
+            written = ast.unparse(node)
+        if isinstance(written, str) and _DOTTED.fullmatch(written):
+            first, *rest = written.split(".")
+            yield from _behind(local.get(first, first), rest, faces)
+
+
+def _taken(module: Module) -> Iterator[tuple[str, ast.alias]]:
+    """Yield each name that a module imports, with what it is imported from, if anything."""
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            named = _absolute(node, module.package) if isinstance(node, ast.ImportFrom) else ""
+            yield from ((named, alias) for alias in node.names)
+
+
+_DOTTED = re.compile(r"\w+(\.\w+)+")
+
+
+def _behind(
+    package: str, rest: list[str], faces: dict[str, dict[str, str]]
+) -> Iterator[tuple[str, str]]:
+    """Yield the name that follows a package, or a package in it."""
+    for part in rest:
+        if part in faces.get(package, {}):
+            yield package, part
+            return
+        package = f"{package}.{part}"
+
+
+def documented(folders: list[Path], faces: dict[str, dict[str, str]]) -> set[tuple[str, str]]:
+    """Return the names of faces that pages, notebooks and examples show to users."""
+    shown: set[tuple[str, str]] = set()
+    for path in (path for folder in folders for path in sorted(folder.rglob("*"))):
+        if path.suffix not in (".md", ".py"):
+            continue
+        text = path.read_text("utf-8")
+        for dotted in _PLACE.findall(text):
+            package, _, name = dotted.rpartition(".")
+            if name in faces.get(package, {}):
+                shown.add((package, name))
+        codes = [text] if path.suffix == ".py" else _CODE.findall(text)
+        for tree in map(_parsed, codes):
+            for node in ast.walk(tree):
+                if isinstance(node, ast.ImportFrom) and node.module in faces:
+                    shown.update((node.module, alias.name) for alias in node.names)
+    return shown
+
+
+_PLACE = re.compile(r"elastocal(?:\.\w+)+")
+_CODE = re.compile(r"```(?:python|py|\{code-cell\})[^\n]*\n(.*?)```", re.DOTALL)
+
+
+def _parsed(code: str) -> ast.Module:
+    try:
+        return ast.parse(code)
+    except SyntaxError:  # a few lines of something longer
+        return ast.Module([], [])
+
+
+def idle_exports(house: House, folders: list[Path]) -> list[str]:
+    """Return the names that a face exports though nobody outside its package uses them.
+
+    What pages show to users is used; so is what is looked up by name: drivers, and faces that are
+    read as a whole (`READ_WHOLE`).
+    """
+    faces = find_faces(house.modules)
+    top = {(package, name) for package in faces if "." not in package for name in faces[package]}
+    used = used_exports(house, faces) | with_sources(documented(folders, faces) | top, house)
+    return sorted(
+        f"{package}.{name}"
+        for package, names in faces.items()
+        for name in names
+        if (package, name) not in used and name not in BY_NAME
+        if package not in READ_WHOLE and "." in package
+    )
+
+
+BY_NAME = {"DRIVER", "plot_result"}
+"""Names that are looked up in a face when they are wanted."""
+READ_WHOLE = {
+    "elastocal.planning.checks",
+    "elastocal.report.document.sections",
+    "elastocal.workflows",
+}
+"""Faces that are tables: who reads them takes all that they export."""
+
+
+def own_names(module: Module, modules: dict[str, Module]) -> int:
+    """Return how many names of this project a module imports."""
+    return len(
+        {
+            (_absolute(node, module.package), alias.name)
+            for node in ast.walk(module.tree)
+            if isinstance(node, ast.ImportFrom)
+            and _absolute(node, module.package).partition(".")[0] in modules
+            for alias in node.names
+        }
+    )
+
+
+SCALES = re.compile(r"\b1e[36] ?\*|\* ?1e[36]\b|np\.(rad2deg|degrees)\b|math\.degrees\b")
+"""How units are scaled by hand."""
+SHELLS = ("cli", "workflows", "report", "verdict", "studio")
+"""Packages above the domain, where quantities come with their unit."""
+
+
+def twins(modules: Iterable[Module]) -> list[str]:
+    """Return the pairs of classes that share most of their fields, of those with four or more."""
+    fields = [
+        (f"{module.name}.{node.name}", {b.id for b in node.bases if isinstance(b, ast.Name)}, names)
+        for module in modules
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.ClassDef) and len(names := _fields(node)) >= _FEW
+    ]
+    return [
+        f"{a} = {b}"
+        for number, (a, bases, first) in enumerate(fields)
+        for b, others, second in fields[number + 1 :]
+        if len(first & second) >= ALIKE * max(len(first), len(second))
+        and a.rpartition(".")[2] not in others
+        and b.rpartition(".")[2] not in bases
+    ]
+
+
+ALIKE = 0.7
+"""Share of the fields that makes two classes twins."""
+_FEW = 4
+
+
+def _fields(node: ast.ClassDef) -> set[str]:
+    return {
+        each.target.id
+        for each in node.body
+        if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name)
+    }
+
+
 def functions(module: Module) -> Iterator[tuple[str, int]]:
     """Yield each function with its lines of code, signature and docstring not among them."""
     for node in ast.walk(module.tree):
@@ -228,19 +412,6 @@ def public_names(module: Module) -> set[str]:
     return {name for name in defined_names(module) if not name.startswith("_")}
 
 
-def forgotten_names(house: House) -> list[str]:
-    """Return the public names of plain modules that no face exports."""
-    faces = find_faces(house.modules)
-    exported = {(source, name) for names in faces.values() for name, source in names.items()}
-    return sorted(
-        f"{module.name}.{name}"
-        for module in house.modules.values()
-        for name in (() if module.is_face else public_names(module))
-        # A module right below the top is imported by its own name: it is a face itself.
-        if (module.name, name) not in exported and module.name.count(".") > 1
-    )
-
-
 def _is_dict_of_any(node: ast.AST) -> bool:
     return isinstance(node, ast.Subscript) and ast.unparse(node) == "dict[str, Any]"
 
@@ -259,10 +430,21 @@ def main() -> None:
     single = sorted(
         f"{module.name} <- {next(iter(house.importers[module.name]))}"
         for module in rooms
-        if len(house.importers[module.name]) == 1 and module.name not in shown
+        if len(house.importers[module.name]) == 1
     )
+    hidden = [name for name in single if name.partition(" ")[0] not in shown]
+    exported = {(package, name) for package, names in faces.items() for name in names}
+    used = used_exports(house, faces)
+    imported = [own_names(module, house.modules) for module in rooms]
+    scaled = [
+        f"{module.path}:{number}"
+        for module in rooms
+        if set(module.name.split(".")[1:2]) & set(SHELLS)
+        for number, line in enumerate(module.text.splitlines(), 1)
+        if SCALES.search(line)
+    ]
+    alike = twins(modules)
     public = [(module.name, name) for module in rooms for name in public_names(module)]
-    hidden = forgotten_names(house)
     loose = [
         f"{module.path}:{node.lineno}"
         for module in modules
@@ -284,8 +466,14 @@ def main() -> None:
         (f"files over {LONG} lines", len(long_files)),
         ("classes", classes),
         ("public names at top level", len(public)),
-        ("of them not exported by a face", len(hidden)),
+        ("names that faces export", len(exported)),
+        ("of them used by another package, %", round(100 * len(exported & used) / len(exported))),
+        ("own names that a file imports, median", statistics.median(imported)),
+        ("the same, 90 % of files", statistics.quantiles(imported, n=10)[-1]),
         ("modules with exactly one importer", len(single)),
+        ("of them not exported by a face", len(hidden)),
+        ("places above the domain that scale units", len(scaled)),
+        ("pairs of classes that share most fields", len(alike)),
         ("imports that go round a face", len(house.bypasses)),
         ("dict[str, Any]", len(loose)),
         ("lines of code of a function, median", statistics.median(lengths)),
@@ -298,7 +486,9 @@ def main() -> None:
         for title, names in (
             ("one importer", single),
             ("round a face", sorted(set(house.bypasses))),
-            ("public, not exported", hidden),
+            ("scale units", scaled),
+            ("share most fields", alike),
+            ("own names", sorted(f"{own_names(m, house.modules):3} {m.name}" for m in rooms)[-60:]),
             ("dict[str, Any]", loose),
             ("long functions", long_functions),
             ("long files", long_files),

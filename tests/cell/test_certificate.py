@@ -2,7 +2,8 @@
 
 import pytest
 
-from elastocal.cell import ASKED, CertificateEntry, certificate_of, read_statements, unstated
+from elastocal.cell import CertificateEntry, certificate_of, read_statements, unstated
+from elastocal.cell.certificate import ASKED
 from elastocal.errors import SchemaError
 
 

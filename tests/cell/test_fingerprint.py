@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from elastocal.cell import SCHEMA, Limits, cell_file_model, fingerprint, load_cell, named_files
+from elastocal.cell import Limits, fingerprint, load_cell, named_files
+from elastocal.cell.cell import SCHEMA, cell_file_model
 from elastocal.cell.examples import write_example
 from elastocal.errors import FileAccessError
 from elastocal.records import read_yaml

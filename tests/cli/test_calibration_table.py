@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from elastocal.cli.output import bold, console, table_of, visible
-from elastocal.identification import SpringSummary, show_calibration, spring_table
+from elastocal.identification import show_calibration, spring_table
+from elastocal.identification.figures import SpringSummary
 from support.summaries import made_up_summary
 
 NAME = "joint_2.axial with a long name, slip 3"

@@ -10,7 +10,7 @@ from elastocal.cell.examples import write_example
 from elastocal.errors import SchemaError
 from elastocal.planning import write_plan
 from elastocal.robot import catalogue
-from elastocal.workflows import describe_file
+from elastocal.workflows.check import describe_file
 from support import plans
 from support.by_day import some_by_day
 from support.cli import elastocal

@@ -4,7 +4,7 @@ import pytest
 
 from elastocal.errors import DatasetError, PathError, SchemaError
 from elastocal.planning.export import write_table
-from elastocal.workflows import describe_file
+from elastocal.workflows.check import describe_file
 from support import plans
 
 JOINTS, FORCE = "joint_a1[deg],joint_a2[rad]", "force_x[N],force_y[N],force_z[N]"

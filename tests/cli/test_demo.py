@@ -10,7 +10,8 @@ import pytest
 
 from elastocal.cli.main import COMMANDS
 from elastocal.errors import FileAccessError
-from elastocal.workflows import README, Chapter, InitResult, begin, chapters
+from elastocal.workflows import Chapter, InitResult
+from elastocal.workflows.demo import README, begin, chapters
 from support.cli import elastocal
 from support.demos import demo_result, finished_demo
 

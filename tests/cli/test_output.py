@@ -6,8 +6,9 @@ import sys
 
 import pytest
 
-from elastocal.cli import bold, console, output
+from elastocal.cli import output
 from elastocal.cli.commands.demo import _log_console
+from elastocal.cli.output import bold, console
 from elastocal.errors import FileAccessError
 from support.cli import elastocal
 

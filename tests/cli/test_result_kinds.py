@@ -5,17 +5,12 @@ import re
 
 import pytest
 
-from elastocal.codec.study import (
-    StudyStore,
-    one_after_the_other,
-    run_study,
-    study_summary,
-    write_study,
-)
+from elastocal.codec.study import StudyStore, run_study, study_summary, write_study
+from elastocal.codec.study.sampling import one_after_the_other
 from elastocal.errors import SchemaError
 from elastocal.records import write_json
-from elastocal.workflows import Ports, describe_file
-from elastocal.workflows.check import _UNITS
+from elastocal.workflows.check import _UNITS, describe_file
+from elastocal.workflows.simulate import Ports
 from support import reported
 from support.cli import elastocal
 from support.studies import settings, simulate

@@ -12,7 +12,7 @@ from elastocal.compensation.process import PathTiming, read_programmed_path
 from elastocal.dataset import PathTable, find_columns, new_rows
 from elastocal.errors import PathError
 from elastocal.identification import write_model
-from elastocal.workflows import describe_file
+from elastocal.workflows.check import describe_file
 from support.cli import elastocal
 from support.geared import geared
 from support.paths import dome_course, euler_columns, read_csv, start_text

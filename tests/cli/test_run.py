@@ -15,7 +15,7 @@ import xarray as xr
 
 from elastocal import procedure
 from elastocal.cell import fingerprint, load_cell
-from elastocal.compensation.programs import speeds_of
+from elastocal.compensation.programs.plan_program import speeds_of
 from elastocal.errors import DatasetError, FileAccessError
 from elastocal.planning import read_plan, write_plan
 from elastocal.procedure import (

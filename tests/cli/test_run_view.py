@@ -9,7 +9,7 @@ from rich.console import Console
 from elastocal.cli import _operator as run_view
 from elastocal.cli._operator import watching
 from elastocal.procedure import Progress
-from elastocal.procedure.run import Step
+from elastocal.procedure.run.steps import Step
 
 
 def report(pose, attempt=1):

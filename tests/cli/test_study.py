@@ -8,18 +8,12 @@ import numpy as np
 import pytest
 
 from elastocal.cell import load_cell
-from elastocal.codec.study import (
-    Sample,
-    StudyStore,
-    batch_executor,
-    one_after_the_other,
-    run_study,
-)
+from elastocal.codec.study import Sample, StudyStore, batch_executor, run_study
+from elastocal.codec.study.sampling import one_after_the_other
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
 from elastocal.sim.workcell import ErrorDraws, ErrorScales
-from elastocal.workflows import study_conditions
-from elastocal.workflows.study import _prepare_study
+from elastocal.workflows.study import _prepare_study, study_conditions
 from support.cli import elastocal
 from support.simulated import example_cell
 from support.studies import numbers

@@ -8,13 +8,8 @@ from dataclasses import replace
 import pytest
 
 from elastocal.procedure import Event, Journal, RunFolder, read_journal
-from elastocal.verdict import (
-    file_links,
-    make_key,
-    read_manifest,
-    read_signature,
-    write_signature,
-)
+from elastocal.verdict import file_links, make_key, read_manifest, write_signature
+from elastocal.verdict.signing import read_signature
 from support import forged, reported
 from support.cli import elastocal
 from support.run_cells import planned_cell

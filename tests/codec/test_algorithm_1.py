@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.codec import SOLVERS, CodecData, CodecOptions, Variant, cross_validate
+from elastocal.codec import CodecData, CodecOptions, Variant, cross_validate
+from elastocal.codec.variants import SOLVERS
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import build

@@ -13,8 +13,8 @@ from elastocal.codec import (
     cross_validation,
     judge,
     make_variants,
-    prepared_variants,
 )
+from elastocal.codec._prepared import prepared_variants
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, ConventionError, DatasetError, IdentificationError
 from elastocal.sim.arm import (

@@ -13,9 +13,9 @@ from elastocal.codec import (
     Variant,
     analyse,
     cross_validate,
-    prepared_variants,
     write_index_table,
 )
+from elastocal.codec._prepared import prepared_variants
 from elastocal.codec.indices import (
     STATISTICS,
     _at_equal_size,

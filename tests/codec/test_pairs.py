@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.codec import compare_variants
+from elastocal.codec.pairs import compare_variants
 from elastocal.identification import Overlap
 
 OVERLAP = Overlap(31, 0.4)

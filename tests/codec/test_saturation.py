@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.codec import Tolerance, find_saturation, median_draws
+from elastocal.codec import Tolerance
+from elastocal.codec.saturation import find_saturation, median_draws
 from elastocal.errors import CodecError
 from elastocal.identification import Overlap
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.codec import CodecOptions, drawn_poses, make_splits, split_sizes
+from elastocal.codec import CodecOptions
+from elastocal.codec.splits import drawn_poses, make_splits, split_sizes
 from elastocal.errors import CodecError
 from elastocal.planning.search import Candidates, Cover
 from support.problems import campaign

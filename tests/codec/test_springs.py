@@ -20,13 +20,9 @@ from elastocal.codec import (
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError, SpringError
-from elastocal.identification import (
-    FitOptions,
-    choose_model,
-    displacement_blocks,
-    gears,
-    rung_summary,
-)
+from elastocal.identification import FitOptions, choose_model, rung_summary
+from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.rungs import gears
 from support.cells import Cell, rich_truth, robot
 from support.problems import campaign
 

@@ -4,8 +4,8 @@ import dataclasses
 
 import pytest
 
-from elastocal.codec import Variant, make_variants, read_comparison, training_cases
-from elastocal.codec.variants import check_different
+from elastocal.codec import Variant, make_variants, training_cases
+from elastocal.codec.variants import check_different, read_comparison
 from elastocal.errors import CodecError, DatasetError, PlanningError
 
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from elastocal.codec import CodecData, CodecOptions, SpringLabels, Variant, judge
+from elastocal.codec import CodecData, CodecOptions, Variant, judge
+from elastocal.codec.data import SpringLabels
 
 SETS, POSES = 8, 8
 VERIFICATION = np.array([[n, (n + 1) % POSES] for n in range(SETS)])

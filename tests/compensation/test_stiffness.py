@@ -9,16 +9,16 @@ from elastocal.compensation import (
     cell_constraints,
     choose_postures,
     directional_stiffness,
-    joint_limit_constraint,
-    principal_stiffness,
     read_stations,
     survey_postures,
 )
+from elastocal.compensation.posture_survey import joint_limit_constraint, principal_stiffness
 from elastocal.errors import PathError
 from elastocal.identification import CalibratedModel
 from elastocal.robot import Robot
-from elastocal.robot.inverse import NumericalInverse, inverse_for, joints_along_path
-from elastocal.sim.arm import START
+from elastocal.robot.inverse import inverse_for, joints_along_path
+from elastocal.robot.inverse.numerical import NumericalInverse
+from elastocal.sim.arm.measurement import START
 from support.cells import rich_truth, robot
 from support.paths import calibrated, dome_course, euler_columns, made_up, write_csv
 from support.simulated import example_cell, places

@@ -6,15 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.cell import EXAMPLES, load_cell, write_example
-from elastocal.planning import (
-    CHECKS,
-    POINT_CHECKS,
-    CollisionScene,
-    cell_surface,
-    point_checks,
-    robot_checks,
-)
+from elastocal.cell import load_cell, write_example
+from elastocal.cell.examples import EXAMPLES
+from elastocal.planning import CollisionScene, cell_surface
 from elastocal.planning.checks import (
     CollisionCheck,
     EdgeCheck,
@@ -31,6 +25,7 @@ from elastocal.planning.checks import (
     WristCheck,
     check_margins,
 )
+from elastocal.planning.pool_sampling import CHECKS, POINT_CHECKS, point_checks, robot_checks
 from elastocal.planning.surface import DiskFit, sample_uniform
 from elastocal.robot import Rail, Robot, on_rail
 from elastocal.shapes import Body, Box

@@ -14,14 +14,15 @@ from elastocal.cell.examples import EXAMPLES
 from elastocal.cli import options
 from elastocal.cli.main import _GROUPS, COMMANDS, app, run
 from elastocal.compensation.process import PROCESSES
-from elastocal.compensation.programs import PROGRAM_WRITERS
+from elastocal.compensation.programs.languages import PROGRAM_WRITERS
 from elastocal.elastic import LAYOUTS
 from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
 from elastocal.planning.search import TECHNIQUES
-from elastocal.report import LANGUAGES
+from elastocal.report.language import LANGUAGES
 from elastocal.robot import catalogue
-from elastocal.workflows import EXPORT_TARGETS, SimulateResult, StudioResult
+from elastocal.workflows import SimulateResult, StudioResult
+from elastocal.workflows.export import EXPORT_TARGETS
 from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
 from support import foreign_logs, kuka_bench, measured_arms, reported
 from support.cli import elastocal

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elastocal.compensation.programs import PROGRAM_READERS, CorrectedPoint
+from elastocal.compensation.programs import PROGRAM_READERS
+from elastocal.compensation.programs.program import CorrectedPoint
 from elastocal.errors import FileAccessError
 from elastocal.robot import T_from_xyzabc
 

@@ -4,14 +4,9 @@ import numpy as np
 import pytest
 
 from elastocal.errors import PlanningError
-from elastocal.planning.search import (
-    CRITERIA,
-    EPSILON,
-    Criterion,
-    Information,
-    build_information,
-    criterion_class,
-)
+from elastocal.planning.search import CRITERIA, Information, build_information
+from elastocal.planning.search.criteria import Criterion, criterion_class
+from elastocal.planning.search.information import EPSILON
 from support.pools import RANK, dome
 
 NAMES = ("d", "a", "e", "o2", "o3", "o4", "o5", "i")

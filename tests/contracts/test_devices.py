@@ -22,11 +22,12 @@ from elastocal.cell import (
     polled_readings,
 )
 from elastocal.cell.devices import BeamState, Devices, Motion, SensorStatus
-from elastocal.drivers.net_ft import CountScale, NetFtSensor
+from elastocal.drivers.net_ft.protocol import CountScale
+from elastocal.drivers.net_ft.sensor import NetFtSensor
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.records import to_data, validate
-from elastocal.sim.wire import NetFtBox
-from elastocal.workflows import GROUP, driver_names, find_driver
+from elastocal.sim.wire.net_ft import NetFtBox
+from elastocal.workflows._operator_and_devices import GROUP, driver_names, find_driver
 from support.simulated import CYCLE, Place, Session, example_cell, places
 
 PRESS = np.array([0.0, 0.0, -300.0])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import sosfilt
 
-from elastocal.compensation.conditioning import FilterChain, FilterSettings, LowPass, Notch
+from elastocal.compensation.conditioning import FilterChain, FilterSettings
+from elastocal.compensation.conditioning.filters import LowPass, Notch
 from elastocal.errors import CompensationError
 from support.filters import EXAMPLES, Lead, filter_settings
 

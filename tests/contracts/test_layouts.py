@@ -5,15 +5,9 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from elastocal.elastic import (
-    LAYOUTS,
-    ElasticModel,
-    Spring,
-    SpringEntry,
-    axial,
-    bearing_joint,
-    custom,
-)
+from elastocal.elastic import LAYOUTS, ElasticModel, Spring
+from elastocal.elastic.layouts import SpringEntry, bearing_joint, custom
+from elastocal.elastic.springs.hinge import axial
 from elastocal.robot import Robot
 from elastocal.sim.arm import (
     Linkage,

@@ -7,17 +7,10 @@ import numpy as np
 import pytest
 
 from elastocal import workflows
-from elastocal.compensation.programs import (
-    BEFORE_PATH,
-    MOST_ROWS,
-    PROGRAM_WRITERS,
-    TOUCH_SPEED,
-    PathProgram,
-    choose_writer,
-    plan_program,
-    write_plan_program,
-    writer_named,
-)
+from elastocal.compensation.programs import PathProgram, choose_writer, write_plan_program
+from elastocal.compensation.programs.languages import PROGRAM_WRITERS, writer_named
+from elastocal.compensation.programs.path_program import BEFORE_PATH, MOST_ROWS
+from elastocal.compensation.programs.plan_program import TOUCH_SPEED, plan_program
 from elastocal.errors import FileAccessError, PathError, PlanningError
 from elastocal.identification import write_model
 from elastocal.robot import Robot, catalogue

@@ -7,8 +7,9 @@ from itertools import combinations
 
 import pytest
 
-from elastocal.report.document import SECTIONS
-from elastocal.report.pages import embedded, templating, view_data
+from elastocal.report.document.page import SECTIONS
+from elastocal.report.pages import templating, view_data
+from elastocal.report.pages.templating import embedded
 from elastocal.verdict import (
     Evidence,
     EvidenceOptions,

@@ -8,31 +8,22 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.online import Compensator, Reading, design
-from elastocal.elastic import (
-    KINDS,
-    ElasticModel,
-    Gear,
-    Hinge,
-    Knowledge,
-    Spring,
-    SpringLoad,
-    Tensor,
-    Unit,
-    axial,
-    unit_of,
-)
+from elastocal.elastic import KINDS, ElasticModel, Gear, Hinge, Spring, SpringLoad, Unit, unit_of
+from elastocal.elastic.known import Knowledge
 from elastocal.elastic.springs import Input
+from elastocal.elastic.springs.hinge import axial
+from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SchemaError, SpringError
 from elastocal.identification import (
     CalibratedModel,
     Observability,
     build,
     calibrate,
-    displacement_blocks,
     read_model,
     solve,
     write_model,
 )
+from elastocal.identification.displacement import displacement_blocks
 from elastocal.records import from_data, to_data
 from support.cells import linkage, robot
 from support.exported import build as compiled_c, needs_gcc, written

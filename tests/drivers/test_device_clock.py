@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elastocal.drivers import DeviceClock
+from elastocal.drivers.device_clock import DeviceClock
 from elastocal.errors import DeviceError
 
 

@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 
 from elastocal.cell import BeamState, RigContext
-from elastocal.drivers import StationFeed
-from elastocal.drivers.emscon import (
-    DRIVER,
-    Answer,
-    Code,
-    Complaint,
-    Dialogue,
-    EmsconSettings,
-    StatusChange,
-)
+from elastocal.drivers.emscon import DRIVER
+from elastocal.drivers.emscon.dialogue import Dialogue, EmsconSettings
+from elastocal.drivers.emscon.packets import Answer, Code, Complaint, StatusChange
+from elastocal.drivers.stations import StationFeed
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import EmsconServer, LiveCell, Told
+from elastocal.sim.wire import LiveCell, Told
+from elastocal.sim.wire.emscon import EmsconServer
 from elastocal.sim.workcell import SimClock
 from support.simulated import QUIET, example_cell
 from support.stations_on_wire import connect, eventually, read_until

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from elastocal.drivers.emscon import (
+from elastocal.drivers.emscon.packets import (
     Answer,
     Code,
     Complaint,

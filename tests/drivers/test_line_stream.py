@@ -9,7 +9,8 @@ import pytest
 from elastocal.cell import BeamState
 from elastocal.drivers.line_stream import DRIVER
 from elastocal.errors import DeviceError, ElastocalError
-from elastocal.sim.wire import LineStreamServer, LiveCell, Told
+from elastocal.sim.wire import LiveCell, Told
+from elastocal.sim.wire.line_stream import LineStreamServer
 from elastocal.sim.workcell import SimClock
 from support.cli import PATIENCE
 from support.simulated import QUIET, example_cell

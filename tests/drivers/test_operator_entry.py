@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell import AskedMetrology, BeamState
-from elastocal.drivers.operator_entry import DRIVER, OperatorEntry, appended_lines
+from elastocal.drivers.operator_entry import DRIVER
+from elastocal.drivers.operator_entry.entry import OperatorEntry, appended_lines
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell import SimClock
 from support.simulated import example_cell

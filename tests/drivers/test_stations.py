@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell import BeamState
-from elastocal.drivers import NEWEST, StationFeed, StationsMetrology
+from elastocal.drivers.stations import NEWEST, StationFeed, StationsMetrology
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell import SimClock
 from support.simulated import example_cell

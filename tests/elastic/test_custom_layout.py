@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from elastocal.elastic import ElasticModel, Gear, Hinge, Tensor, bearing_joint, layout
+from elastocal.elastic import ElasticModel, Gear, Hinge, layout
+from elastocal.elastic.layouts import bearing_joint
+from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import FileAccessError, SchemaError, SpringError
 from elastocal.robot import Rail, Robot, on_rail
 from support.cells import robot

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.kernel import Call, Program, Value, written
-from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum, atan2
+from elastocal.compensation.kernel import Call
+from elastocal.compensation.kernel._laws import written
+from elastocal.compensation.kernel.program import Program, Value
+from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
+from elastocal.elastic.springs.expression import atan2
 
 X, Y = Input("x"), Input("y")
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.elastic import FrictionElements, Gear, SpringLoad
+from elastocal.elastic import Gear, SpringLoad
+from elastocal.elastic.friction import FrictionElements
 from elastocal.errors import SpringError
 
 GEAR = Gear("a.gear", "a", (0.0, 0.0, 1.0), knees=(400.0,), slips=(50.0, 150.0))

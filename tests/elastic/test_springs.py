@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from elastocal.elastic import (
-    ElasticModel,
-    FrictionElements,
-    Gear,
-    Hinge,
-    SpringLoad,
-    as_axis,
-    axial,
-    check_springs,
-    layout,
-    orthogonal_axes,
-)
+from elastocal.elastic import ElasticModel, Gear, Hinge, SpringLoad, layout
+from elastocal.elastic.friction import FrictionElements
+from elastocal.elastic.layouts import orthogonal_axes
+from elastocal.elastic.springs.hinge import axial
+from elastocal.elastic.springs.kinds import check_springs
+from elastocal.elastic.springs.spring import as_axis
 from elastocal.errors import SpringError
 from elastocal.records import from_data, to_data
 from support.cells import robot

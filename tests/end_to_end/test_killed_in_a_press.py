@@ -13,7 +13,8 @@ import pytest
 import elastocal as ec
 from elastocal.errors import ProcedureError
 from elastocal.procedure import RunEnd
-from elastocal.workflows import Supervision, Unattended, release
+from elastocal.workflows import Supervision, release
+from elastocal.workflows._operator_and_devices import Unattended
 from support.cli import PATIENCE
 from support.fault_matrix import Lines, _Watch, begun, wired
 from support.run_cells import planned_cell

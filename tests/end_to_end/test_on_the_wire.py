@@ -18,7 +18,7 @@ import elastocal as ec
 from elastocal import locks
 from elastocal.dataset import read_dataset
 from elastocal.drivers import rtde
-from elastocal.sim.wire import PORTS
+from elastocal.sim.wire.rtde import PORTS
 from support import live_bench
 from support.cli import PATIENCE
 from support.live_on_wire import free

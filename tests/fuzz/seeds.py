@@ -18,13 +18,8 @@ from elastocal.cell import (
     WrenchBlock,
     load_cell,
 )
-from elastocal.codec.study import (
-    StudyStore,
-    one_after_the_other,
-    run_study,
-    study_summary,
-    write_study,
-)
+from elastocal.codec.study import StudyStore, run_study, study_summary, write_study
+from elastocal.codec.study.sampling import one_after_the_other
 from elastocal.geometry import plan_positions
 from elastocal.identification import read_model, write_model
 from elastocal.planning import read_plan
@@ -33,7 +28,7 @@ from elastocal.procedure import PoseRecorder, file_sha256
 from elastocal.records import write_json
 from elastocal.robot import catalogue, xyzabc_from_T
 from elastocal.verdict import OF_RUN, make_key, read_private_key, sign, write_signature
-from elastocal.workflows import Ports
+from elastocal.workflows.simulate import Ports
 from support import foreign_logs, kuka_bench, live_bench, reported, studies
 from support.cli import elastocal
 from support.compensated import calibrated

@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 
 import elastocal as ec
-from elastocal.geometry import (
-    ArmErrors,
-    GeometryProblem,
-    accuracy_figures,
-    climb,
-    frames,
-    link_numbers,
-    link_table,
-    link_transform,
-)
+from elastocal.geometry import GeometryProblem, accuracy_figures, link_table
+from elastocal.geometry.arm import ArmErrors, frames
+from elastocal.geometry.denavit_hartenberg import link_numbers, link_transform
+from elastocal.geometry.ladder import climb
 from elastocal.progress import silent
 from elastocal.robot import T_from_xyzabc, catalogue
 from support.cli import elastocal

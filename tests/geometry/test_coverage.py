@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.geometry import GeometryProblem, climb, fit, register, told_apart
+from elastocal.geometry import GeometryProblem
+from elastocal.geometry.ladder import climb
+from elastocal.geometry.solve import fit, register, told_apart
 from elastocal.identification import interval
 from elastocal.progress import silent
 from support.measured_arms import ARMS, measure

@@ -8,7 +8,8 @@ import pytest
 import elastocal as ec
 from elastocal.dataset import Dataset, write
 from elastocal.errors import GeometryError
-from elastocal.geometry import GeometryModel, GeometryProblem, climb, geometry_model
+from elastocal.geometry import GeometryModel, GeometryProblem, geometry_model
+from elastocal.geometry.ladder import climb
 from elastocal.identification import CalibrateResult
 from elastocal.progress import silent
 from elastocal.records import write_json

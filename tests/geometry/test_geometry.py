@@ -7,19 +7,10 @@ import pytest
 import xarray
 
 from elastocal.errors import GeometryError
-from elastocal.geometry import (
-    ArmErrors,
-    GeometryModel,
-    GeometryProblem,
-    climb,
-    fit,
-    frames,
-    geometry_model,
-    read_positions,
-    register,
-    screws,
-    told_apart,
-)
+from elastocal.geometry import GeometryModel, GeometryProblem, geometry_model, read_positions
+from elastocal.geometry.arm import ArmErrors, frames, screws
+from elastocal.geometry.ladder import climb
+from elastocal.geometry.solve import fit, register, told_apart
 from elastocal.progress import silent
 from elastocal.records import read_json
 from elastocal.robot import GRAVITY, Robot, with_joint_origins

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.geometry import GeometryModel, GeometryProblem, climb, geometry_model
+from elastocal.geometry import GeometryModel, GeometryProblem, geometry_model
+from elastocal.geometry.ladder import climb
 from elastocal.progress import silent
 from support.measured_arms import Measured, kuka, measure, seven_axes, universal
 

@@ -7,13 +7,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import GeometryError
-from elastocal.geometry import (
-    GeometryProblem,
-    Positions,
-    climb,
-    geometry_model,
-    plausible_ladder,
-)
+from elastocal.geometry import GeometryProblem, Positions, geometry_model, plausible_ladder
+from elastocal.geometry.ladder import climb
 from elastocal.progress import silent
 from elastocal.robot import Robot, catalogue
 from support.by_day import some_by_day

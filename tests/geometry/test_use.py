@@ -11,15 +11,9 @@ from elastocal.cell import Cell, load_cell
 from elastocal.compensation.offline import PathCorrection, correct_rows
 from elastocal.dataset import PathTable, find_columns
 from elastocal.errors import GeometryError, PathError
-from elastocal.geometry import (
-    GeometryModel,
-    GeometryProblem,
-    Payload,
-    Positions,
-    climb,
-    geometry_model,
-    register,
-)
+from elastocal.geometry import GeometryModel, GeometryProblem, Payload, Positions, geometry_model
+from elastocal.geometry.ladder import climb
+from elastocal.geometry.solve import register
 from elastocal.identification import read_model, write_model
 from elastocal.progress import silent
 from elastocal.robot import Robot, catalogue, with_tool

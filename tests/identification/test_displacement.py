@@ -7,20 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.dataset import Dataset, Presses, Readings
-from elastocal.elastic import ElasticModel, bearing_joint
-from elastocal.identification import displacement_blocks, gears, reference_joints
+from elastocal.dataset import Dataset, Readings
+from elastocal.dataset.readings import Presses
+from elastocal.elastic import ElasticModel
+from elastocal.elastic.layouts import bearing_joint
+from elastocal.identification.displacement import displacement_blocks, reference_joints
+from elastocal.identification.rungs import gears
 from elastocal.robot import Rail, Robot, T_from_xyzabc, on_rail, with_tool
-from elastocal.sim.arm import (
-    GRAVITY,
-    ElasticArm,
-    Linkage,
-    Noise,
-    bearing_truth,
-    measure,
-    press_forces,
-    press_poses,
-)
+from elastocal.sim.arm import Linkage, Noise, bearing_truth, measure, press_forces, press_poses
+from elastocal.sim.arm.elastic_arm import GRAVITY, ElasticArm
 from sim.conftest import ARM_URDF
 from support.virtual_chain import ARMS
 

@@ -11,22 +11,17 @@ from elastocal.errors import IdentificationError
 from elastocal.identification import (
     Calibration,
     FitOptions,
-    PoseGrams,
     attainable_rank,
     build,
     calibrate,
     frame_columns,
-    frame_summaries,
     solve,
 )
+from elastocal.identification.frames import frame_summaries
+from elastocal.identification.solve import PoseGrams
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm import (
-    ElasticArm,
-    Linkage,
-    Noise,
-    axial_spring,
-    measure,
-)
+from elastocal.sim.arm import Linkage, Noise, axial_spring, measure
+from elastocal.sim.arm.elastic_arm import ElasticArm
 
 URDF = with_tool(
     catalogue.urdf("KR 300 R2500 ultra"),

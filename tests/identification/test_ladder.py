@@ -15,15 +15,14 @@ from elastocal.identification import (
     FitOptions,
     build,
     choose_model,
-    climb,
-    displacement_blocks,
-    gears,
-    has_levels,
     leave_poses_out,
     low_loads,
     solve,
     take_simplest,
 )
+from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.ladder import climb
+from elastocal.identification.rungs import gears, has_levels
 from support.cells import Cell, linear_truth, rich_truth, robot
 from support.problems import campaign
 

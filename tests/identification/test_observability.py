@@ -8,9 +8,9 @@ import pytest
 from scipy.stats import chi
 
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, Hinge, Parameter, bearing_joint, layout
+from elastocal.elastic import ElasticModel, Hinge, Parameter, layout
+from elastocal.elastic.layouts import bearing_joint
 from elastocal.identification import (
-    FaintParameter,
     FitOptions,
     Observability,
     Prior,
@@ -24,7 +24,7 @@ from elastocal.identification import (
     observability,
     solve,
 )
-from elastocal.identification.observability import find_faint
+from elastocal.identification.observability import FaintParameter, find_faint
 from elastocal.identification.solve import Factored
 from elastocal.robot import Robot
 from support.problems import campaign, elastic, made_up

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import IdentificationError
-from elastocal.identification import MINIMUM_DRAWS, FitOptions, FitSettings
-from elastocal.identification.options import bounds, parse_bounds
+from elastocal.identification import FitOptions, FitSettings
+from elastocal.identification.options import MINIMUM_DRAWS, bounds, parse_bounds
 
 
 def test_the_default_is_the_papers_bounded_least_squares():

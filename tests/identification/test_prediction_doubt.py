@@ -8,7 +8,6 @@ import pytest
 
 from elastocal.elastic import ElasticModel, actuated, bearing, bearing_ends
 from elastocal.identification import (
-    DOUBT_ROWS,
     Choice,
     DriveCompliances,
     FitOptions,
@@ -22,6 +21,7 @@ from elastocal.identification import (
     take_simplest,
     with_knowledge,
 )
+from elastocal.identification.prediction_doubt import DOUBT_ROWS
 from support.cells import Cell, linear_truth, rich_truth, robot
 
 OPTIONS = FitOptions()

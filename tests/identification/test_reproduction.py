@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import (
-    calibrate,
-    unseen_errors,
-)
+from elastocal.identification import calibrate
+from elastocal.identification.reproduction import unseen_errors
 from support.cells import TRACKED, Cell, rich_truth, robot
 
 

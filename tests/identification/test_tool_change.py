@@ -19,15 +19,8 @@ from elastocal.identification import (
     write_model,
 )
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
-from elastocal.sim.arm import (
-    ElasticArm,
-    Linkage,
-    Noise,
-    bearing_truth,
-    measure,
-    press_forces,
-    press_poses,
-)
+from elastocal.sim.arm import Linkage, Noise, bearing_truth, measure, press_forces, press_poses
+from elastocal.sim.arm.elastic_arm import ElasticArm
 
 FLANGE = catalogue.urdf("KR 300 R2500 ultra")
 URDF = with_tool(FLANGE, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))

@@ -14,10 +14,10 @@ from elastocal.identification import (
     HeldOut,
     calibrate,
     leave_poses_out,
-    measured_coverage,
     summary,
 )
 from elastocal.identification.recertification import recertify
+from elastocal.identification.uncertainty import measured_coverage
 from elastocal.records import from_data, to_data
 from support.cells import Cell, linear_truth
 from support.problems import elastic, linear_readings, planted

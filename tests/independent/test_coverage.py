@@ -19,9 +19,7 @@ from elastocal.identification import FitOptions, calibrate, choose_model
 from elastocal.parallel import one_blas_thread
 from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
 from elastocal.sim.arm import (
-    GRAVITY,
     LINK_BENDING,
-    ElasticArm,
     Linkage,
     Noise,
     bearing_truth,
@@ -31,6 +29,7 @@ from elastocal.sim.arm import (
     with_link_bending,
     with_stiffening_gears,
 )
+from elastocal.sim.arm.elastic_arm import GRAVITY, ElasticArm
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from elastocal.cell import WallClock
-from elastocal.drivers import StationFeed
-from elastocal.drivers.emscon import Answer, Code, Dialogue, EmsconSettings
-from elastocal.sim.wire import EmsconServer, LiveCell, Told
+from elastocal.drivers.emscon.dialogue import Dialogue, EmsconSettings
+from elastocal.drivers.emscon.packets import Answer, Code
+from elastocal.drivers.stations import StationFeed
+from elastocal.sim.wire import LiveCell, Told
+from elastocal.sim.wire.emscon import EmsconServer
 from elastocal.sim.workcell import SimClock
 from support.simulated import QUIET, example_cell
 

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from elastocal.cell import Arming, Motion, RigContext, WallClock
-from elastocal.drivers.kuka_rsi import (
-    Bounds,
-    LinkAddress,
-    PathCorrections,
-    RsiLink,
-    RsiSettings,
-    connect_arm,
-)
-from elastocal.sim.wire import LiveCell, RsiContext, Told, rsi_server
+from elastocal.drivers.kuka_rsi import Bounds, RsiSettings
+from elastocal.drivers.kuka_rsi.corrections import PathCorrections
+from elastocal.drivers.kuka_rsi.driver import connect_arm
+from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
+from elastocal.sim.wire import LiveCell, Told
+from elastocal.sim.wire._rsi_robot import RsiContext
+from elastocal.sim.wire.rsi import rsi_server
 from support.cli import PATIENCE
 from support.simulated import QUIET, example_cell, places
 

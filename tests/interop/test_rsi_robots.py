@@ -14,14 +14,9 @@ import numpy as np
 import pytest
 
 from elastocal.cell import WallClock
-from elastocal.drivers.kuka_rsi import (
-    Bounds,
-    LinkAddress,
-    PathCorrections,
-    RsiLink,
-    RsiSettings,
-    controller_files,
-)
+from elastocal.drivers.kuka_rsi import Bounds, RsiSettings, controller_files
+from elastocal.drivers.kuka_rsi.corrections import PathCorrections
+from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.sim.wire._rsi_messages import EthernetConfig
 from support.cli import PATIENCE
 from support.simulated import example_cell

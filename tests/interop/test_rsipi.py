@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from elastocal.cell import WallClock
-from elastocal.sim.wire import LiveCell, RsiContext, RsiServer
+from elastocal.sim.wire import LiveCell
 from elastocal.sim.wire._rsi_messages import EthernetConfig
-from elastocal.sim.wire._rsi_robot import corrected_program
+from elastocal.sim.wire._rsi_robot import RsiContext, corrected_program
+from elastocal.sim.wire.rsi import RsiServer
 from support.simulated import QUIET, example_cell
 
 RSIPI = pytest.importorskip("RSIPI", reason="rsipi is not installed")

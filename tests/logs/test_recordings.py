@@ -5,7 +5,8 @@ import os
 import pytest
 
 from elastocal.errors import FileAccessError, LogError
-from elastocal.logs import guess_logs, read_recording, read_topics
+from elastocal.logs import guess_logs
+from elastocal.logs.recordings import read_recording, read_topics
 from support import reported
 from support.foreign_bags import write_bag
 

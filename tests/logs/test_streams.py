@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import LogError
-from elastocal.logs import body_centre
+from elastocal.logs.streams import body_centre
 
 SHAPE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.15, 0.0], [0.02, 0.03, 0.12]])
 

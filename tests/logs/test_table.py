@@ -10,7 +10,9 @@ import pytest
 from openpyxl import Workbook
 
 from elastocal.errors import FileAccessError, LogError
-from elastocal.logs import guess_log, read_text_log, read_workbook
+from elastocal.logs.guess import guess_log
+from elastocal.logs.recordings import read_workbook
+from elastocal.logs.table import read_text_log
 
 
 def _log(folder, text, encoding="utf-8"):

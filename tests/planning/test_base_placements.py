@@ -8,9 +8,7 @@ from elastocal.planning.pool import PostureSolver
 from elastocal.planning.pool_sampling import rank_base_placements
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm import (
-    SphericalCap,
-)
+from elastocal.sim.arm.measurement import SphericalCap
 from support.postures import T_FLANGE_TCP
 
 

@@ -8,9 +8,7 @@ from elastocal.planning.checks import Checks, EdgeCheck, FrictionCheck, JointLim
 from elastocal.planning.pool import UNREACHABLE, BasePlacement, PostureSolver, join_pools
 from elastocal.planning.surface import contact_frames
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm import (
-    SphericalCap,
-)
+from elastocal.sim.arm.measurement import SphericalCap
 from support.postures import FORCE_TCP, arm, pool
 
 STANDS = (BasePlacement(),)

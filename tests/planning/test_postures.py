@@ -7,9 +7,7 @@ from elastocal.planning.checks import Checks
 from elastocal.planning.pool import PostureSolver
 from elastocal.planning.postures import _STRAIGHT, retreat_joints
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm import (
-    SphericalCap,
-)
+from elastocal.sim.arm.measurement import SphericalCap
 from support.postures import arm
 
 

@@ -7,7 +7,9 @@ import trimesh
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.planning.surface import TriangleMesh, build_surface, load_surface, sample_uniform
+from elastocal.planning.surface import load_surface, sample_uniform
+from elastocal.planning.surface.mesh import TriangleMesh
+from elastocal.planning.surface.surface import build_surface
 from support import plans
 
 

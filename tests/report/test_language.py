@@ -10,9 +10,11 @@ import pytest
 
 import elastocal
 from elastocal.errors import ReportError
-from elastocal.planning import UNREACHABLE, checks
+from elastocal.planning import checks
+from elastocal.planning.pool import UNREACHABLE
 from elastocal.procedure.record import ReadingStatus
-from elastocal.report import LANGUAGES, language_of
+from elastocal.report import language_of
+from elastocal.report.language import LANGUAGES
 from elastocal.wording import counted, mm, phrase, sentences
 
 SOURCE = Path(elastocal.__file__).parent

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from elastocal.robot import Gap, Robot, link_gap, same_joints, tcp_gap, tool_gap
+from elastocal.robot import Robot, link_gap, same_joints, tcp_gap, tool_gap
+from elastocal.robot.identity import Gap
 from support.cells import robot, urdf
 
 

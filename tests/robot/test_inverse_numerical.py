@@ -7,7 +7,8 @@ import pytest
 
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import NumericalInverse, OpwInverse, pose_error
+from elastocal.robot.inverse import OpwInverse, pose_error
+from elastocal.robot.inverse.numerical import NumericalInverse
 from elastocal.robot.inverse.solver import InverseKinematics, distinct
 from support.urdfs import KR_LIKE, offset_wrist_urdf, opw_arm_urdf, planar_arm_urdf
 

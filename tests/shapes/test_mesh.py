@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from elastocal.errors import RobotError
-from elastocal.planning.checks import sight_solid
+from elastocal.planning.checks.sight import sight_solid
 from elastocal.shapes import Beams, Body, Box, Capsule, Cylinder, Mesh, Sphere, solid_of
 from support.beams import random_beams
 

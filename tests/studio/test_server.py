@@ -11,7 +11,8 @@ import threading
 import pytest
 
 from elastocal.errors import DeviceError, PlanningError
-from elastocal.studio import MOST_BYTES, StudioServer
+from elastocal.studio import StudioServer
+from elastocal.studio.server import MOST_BYTES
 from support.cli import PATIENCE
 
 

@@ -7,19 +7,13 @@ import pytest
 
 from elastocal.cell import load_cell, write_example
 from elastocal.errors import ProcedureError, RobotError, SchemaError
-from elastocal.studio import (
-    CellView,
-    RunView,
-    Session,
-    Worker,
-    WorkState,
-    compare_techniques,
-    default_springs,
-    find_runs,
-    form_of,
-    survey_reach,
-)
-from elastocal.workflows import describe_file
+from elastocal.studio import Session, default_springs
+from elastocal.studio.cell_edit import form_of
+from elastocal.studio.posture import CellView
+from elastocal.studio.recorded import RunView, find_runs
+from elastocal.studio.trials import compare_techniques, survey_reach
+from elastocal.studio.worker import Worker, WorkState
+from elastocal.workflows.check import describe_file
 from support.recorded_runs import record_run
 from support.run_cells import planned_cell
 from support.tasks import fail, tick_until_stopped

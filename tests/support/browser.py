@@ -7,11 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.report.document import (
-    Message,
-    Tab,
-    open_tab,
-)
+from elastocal.report.document import open_tab
+from elastocal.report.document.chromium import Message, Tab
 
 PROBE = (Path(__file__).parent / "probe.js").read_text(encoding="utf-8")
 

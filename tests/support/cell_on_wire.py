@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 
 from elastocal.cell import BeamState, DeviceSet, DeviceSettings, Metrology, RigContext
-from elastocal.drivers.operator_entry import OperatorEntry, OperatorEntrySettings
+from elastocal.drivers.operator_entry.entry import OperatorEntry, OperatorEntrySettings
 from elastocal.sim.wire import LiveCell, Told, wire_servers
 from elastocal.sim.workcell import SimClock, SimulatedCell
-from elastocal.workflows import find_driver
+from elastocal.workflows._operator_and_devices import find_driver
 from support import drivers
 from support.run_cells import PlannedCell
 

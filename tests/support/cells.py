@@ -10,13 +10,13 @@ from elastocal.robot import Robot
 from elastocal.sim.arm import (
     SHOP_FLOOR,
     Blunder,
-    ElasticArm,
     Linkage,
     Noise,
     elastic_arm as layouts,
     measure,
     measurement as scene,
 )
+from elastocal.sim.arm.elastic_arm import ElasticArm
 from support.urdfs import opw_arm_urdf
 
 QUIET = Noise()

@@ -8,14 +8,13 @@ import numpy as np
 from elastocal.codec import (
     CodecAnalysis,
     CodecData,
-    PreparedVariant,
     Verdicts,
     analyse,
     cross_validate,
     judge,
     make_variants,
-    prepared_variants,
 )
+from elastocal.codec._prepared import PreparedVariant, prepared_variants
 from elastocal.dataset import Readings
 from support.cells import Cell, rich_truth, robot
 

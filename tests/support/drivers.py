@@ -17,7 +17,7 @@ REAL = '''
 """The simulated devices, as if somebody could be hurt; every enabling is noted."""
 from elastocal.cell import Arming
 from elastocal.errors import DeviceError
-from elastocal.sim import SimulatedDriver
+from elastocal.sim.driver import SimulatedDriver
 
 enabled = []
 moves = True

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elastocal.compensation.export import c_files
+from elastocal.compensation.export.writer import c_files
 from elastocal.compensation.online import Design
 from support.kept import ROOT
 

@@ -2,8 +2,8 @@
 
 from typing import get_origin
 
-from elastocal.compensation.conditioning import FilterSettings, LowPass, Notch
-from elastocal.compensation.conditioning.filters import Section, lead_section
+from elastocal.compensation.conditioning import FilterSettings
+from elastocal.compensation.conditioning.filters import LowPass, Notch, Section, lead_section
 
 
 class Lead(float):

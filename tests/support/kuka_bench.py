@@ -8,14 +8,8 @@ import numpy as np
 import yaml
 
 from elastocal.cell import Arming, ArmState, Cell, Motion
-from elastocal.drivers.kuka_rsi import (
-    CommissioningRecord,
-    DelayEstimate,
-    KukaArm,
-    LinkAddress,
-    RsiLink,
-    RsiSettings,
-)
+from elastocal.drivers.kuka_rsi import CommissioningRecord, DelayEstimate, KukaArm, RsiSettings
+from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from support.kuka_peer import KukaPeer, PeerClock, PeerFeed
 from support.simulated import Place, example_cell, places
 

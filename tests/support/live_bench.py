@@ -22,7 +22,7 @@ from elastocal.errors import DeviceError
 from elastocal.identification import write_model
 from elastocal.procedure.derive import sensor_load
 from elastocal.robot import parse_urdf
-from elastocal.workflows import LiveResult
+from elastocal.workflows.live import LiveResult
 from support import compensated, drivers
 from support.simulated import example_cell
 

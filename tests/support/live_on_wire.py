@@ -9,17 +9,10 @@ from pathlib import Path
 import yaml
 
 from elastocal.cell import WallClock, load_cell
-from elastocal.sim.wire import (
-    IPOC_START,
-    LiveCell,
-    NetFtServer,
-    RsiContext,
-    RsiServer,
-    Told,
-    rsi_server,
-    wire_servers,
-)
-from elastocal.sim.wire._rsi_robot import corrected_program
+from elastocal.sim.wire import LiveCell, Told, wire_servers
+from elastocal.sim.wire._rsi_robot import RsiContext, corrected_program
+from elastocal.sim.wire.net_ft import NetFtServer
+from elastocal.sim.wire.rsi import IPOC_START, RsiServer, rsi_server
 from support import live_bench
 from support.simulated import QUIET, example_cell
 

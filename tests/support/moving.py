@@ -6,7 +6,8 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.planning import CollisionScene
-from elastocal.planning.motion import AxisMotion, Mover, Sweep
+from elastocal.planning.motion import AxisMotion, Mover
+from elastocal.planning.motion.mover import Sweep
 from elastocal.planning.postures import Postures
 from elastocal.robot.inverse import inverse_for
 from elastocal.shapes import Body, Box, Sphere

@@ -9,10 +9,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibratedModel, Observability, calibrate
 from elastocal.robot import Robot, xyzabc_from_T
-from elastocal.sim.arm import (
-    START,
-    SphericalCap,
-)
+from elastocal.sim.arm.measurement import START, SphericalCap
 from support.cells import TRACKED, Cell, rich_truth, robot
 from support.problems import elastic
 

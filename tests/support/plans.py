@@ -21,9 +21,7 @@ from elastocal.planning.search import Candidates, covering_radius, nearest_neigh
 from elastocal.planning.surface import contact_frames
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm import (
-    SphericalCap,
-)
+from elastocal.sim.arm.measurement import SphericalCap
 
 MODEL = "KR 120 R2700 extra HA"
 RAIL_AT = 0.3125

@@ -9,9 +9,7 @@ from elastocal.planning.pool import Pool, PostureSolver
 from elastocal.planning.postures import Postures
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
-from elastocal.sim.arm import (
-    SphericalCap,
-)
+from elastocal.sim.arm.measurement import SphericalCap
 
 T_FLANGE_TCP = np.array(
     [[1.0, 0.0, 0.0, 0.15], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.35], [0.0, 0.0, 0.0, 1.0]]

@@ -7,11 +7,9 @@ import numpy as np
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibratedModel, Observability, Term, calibrate
-from elastocal.sim.arm import (
-    ElasticArm,
-    Linear,
-    StiffeningGear,
-)
+from elastocal.sim.arm import Linear
+from elastocal.sim.arm.elastic_arm import ElasticArm
+from elastocal.sim.arm.gears import StiffeningGear
 from support.cells import Cell, linear_truth, robot
 from support.problems import elastic
 

@@ -1,11 +1,7 @@
 """Figures of a calibration that was never made, for files that only need to hold some."""
 
-from elastocal.identification import (
-    CalibrationSummary,
-    DeflectionSummary,
-    HeldOutSummary,
-    ResidualSummary,
-)
+from elastocal.identification import CalibrationSummary, DeflectionSummary
+from elastocal.identification.figures import HeldOutSummary, ResidualSummary
 
 
 def made_up_summary(deflection: float = 1e-3) -> CalibrationSummary:

@@ -4,7 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from elastocal.planning.surface import Surface, build_surface, weld
+from elastocal.planning.surface import Surface
+from elastocal.planning.surface.mesh import weld
+from elastocal.planning.surface.surface import build_surface
 
 
 def grid(height: Callable, n: int = 41, size: float = 1.0) -> Surface:

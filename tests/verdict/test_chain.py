@@ -12,19 +12,11 @@ from elastocal.codec import read_codec, write_codec
 from elastocal.errors import ElastocalError
 from elastocal.procedure import file_sha256
 from elastocal.records import read_arrays, write_arrays
-from elastocal.verdict import (
-    EvidenceOptions,
-    Light,
-    LinkState,
-    Seal,
-    codec_findings,
-    find_everything,
-    gather_evidence,
-    judge,
-    missing_findings,
-    reading_findings,
-)
+from elastocal.verdict import EvidenceOptions, Light, LinkState, find_everything, gather_evidence
 from elastocal.verdict._files import read_seal
+from elastocal.verdict.evidence import Seal
+from elastocal.verdict.findings import codec_findings, missing_findings, reading_findings
+from elastocal.verdict.judgement import judge
 from support import sealed
 from support.by_day import some_by_day
 from support.cli import elastocal

@@ -15,10 +15,10 @@ from elastocal.verdict import (
     chain,
     read_manifest,
     read_private_key,
-    read_signature,
     sign,
     write_signature,
 )
+from elastocal.verdict.signing import read_signature
 from support import forged, sealed
 from support.by_day import some_by_day
 from support.forged import CLOSED, OPENED, PAGE, RUN, refusal

@@ -6,11 +6,8 @@ import json
 import pytest
 
 from elastocal import dataset
-from elastocal.verdict import (
-    BYTES,
-    CONTENT,
-    content_hash,
-)
+from elastocal.verdict import BYTES
+from elastocal.verdict._files import CONTENT, content_hash
 
 
 def written(path, data):

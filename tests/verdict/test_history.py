@@ -5,7 +5,8 @@ import pytest
 from elastocal.errors import VerificationError
 from elastocal.procedure import RunFolder, read_journal
 from elastocal.procedure.record import HISTORY
-from elastocal.verdict import LinkState, begin_record, history_link
+from elastocal.verdict import LinkState, begin_record
+from elastocal.verdict.history import history_link
 from elastocal.workflows import verify
 from support import reported
 from support.fake_runs import RECORD

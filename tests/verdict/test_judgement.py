@@ -7,8 +7,11 @@ import pytest
 
 from elastocal.identification import UnseenErrors
 from elastocal.identification.recertification import Estimate
-from elastocal.report.document import verdict_html
-from elastocal.verdict import AcceptanceLimits, Finding, Light, advise, judge
+from elastocal.report.document.page import verdict_html
+from elastocal.verdict import Light
+from elastocal.verdict._finding import Finding
+from elastocal.verdict.evidence import AcceptanceLimits
+from elastocal.verdict.judgement import advise, judge
 
 
 def errors(worst, low, high, count=20):

@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 
 from elastocal.cell import ProductionPath
-from elastocal.verdict import (
-    AcceptanceLimits,
-    Finding,
-    Light,
-    find_everything,
-    judge,
-    reading_findings,
-)
+from elastocal.verdict import Light, find_everything
+from elastocal.verdict._finding import Finding
+from elastocal.verdict.evidence import AcceptanceLimits
+from elastocal.verdict.findings import reading_findings
+from elastocal.verdict.judgement import judge
 
 
 @pytest.fixture

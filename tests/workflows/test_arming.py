@@ -14,7 +14,7 @@ from elastocal.drivers.kuka_rsi import DRIVER as KUKA, RsiSettings
 from elastocal.errors import DeviceError, ElastocalError, ProcedureError
 from elastocal.studio import Session
 from elastocal.studio.worker import WorkNews
-from elastocal.workflows import arm_devices, rig_of
+from elastocal.workflows._operator_and_devices import arm_devices, rig_of
 from elastocal.workflows.studio import _Commands
 from support import drivers
 from support.kuka_bench import Bench

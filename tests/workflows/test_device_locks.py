@@ -9,10 +9,13 @@ import yaml
 
 from elastocal import workflows
 from elastocal.cell import DevicePlace, LocalPort
-from elastocal.drivers import emscon, kuka_rsi, line_stream, rtde
+from elastocal.drivers import kuka_rsi
+from elastocal.drivers.emscon.dialogue import EmsconSettings
+from elastocal.drivers.line_stream.driver import LineStreamSettings
+from elastocal.drivers.rtde.driver import RtdeSettings
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import NetFtServer
-from elastocal.workflows import rig_of
+from elastocal.sim.wire.net_ft import NetFtServer
+from elastocal.workflows._operator_and_devices import rig_of
 from support.cli import elastocal
 from support.live_on_wire import LiveFiles, free, served
 from support.run_cells import planned_cell
@@ -39,16 +42,16 @@ def places(settings) -> list[str]:
 
 def test_devices_are_known_by_where_they_are():
     two = {"a": {"address": "10.0.0.1"}, "b": {"address": "10.0.0.2", "port": 701}}
-    trackers = emscon.EmsconSettings.model_validate({"stations": two})
+    trackers = EmsconSettings.model_validate({"stations": two})
     assert places(trackers) == ["10.0.0.1:700", "10.0.0.2:701"]
-    assert places(rtde.RtdeSettings(address="10.0.0.3")) == ["10.0.0.3:30004"]
+    assert places(RtdeSettings(address="10.0.0.3")) == ["10.0.0.3:30004"]
     arm = kuka_rsi.RsiSettings(address="10.0.0.5", robot="10.0.0.4")
     assert places(arm) == ["10.0.0.5:49152", "10.0.0.4:49152"]
     assert arm.own_ports() == (LocalPort("udp", "10.0.0.5", 49152),)
-    adapter = line_stream.LineStreamSettings(address="10.0.0.6", port=7)
+    adapter = LineStreamSettings(address="10.0.0.6", port=7)
     assert (places(adapter), adapter.own_ports()) == (["10.0.0.6:7"], ())
     server = {"role": "server", "address": "10.0.0.5", "peer": "10.0.0.7", "port": 8}
-    served = line_stream.LineStreamSettings.model_validate(server)
+    served = LineStreamSettings.model_validate(server)
     assert places(served) == ["10.0.0.7:8"]
     assert served.own_ports() == (LocalPort("tcp", "10.0.0.5", 8),)
 

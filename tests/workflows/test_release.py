@@ -5,7 +5,8 @@ import pytest
 
 from elastocal.cell import SensorStatus, WrenchBlock
 from elastocal.procedure.run import FaultError, LeavingWatch, ToolLoad
-from elastocal.workflows import Unattended, release
+from elastocal.workflows import release
+from elastocal.workflows._operator_and_devices import Unattended
 from support.simulated import example_cell
 
 UP = np.array([0.0, 0.0, 1.0])

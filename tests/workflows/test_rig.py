@@ -6,7 +6,7 @@ import pytest
 from elastocal.cell import KINDS, DeviceSet, WallClock
 from elastocal.errors import DeviceError, SchemaError
 from elastocal.sim.workcell import simulated_devices
-from elastocal.workflows import driver_names, find_driver, rig_of
+from elastocal.workflows._operator_and_devices import driver_names, find_driver, rig_of
 from support import drivers
 from support.simulated import example_cell, places
 

@@ -8,7 +8,7 @@ from elastocal import workflows
 from elastocal.cell import load_cell, write_example
 from elastocal.errors import DeviceError
 from elastocal.sim.wire import servers, suited_servers
-from elastocal.workflows import rig_of
+from elastocal.workflows._operator_and_devices import rig_of
 from support.simulated import example_cell
 
 

@@ -9,13 +9,16 @@ import pytest
 import yaml
 
 from elastocal.cell import LocalPort, RigContext, WallClock, load_cell
-from elastocal.drivers import StationLink
 from elastocal.drivers.kuka_rsi import RsiSettings
 from elastocal.drivers.kuka_rsi._listener import KukaListener
-from elastocal.drivers.rtde import RtdeDriver, RtdeSettings
+from elastocal.drivers.rtde.driver import RtdeDriver, RtdeSettings
+from elastocal.drivers.station_link import StationLink
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import PORTS, LiveCell, NetFtServer, RtdeServer
-from elastocal.workflows import WatchResult, rig_of, studio, watch
+from elastocal.sim.wire import LiveCell
+from elastocal.sim.wire.net_ft import NetFtServer
+from elastocal.sim.wire.rtde import PORTS, RtdeServer
+from elastocal.workflows import WatchResult, studio, watch
+from elastocal.workflows._operator_and_devices import rig_of
 from support import fault_matrix
 from support.cli import elastocal
 from support.kuka_peer import KukaPeer

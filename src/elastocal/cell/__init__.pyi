@@ -27,17 +27,13 @@ from ._quantities import (
 )
 from .arming import Arming as Arming, RealArm as RealArm
 from .cell import (
-    SCHEMA as SCHEMA,
-    SECTIONS_OF_OTHERS as SECTIONS_OF_OTHERS,
     TOOLING as TOOLING,
     Cell as Cell,
     CellFile as CellFile,
-    cell_file_model as cell_file_model,
     load_cell as load_cell,
     mounted_robot as mounted_robot,
 )
 from .certificate import (
-    ASKED as ASKED,
     CertificateEntry as CertificateEntry,
     Equipment as Equipment,
     SensorIdentity as SensorIdentity,
@@ -61,17 +57,10 @@ from .devices import (
     RobotArm as RobotArm,
     SensorStatus as SensorStatus,
     WrenchBlock as WrenchBlock,
-    close_nothing as close_nothing,
     require_duration as require_duration,
 )
 from .examples import (
-    BLOCK_SIZE as BLOCK_SIZE,
-    EXAMPLES as EXAMPLES,
     PROCESS_FILE as PROCESS_FILE,
-    Example as Example,
-    binary_stl as binary_stl,
-    block_mesh as block_mesh,
-    dome_section as dome_section,
     name_process as name_process,
     require_example as require_example,
     write_example as write_example,
@@ -79,39 +68,21 @@ from .examples import (
 from .hardware import (
     Box as Box,
     Cylinder as Cylinder,
-    Marker as Marker,
-    MeshFile as MeshFile,
-    RailEntry as RailEntry,
-    RegionBox as RegionBox,
     RegionEntry as RegionEntry,
-    RegionPolygon as RegionPolygon,
     RobotEntry as RobotEntry,
-    SensorEntry as SensorEntry,
     Shape as Shape,
     Sphere as Sphere,
-    SurfaceEntry as SurfaceEntry,
     Tool as Tool,
     Tracker as Tracker,
 )
 from .identity import (
-    RUN_SECTIONS as RUN_SECTIONS,
     fingerprint as fingerprint,
     named_files as named_files,
 )
 from .line_counts import (
     COUNTED as COUNTED,
     LineCounts as LineCounts,
-    no_lines as no_lines,
     refused_telegrams as refused_telegrams,
-)
-from .motion import (
-    MotionEntry as MotionEntry,
-    axis_speeds as axis_speeds,
-    external_positions as external_positions,
-    home_position as home_position,
-    joint_margins as joint_margins,
-    joint_positions as joint_positions,
-    torque_limits as torque_limits,
 )
 from .path_arm import (
     AnswerTimes as AnswerTimes,
@@ -126,15 +97,10 @@ from .path_arm import (
 from .procedure import (
     CONDITIONING as CONDITIONING,
     DEFAULT_POSES as DEFAULT_POSES,
-    DIRECTIONS as DIRECTIONS,
     LIGHT_CONTACT as LIGHT_CONTACT,
-    Acceptance as Acceptance,
-    Engagement as Engagement,
     Limits as Limits,
     LoadCases as LoadCases,
     ProcedureSettings as ProcedureSettings,
-    Search as Search,
-    TorqueLimits as TorqueLimits,
 )
 from .production import (
     ProcessFile as ProcessFile,
@@ -144,7 +110,6 @@ from .production import (
 )
 from .reading import (
     DeviceReading as DeviceReading,
-    Three as Three,
     polled_readings as polled_readings,
     three as three,
 )
@@ -152,8 +117,6 @@ from .rig import (
     KINDS as KINDS,
     LOOPBACK as LOOPBACK,
     SIMULATED as SIMULATED,
-    DeviceChoice as DeviceChoice,
-    DeviceChoices as DeviceChoices,
     DevicePlace as DevicePlace,
     DeviceSet as DeviceSet,
     DeviceSettings as DeviceSettings,
@@ -170,7 +133,6 @@ from .sensor import (
     weight_response as weight_response,
 )
 from .visit import (
-    VisitStep as VisitStep,
     contact_time as contact_time,
     load_case_time as load_case_time,
     straight_time as straight_time,

@@ -71,8 +71,8 @@ TOOLING = "tooling"
 
 
 SECTIONS_OF_OTHERS = {
-    "simulation": ("elastocal.sim", "Simulation"),
-    "faults": ("elastocal.sim", "Faults"),
+    "simulation": ("elastocal.sim.truth", "Simulation"),
+    "faults": ("elastocal.sim.truth", "Faults"),
 }
 """Sections that the packages read that own them, and that nothing here knows: module and name of
 their type. Each can be left out."""
@@ -191,6 +191,16 @@ class CellFile(StrictModel):
         return limits
 
 
+_WHOLE = "WholeCellFile"
+
+
+def __getattr__(name: str) -> type[CellFile]:
+    """Return the model of whole files by its name, where another process unpacks a cell."""
+    if name == _WHOLE:
+        return cell_file_model()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
 @cache
 def cell_file_model() -> type[CellFile]:
     """Return the model of a whole cell file, with the sections of others."""
@@ -202,7 +212,7 @@ def cell_file_model() -> type[CellFile]:
         name: (kind, Field(default_factory=get_origin(kind) or kind))
         for name, kind in types.items()
     }
-    return create_model("CellFile", __base__=CellFile, __module__=__name__, **fields)
+    return create_model(_WHOLE, __base__=CellFile, __module__=__name__, **fields)
 
 
 _TCP = "tcp"

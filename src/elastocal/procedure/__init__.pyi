@@ -1,11 +1,9 @@
 from .derive import (
-    DerivedRun as DerivedRun,
     PoseReadings as PoseReadings,
     RunSummary as RunSummary,
     derive_run as derive_run,
     read_run as read_run,
     read_summary as read_summary,
-    reduce_pose as reduce_pose,
     rehearse_derivation as rehearse_derivation,
     write_derived as write_derived,
 )

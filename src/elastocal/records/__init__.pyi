@@ -20,7 +20,6 @@ from ._json import (
     SEAL as SEAL,
     json_sha256 as json_sha256,
     parse_json as parse_json,
-    require_seal as require_seal,
     require_written as require_written,
 )
 from ._netcdf import (

@@ -1,6 +1,4 @@
 from .language import (
-    ENGLISH as ENGLISH,
-    LANGUAGES as LANGUAGES,
     Language as Language,
     language_of as language_of,
 )

@@ -12,7 +12,6 @@ from .collision import (
 )
 from .identity import (
     BUILT_MARK as BUILT_MARK,
-    Gap as Gap,
     link_gap as link_gap,
     of_one_arm as of_one_arm,
     probe_configurations as probe_configurations,
@@ -21,7 +20,6 @@ from .identity import (
     tool_gap as tool_gap,
 )
 from .joint_readings import (
-    JOINT_READINGS as JOINT_READINGS,
     JointReading as JointReading,
     other_joint_readings as other_joint_readings,
 )
@@ -44,7 +42,6 @@ from .robot import (
 from .singularity import (
     characteristic_length as characteristic_length,
     has_wrist as has_wrist,
-    scaled_singular_values as scaled_singular_values,
     smallest_singular_value as smallest_singular_value,
     wrist_angle as wrist_angle,
 )
@@ -55,17 +52,11 @@ from .transforms import (
     xyzabc_from_T as xyzabc_from_T,
 )
 from .urdf import (
-    Assumption as Assumption,
-    assumptions as assumptions,
     fixed_joint_of as fixed_joint_of,
     leaf_links as leaf_links,
     parse_urdf as parse_urdf,
-    read_chain as read_chain,
     read_urdf as read_urdf,
     refusals_naming as refusals_naming,
-    robot_name as robot_name,
-    root_link as root_link,
-    serial_urdf as serial_urdf,
     tip_links as tip_links,
     tool_link as tool_link,
 )

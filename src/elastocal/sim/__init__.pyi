@@ -1,31 +1,10 @@
-from .driver import DRIVER as DRIVER, SimulatedDriver as SimulatedDriver
+from .driver import (
+    DRIVER as DRIVER,
+)
 from .presets import (
     PRESET_FIGURES as PRESET_FIGURES,
     PRESETS as PRESETS,
-    Preset as Preset,
-    PresetFigure as PresetFigure,
-    kind_default as kind_default,
-    with_preset as with_preset,
 )
 from .truth import (
-    Balancer as Balancer,
-    Bearings as Bearings,
-    ContactTruth as ContactTruth,
-    ControllerTruth as ControllerTruth,
-    EndEffector as EndEffector,
-    ExternalAxes as ExternalAxes,
-    Fault as Fault,
-    FaultKind as FaultKind,
-    Faults as Faults,
-    Floor as Floor,
-    Gears as Gears,
-    Geometry as Geometry,
-    Links as Links,
-    SensorTruth as SensorTruth,
-    Simulation as Simulation,
-    Thermal as Thermal,
-    TrackerTruth as TrackerTruth,
-    TruthScale as TruthScale,
-    faults_of as faults_of,
     truth_of as truth_of,
 )

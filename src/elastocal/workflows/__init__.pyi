@@ -30,19 +30,10 @@ __all__ = [
     "watch",
 ]  # the commands: what the package itself exports of these
 
-from ._file_kinds import FileDescription as FileDescription
-from ._inputs import NewTool as NewTool, find_robot as find_robot
 from ._live_session import LiveReport as LiveReport
 from ._operator_and_devices import (
-    GROUP as GROUP,
-    Operator as Operator,
-    ReservedRig as ReservedRig,
-    Rig as Rig,
     Supervision as Supervision,
     Unattended as Unattended,
-    arm_devices as arm_devices,
-    driver_names as driver_names,
-    find_driver as find_driver,
     rig_of as rig_of,
 )
 from .calibrate import (
@@ -54,9 +45,12 @@ from .check import (
     CheckResult as CheckResult,
     CheckSettings as CheckSettings,
     check as check,
-    describe_file as describe_file,
 )
-from .codec import CodecResult as CodecResult, CodecSettings as CodecSettings, codec as codec
+from .codec import (
+    CodecResult as CodecResult,
+    CodecSettings as CodecSettings,
+    codec as codec,
+)
 from .compare import (
     CompareResult as CompareResult,
     CompareSettings as CompareSettings,
@@ -69,21 +63,17 @@ from .compensate import (
     compensate as compensate,
 )
 from .demo import (
-    LOG as LOG,
-    README as README,
     Chapter as Chapter,
-    DemoDisplay as DemoDisplay,
     DemoResult as DemoResult,
     DemoSettings as DemoSettings,
-    MakeDisplay as MakeDisplay,
-    begin as begin,
-    chapters as chapters,
     demo as demo,
-    finish as finish,
 )
-from .derive import DeriveResult as DeriveResult, DeriveSettings as DeriveSettings, derive as derive
+from .derive import (
+    DeriveResult as DeriveResult,
+    DeriveSettings as DeriveSettings,
+    derive as derive,
+)
 from .export import (
-    EXPORT_TARGETS as EXPORT_TARGETS,
     ExportResult as ExportResult,
     ExportSettings as ExportSettings,
     export as export,
@@ -96,22 +86,22 @@ from .geometry import (
 from .import_logs import (
     GuessMapResult as GuessMapResult,
     GuessMapSettings as GuessMapSettings,
-    ImportFigures as ImportFigures,
     ImportLogsResult as ImportLogsResult,
     ImportLogsSettings as ImportLogsSettings,
     guess_map as guess_map,
     import_logs as import_logs,
 )
-from .init import InitResult as InitResult, InitSettings as InitSettings, init as init
+from .init import (
+    InitResult as InitResult,
+    InitSettings as InitSettings,
+    init as init,
+)
 from .krc_config import (
     KrcConfigResult as KrcConfigResult,
     KrcConfigSettings as KrcConfigSettings,
     krc_config as krc_config,
-    kuka_settings as kuka_settings,
 )
 from .live import (
-    LIVE_LOG as LIVE_LOG,
-    LIVE_RECORD as LIVE_RECORD,
     LiveResult as LiveResult,
     LiveSettings as LiveSettings,
     live as live,
@@ -127,18 +117,14 @@ from .new import (
     new as new,
 )
 from .new_settings import (
-    NONE as NONE,
     NewSettings as NewSettings,
 )
 from .plan import (
     POSITION_PLAN as POSITION_PLAN,
-    POSITION_TABLE as POSITION_TABLE,
-    ComparedSpread as ComparedSpread,
     PlanFigures as PlanFigures,
     PlanPositionsSettings as PlanPositionsSettings,
     PlanResult as PlanResult,
     PlanSettings as PlanSettings,
-    PlanTimes as PlanTimes,
     plan as plan,
     plan_figures as plan_figures,
     plan_positions as plan_positions,
@@ -146,30 +132,24 @@ from .plan import (
 from .predict import (
     PredictResult as PredictResult,
     PredictSettings as PredictSettings,
-    PredictSummary as PredictSummary,
     predict as predict,
 )
 from .process_trial import (
     ProcessTrial as ProcessTrial,
     TrialRuns as TrialRuns,
-    run_budget as run_budget,
     run_loads as run_loads,
 )
 from .release import (
-    ReleaseFigures as ReleaseFigures,
     ReleaseResult as ReleaseResult,
     ReleaseSettings as ReleaseSettings,
     release as release,
 )
 from .report import (
-    ReportFigures as ReportFigures,
     ReportResult as ReportResult,
     ReportSettings as ReportSettings,
-    UnseenFigures as UnseenFigures,
     report as report,
 )
 from .run import (
-    POSES_MEASURED as POSES_MEASURED,
     DryRunResult as DryRunResult,
     RunFigures as RunFigures,
     RunResult as RunResult,
@@ -184,8 +164,6 @@ from .simulate import (
     simulate as simulate,
 )
 from .simulate_process import (
-    PROGRAMMED as PROGRAMMED,
-    STIFFEST as STIFFEST,
     SimulateProcessResult as SimulateProcessResult,
     SimulateProcessSettings as SimulateProcessSettings,
     simulate_process as simulate_process,
@@ -193,33 +171,32 @@ from .simulate_process import (
 from .stiffness import (
     ChosenStiffness as ChosenStiffness,
     ExternalAxis as ExternalAxis,
-    PostureCounts as PostureCounts,
     StiffnessResult as StiffnessResult,
     StiffnessSettings as StiffnessSettings,
     StiffnessSummary as StiffnessSummary,
     stiffness as stiffness,
 )
 from .studio import (
-    StudioFigures as StudioFigures,
     StudioResult as StudioResult,
     StudioSettings as StudioSettings,
     studio as studio,
 )
 from .study import (
-    DEFAULT_VARIATION as DEFAULT_VARIATION,
     StudyResult as StudyResult,
     StudySettings as StudySettings,
     study as study,
-    study_conditions as study_conditions,
 )
-from .tool import ToolResult as ToolResult, ToolSettings as ToolSettings, tool as tool
+from .tool import (
+    ToolResult as ToolResult,
+    ToolSettings as ToolSettings,
+    tool as tool,
+)
 from .verify import (
     VerifyResult as VerifyResult,
     VerifySettings as VerifySettings,
     verify as verify,
 )
 from .watch import (
-    WatchFigures as WatchFigures,
     WatchResult as WatchResult,
     WatchSettings as WatchSettings,
     watch as watch,

@@ -1,6 +1,7 @@
 import pytest
 
-from elastocal.codec.study import FACTORS, Condition, make_conditions, read_variations
+from elastocal.codec.study import Condition, make_conditions, read_variations
+from elastocal.codec.study.conditions import FACTORS
 from elastocal.errors import CodecError, PlanningError
 
 BASE = Condition(poses=31)

@@ -3,14 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from elastocal.codec.study import (
-    DESIGN,
-    PARTS,
-    StudyStore,
-    one_after_the_other,
-    run_study,
-)
-from elastocal.codec.study.sampling import _BATCH
+from elastocal.codec.study import DESIGN, PARTS, StudyStore, run_study
+from elastocal.codec.study.sampling import _BATCH, one_after_the_other
 from elastocal.errors import CodecError, FileAccessError, SchemaError
 from support.studies import numbers, settings, simulate
 

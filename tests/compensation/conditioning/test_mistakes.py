@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import ToolModel, fit_tool, refuse_mistakes
+from elastocal.compensation.conditioning import ToolModel, refuse_mistakes
+from elastocal.compensation.conditioning.tool_fit import fit_tool
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 

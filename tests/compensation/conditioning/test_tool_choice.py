@@ -9,12 +9,11 @@ from scipy.spatial.transform import Rotation
 from elastocal.compensation.conditioning import (
     TOOL_UNKNOWNS,
     ToolModel,
-    blunders,
     choose_tool,
-    fit_tool,
     refuse_mistakes,
-    rotation_off,
 )
+from elastocal.compensation.conditioning.tool_choice import blunders
+from elastocal.compensation.conditioning.tool_fit import fit_tool, rotation_off
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 

@@ -8,10 +8,10 @@ from elastocal.compensation.conditioning import (
     SensorMount,
     choose_tool,
     read_tool,
-    sensor_load,
     tool_result,
     write_tool,
 )
+from elastocal.compensation.conditioning.tool import sensor_load
 from elastocal.errors import CompensationError, SchemaError
 from elastocal.robot import Robot, catalogue, with_tool
 from support.static_postures import GRAVITY, PlantedTool, turned

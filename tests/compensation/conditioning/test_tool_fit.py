@@ -2,11 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import (
-    TOOL_UNKNOWNS,
-    ToolModel,
+from elastocal.compensation.conditioning import TOOL_UNKNOWNS, ToolModel, static_postures
+from elastocal.compensation.conditioning.tool_fit import (
     fit_tool,
-    static_postures,
     tool_derivatives,
     tool_residual,
     tool_wrenches,

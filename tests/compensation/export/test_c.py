@@ -11,7 +11,8 @@ import pytest
 
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Reading, Status, design
-from elastocal.elastic import SpringEntry, axial, custom
+from elastocal.elastic.layouts import SpringEntry, custom
+from elastocal.elastic.springs.hinge import axial
 from elastocal.errors import CompensationError
 from elastocal.robot import Robot
 from support import compensated, exported

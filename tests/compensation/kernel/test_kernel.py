@@ -5,16 +5,15 @@ from contracts.test_layouts import CASES
 from elastocal.compensation.kernel import (
     Assignment,
     Remark,
-    Value,
     compiled,
     deflection,
     observation_block,
     orientation,
-    python_text,
     sum_text,
     value_text,
 )
-from elastocal.compensation.kernel.program import ONE, ZERO, Program, needed
+from elastocal.compensation.kernel.functions import python_text
+from elastocal.compensation.kernel.program import ONE, ZERO, Program, Value, needed
 from elastocal.elastic import ElasticModel
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS

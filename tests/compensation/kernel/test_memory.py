@@ -12,10 +12,10 @@ from elastocal.compensation.kernel import (
     compiled,
     deflection,
     observation_block,
-    python_text,
     rest,
-    statement_uses,
 )
+from elastocal.compensation.kernel.functions import python_text
+from elastocal.compensation.kernel.program import statement_uses
 from elastocal.elastic import ElasticModel, Gear, bearing
 from elastocal.robot import Robot
 from support.geared import SLIPS, geared, heavy_robot

@@ -7,7 +7,7 @@ import pytest
 
 from elastocal.compensation.offline import CorrectionSettings, compensate_path, path_file
 from elastocal.robot.inverse import inverse_for, joints_along_path
-from elastocal.sim.arm import START
+from elastocal.sim.arm.measurement import START
 from support.geared import geared
 from support.paths import FORCE_TCP, dome_course, force_columns, joint_columns, read_csv, write_csv
 

@@ -16,7 +16,7 @@ from elastocal.robot.inverse import (
     nearest_zero_posture,
     posture_jumps,
 )
-from elastocal.sim.arm import START
+from elastocal.sim.arm.measurement import START
 from support.cells import rich_truth, robot, urdf
 from support.paths import (
     FORCE_TCP,

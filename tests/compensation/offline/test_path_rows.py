@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from elastocal.dataset import (
-    PathColumns,
-    PathTable,
-    find_columns,
-    find_wrench_columns,
-    in_file,
-)
+from elastocal.dataset import PathTable, find_columns, find_wrench_columns, in_file
+from elastocal.dataset.path_columns import PathColumns
 from elastocal.errors import CompensationError, FileAccessError, PathError
 from elastocal.robot import Robot
 from support.cells import robot

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell import SensorLoad
-from elastocal.compensation.online import Compensator, Reading, Status, rkorr
+from elastocal.compensation.online import Compensator, Reading, Status
+from elastocal.compensation.online.state import rkorr
 from elastocal.procedure.derive.tool import RawWrench, wrench_on_robot
 from support.compensated import arm, load, settings
 

@@ -14,12 +14,12 @@ from elastocal.compensation.online import (
     LiveLog,
     LiveLoop,
     LivePhase,
-    LiveSample,
     Status,
     Tare,
     design,
     newest_sample,
 )
+from elastocal.compensation.online.live import LiveSample
 from elastocal.errors import DeviceError
 from support import compensated
 

@@ -15,9 +15,7 @@ from elastocal.compensation.process import (
 )
 from elastocal.compensation.process.course import Ripple
 from elastocal.errors import CompensationError
-from elastocal.sim.arm import (
-    START,
-)
+from elastocal.sim.arm.measurement import START
 from support.cells import robot
 
 COMPLIANCE = 1e-6

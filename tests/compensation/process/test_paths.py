@@ -5,13 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.compensation.process import (
-    FibrePlacement,
-    Roughing,
-    with_postures,
-)
+from elastocal.compensation.process import FibrePlacement, Roughing
 from elastocal.compensation.process.course import engaged, swing
-from elastocal.compensation.process.postures import _Trial
+from elastocal.compensation.process.postures import _Trial, with_postures
 from elastocal.errors import CompensationError
 from elastocal.planning import cell_surface
 from elastocal.robot import Robot, wrist_angle

@@ -10,7 +10,7 @@ from elastocal.compensation.programs import compensate_program
 from elastocal.errors import FileAccessError, PathError
 from elastocal.robot import Robot, T_from_xyzabc, xyzabc_from_T
 from elastocal.robot.inverse import inverse_for, joints_along_path
-from elastocal.sim.arm import START
+from elastocal.sim.arm.measurement import START
 from support import krl
 from support.cells import robot
 from support.paths import FORCE_TCP, calibrated, dome_course, made_up

@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.compensation.programs import TOUCH_SPEED, KrlWriter, write_plan_program
+from elastocal.compensation.programs import write_plan_program
+from elastocal.compensation.programs.krl_writer import KrlWriter
+from elastocal.compensation.programs.plan_program import TOUCH_SPEED
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
 from support import krl, plans
 

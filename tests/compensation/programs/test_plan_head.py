@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.compensation.programs import KrlWriter, plan_program
+from elastocal.compensation.programs.krl_writer import KrlWriter
+from elastocal.compensation.programs.plan_program import plan_program
 from elastocal.robot import Robot
 from support import plans, urdfs
 

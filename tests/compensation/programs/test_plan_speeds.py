@@ -4,14 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.compensation.programs import (
-    LIN_SPEED,
-    PTP_PERCENT,
-    TOUCH_SPEED,
-    KrlWriter,
-    speeds_of,
-    write_plan_program,
-)
+from elastocal.compensation.programs import LIN_SPEED, PTP_PERCENT, write_plan_program
+from elastocal.compensation.programs.krl_writer import KrlWriter
+from elastocal.compensation.programs.plan_program import TOUCH_SPEED, speeds_of
 from support import krl, plans
 
 

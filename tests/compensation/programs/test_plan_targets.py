@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.compensation.programs import KrlWriter, plan_program
+from elastocal.compensation.programs.krl_writer import KrlWriter
+from elastocal.compensation.programs.plan_program import plan_program
 from elastocal.errors import PlanningError
 from elastocal.robot import Robot
 from support import krl, plans, urdfs

@@ -2,7 +2,7 @@
 
 import pytest
 
-from elastocal.compensation.programs import KrlWriter
+from elastocal.compensation.programs.krl_writer import KrlWriter
 from elastocal.errors import PlanningError
 from elastocal.templating import plain
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from elastocal.cell import Motion, RigContext, SensorStatus
-from elastocal.drivers.kuka_rsi import DRIVER, KukaArm, RsiSettings, connect_arm, read_rob
+from elastocal.drivers.kuka_rsi import DRIVER, KukaArm, RsiSettings
+from elastocal.drivers.kuka_rsi.driver import connect_arm
+from elastocal.drivers.kuka_rsi.messages import read_rob
 from elastocal.errors import DeviceError
 from support.kuka_bench import SETTINGS, Bench
 from support.kuka_peer import PeerClock, PeerFeed

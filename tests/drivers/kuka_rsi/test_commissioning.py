@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell import Motion
-from elastocal.drivers.kuka_rsi import (
-    CommissioningRecord,
-    Excitation,
-    RsiSettings,
-    chirp,
-    estimate_delay,
-)
+from elastocal.drivers.kuka_rsi import CommissioningRecord, RsiSettings, chirp, estimate_delay
+from elastocal.drivers.kuka_rsi.commissioning import Excitation
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.records import write_json
 from support import kuka_bench

@@ -12,17 +12,16 @@ import pytest
 
 from elastocal import workflows
 from elastocal.drivers.kuka_rsi import (
-    CHOICES,
-    FORMS,
-    MODES,
-    PROGRAMS,
     SHEET,
     RsiSettings,
     bounds_of,
     check_controller_file,
     controller_files,
-    read_context,
 )
+from elastocal.drivers.kuka_rsi.context import CHOICES
+from elastocal.drivers.kuka_rsi.context_reader import read_context
+from elastocal.drivers.kuka_rsi.controller_files import FORMS, PROGRAMS
+from elastocal.drivers.kuka_rsi.ethernet_file import MODES
 from elastocal.errors import DeviceError
 from support.kuka_bench import write_cell
 from support.simulated import example_cell

@@ -6,16 +6,9 @@ from xml.etree import ElementTree
 import pytest
 
 from elastocal import workflows
-from elastocal.drivers.kuka_rsi import (
-    LONGEST_NAME,
-    MODES,
-    PROGRAMS,
-    SHEET,
-    RsiSettings,
-    bounds_of,
-    check_ethernet_file,
-    controller_files,
-)
+from elastocal.drivers.kuka_rsi import SHEET, RsiSettings, bounds_of, controller_files
+from elastocal.drivers.kuka_rsi.controller_files import LONGEST_NAME, PROGRAMS
+from elastocal.drivers.kuka_rsi.ethernet_file import MODES, check_ethernet_file
 from elastocal.errors import DeviceError, ElastocalError, FileAccessError
 from support.cli import elastocal
 from support.kuka_bench import write_cell

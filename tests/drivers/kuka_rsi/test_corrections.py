@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 
 from elastocal.cell import Arming, PathCycle, RigContext, WallClock
-from elastocal.drivers.kuka_rsi import (
-    Arrival,
-    Bounds,
-    CorrectedKuka,
-    CorrectionGuard,
-    PathCorrections,
-    RobMessage,
-    RsiSettings,
-)
+from elastocal.drivers.kuka_rsi import Bounds, RsiSettings
+from elastocal.drivers.kuka_rsi.corrections import CorrectedKuka, CorrectionGuard, PathCorrections
+from elastocal.drivers.kuka_rsi.messages import Arrival, RobMessage
 from elastocal.errors import DeviceError
 from elastocal.robot import xyzabc_from_T
 from support.simulated import example_cell

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell import CollisionWatch, SensorStatus, WrenchSample
-from elastocal.drivers.kuka_rsi import ForceLaw, ForceReader, overshoot
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader, overshoot
 
 CYCLE = 0.004
 FILTER = 0.01

@@ -5,14 +5,8 @@ import socket
 import pytest
 
 from elastocal.cell import WallClock
-from elastocal.drivers.kuka_rsi import (
-    Arrival,
-    IpocWatch,
-    LinkAddress,
-    Order,
-    RsiLink,
-    SenMessage,
-)
+from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
+from elastocal.drivers.kuka_rsi.messages import Arrival, IpocWatch, Order, SenMessage
 from elastocal.errors import DeviceError
 from support.cli import PATIENCE
 

@@ -6,7 +6,7 @@ import re
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from elastocal.drivers.kuka_rsi import (
+from elastocal.drivers.kuka_rsi.messages import (
     MoveTarget,
     Order,
     RobMessage,

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from elastocal.drivers.kuka_rsi import RsiSettings, bounds_of, require_pair
+from elastocal.drivers.kuka_rsi import RsiSettings, bounds_of
+from elastocal.drivers.kuka_rsi.settings import require_pair
 from elastocal.errors import ElastocalError
 from elastocal.records import validate
 from support.simulated import example_cell

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from elastocal.cell import SensorStatus
-from elastocal.drivers.net_ft import (
+from elastocal.drivers.net_ft.protocol import (
     ASK_CALIBRATION,
     Command,
     parse_calibration,

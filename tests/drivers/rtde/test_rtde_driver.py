@@ -8,7 +8,9 @@ import pytest
 
 from elastocal.cell import LOOPBACK, Arming, RigContext, WallClock, load_cell
 from elastocal.cell.examples import write_example
-from elastocal.drivers.rtde import DRIVER, RtdeDriver, RtdeSettings, UrLine, pose_of_T
+from elastocal.drivers.rtde import DRIVER
+from elastocal.drivers.rtde.driver import RtdeDriver, RtdeSettings
+from elastocal.drivers.rtde.line import UrLine, pose_of_T
 from elastocal.errors import DeviceError
 from support.simulated import example_cell
 

@@ -7,9 +7,10 @@ import pytest
 
 from elastocal.cell import Arming, Motion, RigContext, WallClock, load_cell
 from elastocal.cell.examples import write_example
-from elastocal.drivers.rtde import RtdeDriver, RtdeSettings
+from elastocal.drivers.rtde.driver import RtdeDriver, RtdeSettings
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import PORTS, LiveCell, RtdeServer
+from elastocal.sim.wire import LiveCell
+from elastocal.sim.wire.rtde import PORTS, RtdeServer
 from support.cli import PATIENCE
 from support.ur_client import UrClient
 

@@ -14,29 +14,22 @@ from elastocal.identification import (
     FitSettings,
     calibrate,
     choose_model,
-    displacement_blocks,
     summary,
     write_model,
 )
+from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.recertification import (
     ComparedRows,
     Verdict,
-    model_on,
     recertify,
     recertify_files,
 )
 from elastocal.identification.recertification._sums import common_springs, shared_numbers
+from elastocal.identification.recertification.arms import model_on
 from elastocal.robot import Robot
-from elastocal.sim.arm import (
-    SHOP_FLOOR,
-    ElasticArm,
-    Linkage,
-    SphericalCap,
-    bearing_truth,
-    measure,
-    press_forces,
-    press_poses,
-)
+from elastocal.sim.arm import SHOP_FLOOR, Linkage, bearing_truth, measure, press_forces, press_poses
+from elastocal.sim.arm.elastic_arm import ElasticArm
+from elastocal.sim.arm.measurement import SphericalCap
 from support.cells import START, linear_truth, rich_truth, robot, urdf
 from support.geared import geared, heavy_robot
 from support.recertified import softened

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal.planning import CollisionScene
-from elastocal.planning.motion import Sweep
-from elastocal.planning.motion.mover import _SHORTEST_PIECE
+from elastocal.planning.motion.mover import _SHORTEST_PIECE, Sweep
 from elastocal.shapes import Body, Sphere
 from support.moving import BALL, CLEARANCE, box, dense, scene
 from support.postures import arm

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from elastocal.errors import PlanningError
-from elastocal.planning.motion import shortest_tour
 from elastocal.planning.motion.tour import (
     _ALL_EDGES,
     _MOST_NODES,
     _nearest_neighbour,
     _tour_length,
     _two_opt,
+    shortest_tour,
 )
 
 

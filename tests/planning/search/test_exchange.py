@@ -8,16 +8,16 @@ import pytest
 from elastocal.errors import PlanningError
 from elastocal.planning.search import (
     CRITERIA,
-    EPSILON,
     Candidates,
-    Criterion,
     ExchangeSearch,
     Information,
     build_information,
     o1,
     technique,
 )
+from elastocal.planning.search.criteria import Criterion
 from elastocal.planning.search.exchange import _exchange_poses, _greedy_order
+from elastocal.planning.search.information import EPSILON
 from support.pools import dome
 
 

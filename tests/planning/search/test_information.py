@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from elastocal.planning.search import EPSILON, Candidates, build_information
+from elastocal.planning.search import Candidates, build_information
+from elastocal.planning.search.information import EPSILON
 from support.pools import LOAD_CASES, RANK, SPRINGS, dome
 
 

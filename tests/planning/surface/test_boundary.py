@@ -4,7 +4,9 @@ import numpy as np
 import trimesh
 
 from elastocal.cell.examples import BLOCK_SIZE, block_mesh
-from elastocal.planning.surface import build_surface, distance_to_boundary, sample_uniform, weld
+from elastocal.planning.surface import distance_to_boundary, sample_uniform
+from elastocal.planning.surface.mesh import weld
+from elastocal.planning.surface.surface import build_surface
 from support.tooling import plane, soup
 
 

@@ -9,11 +9,9 @@ from elastocal.cell.examples import EXAMPLES, block_mesh, dome_section, write_ex
 from elastocal.planning.surface import (
     ReachableFrom,
     arm_reach,
-    build_surface,
     contact_frames,
     first_joint_positions,
     flipped,
-    inverted_finding,
     load_surface,
     mesh_findings,
     placement_findings,
@@ -21,6 +19,8 @@ from elastocal.planning.surface import (
     size_findings,
     unit_findings,
 )
+from elastocal.planning.surface.findings import inverted_finding
+from elastocal.planning.surface.surface import build_surface
 from elastocal.robot.inverse import inverse_for
 from support.tooling import plane, soup
 

@@ -6,15 +6,10 @@ from scipy.spatial import cKDTree
 
 from elastocal.cell.examples import block_mesh
 from elastocal.cell.hardware import RegionEntry
-from elastocal.planning.surface import (
-    SurfaceError,
-    build_surface,
-    region_share,
-    sample_blue_noise,
-    sample_uniform,
-    weld,
-)
-from elastocal.planning.surface.sampling import _eliminate, _pair_weights
+from elastocal.planning.surface import SurfaceError, sample_blue_noise, sample_uniform
+from elastocal.planning.surface.mesh import weld
+from elastocal.planning.surface.sampling import _eliminate, _pair_weights, region_share
+from elastocal.planning.surface.surface import build_surface
 from support.tooling import cap, plane, soup
 
 

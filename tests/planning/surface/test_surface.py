@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 
 from elastocal.cell.examples import block_mesh
-from elastocal.planning.surface import (
-    SurfaceError,
-    build_surface,
-    flipped,
-    sample_uniform,
-    weld,
-)
+from elastocal.planning.surface import SurfaceError, flipped, sample_uniform
+from elastocal.planning.surface.mesh import weld
+from elastocal.planning.surface.surface import build_surface
 from support.tooling import cap, plane, soup
 
 

@@ -5,7 +5,8 @@ import pytest
 
 from elastocal.cell.examples import binary_stl, block_mesh
 from elastocal.errors import FileAccessError
-from elastocal.planning.surface import SurfaceError, load_surface, read_mesh, weld
+from elastocal.planning.surface import SurfaceError, load_surface, read_mesh
+from elastocal.planning.surface.mesh import weld
 
 PLY = """ply
 format ascii 1.0

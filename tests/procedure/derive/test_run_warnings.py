@@ -8,7 +8,8 @@ from elastocal.procedure.derive import LoadRow
 from elastocal.procedure.derive.findings import run_warnings
 from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate
 from elastocal.procedure.record import ReadingStatus
-from elastocal.procedure.registration import Blunder, Registration, StationFit, StationMove
+from elastocal.procedure.registration import Blunder, Registration, StationFit
+from elastocal.procedure.registration.register import StationMove
 
 TOOL = SensorLoad(60.0, np.array([0.0, 0.0, 0.15]), gravity=np.array([0.0, 0.0, -9.8]))
 SMALL = Interval(np.zeros(3), np.ones(3))

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from elastocal.procedure.derive import robot_errors
+from elastocal.procedure.derive.readings import robot_errors
 from elastocal.procedure.registration import Registration, UnloadedReadings, register
 from elastocal.procedure.registration._fit import fit
 from elastocal.sim import PRESETS

@@ -7,8 +7,9 @@ import pytest
 from openpyxl import load_workbook
 
 from elastocal.report import language_of
-from elastocal.report.document import SECTIONS, certificate_of_evidence, write_tables
-from elastocal.report.document.certificate import _scale
+from elastocal.report.document import write_tables
+from elastocal.report.document.certificate import _scale, certificate_of_evidence
+from elastocal.report.document.page import SECTIONS
 from elastocal.verdict import Evidence, judge_evidence, state_uncertainty
 from support.reported import MADE
 

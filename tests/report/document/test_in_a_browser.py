@@ -12,8 +12,9 @@ import pytest
 
 import elastocal as ec
 from elastocal.errors import FileAccessError
-from elastocal.report import LANGUAGES, language_of, write_plan_page
+from elastocal.report import language_of, write_plan_page
 from elastocal.report.document import find_browser, open_tab, write_pdf, write_report
+from elastocal.report.language import LANGUAGES
 from elastocal.report.pages import templating
 from elastocal.verdict import Evidence
 from support.browser import Look, look

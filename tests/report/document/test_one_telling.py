@@ -9,7 +9,9 @@ import pytest
 from elastocal.blocks import Table
 from elastocal.cli.output import console, print_blocks
 from elastocal.identification import show_calibration
-from elastocal.report.document import SECTIONS, Content, write_tables
+from elastocal.report.document import write_tables
+from elastocal.report.document.page import SECTIONS
+from elastocal.report.document.section import Content
 from elastocal.report.language import language_of
 
 SHARED = {"Compliances", "Models at the same left-out poses", "Readings that look wrong"}

@@ -13,16 +13,10 @@ from elastocal.codec import read_codec, write_codec
 from elastocal.errors import FileAccessError
 from elastocal.procedure import file_sha256, read_journal
 from elastocal.report import language_of, write_plan_page
-from elastocal.report.document import (
-    SECTIONS,
-    write_report,
-)
-from elastocal.verdict import (
-    Evidence,
-    EvidenceOptions,
-    MissingPart,
-    gather_evidence,
-)
+from elastocal.report.document import write_report
+from elastocal.report.document.page import SECTIONS
+from elastocal.verdict import Evidence, EvidenceOptions, gather_evidence
+from elastocal.verdict.evidence import MissingPart
 from support.pages import english_left, texts_of
 from support.reported import MADE
 from support.sealed import edit, edit_journal

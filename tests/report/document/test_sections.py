@@ -12,23 +12,19 @@ from elastocal.cell import Limits
 from elastocal.identification import CalibrationSummary, describe
 from elastocal.procedure import Event, RunSummary
 from elastocal.records import from_data, to_data
-from elastocal.report.document import SECTIONS
+from elastocal.report.document.page import SECTIONS
 from elastocal.report.document.sections import PAPER
 from elastocal.report.document.sections.cell import _LIMITS, _tool_file
-from elastocal.verdict import (
-    ChainFiles,
-    Link,
-    LinkState,
-    MissingPart,
-    Seal,
-    UsedFile,
+from elastocal.verdict import Link, LinkState
+from elastocal.verdict.chain import ChainFiles, verify_chain
+from elastocal.verdict.evidence import MissingPart, Seal, UsedFile
+from elastocal.verdict.findings import (
     codec_findings,
     compliance_findings,
     instrument_findings,
     missing_findings,
     process_findings,
     reading_findings,
-    verify_chain,
 )
 
 (

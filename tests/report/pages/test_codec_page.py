@@ -12,9 +12,7 @@ import pytest
 
 from elastocal.errors import CodecError, FileAccessError
 from elastocal.report import write_codec_figures
-from elastocal.report.pages import (
-    write_codec_page,
-)
+from elastocal.report.pages.codec_page import write_codec_page
 from elastocal.report.plots import (
     write_figure,
 )

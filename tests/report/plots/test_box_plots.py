@@ -5,12 +5,9 @@ import pytest
 from matplotlib.cbook import boxplot_stats
 
 from elastocal.errors import CodecError
-from elastocal.report.plots import (
-    COLOURS,
-    style,
-    variant_styles,
-)
+from elastocal.report.plots import style, variant_styles
 from elastocal.report.plots._box_plots import label_step, make_boxes, round_values
+from elastocal.report.plots.style import COLOURS
 
 
 def test_boxes_are_those_of_matplotlib():

@@ -16,13 +16,13 @@ from elastocal.report.plots import (
     compliance_chart,
     error_boxes,
     index_chart,
-    saturation_words,
-    spring_boxes,
     style,
-    tint,
     variant_styles,
 )
 from elastocal.report.plots._box_plots import PALE
+from elastocal.report.plots.analysis_charts import spring_boxes
+from elastocal.report.plots.codec_chart import saturation_words
+from elastocal.report.plots.style import tint
 from support.codecs import judged, renamed, without_errors
 
 

@@ -1,8 +1,6 @@
 import numpy as np
 
-from elastocal.report.plots import (
-    spread_labels,
-)
+from elastocal.report.plots.plan_figure import spread_labels
 
 
 def _gaps(place):

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.planning.surface import TriangleMesh, build_surface
+from elastocal.planning.surface.mesh import TriangleMesh
+from elastocal.planning.surface.surface import build_surface
 from elastocal.report import write_plan_figure
 from elastocal.report.plots import (
     plan_figure,

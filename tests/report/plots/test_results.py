@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.compensation.offline import CorrectionFigures, LengthStatistics
+from elastocal.compensation.offline import CorrectionFigures
+from elastocal.compensation.offline.summary import LengthStatistics
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import ReportError
-from elastocal.geometry import AxisErrors, ErrorFigures, GeometryAccuracy
+from elastocal.geometry import GeometryAccuracy
+from elastocal.geometry.accuracy import AxisErrors, ErrorFigures
 from elastocal.identification import CalibrateResult, calibrate, summary
-from elastocal.report import error_maps, plot_result
+from elastocal.report import error_maps
+from elastocal.report.plots.results import plot_result
 from support.cells import Cell, linear_truth, robot
 from support.plans import plan
 

@@ -9,12 +9,8 @@ from elastocal.identification.recertification import recertify
 from elastocal.report import (
     write_recertification_figure,
 )
-from elastocal.report.plots import (
-    SpringBar,
-    recertification_figure,
-    spring_figure,
-    style,
-)
+from elastocal.report.plots import recertification_figure, spring_figure, style
+from elastocal.report.plots.spring_figures import SpringBar
 from support.cells import linear_truth, unseen
 from support.recertified import calibrated, made_up, soft_truth
 

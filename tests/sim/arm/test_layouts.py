@@ -6,11 +6,11 @@ from elastocal.sim.arm import (
     AXIAL_STIFFNESS,
     LINK_BENDING,
     Linear,
-    StiffeningGear,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
+from elastocal.sim.arm.gears import StiffeningGear
 
 
 def norms(arm, poses, forces):

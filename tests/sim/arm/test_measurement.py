@@ -3,17 +3,17 @@ import pytest
 
 from elastocal.errors import DatasetError, UnreachableError
 from elastocal.sim.arm import (
-    GRAVITY,
     LOAD_CASES,
     SHOP_FLOOR,
     Blunder,
-    Contact,
     Noise,
     bearing_truth,
     measure,
     with_link_bending,
     with_stiffening_gears,
 )
+from elastocal.sim.arm.elastic_arm import GRAVITY
+from elastocal.sim.arm.measurement import Contact
 
 
 @pytest.fixture(scope="module")

@@ -2,14 +2,9 @@ import numpy as np
 import pytest
 
 from elastocal.errors import UnreachableError
-from elastocal.sim.arm import (
-    LOAD_CASES,
-    SphericalCap,
-    pose_error,
-    press_forces,
-    press_poses,
-    solve_inverse,
-)
+from elastocal.sim.arm import LOAD_CASES, press_forces, press_poses, solve_inverse
+from elastocal.sim.arm.linkage import pose_error
+from elastocal.sim.arm.measurement import SphericalCap
 
 
 def test_the_tool_touches_the_dome_along_its_normal(linkage, poses):

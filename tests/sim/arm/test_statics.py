@@ -1,13 +1,8 @@
 import numpy as np
 import pytest
 
-from elastocal.sim.arm import (
-    DeadLoads,
-    Linear,
-    LoadedMechanism,
-    Screws,
-    StiffeningGear,
-)
+from elastocal.sim.arm import DeadLoads, Linear, LoadedMechanism, Screws
+from elastocal.sim.arm.gears import StiffeningGear
 
 STEP = 1e-6
 

@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import SpringError
-from elastocal.sim.arm import (
-    Linear,
-    StiffeningGear,
-)
+from elastocal.sim.arm import Linear
+from elastocal.sim.arm.gears import StiffeningGear
 
 LAWS = [Linear(2e6), StiffeningGear(1e6, 0.3, 5e-4)]
 ANGLES = np.linspace(-5e-3, 5e-3, 41)

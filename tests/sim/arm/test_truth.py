@@ -6,17 +6,16 @@ import pytest
 
 from elastocal.errors import RobotError, SpringError
 from elastocal.sim.arm import (
-    GRAVITY,
-    ElasticArm,
-    EquilibriumError,
     Linear,
     Linkage,
-    StiffeningGear,
     TruthSpring,
     bearing_truth,
     with_link_bending,
     with_stiffening_gears,
 )
+from elastocal.sim.arm.elastic_arm import GRAVITY, ElasticArm
+from elastocal.sim.arm.gears import StiffeningGear
+from elastocal.sim.arm.statics import EquilibriumError
 
 LENGTH = 2.0
 K = 1000.0

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from elastocal.cell import WallClock
-from elastocal.drivers.net_ft import BoxLine, NetFtSettings
+from elastocal.drivers.net_ft import NetFtSettings
+from elastocal.drivers.net_ft.driver import BoxLine
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import LiveCell, NetFtBox, NetFtServer, Told, wire_servers
+from elastocal.sim.wire import LiveCell, Told, wire_servers
+from elastocal.sim.wire.net_ft import NetFtBox, NetFtServer
 from support.simulated import QUIET, example_cell
 
 RATE = 20.0

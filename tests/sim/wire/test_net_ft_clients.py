@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell import WallClock
-from elastocal.sim.wire import LiveCell, NetFtBox, NetFtServer
+from elastocal.sim.wire import LiveCell
+from elastocal.sim.wire.net_ft import NetFtBox, NetFtServer
 from support.simulated import QUIET, example_cell
 
 

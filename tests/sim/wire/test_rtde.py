@@ -14,7 +14,8 @@ import pytest
 from elastocal.cell import WallClock, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.errors import DeviceError
-from elastocal.sim.wire import PORTS, LiveCell, RtdeServer
+from elastocal.sim.wire import LiveCell
+from elastocal.sim.wire.rtde import PORTS, RtdeServer
 from support.cli import PATIENCE
 from support.simulated import example_cell
 from support.ur_client import RtdeClient

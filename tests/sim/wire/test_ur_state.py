@@ -7,7 +7,8 @@ import pytest
 
 from elastocal.cell import WallClock, load_cell
 from elastocal.cell.examples import write_example
-from elastocal.sim.wire import PORTS, LiveCell, RtdeServer
+from elastocal.sim.wire import LiveCell
+from elastocal.sim.wire.rtde import PORTS, RtdeServer
 
 STATE, MESSAGE = 16, 20
 TEXT, VERSION, EXCEPTION = 0, 3, 10

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import SchemaError
-from elastocal.sim import PRESET_FIGURES, PRESETS, Simulation
+from elastocal.sim import PRESET_FIGURES, PRESETS
+from elastocal.sim.truth import Simulation
 from elastocal.sim.workcell import CampaignSimulator, ContactPoses, ProcessCell
 from elastocal.sim.workcell._contact import ContactLaw
 from elastocal.sim.workcell._imperfections import SensorHysteresis, VisitChance

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from elastocal.sim import Gears
 from elastocal.sim.arm import BalancerSpring, GearLaws, RobotSprings
+from elastocal.sim.truth import Gears
 
 K = np.array([2e6, 1e6, 5e5])
 ENTRY = Gears()

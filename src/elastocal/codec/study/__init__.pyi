@@ -1,18 +1,13 @@
 from .conditions import (
-    FACTORS as FACTORS,
     Condition as Condition,
-    Factor as Factor,
-    Value as Value,
     condition_name as condition_name,
     make_conditions as make_conditions,
-    read_variation as read_variation,
     read_variations as read_variations,
     value_text as value_text,
 )
 from .poses import (
     PoseChoice as PoseChoice,
     StudyPool as StudyPool,
-    StudyPoses as StudyPoses,
     choose_poses as choose_poses,
     study_poses as study_poses,
 )
@@ -25,7 +20,6 @@ from .samples import (
     Purpose as Purpose,
     Sample as Sample,
     SampleResult as SampleResult,
-    Simulate as Simulate,
     SpringLabel as SpringLabel,
     StudyDesign as StudyDesign,
     StudyStore as StudyStore,
@@ -35,25 +29,16 @@ from .samples import (
     read_part as read_part,
 )
 from .sampling import (
-    BatchExecutor as BatchExecutor,
-    Work as Work,
     batch_executor as batch_executor,
     check_samples as check_samples,
-    one_after_the_other as one_after_the_other,
     run_study as run_study,
 )
 from .summary import (
     STUDY_SCHEMA as STUDY_SCHEMA,
-    ConditionSummary as ConditionSummary,
-    Distribution as Distribution,
     Share as Share,
     StudySummary as StudySummary,
-    advice as advice,
-    distribution as distribution,
     micrometres as micrometres,
     read_study as read_study,
-    share as share,
     study_summary as study_summary,
-    summarise as summarise,
     write_study as write_study,
 )

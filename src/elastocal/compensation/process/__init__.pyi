@@ -1,25 +1,15 @@
 from .course import (
     Course as Course,
-    Process as Process,
-    Ripple as Ripple,
     arc_length as arc_length,
     at_load as at_load,
-    engaged as engaged,
-    evenly_spaced as evenly_spaced,
-    swing as swing,
-    tool_frames as tool_frames,
-    unit_tangents as unit_tangents,
 )
 from .loop import (
     Controller as Controller,
     Corrector as Corrector,
     CourseRun as CourseRun,
-    CycleInput as CycleInput,
-    LoadedRobot as LoadedRobot,
     ModelCorrector as ModelCorrector,
     Passage as Passage,
     PerfectCorrector as PerfectCorrector,
-    TrueCell as TrueCell,
     air_shifts as air_shifts,
     run_courses as run_courses,
 )
@@ -30,7 +20,6 @@ from .postures import (
     process_courses as process_courses,
     require_process as require_process,
     stiffest_posture as stiffest_posture,
-    with_postures as with_postures,
 )
 from .programmed import (
     LATERAL as LATERAL,

@@ -27,7 +27,6 @@ from .sight import (
     assign_stations as assign_stations,
     registration_shortages as registration_shortages,
     shortage_text as shortage_text,
-    sight_solid as sight_solid,
     unseen_bumps as unseen_bumps,
 )
 from .singularity import SingularityCheck as SingularityCheck, WristCheck as WristCheck

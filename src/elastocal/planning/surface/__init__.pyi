@@ -4,17 +4,14 @@ from .contact import (
     fit_disk as fit_disk,
 )
 from .distances import (
-    GeodesicDistance as GeodesicDistance,
     distance_to_boundary as distance_to_boundary,
     geodesic_distance as geodesic_distance,
 )
 from .findings import (
     Finding as Finding,
-    Reachable as Reachable,
     ReachableFrom as ReachableFrom,
     arm_reach as arm_reach,
     first_joint_positions as first_joint_positions,
-    inverted_finding as inverted_finding,
     mesh_findings as mesh_findings,
     placement_findings as placement_findings,
     size_findings as size_findings,
@@ -23,22 +20,15 @@ from .findings import (
 )
 from .mesh import (
     SurfaceError as SurfaceError,
-    TriangleMesh as TriangleMesh,
     read_mesh as read_mesh,
-    weld as weld,
 )
 from .sampling import (
-    region_share as region_share,
     sample_blue_noise as sample_blue_noise,
     sample_uniform as sample_uniform,
 )
 from .surface import (
-    CREASE_ANGLE as CREASE_ANGLE,
-    Edges as Edges,
-    Region as Region,
     Surface as Surface,
     SurfacePoints as SurfacePoints,
-    build_surface as build_surface,
     flipped as flipped,
     load_surface as load_surface,
 )

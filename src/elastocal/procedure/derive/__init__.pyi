@@ -1,74 +1,29 @@
-from ._rows import LoadRow as LoadRow, LoadValues as LoadValues, load_rows as load_rows
+from ._rows import (
+    LoadRow as LoadRow,
+    load_rows as load_rows,
+)
 from .derivation import (
-    CommittedRun as CommittedRun,
-    DerivedRun as DerivedRun,
     MeasuredArm as MeasuredArm,
     dataset_of as dataset_of,
-    derive_poses as derive_poses,
     derive_run as derive_run,
-    measured_arm as measured_arm,
     read_run as read_run,
-    run_provenance as run_provenance,
     write_derived as write_derived,
 )
-from .findings import (
-    RunFindings as RunFindings,
-    run_warnings as run_warnings,
-    summarise as summarise,
-)
 from .readings import (
-    AXIS_SHIFT as AXIS_SHIFT,
-    AXIS_TILT as AXIS_TILT,
-    JOINT_ERROR as JOINT_ERROR,
     LEAST_SAMPLES as LEAST_SAMPLES,
-    SAG as SAG,
-    Mean as Mean,
     PoseReadings as PoseReadings,
     Reading as Reading,
     ToolState as ToolState,
     average as average,
-    felt_windows as felt_windows,
     marker_readings as marker_readings,
-    places_in_time as places_in_time,
-    reduce_pose as reduce_pose,
-    robot_errors as robot_errors,
-    tool_readings as tool_readings,
-    weighed_poses as weighed_poses,
 )
 from .rehearsal import rehearse_derivation as rehearse_derivation
 from .summary import (
-    AttemptSummary as AttemptSummary,
-    DriftSummary as DriftSummary,
-    FaultSummary as FaultSummary,
-    LostReading as LostReading,
-    MomentSummary as MomentSummary,
-    MoveSummary as MoveSummary,
-    NoiseSummary as NoiseSummary,
-    Number as Number,
-    PoseCounts as PoseCounts,
-    ReadingCounts as ReadingCounts,
     RegistrationSummary as RegistrationSummary,
     RunSummary as RunSummary,
-    ScalarEstimate as ScalarEstimate,
-    StationSummary as StationSummary,
-    TimeSummary as TimeSummary,
-    ToolStep as ToolStep,
     ToolSummary as ToolSummary,
-    Vector as Vector,
-    VectorEstimate as VectorEstimate,
-    VectorInterval as VectorInterval,
     read_summary as read_summary,
 )
 from .tool import (
-    Interval as Interval,
-    RawWrench as RawWrench,
-    RobotWrench as RobotWrench,
-    ToolChange as ToolChange,
-    ToolEstimate as ToolEstimate,
-    UnloadedWrenches as UnloadedWrenches,
-    estimate_tool as estimate_tool,
     sensor_load as sensor_load,
-    tool_change as tool_change,
-    turned_sigma as turned_sigma,
-    wrench_on_robot as wrench_on_robot,
 )

@@ -14,9 +14,7 @@ from .folder import (
 )
 from .history import (
     HISTORY as HISTORY,
-    JOURNAL_SCHEMA as JOURNAL_SCHEMA,
     EarlierRun as EarlierRun,
-    HistoryEntry as HistoryEntry,
     RunRecord as RunRecord,
     note_run as note_run,
     read_history as read_history,
@@ -29,7 +27,6 @@ from .journal import (
     Logbook as Logbook,
     PoseLog as PoseLog,
     ReadingStatus as ReadingStatus,
-    Sync as Sync,
     Window as Window,
     commits as commits,
     read_commits as read_commits,
@@ -39,7 +36,6 @@ from .streams import (
     SAME_TIME as SAME_TIME,
     STREAMS_SCHEMA as STREAMS_SCHEMA,
     ArmStream as ArmStream,
-    Mark as Mark,
     PointStream as PointStream,
     PoseRecorder as PoseRecorder,
     StreamRecorder as StreamRecorder,

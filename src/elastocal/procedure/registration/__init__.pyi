@@ -3,6 +3,5 @@ from .register import (
     Blunder as Blunder,
     Registration as Registration,
     StationFit as StationFit,
-    StationMove as StationMove,
     register as register,
 )

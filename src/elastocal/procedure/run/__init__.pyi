@@ -5,15 +5,9 @@ from .leaving import (
     leave_surface as leave_surface,
 )
 from .routes import (
-    HOME_AT_START as HOME_AT_START,
-    ApproachLine as ApproachLine,
-    HomeRoute as HomeRoute,
     PlannedStep as PlannedStep,
     home_route as home_route,
     itinerary as itinerary,
-    remaining_times as remaining_times,
-    route as route,
-    stop_joints as stop_joints,
 )
 from .runner import Runner as Runner
 from .session import (
@@ -35,17 +29,6 @@ from .settings import (
     run_settings as run_settings,
 )
 from .steps import (
-    EXPECTED_ERRORS as EXPECTED_ERRORS,
-    MAY_TOUCH as MAY_TOUCH,
-    ON_APPROACH_LINE as ON_APPROACH_LINE,
-    ArmLocation as ArmLocation,
-    BackOffResult as BackOffResult,
-    Fault as Fault,
     FaultError as FaultError,
-    FaultScope as FaultScope,
     Progress as Progress,
-    Step as Step,
-    StepResult as StepResult,
-    as_fault as as_fault,
-    next_step as next_step,
 )

@@ -9,18 +9,5 @@ from .catalogue import (
     urdf as urdf,
 )
 from .record import (
-    LINKS as LINKS,
-    ArmDimensions as ArmDimensions,
     CatalogueEntry as CatalogueEntry,
-    Dimensions as Dimensions,
-    Group as Group,
-    Inertias as Inertias,
-    LinkInertia as LinkInertia,
-    Maker as Maker,
-    Maxima as Maxima,
-    ParallelDimensions as ParallelDimensions,
-    ParallelEntry as ParallelEntry,
-    PositionLimits as PositionLimits,
-    WristEntry as WristEntry,
-    inertias_like as inertias_like,
 )

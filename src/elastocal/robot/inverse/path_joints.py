@@ -7,7 +7,9 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PathError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import TURN, InverseKinematics, NumericalInverse
+from elastocal.robot.inverse import InverseKinematics
+from elastocal.robot.inverse.arm import TURN
+from elastocal.robot.inverse.numerical import NumericalInverse
 
 RowName = Callable[[int], str]
 """Names a row for a person, e.g. ``row 12``."""

@@ -189,7 +189,7 @@ def bearing_truth(
     transverse : array_like, shape (joint, 2), optional
         Tilt stiffnesses in N·m/rad; by default `TRANSVERSE_RATIO` times the axial ones.
     gravity : tuple of float
-        Acceleration in base in m/s²; see `elastocal.sim.arm.elastic_arm.GRAVITY`.
+        Acceleration in base in m/s²; see `GRAVITY`.
 
     Raises
     ------

@@ -2,7 +2,6 @@ from ._timeline import SimClock as SimClock
 from .campaign import (
     CampaignSimulator as CampaignSimulator,
     ContactPoses as ContactPoses,
-    TrueReadings as TrueReadings,
 )
 from .campaign_errors import (
     CampaignErrors as CampaignErrors,
@@ -11,7 +10,6 @@ from .campaign_errors import (
 )
 from .cell import (
     ProcessCell as ProcessCell,
-    ProcessState as ProcessState,
     SimulatedCell as SimulatedCell,
     simulated_devices as simulated_devices,
 )
