@@ -49,7 +49,8 @@ from .plan_scene import (
     plan_view as plan_view,
     weakest_margins as weakest_margins,
 )
-from .results import (
+from .results import plot_result as plot_result, (
+    plot_result as plot_result,
     StationResiduals as StationResiduals,
     displacement_figure as displacement_figure,
     drawn as drawn,
