@@ -49,11 +49,11 @@ from .plan_scene import (
     plan_view as plan_view,
     weakest_margins as weakest_margins,
 )
-from .results import plot_result as plot_result, (
-    plot_result as plot_result,
+from .results import (
     StationResiduals as StationResiduals,
     displacement_figure as displacement_figure,
     drawn as drawn,
+    plot_result as plot_result,
     pose_grid as pose_grid,
     station_figure as station_figure,
 )
