@@ -290,8 +290,8 @@ def _numbers(path: Path, header: Sequence[str], rows: TableRows) -> FloatArray:
         for column, (name, place) in enumerate(zip(names, places, strict=True)):
             value = cells[place]
             try:
-                number = int(value) if name == "seed" else parse_number(value)
-            except ValueError:
+                number = float(int(value)) if name == "seed" else parse_number(value)
+            except (ValueError, OverflowError):
                 number = np.nan
             if not np.isfinite(number):
                 raise CompensationError(f"{path}: line {line}: {name} {value!r} is not a number")
