@@ -131,7 +131,8 @@ def look_at_it(page, cell, told):
     told["springs"] = (page.text("springs"), page.text("cases"))
     told["drawn"] = page.get(
         """(() => {
-          const canvas = document.getElementById("view"), gl = canvas.getContext("webgl2");
+          const { shown } = document.getElementById("view"), { canvas, gl } = shown;
+          shown.drawNow();
           const pixels = new Uint8Array(4 * canvas.width * canvas.height), colours = new Set();
           gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
           for (let k = 0; k < pixels.length; k += 4) colours.add(pixels.slice(k, k + 3).join());
@@ -145,10 +146,11 @@ def drag_it(page, cell, told):
     told["before"] = page.text("tool")
     # By the ring at the tool, as a person does.
     x, y = page.get(
-        """import(new URL("studio.js", location)).then(({ view }) => {
-          const [x, y] = view.project(view.tool), box = view.canvas.getBoundingClientRect();
+        """(() => {
+          const view = document.getElementById("view").shown;
+          const [x, y] = view.project(view.handle), box = view.canvas.getBoundingClientRect();
           return [x + box.left, y + box.top];
-        })"""
+        })()"""
     )
     page.drag((x, y), (x + 40, y - 30))
     page.wait(f"{moved} 0")

@@ -71,7 +71,9 @@ def test_the_address_leads_to_the_page(server, ask):
     assert answer.headers["X-Frame-Options"] == "DENY"
 
 
-@pytest.mark.parametrize("name", ["studio.js", "view.js", "forms.js", "runs.js", "studio.css"])
+@pytest.mark.parametrize(
+    "name", ["studio.js", "viewer.js", "forms.js", "runs.js", "studio.css", "viewer.css"]
+)
 def test_the_files_of_the_page_are_there(ask, name):
     answer, text = ask(name)
     assert answer.status == 200

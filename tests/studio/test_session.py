@@ -1,5 +1,6 @@
 """What a page can ask of a session: figures of postures, edits, work."""
 
+import base64
 import threading
 
 import numpy as np
@@ -127,8 +128,10 @@ def test_stations_region_and_home_are_edited(session):
     home[1] = 0.1
     session.actions["edit"]({"home": home})
     found = session.actions["scene"]({})
-    assert [each["name"] for each in found["scene"]["stations"]] == ["station_1", "station_2"]
-    assert len(found["scene"]["region"]["points"]) == 24
+    layers = {layer["label"]: layer["parts"][0] for layer in found["scene"]["layers"]}
+    assert layers["Tracker stations"]["texts"] == ["station_1", "station_2"]
+    edges = np.frombuffer(base64.b64decode(layers["Region of the tooling"]["ends"]), "<f4")
+    assert edges.shape == (12 * 2 * 3,)
     assert found["form"]["region"] == region
     assert found["home"][1] == pytest.approx(0.1, abs=1e-3)
     assert "# in base" in found["text"]

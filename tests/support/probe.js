@@ -55,7 +55,7 @@
     pen.drawImage(canvas, 2, 2, 1, 1, 0, 0, 1, 1);
     return {
       colours: colours(canvas), width: canvas.width, ground: [...pen.getImageData(0, 0, 1, 1).data].slice(0, 3),
-      layers: view.shown.layers(), height: view.shown.eyeHeight(), floor: view.shown.floor,
+      layers: view.shown.layers.filter((each) => each.shown).length, height: view.shown.eyeHeight(), floor: view.shown.scene.floor,
     };
   }
 

@@ -26,8 +26,8 @@ from elastocal.planning.surface import Surface, sample_uniform
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
-from elastocal.studio.scene import Scene, drawn_scene
 from elastocal.studio.springs import CaseFigure, StiffnessFigure, StudioSprings
+from elastocal.viewer import Scene, cell_scene, packed_places
 from elastocal.wording import millimetres, mm, readable
 
 _PROBES = 32
@@ -66,6 +66,8 @@ class SightFigure:
     """The view from one station to the marker."""
 
     station: str
+    position: tuple[float, float, float]
+    """Of the station in base, in m."""
     text: str
     sees: bool
 
@@ -77,10 +79,10 @@ class PostureFigures:
 
     q: tuple[float, ...]
     """In rad or m."""
-    places: tuple[tuple[float, ...], ...]
-    """Place of each moving body in base: 16 numbers, row by row, in m."""
+    places: str
+    """Places of the robot's parts, as the viewer takes them."""
     tcp: tuple[float, ...]
-    """Likewise."""
+    """``T_base_tcp``: 16 numbers, row by row, in m."""
     position: str
     orientation: str
     """KUKA Z-Y'-X''."""
@@ -129,7 +131,8 @@ class CellView:
     @cached_property
     def scene(self) -> Scene:
         """What is drawn of the cell."""
-        return drawn_scene(self.cell, self.surface, self.collisions)
+        home = self.cell.home[None]
+        return cell_scene(self.cell, self.surface, self.collisions, home, np.zeros((0, 3)))
 
     @cached_property
     def _placements(self) -> tuple[BasePlacement, ...]:
@@ -154,9 +157,8 @@ class CellView:
         x, y, z, a, b, c = xyzabc_from_T(T).tolist()
         return PostureFigures(
             q=tuple(inside.tolist()),
-            places=tuple(
-                tuple(body.T_frame_body[0].ravel().tolist())
-                for body in self.collisions.moving(inside[None])
+            places=packed_places(
+                np.concatenate([body.T_frame_body for body in self.collisions.moving(inside[None])])
             ),
             tcp=tuple(T.ravel().tolist()),
             position=f"{millimetres((x, y, z))} mm",
@@ -274,7 +276,7 @@ class CellView:
             return ()
         margins = self.sight.margins(postures)[:, 0].tolist()
         return tuple(
-            SightFigure(station.name, _sight_text(margin), margin > 0.0)
+            SightFigure(station.name, station.position, _sight_text(margin), margin > 0.0)
             for station, margin in zip(self.sight.stations, margins, strict=True)
         )
 

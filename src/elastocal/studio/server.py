@@ -49,14 +49,16 @@ _HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
+_KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
 _FILES = {
-    "": ("studio.html", "text/html; charset=utf-8"),
-    **{name: (name, "text/css; charset=utf-8") for name in ("studio.css",)},
+    "": ("elastocal.studio", "page/studio.html"),
     **{
-        name: (name, "text/javascript; charset=utf-8")
-        for name in ("studio.js", "view.js", "forms.js", "runs.js")
+        name: ("elastocal.studio", f"page/{name}")
+        for name in ("studio.css", "studio.js", "forms.js", "runs.js")
     },
+    **{name: ("elastocal.viewer", name) for name in ("viewer.css", "viewer.js")},
 }
+"""Package and file behind each name."""
 _JSON = "application/json"
 
 Action = Callable[[Any], Mapping[str, object]]
@@ -266,9 +268,10 @@ class _Request(BaseHTTPRequestHandler):
             return
         if name not in _FILES:
             raise _RefusedError(HTTPStatus.NOT_FOUND, "no such page")
-        file, kind = _FILES[name]
-        text = resources.files("elastocal.studio").joinpath("page").joinpath(file).read_bytes()
-        self._send(HTTPStatus.OK, text, kind)
+        package, file = _FILES[name]
+        kind = _KINDS[file.rpartition(".")[2]]
+        text = resources.files(package).joinpath(file).read_bytes()
+        self._send(HTTPStatus.OK, text, f"{kind}; charset=utf-8")
 
     def _post(self, name: str) -> None:
         message = self._message()

@@ -26,6 +26,7 @@ from elastocal.studio.recorded import RunView, find_runs
 from elastocal.studio.springs import StudioSprings
 from elastocal.studio.trials import compare_techniques, survey_reach
 from elastocal.studio.worker import Data, Outbox, Worker, WorkState
+from elastocal.viewer import scene_data
 from elastocal.wording import duration, readable
 
 _FOLDER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -233,7 +234,7 @@ class Session:
                 "text": opened.text.text,
                 "form": to_data(form_of(cell)),
                 "bounds": to_data(region_around(cell, view.surface.mesh.vertices)),
-                "scene": to_data(view.scene),
+                "scene": scene_data(view.scene),
                 "springs": view.springs.source,
                 "joints": [
                     {"name": name, "turns": turns, "low": low, "high": high}

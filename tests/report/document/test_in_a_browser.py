@@ -150,7 +150,7 @@ def keys(browser, report):
         for _ in range(40):
             press(tab, "ArrowDown")
         found["low"] = tab.evaluate("document.getElementById('view').shown.eyeHeight()")
-        found["floor"] = tab.evaluate("document.getElementById('view').shown.floor")
+        found["floor"] = tab.evaluate("document.getElementById('view').shown.scene.floor")
         tab.evaluate("document.getElementById('posture').focus()")
         press(tab, "ArrowRight")
         found["posture"] = tab.evaluate("document.getElementById('shown').textContent")
@@ -175,7 +175,7 @@ def reached(browser, plan, geometry):
         for _ in range(40):
             press(tab, "ArrowDown")
         found["low"] = tab.evaluate("document.getElementById('view').shown.eyeHeight()")
-        found["floor"] = tab.evaluate("document.getElementById('view').shown.floor")
+        found["floor"] = tab.evaluate("document.getElementById('view').shown.scene.floor")
         found["deaf"] = tab.evaluate(DEAF)
         found["plan"] = sheets_of(tab)
         tab.open(geometry)

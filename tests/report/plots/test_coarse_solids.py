@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from elastocal.report.plots._solids import Solid, coarsened
+from elastocal.viewer.solids import Solid, coarsened
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,10 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
-from elastocal.report.plots import Dots, Paint, Strokes, Tags, plan_view
-from elastocal.report.plots._solids import rail_solid
+from elastocal.report.plots import plan_view
+from elastocal.viewer import Dots, Strokes, Tags
+from elastocal.viewer.scene import Paint
+from elastocal.viewer.solids import rail_solid
 
 
 @pytest.fixture(scope="module")
@@ -18,13 +20,13 @@ def view(cell, block, plan, pool):
 
 
 def layer(view, start):
-    (found,) = [each for each in view.layers if each.label.startswith(start)]
+    (found,) = [each for each in view.scene.layers if each.label.startswith(start)]
     return found
 
 
 def test_every_layer_holds_something(view):
-    for each in view.layers:
-        assert each.parts or each.sight, each.label
+    for each in view.scene.layers:
+        assert each.parts or each.name == "sight", each.label
         for part in each.parts:
             match part:
                 case Paint():
@@ -49,9 +51,9 @@ def test_home_has_no_line_of_sight(view):
 
 def test_robot_moves_from_posture_to_posture_and_its_foot_stays(view, plan):
     parts = [each.part for each in layer(view, "Robot").parts]
-    assert parts == list(range(view.places.shape[1]))
-    assert len(view.places) == len(plan.poses) + 1
-    for before, after in pairwise(view.places):
+    assert parts == list(range(view.scene.places.shape[1]))
+    assert len(view.scene.places) == len(plan.poses) + 1
+    for before, after in pairwise(view.scene.places):
         np.testing.assert_array_equal(before[0], after[0])
         assert np.abs(after[-1] - before[-1]).max() > 0.05
 
@@ -66,22 +68,22 @@ def test_way_runs_from_home_through_every_approach_pose_and_back(view, cell, pla
 
 
 def test_a_wide_floor_does_not_send_the_camera_far_away(view):
-    for camera in view.cameras:
+    for camera in view.scene.cameras:
         assert np.linalg.norm(camera.eye - camera.centre) < 20.0
 
 
 def test_no_camera_is_below_the_floor_nor_looks_up(view):
-    for camera in view.cameras:
-        assert camera.eye @ view.up > view.floor
-        assert (camera.eye - camera.centre) @ view.up > 0.0
+    for camera in view.scene.cameras:
+        assert camera.eye @ view.scene.up > view.scene.floor
+        assert (camera.eye - camera.centre) @ view.scene.up > 0.0
 
 
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", range(5))
 def test_camera_sees_all_of_the_tooling(view, block, number):
-    camera = view.cameras[number]
+    camera = view.scene.cameras[number]
     seen = block.mesh.vertices - camera.eye
     ahead = (camera.centre - camera.eye) / np.linalg.norm(camera.centre - camera.eye)
-    right = np.cross(ahead, view.up) / np.linalg.norm(np.cross(ahead, view.up))
+    right = np.cross(ahead, view.scene.up) / np.linalg.norm(np.cross(ahead, view.scene.up))
     depth = seen @ ahead
     assert depth.min() > 0.0
     assert np.abs(seen @ np.cross(right, ahead) / depth).max() < np.tan(np.radians(22.5))
@@ -91,7 +93,7 @@ def test_camera_sees_all_of_the_tooling(view, block, number):
 def test_a_cell_without_stations_has_no_line_of_sight(cell, block, plan, pool):
     unseen = tuple(replace(pose, seen_by=None) for pose in plan.poses)
     view = plan_view(cell, block, replace(plan, poses=unseen), pool)
-    assert not any(each.sight for each in view.layers)
+    assert not any(each.name == "sight" for each in view.scene.layers)
     assert np.isnan(view.sight).all()
 
 
@@ -103,7 +105,7 @@ def test_a_hint_tells_margins_with_units_and_times(view):
 
 
 def test_dots_and_tags_have_a_hint_each(view):
-    for each in view.layers:
+    for each in view.scene.layers:
         for part in each.parts:
             if isinstance(part, Dots | Tags):
                 assert len(part.hints) == len(part.at)

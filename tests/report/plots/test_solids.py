@@ -4,8 +4,9 @@ import coal
 import numpy as np
 import pytest
 
-from elastocal.report.plots._solids import fixture_solids, joined, robot_solids, triangles_of
+from elastocal.planning import collision_scene
 from elastocal.shapes import Mesh, solid_of
+from elastocal.viewer.solids import fixture_solids, joined, robot_solids, triangles_of
 
 TETRAHEDRON = (
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
@@ -51,7 +52,7 @@ class TestRobot:
 
     @pytest.fixture
     def solids(self, cell, block, q):
-        return robot_solids(cell, block, q)
+        return robot_solids(collision_scene(cell, block), q)
 
     def test_tool_follows_the_tool_centre_point(self, solids, cell, q):
         count = sum(len(part.vertices) for part in solids.parts[solids.tool :])
@@ -72,7 +73,7 @@ class TestRobot:
 
 
 def test_fixtures_are_named_and_placed_and_the_tooling_is_not_among_them(cell, block):
-    found = fixture_solids(cell, block)
+    found = fixture_solids(collision_scene(cell, block))
     assert set(found) == {"table", "floor"}
     np.testing.assert_allclose(np.ptp(found["floor"].vertices, axis=0), [12.0, 12.0, 0.1])
     np.testing.assert_allclose(found["table"].vertices.mean(axis=0), [1.5, 0.0, 0.24])

@@ -1,14 +1,9 @@
 """One HTML page that shows a plan: a view to turn, its key figures and a table of its poses."""
 
-import base64
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import singledispatch
 from pathlib import Path
 
-import numpy as np
-
-from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.files import write_text
 from elastocal.planning import (
@@ -22,16 +17,9 @@ from elastocal.planning import (
 from elastocal.planning.surface import Surface
 from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages.templating import render
-from elastocal.report.plots import (
-    Dots,
-    Paint,
-    PlanView,
-    Strokes,
-    Tags,
-    plan_view,
-    weakest_margins,
-)
+from elastocal.report.plots import PlanView, plan_view, weakest_margins
 from elastocal.results import brief_repr
+from elastocal.viewer import packed, scene_data
 from elastocal.wording import (
     counted,
     duration,
@@ -81,8 +69,8 @@ def write_plan_page(
         "plan.html",
         language,
         title=phrase("Calibration plan: {name}", name=plan.cell.name),
-        styles=("page.css",),
-        scripts=("view.js", "plan.js"),
+        styles=("page.css", "viewer.css"),
+        scripts=("viewer.js", "postures.js", "plan.js"),
         data=view_data(view, plan, pool, language.say),
         plan=plan,
         figures=key_figures(plan),
@@ -110,7 +98,7 @@ def write_plan_page(
             file=plan.cell.file,
             fingerprint=plan.cell.fingerprint[:12],
         ),
-        notes=[layer.note for layer in view.layers if layer.note],
+        notes=[layer.note for layer in view.scene.layers if layer.note],
     )
     write_text(path, page)
     return Path(path)
@@ -229,76 +217,7 @@ def view_data(
         )
         for pose in plan.poses
     ]
-    return {
-        "layers": [
-            {
-                "label": say(layer.label),
-                "colour": layer.colour,
-                "shown": layer.shown,
-                "sight": layer.sight,
-                "parts": [_said(_part(each), say) for each in layer.parts],
-            }
-            for layer in view.layers
-        ],
-        # Column by column, as WebGL takes matrices.
-        "places": _packed(np.swapaxes(view.places, 2, 3)),
-        "sight": _packed(view.sight),
-        "cameras": [
-            {"name": say(each.name), "centre": each.centre.tolist(), "eye": each.eye.tolist()}
-            for each in view.cameras
-        ],
-        "light": view.light.tolist(),
-        "up": view.up.tolist(),
-        "floor": view.floor,
+    return scene_data(view.scene, say) | {
+        "sight": packed(view.sight),
         "postures": ["HOME", *map(say, poses)],
     }
-
-
-@singledispatch
-def _part(part: object) -> dict[str, object]:
-    raise TypeError(f"no part of a view: {type(part).__name__}")
-
-
-@_part.register
-def _(part: Paint) -> dict[str, object]:
-    return {
-        "kind": "paint", "vertices": _packed(part.solid.vertices),
-        "faces": _packed(part.solid.faces, "<u4"), "colour": part.colour, "part": part.part,
-    }  # fmt: skip
-
-
-@_part.register
-def _(part: Strokes) -> dict[str, object]:
-    ends = _packed(part.ends)
-    return {"kind": "strokes", "ends": ends, "colour": part.colour, "width": part.width}
-
-
-@_part.register
-def _(part: Dots) -> dict[str, object]:
-    colours = _packed(part.colours, "u1")
-    return {
-        "kind": "dots",
-        "at": _packed(part.at),
-        "colours": colours,
-        "hints": list(part.hints),
-    }
-
-
-@_part.register
-def _(part: Tags) -> dict[str, object]:
-    return {
-        "kind": "tags", "at": _packed(part.at), "texts": list(part.texts), "colour": part.colour,
-        "hints": list(part.hints),
-        "normals": None if part.normals is None else _packed(part.normals),
-    }  # fmt: skip
-
-
-def _said(part: dict[str, object], say: Callable[[object], str]) -> dict[str, object]:
-    """Return a part with its hints in the language of the page."""
-    hints = part.get("hints")
-    return part | {"hints": list(map(say, hints))} if isinstance(hints, list) else part
-
-
-def _packed(values: FloatArray | IndexArray, kind: str = "<f4") -> str:
-    """Return numbers as base64; single precision is good to a micrometre within 10 m."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -117,10 +117,13 @@ def _hashes(texts: Iterable[str]) -> str:
 
 
 def _asset(name: str) -> "Markup":
-    """Return a style sheet or a script from the folder of the templates, as it stands."""
+    """Return a style sheet or a script of the templates or of the viewer, as it stands."""
     from markupsafe import Markup
 
-    folder = resources.files("elastocal.report.pages").joinpath("templates")
+    if name.startswith("viewer."):
+        folder = resources.files("elastocal.viewer")
+    else:
+        folder = resources.files("elastocal.report.pages").joinpath("templates")
     return Markup(folder.joinpath(name).read_text(encoding="utf-8"))
 
 

@@ -1,9 +1,4 @@
 from . import style as style
-from ._solids import (
-    Solid as Solid,
-    coarsened as coarsened,
-    triangles_of as triangles_of,
-)
 from .analysis_charts import (
     INDEX_NAMES as INDEX_NAMES,
     KIND_TITLES as KIND_TITLES,
@@ -41,11 +36,7 @@ from .plan_figure import (
     write_plan_figure as write_plan_figure,
 )
 from .plan_scene import (
-    Dots as Dots,
-    Paint as Paint,
     PlanView as PlanView,
-    Strokes as Strokes,
-    Tags as Tags,
     plan_view as plan_view,
     weakest_margins as weakest_margins,
 )

@@ -1,6 +1,6 @@
-"""How a plan is seen: its surface laid flat on paper, from cameras on the screen.
+"""The surface of a plan laid flat on paper, where every candidate can be seen.
 
-On paper every candidate can be seen. A surface that faces one way is seen along its mean normal. A
+ A surface that faces one way is seen along its mean normal. A
 block is unfolded like a paper net: each of its faces is turned about the edge that it shares with
 the face in the middle. What cannot be unfolded without overlap is drawn twice, from two opposite
 sides.
@@ -13,10 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell
 from elastocal.planning.surface import Surface
-from elastocal.report.plots._solids import fixture_solids
-from elastocal.wording import phrase
 
 ONE_WAY = np.cos(np.radians(72.0))
 """Least cosine between a normal and the viewing direction at which a surface still reads well."""
@@ -31,13 +28,6 @@ _NET_GAP = 0.05
 """Between the parts of a net, as part of the middle one's size."""
 _TOUCHING = 0.02
 """Parts whose boxes share more than this part of the smaller one overlap."""
-
-_FIELD_OF_VIEW = np.radians(45.0)
-"""Field of view of the page's camera, upward, in rad; ``view.js`` has the same."""
-_ASPECT = 1.5
-"""Width by height of the picture that cameras are set for; the page steps back if narrower."""
-_ROOM = 1.08
-_MARGIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,113 +223,6 @@ def _corners(surface: Surface, patch: int) -> FloatArray:
     faces = surface.mesh.faces[surface.patch == patch]
     corners: FloatArray = surface.mesh.vertices[np.unique(faces)]
     return corners
-
-
-@dataclass(frozen=True, eq=False)
-class Bounds:
-    """A box that holds what a view shows, in m in base."""
-
-    low: FloatArray
-    """Shape (3,)."""
-    high: FloatArray
-    """Shape (3,)."""
-
-    @property
-    def corners(self) -> FloatArray:
-        """Corners, shape (8, 3)."""
-        return np.array(np.meshgrid(*zip(self.low, self.high, strict=True))).reshape(3, -1).T
-
-
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """From where a view is seen."""
-
-    name: str
-    centre: FloatArray
-    """What stands in the middle of the picture, shape (3,), in m in base."""
-    eye: FloatArray
-    """Shape (3,), in m in base."""
-
-
-def bounds_of(cell: Cell, surface: Surface, reach: FloatArray) -> Bounds:
-    """Return a box that holds robot, tooling and stations, whatever the size of the floor.
-
-    Parameters
-    ----------
-    cell, surface : Cell, Surface
-        What stands in the view.
-    reach : ndarray, shape (point, 3)
-        Where robot and tool come to, in m.
-    """
-    stations = [station.position_base[None] for station in cell.file.trackers]
-    points = np.concatenate([surface.mesh.vertices, reach, *stations])
-    low, high = points.min(axis=0), points.max(axis=0)
-    room = _MARGIN * float(np.max(high - low))
-    least, most = low - 4.0 * room, high + 4.0 * room
-    for solid in fixture_solids(cell, surface).values():
-        inner = np.clip(solid.vertices, least, most)
-        # A fixture that only begins beyond the box is left out of it.
-        if np.all(np.ptp(inner, axis=0) > 0.0):
-            low, high = np.minimum(low, inner.min(axis=0)), np.maximum(high, inner.max(axis=0))
-    return Bounds(low - room, high + room)
-
-
-def cameras_of(
-    cell: Cell, surface: Surface, robot: FloatArray, bounds: Bounds
-) -> tuple[Camera, ...]:
-    """Return cameras that look at the work, at the tooling and at everything.
-
-    Parameters
-    ----------
-    cell, surface : Cell, Surface
-        What stands in the view.
-    robot : ndarray, shape (vertex, 3)
-        The robot at its work, in m.
-    bounds : Bounds
-        Of the view.
-    """
-    tooling, direction = surface.mesh.vertices, _viewing_direction(cell, surface)
-    places = {
-        phrase("Robot and tooling"): np.concatenate([tooling, robot]),
-        phrase("Tooling"): tooling,
-        phrase("Whole cell"): bounds.corners,
-    }
-    return tuple(_camera(name, points, direction, upward(cell)) for name, points in places.items())
-
-
-def light_over(cell: Cell, surface: Surface) -> FloatArray:
-    """Return the unit vector towards the light, shape (3,): over the shoulder of who looks."""
-    return _unit(0.6 * _viewing_direction(cell, surface) + upward(cell))
-
-
-def _camera(name: str, points: FloatArray, direction: FloatArray, up: FloatArray) -> Camera:
-    """Return the camera that has all points in a picture of the aspect `_ASPECT`."""
-    right = _unit(np.cross(up, direction))
-    axes = np.stack([right, np.cross(direction, right), direction])
-    seen = points @ axes.T
-    centre = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    across, high, ahead = (seen - centre).T
-    tangent = np.tan(0.5 * _FIELD_OF_VIEW)
-    distance = ahead + np.maximum(np.abs(high), np.abs(across) / _ASPECT) / tangent
-    middle, back = centre @ axes, _ROOM * float(distance.max())
-    return Camera(name, middle, middle + back * direction)
-
-
-def _viewing_direction(cell: Cell, surface: Surface) -> FloatArray:
-    """Return where to look from: beside the robot, from above, opposite to the stations."""
-    up, middle = upward(cell), surface.mesh.vertices.mean(axis=0)
-    ahead = middle - up * (up @ middle)
-    # A tooling right above or below the base leaves the side open: any will do.
-    ahead = _unit(ahead if np.linalg.norm(ahead) > 1e-6 else np.roll(up, 1))
-    side = np.cross(up, ahead)
-    stations = [station.position_base for station in cell.file.trackers]
-    away = -1.0 if stations and side @ np.mean(stations, axis=0) > 0.0 else 1.0
-    return _unit(0.85 * away * side + 0.3 * ahead + 0.65 * up)
-
-
-def upward(cell: Cell) -> FloatArray:
-    """Return the world's vertical in base; a robot may hang from the ceiling."""
-    return cell.T_world_base[2, :3]
 
 
 def _unit(vector: FloatArray) -> FloatArray:

@@ -1,10 +1,6 @@
-"""The view of a plan in three dimensions: layers of solids, lines, dots and tags, and postures.
+"""The view of a plan in three dimensions: its cell with candidates, poses and ways."""
 
-Nothing here draws: ``view.js`` shows what this module describes. What moves is the robot, whose
-parts are placed anew for every posture, and the line of sight.
-"""
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import matplotlib
@@ -12,29 +8,16 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
-from elastocal.planning import PlanResult, PoolData, PoseRecord
+from elastocal.planning import PlanResult, PoolData, PoseRecord, collision_scene
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
-from elastocal.report.plots._solids import (
-    MOST_OF_FIXTURE,
-    MOST_OF_TOOLING,
-    RobotSolids,
-    Solid,
-    coarsened,
-    fixture_solids,
-    joined,
-    rail_solid,
-    robot_solids,
-)
-from elastocal.report.plots._views import Camera, bounds_of, cameras_of, light_over, upward
 from elastocal.results import brief_repr
+from elastocal.viewer import Dots, Layer, Scene, Strokes, Tags, cell_scene
 from elastocal.wording import duration, millimetres, phrase, readable, sentences
 
 _OFF_SURFACE = 0.004
 """Dots are drawn this far off the surface, as part of its size, so that it does not swallow half
 of each."""
-_QUIET, _TOOLING, _FIXTURE, _RAIL = "--muted", "--tooling", "--fixture", "--strong"
-"""Colours that follow the scheme of the page: names of its style sheet."""
 
 
 @brief_repr
@@ -52,91 +35,13 @@ class WeakestMargins:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class Paint:
-    """A solid and its colour."""
-
-    solid: Solid
-    """In base; of a part of the robot in its own frame."""
-    colour: str
-    """``#rrggbb``, or a name of the page's style sheet."""
-    part: int = -1
-    """Number of the robot's part that it is; -1 for what stays."""
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class Strokes:
-    """Straight lines, each by itself."""
-
-    ends: FloatArray
-    """Shape (line, 2, 3), in m in base."""
-    colour: str
-    width: float
-    """In pixels."""
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class Dots:
-    """Small discs."""
-
-    at: FloatArray
-    """Shape (dot, 3), in m in base."""
-    colours: IndexArray
-    """Red, green and blue from 0 to 255, shape (dot, 3)."""
-    hints: tuple[str, ...] = ()
-    """Texts that a reader who points at one sees; empty for none."""
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class Tags:
-    """Short texts at places."""
-
-    at: FloatArray
-    """Shape (tag, 3), in m in base."""
-    texts: tuple[str, ...]
-    colour: str
-    hints: tuple[str, ...]
-    normals: FloatArray | None = None
-    """Of poses: out of the surface, shape (tag, 3); a tag on the far side is drawn pale."""
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
-class Layer:
-    """What has one switch."""
-
-    label: str
-    colour: str
-    """Colour of the switch's swatch."""
-    parts: tuple[Paint | Strokes | Dots | Tags, ...]
-    shown: bool = True
-    """Whether the layer is on when the page opens."""
-    note: str = ""
-    """A remark for readers on how it is drawn."""
-    sight: bool = False
-    """Whether it holds the line of sight, which moves."""
-
-
-@brief_repr
-@dataclass(frozen=True, eq=False)
 class PlanView:
-    """Layers, postures and cameras."""
+    """A plan in its cell."""
 
-    layers: tuple[Layer, ...]
-    places: FloatArray
-    """``T_base_part``, shape (posture, part, 4, 4); posture 0 is HOME, i + 1 is pose i."""
+    scene: Scene
+    """Posture 0 is HOME, i + 1 is pose i."""
     sight: FloatArray
     """Marker and station of each posture, shape (posture, 2, 3), in m; NaN where none sees."""
-    cameras: tuple[Camera, ...]
-    """The first is the initial one."""
-    light: FloatArray
-    """Unit vector towards the light, shape (3,)."""
-    up: FloatArray
-    """The world's vertical in base, shape (3,)."""
-    floor: float
-    """Height above which the camera stays, along `up`, in m."""
 
 
 def plan_view(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) -> PlanView:
@@ -148,33 +53,13 @@ def plan_view(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) ->
         Which belong together; the plan has at least one pose.
     """
     q = np.array([plan.robot.home, *(pose.joints for pose in plan.poses)])
-    robot = robot_solids(cell, surface, q)
-    postures = [robot.at(posture).vertices for posture in range(len(q))]
+    path = _tool_path(cell, plan)
+    scene = cell_scene(cell, surface, collision_scene(cell, surface), q, path)
     sight = _sights(cell, cell.robot.forward(q), plan)
-    bounds = bounds_of(cell, surface, np.concatenate([*postures, _tool_path(cell, plan)]))
-    up = upward(cell)
-    standing = np.concatenate([surface.mesh.vertices, postures[0]])
-    return PlanView(
-        (*_moving_layers(robot, sight), *_still_layers(cell, surface, plan, pool)),
-        robot.places,
-        sight,
-        cameras_of(cell, surface, postures[1], bounds),
-        light_over(cell, surface),
-        up,
-        float((standing @ up).min()),
-    )
-
-
-def _moving_layers(robot: RobotSolids, sight: FloatArray) -> list[Layer]:
-    """Return the layers that differ between postures."""
-    parts = tuple(
-        Paint(part, style.ARM if number < robot.tool else style.TOOL, number)
-        for number, part in enumerate(robot.parts)
-    )
-    layers = [Layer(phrase("Robot and tool"), style.ARM, parts, note=robot.note)]
+    more = _plan_layers(surface, plan, pool, path)
     if np.isfinite(sight).any():
-        layers.append(Layer(phrase("Line of sight to the marker"), style.SIGHT, (), sight=True))
-    return layers
+        more.insert(0, Layer(phrase("Line of sight to the marker"), "--sight", (), name="sight"))
+    return PlanView(replace(scene, layers=(*scene.layers, *more)), sight)
 
 
 def _sights(cell: Cell, T_base_tcp: FloatArray, plan: PlanResult) -> FloatArray:
@@ -187,53 +72,18 @@ def _sights(cell: Cell, T_base_tcp: FloatArray, plan: PlanResult) -> FloatArray:
     return found
 
 
-def _still_layers(cell: Cell, surface: Surface, plan: PlanResult, pool: PoolData) -> list[Layer]:
-    """Return the layers that stay as they are whatever posture is shown."""
+def _plan_layers(
+    surface: Surface, plan: PlanResult, pool: PoolData, path: FloatArray
+) -> list[Layer]:
+    """Return the layers of a plan, which stay as they are whatever posture is shown."""
     lift = _OFF_SURFACE * float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
     return [
-        _tooling(surface),
-        *_fixtures(cell, surface),
-        *_rail(cell),
         _candidates(pool, lift),
         Layer(phrase("Poses, in visiting order"), style.BLUE, (_poses(plan, 5.0 * lift),)),
-        Layer(phrase("Approach, along the normal"), _QUIET, (_approaches(plan),)),
-        Layer(phrase("Way of the tool from HOME to HOME"), style.TOUR, _tour(cell, plan)),
-        *_trackers(cell),
+        Layer(phrase("Approach, along the normal"), "--muted", (_approaches(plan),)),
+        Layer(phrase("Way of the tool from HOME to HOME"), style.TOUR, _tour(path)),
         *_refused(pool),
     ]
-
-
-def _tooling(surface: Surface) -> Layer:
-    """Return the surface and the lines at which its smooth patches end."""
-    mesh = surface.mesh
-    drawn = coarsened(Solid(mesh.vertices, mesh.faces), MOST_OF_TOOLING)
-    face, corner = np.divmod(surface.border_half_edges, 3)
-    ends = np.stack([mesh.faces[face, (corner + step) % 3] for step in (0, 1)], axis=1)
-    edges = Strokes(drawn.solid.vertices[drawn.edges(ends)], _QUIET, 1.5)
-    paint = Paint(drawn.solid, _TOOLING)
-    return Layer(
-        phrase("Tooling"), _TOOLING, (paint, edges), note=drawn.note(phrase("The tooling"))
-    )
-
-
-def _fixtures(cell: Cell, surface: Surface) -> list[Layer]:
-    """Return the layer of the fixtures, if there are any."""
-    drawn = {
-        name: coarsened(solid, MOST_OF_FIXTURE)
-        for name, solid in fixture_solids(cell, surface).items()
-    }
-    if not drawn:
-        return []
-    together = joined([fixture.solid for fixture in drawn.values()])
-    notes = (fixture.note(phrase("Fixture {name}", name=name)) for name, fixture in drawn.items())
-    note = sentences([note for note in notes if note])
-    return [Layer(phrase("Fixtures"), _FIXTURE, (Paint(together, _FIXTURE),), note=note)]
-
-
-def _rail(cell: Cell) -> list[Layer]:
-    """Return the layer of the rail below the robot, if there is one."""
-    solid = rail_solid(cell)
-    return [] if solid is None else [Layer(phrase("Rail"), _RAIL, (Paint(solid, _RAIL),))]
 
 
 def _candidates(pool: PoolData, lift: float) -> Layer:
@@ -311,7 +161,7 @@ def _approaches(plan: PlanResult) -> Strokes:
     """Return the last part of the way to each pose; near the surface it would cross the number."""
     far = plan.contact.approach_distance
     ends = [(_above(pose, 0.4 * far), _above(pose, 1.0 * far)) for pose in plan.poses]
-    return Strokes(np.array(ends), _QUIET, 1.5)
+    return Strokes(np.array(ends), "--muted", 1.5)
 
 
 def _above(pose: PoseRecord, distance: float) -> FloatArray:
@@ -319,35 +169,11 @@ def _above(pose: PoseRecord, distance: float) -> FloatArray:
     return np.array(pose.tcp_position) + distance * np.array(pose.normal)
 
 
-def _tour(cell: Cell, plan: PlanResult) -> tuple[Strokes, Tags]:
-    path = _tool_path(cell, plan)
+def _tour(path: FloatArray) -> tuple[Strokes, Tags]:
     way = Strokes(np.stack([path[:-1], path[1:]], axis=1), style.TOUR, 2.0)
     return way, Tags(
         path[:1], ("HOME",), style.TOUR, (phrase("HOME: where the robot starts and ends"),)
     )
-
-
-def _trackers(cell: Cell) -> list[Layer]:
-    """Return the layer of the tracker stations, if there are any."""
-    stations = cell.file.trackers
-    if not stations:
-        return []
-    tags = Tags(
-        np.array([station.position_base for station in stations]),
-        tuple(station.name for station in stations),
-        style.SIGHT,
-        tuple(
-            phrase(
-                "{station}\nx, y, z: {place} mm\nrange {near} m to {far} m",
-                station=station.name,
-                place=millimetres(station.position),
-                near=f"{station.range[0]:g}",
-                far=f"{station.range[1]:g}",
-            )
-            for station in stations
-        ),
-    )
-    return [Layer(phrase("Tracker stations"), style.SIGHT, (tags,))]
 
 
 def _tool_path(cell: Cell, plan: PlanResult, steps: int = 12) -> FloatArray:

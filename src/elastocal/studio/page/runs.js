@@ -50,16 +50,15 @@ function showDevices({ columns, devices }) {
 }
 
 function showSurvey({ points, refused, summary }) {
-  view.clear("survey");
   const names = [...new Set(refused)].sort();
   const colours = Object.fromEntries(names.map((name, k) => [name, name ? REFUSED[k % REFUSED.length] : "#009e73"]));
   $("survey-legend").replaceChildren(...names.map((name) => {
     const row = element("li"), dot = element("i");
     dot.style.background = colours[name];
     row.append(dot, `${name ? `refused by ${name}` : "a pose can be had"} (${refused.filter((each) => each === name).length})`);
-    view.points(`survey ${name}`, points.filter((_, k) => refused[k] === name), colours[name], 7);
     return row;
   }));
+  view.set("survey", ...names.map((name) => ({ kind: "dots", at: points.filter((_, k) => refused[k] === name), colour: colours[name], width: 7 })));
   $("survey-text").textContent = summary;
 }
 
@@ -98,18 +97,19 @@ async function openPlan(folder) {
   $("plans").value = folder;
   $("plan-text").textContent = plan.summary;
   $("findings").replaceChildren(...plan.findings.map((text) => element("li", text)));
-  view.clear("survey");
-  view.points("poses", plan.poses.map((pose) => pose.position), "region", 10);
-  view.label([...state.cell.scene.stations, ...plan.poses.map((pose) => ({ name: String(pose.id), position: pose.position }))]);
+  view.set("survey");
+  view.set("poses", { kind: "tags", poses: true, at: plan.poses.map((pose) => pose.position), texts: plan.poses.map((pose) => String(pose.id)), hints: plan.poses.map((pose) => `pose ${pose.id}, seen by ${pose.station}`), colour: "--region" });
   $("poses").replaceChildren(...plan.poses.map((pose) => {
     const button = element("button", String(pose.id), { type: "button", title: `seen by ${pose.station}` });
     button.setAttribute("aria-pressed", "false");
     button.addEventListener("click", () => {
       for (const each of $("poses").children) each.setAttribute("aria-pressed", String(each === button));
+      view.chosen = pose.id;
       move("posture", { q: pose.q });
     });
     return button;
   }));
+  view.onPick = (pose) => $("poses").children[plan.poses.findIndex((each) => each.id === pose)].click();
 }
 
 function showLive(live) {

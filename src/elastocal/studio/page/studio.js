@@ -1,7 +1,6 @@
 // The page of the studio: asks the server, shows what it answers. Figures and their units come as
 // texts; what is computed here is only where a pointer points.
 
-import { CAMERAS, View } from "./view.js";
 import { openForms, showForms } from "./forms.js";
 import { openRuns, showFolders, showWork } from "./runs.js";
 
@@ -50,7 +49,7 @@ export function fill(list, rows) { // a definition list
   list.replaceChildren(...rows.flatMap(([name, text, kind]) => [element("dt", name), element("dd", text, { className: kind || "" })]));
 }
 
-export const view = new View($("view"), $("labels"));
+export const view = $("view").shown = new Viewer($("view"), { eager: true });
 
 // Only the newest wish counts: while one is asked, later ones replace each other.
 let waiting = null, asking = false;
@@ -73,8 +72,7 @@ export async function move(action, message) {
 
 export function showPosture(posture) {
   state.posture = posture;
-  const tcp = [3, 7, 11].map((k) => posture.tcp[k]);
-  view.tool = tcp;
+  view.handle = [3, 7, 11].map((k) => posture.tcp[k]);
   view.place(posture.places);
   $("refusal").textContent = posture.refusal;
   showJoints(posture.joints);
@@ -116,16 +114,13 @@ function showCases(posture) {
     row.append(name, element("td", each.size), element("td", each.interval ? `${each.parts} (95 %: ${each.interval})` : each.parts));
     return row;
   }));
-  const from = view.tool, { deflection } = cases.find((each) => each.name === state.chosen);
-  view.lines("deflection", [from, from.map((x, k) => x + ENLARGED * deflection[k])], "arrow", 5);
+  const from = view.handle, { deflection } = cases.find((each) => each.name === state.chosen);
+  view.set("deflection", { kind: "arrow", from, to: from.map((x, k) => x + ENLARGED * deflection[k]), colour: "--arrow" });
 }
 
 function drawSight({ marker, sight }) {
-  const seen = sight.filter((each) => each.sees).map((each) => each.station), hidden = sight.length - seen.length;
-  const ends = (sees) => state.cell.scene.stations.filter(({ name }) => seen.includes(name) === sees).flatMap(({ position }) => [marker, position]);
-  view.lines("seen", marker ? ends(true) : [], "sight", 2.5);
-  view.lines("hidden", marker && hidden ? ends(false) : [], "bad", 1);
-  view.points("marker", marker ? [marker] : [], "sight", 9);
+  const lines = (sees, colour, width) => ({ kind: "strokes", ends: sight.filter((each) => each.sees === sees).map(({ position }) => [marker, position]), colour, width });
+  view.set("sight", ...(marker ? [lines(true, "--sight", 2.5), lines(false, "--bad", 1), { kind: "dots", at: [marker], colour: "--sight", width: 9 }] : []));
 }
 
 function buildJoints(joints) {
@@ -154,12 +149,8 @@ async function load(first = false) {
   $("file").textContent = cell.file;
   $("springs").textContent = `By ${cell.springs}.`;
   buildJoints(cell.joints);
-  view.show(cell.scene);
-  view.lines("rail", cell.scene.rail ? cell.scene.rail.points : [], "arm", 5);
-  view.lines("region", cell.scene.region ? cell.scene.region.points : [], "region", 2.5);
-  view.points("stations", cell.scene.stations.map((each) => each.position), "sight", 14);
-  view.label(cell.scene.stations);
-  if (first) view.camera("Cell");
+  view.show(cell.scene, first);
+  view.cameras($("cameras"));
   showForms(cell);
   showPosture(cell.posture);
   if (q) await move("posture", { q });
@@ -204,11 +195,6 @@ function openPosture() {
     move("place", { q: state.posture.q, position, orientation });
     event.target.reset();
   });
-  for (const name of Object.keys(CAMERAS)) {
-    const button = element("button", name, { type: "button" });
-    button.addEventListener("click", () => view.camera(name));
-    $("cameras").append(button);
-  }
 }
 
 function listen() {

@@ -6,9 +6,7 @@
 
   // The view costs a second where there is no graphics card: it is made when it is first seen.
   function showScene() {
-    if (view || !data.layers) return;
-    view = showView(data, document.querySelectorAll("#pose-table tbody tr"));
-    document.getElementById("view").shown = view;
+    if (!view && data.layers) view = showPostures(data);
   }
   const seen = (section) => section.open && section.querySelector("#view");
 

@@ -17,8 +17,7 @@ import numpy as np
 from elastocal import shapes
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import TOOLING, Cell
-from elastocal.planning import collision_scene
-from elastocal.planning.surface import Surface
+from elastocal.planning import CollisionScene
 from elastocal.results import brief_repr
 from elastocal.wording import phrase
 
@@ -105,17 +104,16 @@ class CoarseSolid:
         )
 
 
-def robot_solids(cell: Cell, surface: Surface, q: FloatArray) -> RobotSolids:
+def robot_solids(scene: CollisionScene, q: FloatArray) -> RobotSolids:
     """Return the solids of a cell's robot and tool.
 
     Parameters
     ----------
-    cell, surface : Cell, Surface
-        Where it stands.
+    scene : CollisionScene
+        Of the cell.
     q : ndarray, shape (posture, joint)
         Joint positions in rad or m, in the order of the robot's joints.
     """
-    scene = collision_scene(cell, surface)
     bodies = scene.moving(q)
     parts = [coarsened(triangles_of(body.solid), MOST_OF_LINK) for body in bodies]
     finer = any(part.note("A part") for part in parts)
@@ -152,11 +150,11 @@ def rail_solid(cell: Cell) -> Solid | None:
     return joined(beams)
 
 
-def fixture_solids(cell: Cell, surface: Surface) -> dict[str, Solid]:
+def fixture_solids(scene: CollisionScene) -> dict[str, Solid]:
     """Return the fixtures of a cell in base, by name; not the tooling."""
     return {
         body.name: triangles_of(body.solid).placed(body.T_frame_body)
-        for body in collision_scene(cell, surface).obstacles
+        for body in scene.obstacles
         if body.name != TOOLING
     }
 
