@@ -44,6 +44,11 @@ class Sound:
     rail: bool = True
     """Whether the arm moves along its rail, where it has one."""
 
+    @property
+    def title(self) -> str:
+        """Return what it is called in the table of mistakes."""
+        return f"{self.like} {self.preset}"
+
 
 @dataclass(frozen=True, eq=False)
 class Made:

@@ -1,5 +1,6 @@
 """The table of mistakes: how harmful each is where it goes unseen; whether it is found, named."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -61,8 +62,16 @@ def outcome(made: Made, mistake: Mistake, with_harm: bool = True) -> Outcome:
 
 
 def _outcome(mistake: Mistake, harm: float, refused: bool, said: tuple[str, ...]) -> Outcome:
-    named = any(word.lower() in text.lower() for text in said for word in mistake.named)
-    return Outcome(mistake.name, harm, refused, said, named)
+    words = tuple(re.escape(word) for word in mistake.named)
+    return judged(mistake.name, words, harm, refused, said)
+
+
+def judged(
+    name: str, patterns: Iterable[str], harm: float, refused: bool, said: tuple[str, ...]
+) -> Outcome:
+    """Return the outcome of a mistake that a message names if one of some patterns is in it."""
+    named = any(re.search(each, text, re.IGNORECASE) for text in said for each in patterns)
+    return Outcome(name, harm, refused, said, named)
 
 
 def _kind(text: str) -> str:

@@ -1,6 +1,6 @@
 """What mistakes in readings do, and whether they are found: the table of `mistakes.json`.
 
-``python tests/support/walk_mistakes.py docs/hooks/gallery/mistakes.json`` makes every mistake.
+``python tests/support/walk_mistakes.py docs/hooks/gallery/mistakes.json COMMAND`` makes every one.
 """
 
 import json
@@ -10,12 +10,21 @@ from typing import Any
 TRIED = Path(__file__).with_name("mistakes.json")
 HARMFUL = 0.05
 """Change of predictions from which a mistake is harmful."""
+_INPUTS = {
+    "calibrate": ("predictions", "campaigns"),
+    "tool": ("what is taken off", "tables"),
+    "import": ("readings", "recordings"),
+}
+"""What mistakes change, and what they are made in."""
 
 
 def make(_: Path) -> dict[str, str]:
     """Return what is told of the mistakes; there is no figure."""
-    tried = json.loads(TRIED.read_text(encoding="utf-8"))
-    return {"mistakes": told(tried), "mistakes-table": table(tried["mistakes"])}
+    found = {}
+    for command, tried in json.loads(TRIED.read_text(encoding="utf-8")).items():
+        found[f"mistakes-{command}"] = told(tried, *_INPUTS[command])
+        found[f"mistakes-{command}-table"] = table(tried["mistakes"])
+    return found
 
 
 def harmful(row: dict[str, Any]) -> bool:
@@ -23,7 +32,7 @@ def harmful(row: dict[str, Any]) -> bool:
     return row["harm"] is None or row["harm"] > HARMFUL
 
 
-def told(tried: dict[str, Any]) -> str:
+def told(tried: dict[str, Any], changed: str, inputs: str) -> str:
     """Return the rates as a sentence."""
     rows, sound = tried["mistakes"], tried["sound"]
     bad = [row for row in rows if harmful(row)]
@@ -32,10 +41,10 @@ def told(tried: dict[str, Any]) -> str:
     alarms = sum(bool(row["said"]) for row in sound)
     kinds = len({row["mistake"] for row in rows})
     return (
-        f"{len(rows)} trials of {kinds} mistakes: {len(bad)} change predictions by more than"
+        f"{len(rows)} trials of {kinds} mistakes: {len(bad)} change {changed} by more than"
         f" {HARMFUL:.0%}; {len(found)} of these ({len(found) / len(bad):.0%}) are refused or warned"
         f" of, {named} ({named / len(found):.0%}) by the right name. Of {len(sound)} sound"
-        f" campaigns {alarms} are warned of"
+        f" {inputs} {alarms} are warned of"
     )
 
 

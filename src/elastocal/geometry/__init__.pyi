@@ -15,6 +15,7 @@ from .model import (
 )
 from .plausibility import (
     plausible_ladder as plausible_ladder,
+    position_mistake as position_mistake,
 )
 from .position_file import (
     read_positions as read_positions,

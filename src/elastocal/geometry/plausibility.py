@@ -51,6 +51,8 @@ _LARGEST = {
 }
 """Errors that no arm has: three times the zero of a motor that was just exchanged, ten times the
 links of a bad arm; in rad and m."""
+_NOT_DRAWN = 4e-3
+"""Median error of an arm as drawn, over its length, that none has: twice what is left of one."""
 _TRIED = 6
 """Mistakes whose undoing is fitted, the likeliest by the arm as drawn first."""
 _TIE = 1.5
@@ -108,6 +110,35 @@ def plausible_ladder(
         return found
     missed = f"poses left out miss by {1e3 * stated:.3g} mm (median)"
     raise GeometryError(_refusal(problem, mistakes, missed if why is None else why))
+
+
+def position_mistake(robot: Robot, data: Positions) -> str | None:
+    """Return why an arm as drawn does not carry its marker to some positions; None: it does.
+
+    For a few positions, none of which can be left out: mistakes are judged by the arm as drawn.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm as stated.
+    data : Positions
+        As stated.
+    """
+
+    def missed(each: Undone) -> float:
+        return _as_drawn(each.robot, each.data)
+
+    stated = _as_drawn(robot, data)
+    if not stated > _NOT_DRAWN * arm_length(robot):
+        return None
+    why = f"the marker is {1e3 * stated:.3g} mm (median) from where the arm carries it"
+    every = [*undone_joints(robot, data, missed), *undone_markers(robot, data)]
+    found = sorted(((missed(each), each.mistake) for each in every), key=lambda pair: pair[0])
+    best = found[0][0]
+    named = [text for left, text in found if left <= _TIE * best][:2]
+    if best <= max(_FAR_BETTER * stated, min(_NOT_DRAWN * arm_length(robot), 0.5 * stated)):
+        return f"{', or '.join(named)}; {why}, with that undone {1e3 * best:.2g} mm"
+    return f"{why}: is the log of another run, of another arm, or its time mistaken?"
 
 
 def arm_length(robot: Robot) -> float:

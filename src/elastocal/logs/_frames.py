@@ -20,6 +20,8 @@ from elastocal.units import factor, largest
 _LARGEST_GAP = (20e-3, np.radians(2.0))
 """Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
 that is not calibrated is off by some millimetres, another frame by more."""
+_PARTS = 10
+"""Parts of a log, each of which must agree: a column may freeze half way."""
 ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
 _WRONG_UNIT = 1e3
 """How much larger than all in a cell a number may be: up to there the arm contradicts its unit."""
@@ -89,15 +91,37 @@ def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) 
         gap[rows] = np.linalg.norm(position[rows] - T_joints[:, :3, 3], axis=1)
         relative = np.swapaxes(R_joints, 1, 2) @ T[whole, :3, :3]
         turn[whole] = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
-    worst = float(np.nanmedian(gap)), float(np.median(turn[known]))
-    if not (worst[0] <= _LARGEST_GAP[0] and worst[1] <= _LARGEST_GAP[1]):
-        raise LogError(
-            f"{table.name}: the logged tool frame lies {1e3 * worst[0]:.4g} mm and"
-            f" {np.degrees(worst[1]):.3g} deg (median) from the tcp of the logged joints: its tool,"
-            " its base, or a joint's sign is another; without `pose` in the map the joints alone"
-            " count"
-        )
+    both = known & np.isfinite(gap) & np.isfinite(turn)
+    _require_near(table, gap[both], turn[both])
     return T
+
+
+def _require_near(table: LogTable, gap: FloatArray, turn: FloatArray) -> None:
+    """Refuse tool frames that are too far from those of the joints in any part of a log.
+
+    Raises
+    ------
+    LogError
+        With the rows, counted without those that state no tool frame.
+    """
+    parts = np.array_split(np.arange(len(gap)), max(1, min(_PARTS, len(gap))))
+    far = [
+        (
+            float(np.median(gap[part])) / _LARGEST_GAP[0],
+            float(np.median(turn[part])) / _LARGEST_GAP[1],
+        )
+        for part in (np.arange(len(gap)), *parts)
+    ]
+    if all(value <= 1.0 for each in far for value in each):
+        return
+    worst = 0 if max(far[0]) > 1.0 else int(np.argmax([max(each) for each in far]))
+    where = "median" if worst == 0 else f"median from row {parts[worst - 1][0] + 1} on"
+    raise LogError(
+        f"{table.name}: the logged tool frame lies {1e3 * far[worst][0] * _LARGEST_GAP[0]:.4g} mm"
+        f" and {np.degrees(far[worst][1] * _LARGEST_GAP[1]):.3g} deg ({where}) from the tcp of the"
+        " logged joints: its tool, its base, or a joint's sign is another; without `pose` in the"
+        " map the joints alone count"
+    )
 
 
 def _stated_turns(table: LogTable, pose: ToolPose) -> FloatArray:

@@ -169,7 +169,7 @@ def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> Cloc
     best = 0
     if log.wrench is not None and len(lags) > 1:
         shifts = theirs.start - ours.start + lags * step
-        best = int(np.argmin([_weight_misfit(log, reference, each) for each in shifts]))
+        best = int(np.argmin([weight_misfit(log, reference, each) for each in shifts]))
     lag, correlation = int(lags[best]), float(correlations[best])
     if not correlation >= _LEAST_CORRELATION:
         raise LogError(
@@ -271,7 +271,7 @@ def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArr
     return lags[peaks], correlation[peaks]
 
 
-def _weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float:
+def weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float:
     """Return how badly the tool's weight explains the force while the arm travels, in N.
 
     ``F = A R_base_tcp^T g + b`` with any ``A``, so that the sensor may sit as it likes; the median
@@ -284,9 +284,13 @@ def _weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> floa
     speed = np.linalg.norm(np.gradient(place, axis=0), axis=1) / np.maximum(np.gradient(time), 1e-9)
     own = time[speed > _TRAVELLING] - shift
     own = own[(own > wrench.time[0]) & (own < wrench.time[-1])]
+    after = np.searchsorted(wrench.time, own)
+    # Across a gap the next sample is of another posture.
+    near = wrench.time[after] - own <= _LONGEST_GAP
+    own, after = own[near], after[near]
     if len(own) < _LEAST_TRAVELLED:
         return np.inf
-    force = wrench.force[np.searchsorted(wrench.time, own).clip(0, len(wrench.time) - 1)]
+    force = wrench.force[after]
     down = arm.T_base_tcp[np.searchsorted(time, own + shift).clip(0, len(time) - 1), 2, :3]
     columns = np.column_stack([down, np.ones(len(down))])
     known = np.isfinite(force).all(axis=1)

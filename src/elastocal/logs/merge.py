@@ -17,6 +17,14 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import LogError, present
 from elastocal.files import sha256
+from elastocal.logs._doubts import (
+    marker_contradictions,
+    postures_at_rest,
+    sensor_contradictions,
+    sensor_misfit,
+    still_columns,
+    stream_doubts,
+)
 from elastocal.logs._frames import sensor_doubts
 from elastocal.logs.clocks import ClockFit, align, handshake_spans
 from elastocal.logs.map import LogMap, Site
@@ -113,10 +121,40 @@ def import_streams(
     streams = _merged(logs, site)
     progress("plateaus", 2, 4)
     by_word = next((log for log in logs if log.arm is not None and log.handshake), None)
-    least = LEAST_SAMPLES if by_word is None else 1
-    plateaus = _plateaus(streams, site, log_map, by_word, least)
+    standing = _standing(streams, site, by_word)
+    poses = [each.pose for each in standing.bare]
+    postures = postures_at_rest(standing.readings, poses, site)
+    # What is named first explains what comes after: joints that are mistaken turn the weight, too.
+    still = tuple(still_columns(logs))
+    astray = () if still else tuple(marker_contradictions(standing.readings, poses, site))
+    judged = None if still or astray else postures
+    sensor = () if judged is None else tuple(sensor_contradictions(judged, site))
+    doubts = (*still, *astray, *sensor, *stream_doubts(logs, clocks, site.marker))
+    try:
+        found = _imported(streams, standing, log_map, site, files, not (still or sensor), progress)
+    except LogError as error:
+        why = next(iter(doubts), None if judged is None else sensor_misfit(judged, site))
+        if why is None:
+            raise
+        raise LogError(f"{why} ({error})") from error
+    return replace(found, clocks=clocks, warnings=(*doubts, *found.warnings))
+
+
+def _imported(
+    streams: Streams,
+    standing: "_Standing",
+    log_map: LogMap,
+    site: Site,
+    files: Sequence[Path],
+    judge_sensor: bool,
+    progress: Progress,
+) -> ImportedLogs:
+    """Return the dataset of what stood."""
+    states = [each.tool for each in standing.readings]
+    named = name_loads(standing.bare, states, site.sensor, log_map.load_cases)
+    plateaus = _with_references(named)
     progress("readings", 3, 4)
-    poses = _readings(streams, plateaus, least)
+    poses = _readings(streams, plateaus, standing.least)
     seen = marker_readings(poses, site.robot, site.sensor.gravity, site.marker)
     registration = register(seen, site.marker)
     seen_at_all = len(streams.points.time) > 0
@@ -124,9 +162,9 @@ def import_streams(
     dataset = _dataset(poses, rows, log_map, site, registration, files)
     progress("readings", 4, 4)
     loads = np.array([each.force_tcp for each in plateaus if each.pose >= 0 and each.load])
-    doubts = sensor_doubts(poses, loads.reshape(-1, 3), site)
+    doubts = sensor_doubts(poses, loads.reshape(-1, 3), site) if judge_sensor else ()
     warnings = (*doubts, *_warnings(plateaus, rows, registration, log_map))
-    return ImportedLogs(dataset, streams, tuple(plateaus), clocks, registration, warnings)
+    return ImportedLogs(dataset, streams, tuple(plateaus), (), registration, warnings)
 
 
 def log_sha256(path: Path) -> str:
@@ -182,10 +220,19 @@ def _in_sensor(log: LogStreams, arm: ArmStream, site: Site) -> WrenchStream:
     return replace(wrench, force=force, moment=moment - np.cross(T[:3, :3].T @ T[:3, 3], force))
 
 
-def _plateaus(
-    streams: Streams, site: Site, log_map: LogMap, by_word: LogStreams | None, least: int
-) -> list[Plateau]:
-    """Return all plateaus, with pose and load case."""
+@dataclass(frozen=True, eq=False)
+class _Standing:
+    """What stood, before it is known what loaded it."""
+
+    bare: list[Plateau]
+    readings: list[Reading]
+    """Means over each."""
+    least: int
+    """Samples that a mean needs."""
+
+
+def _standing(streams: Streams, site: Site, by_word: LogStreams | None) -> _Standing:
+    """Return all plateaus, with their poses."""
     if by_word is not None:
         spans = list(handshake_spans(by_word).values())
         parts = spans
@@ -198,9 +245,9 @@ def _plateaus(
             " second at the same time; are the clocks the same, is the noise that large?"
         )
     numbers = number_poses(spans, streams)
+    least = LEAST_SAMPLES if by_word is None else 1
     bare = [Plateau(*part, pose) for part, pose in zip(parts, numbers, strict=True)]
-    states = [_reading(each, streams, least).tool for each in bare]
-    return _with_references(name_loads(bare, states, site.sensor, log_map.load_cases))
+    return _Standing(bare, [_reading(each, streams, least) for each in bare], least)
 
 
 def _with_references(plateaus: Sequence[Plateau]) -> list[Plateau]:

@@ -1,7 +1,7 @@
 """``tool``: tool weight, sensor bias, drift, matrix and rotation from static postures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from elastocal.errors import CompensationError, FileAccessError, ProcedureError
 from elastocal.identification import read_model
 from elastocal.progress import Progress
 from elastocal.robot import GRAVITY, Robot
+from elastocal.units import parse_quantity
 from elastocal.workflows._inputs import find_robot, parse_frame
 from elastocal.workflows._workflow import workflow
 
@@ -25,7 +26,7 @@ _FLANGE = "flange"
 _DOWN = (0.0, 0.0, -1.0)
 _AS_FLANGE = "0 mm, 0 mm, 0 mm, 0 deg, 0 deg, 0 deg"
 """A sensor whose frame is that of its link."""
-_OF_A_TABLE = ("robot", "flange", "sensor", "down")
+_OF_A_TABLE = ("robot", "flange", "sensor", "down", "mass")
 """Settings that the cell of a run says itself."""
 _LEVER = 0.1
 """Moment range of a sensor over its force range, in m, where the ranges are not known."""
@@ -48,6 +49,8 @@ class ToolSettings:
     default the link itself."""
     down: tuple[float, float, float] | None = None
     """Direction of gravity in base, of any length, for a CSV; by default along -z."""
+    mass: str | None = None
+    """Mass of the tool as weighed, with its unit, for a CSV; a cell says it itself."""
     free_rotation: bool = False
     """Find the sensor's rotation where unseen postures speak for it; else it is as mounted."""
     matrix: bool = False
@@ -73,6 +76,8 @@ class _PostureSource:
     """Points that moments may be about by mistake, in the sensor's frame, in m."""
     lever: float = _LEVER
     """The sensor's moment range over its force range, in m."""
+    mass: float | None = None
+    """Of the tool by another source than the postures, in kg."""
 
 
 @workflow(ToolSettings, marks=("elastocal.tool/",))
@@ -106,14 +111,19 @@ def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG
         cross_talk=settings.cross_talk,
         lever=source.lever,
     )
+    if not settings.free_rotation:
+        conditioning.refuse_other_readings(source.postures, source.R_nominal, source.lever)
     found = conditioning.choose_tool(source.postures, source.R_nominal, richest)
+    used = source.postures.chosen(found.used)
     conditioning.refuse_mistakes(
-        source.postures.chosen(found.used),
+        used,
         found.fit,
         source.R_nominal,
         source.expected_centre,
         source.points,
     )
+    doubts = conditioning.tool_doubts(used, found.fit, source.mass, source.expected_centre)
+    found = replace(found, notes=(*found.notes, *doubts))
     result = conditioning.tool_result(found, source.mount, str(data), settings.matrix)
     if settings.out is not None:
         conditioning.write_tool(settings.out, result)
@@ -163,7 +173,9 @@ def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     R, origin = T_flange_sensor[:3, :3], T_flange_sensor[:3, 3]
     points = {} if not np.any(origin) else {"flange": -origin @ R}
     mount = SensorMount(flange, origin, gravity)
-    return _PostureSource(conditioning.read_postures(path, arm, gravity), mount, R, points=points)
+    mass = None if settings.mass is None else parse_quantity(settings.mass, "mass")
+    postures = conditioning.read_postures(path, arm, gravity)
+    return _PostureSource(postures, mount, R, points=points, mass=mass)
 
 
 def _from_run(run: Path) -> _PostureSource:
@@ -178,7 +190,8 @@ def _from_run(run: Path) -> _PostureSource:
     points = {"tool centre point": T_sensor_tcp[:3, 3], "flange": -T[:3, 3] @ T[:3, :3]}
     mount = SensorMount(cell.file.robot.flange, T[:3, 3], cell.gravity_base)
     lever = float(np.mean(sensor.largest_moment) / np.mean(sensor.largest_force))
-    return _PostureSource(_unloaded(found.poses, cell), mount, T[:3, :3], centre, points, lever)
+    postures, mass = _unloaded(found.poses, cell), cell.file.tool.mass
+    return _PostureSource(postures, mount, T[:3, :3], centre, points, lever, mass)
 
 
 def _unloaded(poses: Sequence[procedure.PoseReadings], cell: Cell) -> StaticPostures:

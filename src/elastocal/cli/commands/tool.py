@@ -34,6 +34,9 @@ def _tool(  # noqa: PLR0913 - one parameter an option
     down: Annotated[
         str | None, typer.Option(help="Direction of gravity in base: 'x, y, z'; default: 0, 0, -1.")
     ] = None,
+    mass: Annotated[
+        str | None, typer.Option(help="Mass of the tool as weighed, e.g. '43 kg', for a CSV.")
+    ] = None,
     free_rotation: Annotated[
         bool,
         typer.Option(
@@ -65,6 +68,7 @@ def _tool(  # noqa: PLR0913 - one parameter an option
         flange=flange,
         sensor=sensor,
         down=None if down is None else options.parse_direction(down),
+        mass=mass,
         free_rotation=free_rotation,
         matrix=matrix,
         cross_talk=cross_talk,

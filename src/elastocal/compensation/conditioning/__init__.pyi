@@ -1,10 +1,19 @@
+from .doubts import (
+    other_centre as other_centre,
+    other_mass as other_mass,
+    tool_doubts as tool_doubts,
+)
 from .filters import (
     Duration as Duration,
     FilterChain as FilterChain,
     FilterSettings as FilterSettings,
     Speed as Speed,
 )
-from .mistakes import refuse_mistakes as refuse_mistakes
+from .mistakes import (
+    SENSOR_TURNED as SENSOR_TURNED,
+    refuse_mistakes as refuse_mistakes,
+    refuse_other_readings as refuse_other_readings,
+)
 from .postures import (
     StaticPostures as StaticPostures,
     read_postures as read_postures,
@@ -24,4 +33,5 @@ from .tool_choice import (
 from .tool_fit import (
     TOOL_UNKNOWNS as TOOL_UNKNOWNS,
     ToolModel as ToolModel,
+    fit_tool as fit_tool,
 )

@@ -11,6 +11,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation.conditioning._undone import (
+    SENSOR_TURNED as SENSOR_TURNED,
+    force_mistake,
+    moment_mistake,
+)
 from elastocal.compensation.conditioning.postures import LEAST_POSTURES, StaticPostures
 from elastocal.compensation.conditioning.tool_choice import affine_scatter
 from elastocal.compensation.conditioning.tool_fit import (
@@ -83,6 +88,8 @@ def refuse_mistakes(
     CompensationError
         Naming the mistake.
     """
+    if fit.rotation_known:
+        refuse_other_readings(postures, fit.R_flange_sensor, fit.model.lever)
     # Judged with the rotation free: a sensor that sits elsewhere is another mistake.
     free = fit if fit.model.rotation else fit_tool(postures, R_nominal, _FREE)
     _refuse_other_order(postures, free, R_nominal)
@@ -93,6 +100,31 @@ def refuse_mistakes(
     _refuse_misfit(postures, fit, R_nominal)
     if expected_centre is not None:
         _refuse_other_point(fit, expected_centre, points or {})
+
+
+def refuse_other_readings(
+    postures: StaticPostures, R_flange_sensor: FloatArray, lever: float
+) -> None:
+    """Refuse postures that one tool explains once a mistake is undone, the sensor as mounted.
+
+    Parameters
+    ----------
+    postures : StaticPostures
+        As stated.
+    R_flange_sensor : ndarray, shape (3, 3)
+        As mounted.
+    lever : float
+        The sensor's moment range over its force range, in m.
+
+    Raises
+    ------
+    CompensationError
+        Naming the mistake.
+    """
+    for mistake in (force_mistake, moment_mistake):
+        found = mistake(postures, R_flange_sensor, lever)
+        if found is not None:
+            raise CompensationError(found)
 
 
 def _refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None) -> None:
@@ -106,12 +138,8 @@ def _refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray
     if not np.any(left > _allowed(postures)):
         return
     _refuse_one_posture(postures, fit, R_nominal, left)
-    if fit.rotation_known:
-        _refuse_rotation(postures, fit, left)
     # Without weight, or turned too little, noise is all that changes: undetermined, no misfit.
     if postures.spread > _TURNED and _weight(postures, fit) > left[0]:
-        if fit.rotation_known:
-            _refuse_axis(postures, fit, left)
         which = int(np.argmax(left / _allowed(postures)))
         unit = _UNITS[which]
         raise CompensationError(
@@ -147,33 +175,6 @@ def _suspects(postures: StaticPostures, fit: ToolFit) -> Iterable[int]:
     )
     worst: list[int] = np.argsort(-np.maximum(force, moment), kind="stable").tolist()
     return worst[:_TRIED]
-
-
-def _refuse_rotation(postures: StaticPostures, fit: ToolFit, left: FloatArray) -> None:
-    free = fit_tool(postures, fit.R_flange_sensor, _FREE)
-    found = _left(postures, free)
-    if np.any(found < _MUCH_BETTER * left):
-        angle = np.degrees(_angle(fit.R_flange_sensor, free.R_flange_sensor))
-        raise CompensationError(
-            f"the sensor is not turned as --sensor says: with {left[0]:.3g} N left of a force"
-            f" component, {found[0]:.3g} N if it sits {angle:.1f} deg from there; correct"
-            " it, or give --free-rotation"
-        )
-
-
-def _refuse_axis(postures: StaticPostures, fit: ToolFit, left: FloatArray) -> None:
-    """Refuse a force axis that is dead or scaled: each axis feels a weight, and not the same."""
-    gravity = postures.gravity @ postures.R_base_flange @ fit.R_flange_sensor
-    gravity, force = (part - part.mean(axis=0) for part in (gravity, postures.force))
-    mass = (gravity * force).sum(axis=0) / np.maximum((gravity**2).sum(axis=0), 1e-12)
-    if not _rms(force - mass * gravity) < _MUCH_BETTER * left[0]:
-        return
-    axis = int(np.argmax(np.abs(mass - np.median(mass))))
-    raise CompensationError(
-        f"force_{'xyz'[axis]} shows {mass[axis]:.3g} kg of the tool, the other axes"
-        f" {float(np.delete(mass, axis).mean()):.3g} kg: is its channel dead, its gain or unit"
-        " another?"
-    )
 
 
 def _left(postures: StaticPostures, fit: ToolFit) -> FloatArray:
@@ -243,9 +244,8 @@ def _refuse_other_forces(
 ) -> None:
     stated = _rms(tool_residual(postures, free)[0])
     others = {
-        "the sign of the wrenches is turned, or one of the sensor's axes (a left-handed frame)": (
-            postures.read_as(-postures.force, -postures.moment)
-        ),
+        "the sign of the wrenches is turned, or one of the sensor's axes (a left-handed frame),"
+        " or gravity": (postures.read_as(-postures.force, -postures.moment)),
         "the orientations are those of the base in the flange: invert them": (
             postures.read_as(R_base_flange=np.swapaxes(postures.R_base_flange, 1, 2))
         ),
@@ -294,8 +294,8 @@ def _refuse_far_centre(postures: StaticPostures, fit: ToolFit) -> None:
     seen = _turning(postures)[1] > _CLEAR * fit.moment_scatter and "mass" not in fit.undetermined
     if seen and distance > _FARTHEST:
         raise CompensationError(
-            f"centre of mass comes out {distance:.3g} m from the sensor: moments in another unit"
-            " than stated, or about a point far away"
+            f"centre of mass comes out {distance:.3g} m from the sensor: forces or moments in"
+            " another unit than stated, or moments about a point far away"
         )
 
 
