@@ -140,6 +140,23 @@ def look_at_it(page, cell, told):
         })()"""
     )
 
+    told["arrow"] = page.get(ARROW)
+
+
+ARROW = """(() => {
+  const view = document.getElementById("view").shown;
+  const { from, to, colour } = view.layers.find((each) => each.name === "deflection").parts[0];
+  view.drawNow();
+  const ratio = view.above.width / view.host.clientWidth, pen = view.above.getContext("2d");
+  const drawn = Array.from({ length: 50 }, (_, k) => {
+    const place = view.project(from.map((x, i) => x + (to[i] - x) * (k + 1) / 52));
+    return [...pen.getImageData(ratio * place[0], ratio * place[1], 1, 1).data];
+  });
+  const hex = getComputedStyle(document.documentElement).getPropertyValue(colour).trim();
+  return { drawn, wanted: [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16)) };
+})()"""
+"""What is above everything else along the arrow of the deflection, and its colour."""
+
 
 def drag_it(page, cell, told):
     moved = "document.documentElement.dataset.moved > "
@@ -218,7 +235,8 @@ def plan_it(page, cell, told):
 def watch_it(page, cell, told):
     page.click("#tab-run")
     page.click("#watch")
-    page.wait("document.getElementById('devices').textContent.includes('locked')")
+    page.wait("/locked/.test(document.getElementById('devices').textContent)")
+    page.wait("/\\d N/.test(document.getElementById('devices').textContent)")
     told["devices"] = page.text("devices")
     page.keep("devices")
     page.click("#work-stop")
@@ -262,6 +280,12 @@ def test_the_page_fits_and_can_be_read(told, look):
 def test_the_cell_is_drawn(told):
     assert told["name"] == "afp: KR 120 R2700 extra HA"
     assert told["drawn"] > 100
+
+
+def test_nothing_hides_the_arrow_of_the_deflection(told):
+    drawn, wanted = told["arrow"]["drawn"], told["arrow"]["wanted"]
+    # The ring at the tool stands above its beginning.
+    assert drawn[5:] == [[*wanted, 255]] * 45
 
 
 def test_the_tool_is_dragged_and_the_deflection_follows(told):

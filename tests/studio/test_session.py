@@ -291,3 +291,19 @@ def test_a_survey_and_a_comparison_are_made_of_the_pool_of_the_cell(tmp_path):
     radius = {name: float(each["covering_radius"].split()[0]) for name, each in rows.items()}
     assert radius["cover"] == min(radius.values())
     assert float(rows["ioops"]["o1"]) == max(float(each["o1"]) for each in rows.values())
+
+
+def test_the_view_opens_on_arm_and_tooling_and_not_on_the_floor(view):
+    """A floor of 12 m by 12 m stands below them."""
+    camera, up = view.scene.cameras[0], view.scene.up
+    shown = [view.surface.mesh.vertices]
+    for part in view.scene.layers[0].parts:
+        T = view.scene.places[0, part.part]
+        shown.append(part.solid.vertices @ T[:3, :3].T + T[:3, 3])
+    ahead = (camera.centre - camera.eye) / np.linalg.norm(camera.centre - camera.eye)
+    right = np.cross(ahead, up) / np.linalg.norm(np.cross(ahead, up))
+    seen = np.concatenate(shown) - camera.eye
+    edge = (seen @ ahead) * np.tan(np.radians(22.5))
+    high, wide = seen @ np.cross(right, ahead) / edge, seen @ right / edge / 1.5
+    part_of_picture = np.abs([high, wide]).max()
+    assert 0.75 < part_of_picture < 1.0

@@ -19,9 +19,8 @@ WAIT = """new Promise((done) => {
   const look = () => shown() ? setTimeout(done, 1500) : setTimeout(look, 30);
   look();
 })"""
-PRESS = """import(new URL("studio.js", location)).then(({ view }) => {
-  view.camera("Work");
-  view.onPress({ origin: [1.75, -0.15, 3.0], direction: [0, 0, -1] });
+PRESS = """document.getElementById("view").shown.onPress({
+  origin: [1.75, -0.15, 3.0], direction: [0, 0, -1],
 })"""
 
 

@@ -344,7 +344,7 @@ class Viewer {
     this.host.style.cursor = found && found.pose !== null ? "pointer" : "";
     this.hint.textContent = found?.hint;
     this.hint.style.left = `${Math.max(0, Math.min(x + 14, this.host.clientWidth - 260))}px`;
-    this.hint.style.top = `${y + 14}px`;
+    this.hint.style.top = `${Math.max(0, Math.min(y + 14, this.host.clientHeight - this.hint.offsetHeight))}px`;
   }
 
   #listen() {

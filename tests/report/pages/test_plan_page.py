@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -57,6 +58,11 @@ def test_a_fine_mesh_is_drawn_coarser_and_the_page_says_so(
 
 def test_a_mesh_that_is_drawn_whole_needs_no_words(written):
     assert "in place of" not in written.read_text(encoding="utf-8")
+
+
+def test_the_viewer_is_the_file_that_the_studio_serves(written):
+    viewer = resources.files("elastocal.viewer").joinpath("viewer.js").read_text("utf-8")
+    assert viewer in written.read_text(encoding="utf-8")
 
 
 def test_page_is_small(written):
