@@ -85,7 +85,7 @@ def test_poses_stand_with_their_places_and_the_other_technique(parts):
     x = 1e3 * parts.plan.poses[0].tcp_position[0]
     assert f"{x:.1f}" in text
     scene = poses.body(parts).scene
-    assert len(scene.view.places) == len(parts.plan.poses) + 1
+    assert len(scene.view.scene.places) == len(parts.plan.poses) + 1
     assert str(parts.plan.cell.file).rpartition("/")[0] not in text
 
 
