@@ -133,6 +133,7 @@ def recorded(tmp_path_factory):
         ("--down", "0, 0, 1"),
         ("--down", "0, 0, -1"),
         ("--robot", "KR 120 R2700-2"),
+        ("--mass", "43 kg"),
     ],
 )
 def test_what_the_cell_of_a_run_says_is_no_option(recorded, tmp_path, option):

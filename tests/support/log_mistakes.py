@@ -7,7 +7,7 @@ sound import, RMS over the readings of both, each over its own size (the joints 
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -247,7 +247,7 @@ LOG_MISTAKES = (
 
 def log_outcome(recording: Recording, mistake: LogMistake) -> Outcome:
     """Return what `import` says of logs in which a mistake is made, and its harm."""
-    sound, _ = _imported(recording.logs)
+    sound, _ = _sound(recording)
     found, said = _imported(mistake.make(recording.logs))
     harm = float("nan") if sound is None or found is None else _harm(sound, found)
     return judged(mistake.name, mistake.named, harm, found is None, said)
@@ -255,7 +255,12 @@ def log_outcome(recording: Recording, mistake: LogMistake) -> Outcome:
 
 def log_alarms(recording: Recording) -> tuple[str, ...]:
     """Return what `import` says of sound logs."""
-    return _imported(recording.logs)[1]
+    return _sound(recording)[1]
+
+
+@lru_cache(maxsize=2)
+def _sound(recording: Recording) -> tuple[Dataset | None, tuple[str, ...]]:
+    return _imported(recording.logs)
 
 
 def _imported(logs: Logs) -> tuple[Dataset | None, tuple[str, ...]]:

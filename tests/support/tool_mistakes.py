@@ -143,7 +143,7 @@ TOOL_MISTAKES = (
     ToolMistake("moment_x reversed", (f"moment_x .*{_TURNED}",), _scaled(1.0, [-1, 1, 1])),
     ToolMistake("sensor turned by 90 deg", (f"{_SENSOR}.*90.. deg",), _turned_by("z", 90.0)),
     ToolMistake("sensor turned by 10 deg", (f"{_SENSOR}.*10.. deg",), _turned_by("z", 10.0)),
-    ToolMistake("sensor upside down", (f"{_SENSOR}.*180.0 deg",), _turned_by("x", 180.0)),
+    ToolMistake("sensor upside down", (f"{_SENSOR}.*1(79|80).. deg",), _turned_by("x", 180.0)),
     ToolMistake("contact in one posture", ("posture 4",), _at(3, [30, 0, -120, 0, 9, 0])),
     ToolMistake(
         "contact in every third posture",

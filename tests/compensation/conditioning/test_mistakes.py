@@ -2,8 +2,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import ToolModel, refuse_mistakes
-from elastocal.compensation.conditioning.tool_fit import fit_tool
+from elastocal.compensation.conditioning import (
+    ToolModel,
+    fit_tool,
+    refuse_mistakes,
+    refuse_other_readings,
+    tool_doubts,
+)
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 
@@ -115,3 +120,20 @@ def test_a_dead_or_scaled_force_axis_is_named(postures, axis, gain):
     wrong = postures.read_as(force=force)
     with pytest.raises(CompensationError, match=f"force_{'xyz'[axis]} shows .* kg of the tool"):
         refuse_mistakes(wrong, fit_tool(wrong, TOOL.R_flange_sensor), TOOL.R_flange_sensor)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_cross_talk_of_moments_is_no_mistake_of_a_force_axis(seed):
+    rng = np.random.default_rng(seed)
+    matrix = PlantedTool.cross_talk(0.015, rng)
+    tool = PlantedTool(mass=60.0, centre=np.array([0.0, 0.0, 0.3]), matrix=matrix)
+    refuse_other_readings(tool.raw(turned(20, rng, 0.15), rng), tool.R_flange_sensor, 0.1)
+
+
+def test_without_the_mass_forces_in_kgf_are_not_seen():
+    rng = np.random.default_rng(0)
+    light = TOOL.raw(turned(12, rng), rng)
+    light = light.read_as(light.force / 9.80665)
+    fit = fit_tool(light, TOOL.R_flange_sensor)
+    assert tool_doubts(light, fit) == ()
+    assert "are the forces in kgf?" in tool_doubts(light, fit, TOOL.mass)[0]
