@@ -3,18 +3,15 @@
 import dataclasses
 import html
 import importlib
-import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import Any, TypeVar
 
-from elastocal.wording import phrase
+from elastocal.findings import group_alike
 
 MOST_LINES = 20
 """Longest representation in a console."""
 MOST_CHARACTERS = 1500
 """Longest representation in a console."""
-_VARYING = re.compile(r"'[^']*'|[-+]?\d[\d.,e ]*(?:(?<= )[-+]?\d[\d.,e]*)*")
-"""What differs between texts of one kind: names in quotes, numbers and lists of them."""
 _REMARKS = ("warning", "finding")
 """Labels of facts of which there may be hundreds of one kind."""
 _LONGEST = 60
@@ -72,7 +69,7 @@ class Result:
                 shown.append((label, text))
             elif (label, text) == next(fact for fact in facts if fact[0] == label):
                 alike = (each for name, each in facts if name == label)
-                shown += [(label, each) for each in counted_alike(alike)]
+                shown += [(label, each) for each in group_alike(alike)]
         return shown
 
     def _repr_html_(self) -> str:
@@ -126,35 +123,6 @@ def brief(value: Any) -> str:
     if isinstance(value, Collection) and not isinstance(value, str | bytes):
         return _entries(value)
     return _cut(" ".join(str(value).split()), _LONGEST)
-
-
-def counted_alike(texts: Iterable[str], most: int = 3) -> list[str]:
-    """Return texts without endless repetition: many of one kind are one, with their number.
-
-    Of one kind are those that differ only in their numbers and in what stands in quotes. Whoever
-    shows warnings to a person shows them so; files and ``--json`` hold them all.
-
-    >>> counted_alike([f"pose {n} is odd" for n in range(9)])
-    ['pose 0 is odd (and 8 more of this kind)']
-    >>> counted_alike(["pose 0 is odd", "pose 1 is odd"])
-    ['pose 0 is odd', 'pose 1 is odd']
-    """
-    kinds: dict[str, list[str]] = {}
-    for text in texts:
-        kinds.setdefault(_VARYING.sub("#", text), []).append(text)
-    shown: list[str] = []
-    for alike in kinds.values():
-        few = len(alike) <= most
-        shown += (
-            alike
-            if few
-            else [
-                phrase(
-                    "{first} (and {more} more of this kind)", first=alike[0], more=len(alike) - 1
-                )
-            ]
-        )
-    return shown
 
 
 def _literally(value: Any) -> str:

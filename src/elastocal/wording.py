@@ -19,8 +19,8 @@ class Phrase(str):
     """
 
     template: str
-    """English, with names of values in braces."""
-    values: Mapping[str, object]
+    """English, with names of values in braces; empty where it is not known how it was made."""
+    parts: Mapping[str, object]
     """By name; phrases among them are said in the other language too."""
 
     def __str__(self) -> str:
@@ -35,7 +35,7 @@ def phrase(template: str, **values: object) -> Phrase:
     'the largest with 0.109 mm'
     """
     made = Phrase(template.format(**values) if values else template)
-    made.template, made.values = template, values
+    made.template, made.parts = template, values
     return made
 
 

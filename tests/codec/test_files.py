@@ -62,7 +62,7 @@ def test_arrays_are_labelled_for_any_reader_of_netcdf(tmp_path, data):
         np.testing.assert_array_equal(one, data.errors("six")[:, 2])
         assert found["compliance_0"].sizes["spring_0"] == 6
         assert found["compliance_1"].sizes["spring_1"] == 18
-        assert found.attrs["schema"] == "elastocal.codec/1"
+        assert found.attrs["schema"] == "elastocal.codec/2"
         assert json.loads(found.attrs["options"])["seed"] == 3
 
 

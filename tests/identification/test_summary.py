@@ -34,7 +34,7 @@ def calibration(springs="bearing", keep=False) -> Calibration:
 
 def test_it_is_json_without_nan():
     text = json.dumps(to_data(summary(calibration())), allow_nan=False)
-    assert json.loads(text)["schema"] == "elastocal.calibration/1"
+    assert json.loads(text)["schema"] == "elastocal.calibration/2"
 
 
 def test_the_residuals_are_those_of_the_readings_in_the_fit():

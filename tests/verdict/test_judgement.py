@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.findings import Grade, Kind
 from elastocal.identification import UnseenErrors
 from elastocal.identification.recertification import Estimate
 from elastocal.report.document.page import verdict_html
 from elastocal.verdict import Light
-from elastocal.verdict._finding import Finding
 from elastocal.verdict.evidence import AcceptanceLimits
 from elastocal.verdict.judgement import advise, judge
+
+NOTE = Kind("test.note", "{text}", grade=Grade.NOTE)
+ADVISED = Kind("test.advised", "{text}", advice="One.", grade=Grade.NOTE)
+OPEN = Kind("test.open", "{text}", advice="Fix it.")
+BROKEN = Kind("test.broken", "{text}", grade=Grade.REFUSAL)
 
 
 def errors(worst, low, high, count=20):
@@ -71,7 +76,7 @@ def test_what_is_not_a_number_is_never_within(parts):
 
 
 def test_a_finding_that_holds_back_makes_it_yellow_and_is_told(parts):
-    findings = (Finding("the station moved", advice="Fix it."), Finding("a note", False))
+    findings = (OPEN(text="the station moved"), NOTE(text="a note"))
     verdict = judged(parts, 0.2, 0.1, 0.2, findings=findings)
     assert (verdict.light, verdict.word) == (Light.YELLOW, "Within, with open points")
     assert verdict.reasons == ("the station moved",)
@@ -80,7 +85,7 @@ def test_a_finding_that_holds_back_makes_it_yellow_and_is_told(parts):
 
 
 def test_files_that_were_changed_are_told_before_every_figure(parts):
-    findings = (Finding("a warning"), Finding("model.json was changed", breaks_trust=True))
+    findings = (OPEN(text="a warning"), BROKEN(text="model.json was changed"))
     verdict = judged(parts, worst=0.4, low=0.1, high=0.2, findings=findings)
     assert verdict.reasons[0] == "model.json was changed"
     assert "cannot be relied on. A simulation releases nothing" in verdict.meaning
@@ -98,7 +103,7 @@ def test_a_real_cell_that_is_not_proved_is_not_to_be_released(parts):
 
 
 def test_errors_beyond_the_tolerance_are_not_lost_behind_files_that_were_changed(parts):
-    findings = [Finding(f"file {number} was changed", breaks_trust=True) for number in range(4)]
+    findings = [BROKEN(text=f"file {number} was changed") for number in range(4)]
     verdict = judged(parts, worst=0.9, low=0.31, high=0.5, findings=findings)
     assert verdict.reasons[0] == "file 0 was changed"
     assert "the whole interval is beyond" in verdict.reasons[1]
@@ -115,16 +120,16 @@ def test_the_largest_errors_at_one_pose_are_told_together():
 
 
 def test_a_note_alone_leaves_it_green(parts):
-    assert judged(parts, 0.2, 0.1, 0.2, findings=(Finding("n", False),)).light is Light.GREEN
+    assert judged(parts, 0.2, 0.1, 0.2, findings=(NOTE(text="n"),)).light is Light.GREEN
 
 
 def test_red_stays_red_whatever_is_missing(parts):
-    verdict = judged(parts, 0.9, 0.4, 0.5, findings=(Finding("x"),))
+    verdict = judged(parts, 0.9, 0.4, 0.5, findings=(OPEN(text="x"),))
     assert verdict.light is Light.RED
 
 
 def test_without_a_tolerance_there_is_no_light_but_a_sentence(parts):
-    verdict = judged(parts, 0.2, 0.1, 0.2, tolerance=None, findings=(Finding("x"),))
+    verdict = judged(parts, 0.2, 0.1, 0.2, tolerance=None, findings=(OPEN(text="x"),))
     assert verdict.light is None
     assert "No tolerance was given" in verdict.sentence
     assert verdict.reasons == ("x",)
@@ -194,7 +199,7 @@ def test_advice_names_the_pose_of_the_largest_error_when_it_stands_out(parts):
 
 def test_advice_stands_behind_that_of_the_findings_and_holds_nothing_back(parts):
     again = replace(parts.reproduction, unseen=errors(0.2, 0.1, 0.2))
-    findings = (Finding("a note", holds_back=False, advice="One."),)
+    findings = (ADVISED(text="a note"),)
     verdict = judge(replace(parts, reproduction=again), findings, ("Two.", "One."))
     assert verdict.light is Light.GREEN
     assert verdict.advice == ("One.", "Two.")

@@ -16,8 +16,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from elastocal.errors import FileAccessError
+from elastocal.findings import group_alike
 from elastocal.progress import Progress
-from elastocal.results import counted_alike
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -108,7 +108,7 @@ def _hand_over(text: str) -> None:
 
 def print_remarks(screen: "Console", label: str, texts: Iterable[str]) -> None:
     """Print warnings or notes, a line each; many of one kind are one line with their number."""
-    for text in counted_alike(texts):
+    for text in group_alike(texts):
         screen.print(f"{yellow(f'{label}:')} {text}", soft_wrap=True)
 
 

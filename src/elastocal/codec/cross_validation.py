@@ -35,12 +35,12 @@ from elastocal.codec.splits import (
 from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, IdentificationError
+from elastocal.findings import Finding, Kind
 from elastocal.identification import MINIMUM_BLOCKS, Problem, rung_summary, solve
 from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import Candidates, growing_choices, technique
 from elastocal.progress import Progress, silent
 from elastocal.robot import Robot
-from elastocal.wording import phrase
 
 _STAGE = "splits"
 _WORTH_PROCESSES = 4.0
@@ -130,10 +130,7 @@ def cross_validate(
     most = min(_largest_training_set(each, splits) for each in prepared)
     findings = [*_draw_findings(measured, readings, options), *campaign.findings]
     if most < training:
-        findings.append(
-            f"training sets end at {most} of {training} poses: the others have no reading of the"
-            " load cases that a variant trains with"
-        )
+        findings.append(TRAINING_ENDS(most=most, training=training))
     curves = _run_splits(entrants, splits, most, options.seed, jobs, progress)
     for each, found in zip(prepared, curves, strict=True):
         _require_a_fit(each, found)
@@ -162,20 +159,24 @@ def cross_validate(
     )
 
 
-def _draw_findings(measured: Readings, drawn: Readings, options: CodecOptions) -> list[str]:
+DRAWN = Kind(
+    "codec.poses-drawn",
+    "made on {poses} of the {of} poses, drawn with seed {seed}: work and memory grow with"
+    " the cube of their number (--poses takes more)",
+)
+TRAINING_ENDS = Kind(
+    "codec.training-ends",
+    "training sets end at {most} of {training} poses: the others have no reading of the"
+    " load cases that a variant trains with",
+)
+
+
+def _draw_findings(measured: Readings, drawn: Readings, options: CodecOptions) -> list[Finding]:
     """Return what a person has to know of a codec that was not made on all poses."""
     poses, of = (len(np.unique(readings.pose)) for readings in (drawn, measured))
     if poses == of:
         return []
-    return [
-        phrase(
-            "made on {poses} of the {of} poses, drawn with seed {seed}: work and memory grow with"
-            " the cube of their number (--poses takes more)",
-            poses=poses,
-            of=of,
-            seed=options.seed,
-        )
-    ]
+    return [DRAWN(poses=poses, of=of, seed=options.seed)]
 
 
 def _zero_error(problem: Problem, split: Split) -> float:

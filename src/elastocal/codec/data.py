@@ -19,6 +19,7 @@ from elastocal.codec.splits import CodecOptions
 from elastocal.codec.variants import KEYS, Variant
 from elastocal.elastic import Spring
 from elastocal.errors import CodecError, SchemaError, nearest
+from elastocal.findings import Finding
 from elastocal.identification import RungSummary
 from elastocal.records import (
     SEAL,
@@ -41,7 +42,9 @@ AXES = ("x", "y", "z", "norm")
 _ERROR_DIMS = ("variant", "cv", "n_train", "axis")
 NO_POSE = -1
 """Fills `CodecData.chosen` behind the last chosen pose."""
-ARRAYS_SCHEMA = "elastocal.codec/1"
+ARRAYS_SCHEMA = "elastocal.codec/2"
+_OLDER = ("elastocal.codec/1",)
+"""Its findings are sentences alone."""
 ARRAYS = "codec.nc"
 """Name of the file in a codec's folder."""
 _OPTIONS = ("ratio", "seed", "set_blunders_aside", "trust_conventions", "poses")
@@ -126,7 +129,7 @@ class CodecData:
     """Name of the robot."""
     provenance: str = ""
     """Origin of the readings."""
-    findings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     """Notes on the data for the user."""
     versions: dict[str, str] = field(default_factory=dict)
     """Version of each package that the numbers come from."""
@@ -279,7 +282,7 @@ def read_codec(folder: Path) -> CodecData:
     """
     path = Path(folder)
     path = path / ARRAYS if path.is_dir() else path
-    found = read_arrays(path, ARRAYS_SCHEMA)
+    found = read_arrays(path, ARRAYS_SCHEMA, _OLDER)
     try:
         return _data_of(found)
     except (CodecError, SchemaError, KeyError, TypeError, ValueError) as error:
@@ -328,7 +331,7 @@ def _attributes(data: CodecData) -> dict[str, str]:
         "provenance": data.provenance,
         "options": json.dumps(options | {"splits": splits}),
         "load_cases": json.dumps(data.load_cases),
-        "findings": json.dumps(data.findings),
+        "findings": json.dumps(to_data(data.findings, stored=True)),
         "versions": json.dumps(data.versions),
         "ladder": json.dumps([to_data(rung) for rung in data.ladder]),
         "made_from": json.dumps(data.made_from),
@@ -362,7 +365,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
         options=CodecOptions(**(_ALL_POSES | _said(found, "options"))),
         robot=str(found.attributes["robot_name"]),
         provenance=str(found.attributes["provenance"]),
-        findings=tuple(_said(found, "findings")),
+        findings=tuple(map(Finding.read, _said(found, "findings"))),
         versions=_said(found, "versions"),
         zero_error=found["zero_error"].values if "zero_error" in found else None,
         layouts=_listed(found["variant_layout"]) if "variant_layout" in found else (),

@@ -14,6 +14,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import CodecError, ConventionError
+from elastocal.findings import Finding, Kind
 from elastocal.identification import (
     MINIMUM_BLOCKS,
     build,
@@ -27,7 +28,6 @@ from elastocal.identification import (
 from elastocal.planning.search import Candidates, Cover
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.wording import phrase
 
 _RATIO = 70.0 / 30.0
 """Training to verification poses, the paper's ``r``."""
@@ -80,7 +80,7 @@ class Campaign:
     """Poses that may verify, shape (pose,); see `identification.poses_in_company`."""
     labels: tuple[tuple[int, ...], ...]
     """Labels of each pose in the dataset."""
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     """Notes on the data for the user."""
 
     def __len__(self) -> int:
@@ -111,6 +111,23 @@ def drawn_poses(readings: Readings, options: CodecOptions) -> Readings:
     rng = np.random.default_rng((options.seed, len(labels)))
     drawn = rng.choice(labels, options.poses, replace=False)
     return readings.take(np.isin(readings.pose, drawn))
+
+
+IN_SPITE = Kind("codec.fitted-in-spite", "fitted in spite of this: {error}")
+SET_ASIDE = Kind(
+    "codec.set-aside",
+    "pose {pose}, load case {load_case} is set aside: it cannot be a measurement of this robot",
+    shown={"load_case": repr},
+)
+SAME_CONFIGURATION = Kind(
+    "codec.same-configuration",
+    "poses {poses} are one configuration: kept on one side of each split",
+)
+FAR_FROM_OTHERS = Kind(
+    "codec.far-from-others",
+    "pose {pose} is far from all others: it trains, and verifies nothing, as it is left"
+    " out of the ladder",
+)
 
 
 def make_campaign(
@@ -150,28 +167,21 @@ def make_campaign(
     except ConventionError as error:
         if not options.trust_conventions:
             raise
-        findings.append(f"fitted in spite of this: {error}")
+        findings.append(IN_SPITE(error=str(error)))
     if options.set_blunders_aside:
         blunder = _blunders(models, readings, marker_offset)
         findings += [
-            f"pose {readings.pose[row]}, load case {str(readings.load_case[row])!r} is set aside:"
-            " it cannot be a measurement of this robot"
+            SET_ASIDE(pose=int(readings.pose[row]), load_case=str(readings.load_case[row]))
             for row in np.flatnonzero(blunder)
         ]
         readings = readings.set_aside(blunder)
     return _group_by_pose(models[0].robot, readings, findings)
 
 
-def _group_by_pose(robot: Robot, readings: Readings, findings: list[str]) -> Campaign:
+def _group_by_pose(robot: Robot, readings: Readings, findings: list[Finding]) -> Campaign:
     """Return readings by physical pose."""
     pose = pose_blocks(readings)
-    repeated = [
-        phrase(
-            "poses {poses} are one configuration: kept on one side of each split",
-            poses=", ".join(map(str, group)),
-        )
-        for group in same_configuration(readings, pose)
-    ]
+    repeated = [SAME_CONFIGURATION(poses=group) for group in same_configuration(readings, pose)]
     position = robot.forward(readings.joint_position)[:, :3, 3]
     counts = np.bincount(pose)
     contact = np.stack([np.bincount(pose, axis) / counts for axis in position.T], axis=1)
@@ -179,14 +189,7 @@ def _group_by_pose(robot: Robot, readings: Readings, findings: list[str]) -> Cam
         tuple(np.unique(readings.pose[pose == number]).tolist()) for number in range(len(counts))
     )
     company = poses_in_company(robot, readings.joint_position, pose)
-    lone = [
-        phrase(
-            "pose {pose} is far from all others: it trains, and verifies nothing, as it is left"
-            " out of the ladder",
-            pose=", ".join(map(str, labels[number])),
-        )
-        for number in np.flatnonzero(~company).tolist()
-    ]
+    lone = [FAR_FROM_OTHERS(pose=labels[number]) for number in np.flatnonzero(~company).tolist()]
     return Campaign(readings, pose, contact, company, labels, (*findings, *repeated, *lone))
 
 

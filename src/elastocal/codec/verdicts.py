@@ -23,12 +23,13 @@ from elastocal.codec.pairs import (
 from elastocal.codec.saturation import Saturation, SaturationInterval, Tolerance, find_saturation
 from elastocal.codec.variants import KEYS
 from elastocal.errors import SchemaError
+from elastocal.findings import Finding
 from elastocal.identification import Overlap, RungSummary, ladder_sentence
 from elastocal.records import read_json, record, write_json
 from elastocal.results import brief_repr
 from elastocal.wording import counted
 
-VERDICTS_SCHEMA = "elastocal.codec_verdicts/1"
+VERDICTS_SCHEMA = "elastocal.codec_verdicts/2"
 VERDICTS = "codec.json"
 """Name of the file in a codec's folder."""
 
@@ -98,7 +99,7 @@ class CodecSetup:
 
 
 @brief_repr
-@record(VERDICTS_SCHEMA, sealed=True)
+@record(VERDICTS_SCHEMA, sealed=True, reads=("elastocal.codec_verdicts/1",))
 class CodecSummary:
     """The figures of a codec: contents of ``codec.json``, for people's scripts."""
 
@@ -116,7 +117,7 @@ class CodecSummary:
     """Rank correlations of indices with accuracy; empty where they were not asked for."""
     sentences: tuple[str, ...]
     """The verdicts in words: one for each variant, then one for each pair."""
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     """Notes on the data."""
     versions: dict[str, str]
     ladder: tuple[RungSummary, ...] = ()

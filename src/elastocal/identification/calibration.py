@@ -5,7 +5,7 @@ model is what the compensation and every prediction work with.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -15,13 +15,13 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, IdentificationError
+from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.mistakes import (
-    Suspicion,
     find_implausible,
     find_undone,
     find_wrong_units,
@@ -50,10 +50,47 @@ from elastocal.identification.uncertainty import (
 )
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
-from elastocal.wording import phrase, sentences
 
 _PART_OF_DATA = 1e-2
 """Least part of the measured deflection that has to move when springs go to their bounds."""
+
+
+SAME_CONFIGURATION = Kind(
+    "calibration.same-configuration",
+    "poses {poses} are one configuration: resampled and left out together",
+)
+WEIGHT_GAP = Kind(
+    "calibration.weight-gap",
+    "robot {name}: {gap}: the arm's own weight bends it otherwise at the reference"
+    " than under load, and here that passes as deflection",
+)
+IN_SPITE = Kind("calibration.fitted-in-spite", "fitted in spite of this: {error}")
+POORLY_FITTED = Kind(
+    "calibration.poorly-fitted",
+    "the springs leave {left} of the median deflection unexplained",
+    shown={"left": as_number(".0%")},
+)
+NOT_DETERMINED = Kind(
+    "calibration.not-determined",
+    "poses and load cases determine {rank} of the {reach} directions that more of them"
+    " would: predictions elsewhere are not covered",
+)
+UNFIT = Kind(
+    "calibration.unfit",
+    "at left-out poses the model leaves {left} of the deflection unexplained, more than"
+    " half: it is not fit for use, and is not exported",
+    shown={"left": as_number(".0%")},
+)
+WORSE_THAN_NONE = replace(
+    UNFIT,
+    name="calibration.worse-than-none",
+    template=f"{UNFIT.template}; it predicts no better than none at all",
+)
+NOT_SETTLED = Kind(
+    "calibration.loss-not-settled",
+    "the {loss} loss had not settled when reweighting ended: its weights, and so the"
+    " springs, depend on where it stopped",
+)
 
 
 @brief_repr
@@ -82,7 +119,7 @@ class Calibration:
     """Factor by which the bootstrap draws were stretched; see `widening_factor`."""
     screening: Screening
     solution: Solution
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
     frames: tuple[FrameSummary, ...] = ()
     """Frames that were estimated with the springs."""
 
@@ -209,39 +246,24 @@ def _data_warnings(
     problem: Problem,
     options: FitOptions,
     marker_offset: ArrayLike | None,
-) -> list[str]:
+) -> list[Finding]:
     """Return what is odd about the data, or refuse them."""
     seen = find_implausible(model.robot, readings, marker_offset)
     warnings = _stated(seen, options)
     warnings += list(check_joints(model.robot, readings)) + [
-        phrase(
-            "poses {poses} are one configuration: resampled and left out together",
-            poses=", ".join(map(str, group)),
-        )
-        for group in same_configuration(readings, problem.block)
+        SAME_CONFIGURATION(poses=group) for group in same_configuration(readings, problem.block)
     ]
     if gap := model.robot.chain.weight_gap:
-        warnings.append(
-            phrase(
-                "robot {name}: {gap}: the arm's own weight bends it otherwise at the reference"
-                " than under load, and here that passes as deflection",
-                name=model.robot.name,
-                gap=gap,
-            )
-        )
+        warnings.append(WEIGHT_GAP(name=model.robot.name, gap=gap))
     warnings += _fitted_mistakes(model, readings, options, marker_offset, seen)
     try:
         left = check_conventions(model, readings, marker_offset, options.free_frame)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
-        return [*warnings, phrase("fitted in spite of this: {error}", error=error)]
+        return [*warnings, IN_SPITE(error=str(error))]
     if left > POOR_FIT:
-        warnings.append(
-            phrase(
-                "the springs leave {left} of the median deflection unexplained", left=f"{left:.0%}"
-            )
-        )
+        warnings.append(POORLY_FITTED(left=left))
     return warnings
 
 
@@ -250,10 +272,10 @@ def _fitted_mistakes(
     readings: Readings,
     options: FitOptions,
     marker_offset: ArrayLike | None,
-    seen: Sequence[Suspicion],
-) -> list[str]:
+    seen: Sequence[Finding],
+) -> list[Finding]:
     """Return mistakes that fits show, beside those that readings show by themselves."""
-    if options.free_frame != "none" or any(each.certain for each in seen):
+    if options.free_frame != "none" or any(each.grade is Grade.REFUSAL for each in seen):
         return []
     found = find_undone(model.robot, readings, marker_offset)
     if not (seen or found):
@@ -261,7 +283,7 @@ def _fitted_mistakes(
     return _stated(found, options)
 
 
-def _stated(found: Sequence[Suspicion], options: FitOptions) -> list[str]:
+def _stated(found: Sequence[Finding], options: FitOptions) -> list[Finding]:
     """Return mistakes that readings seem to contain as warnings; refuse them where one is certain.
 
     Raises
@@ -269,44 +291,27 @@ def _stated(found: Sequence[Suspicion], options: FitOptions) -> list[str]:
     ConventionError
         With the first that is certain, unless the options trust the conventions.
     """
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     for each in found:
-        if not each.certain:
-            warnings.append(each.text)
+        if each.grade is not Grade.REFUSAL:
+            warnings.append(each)
         elif options.trust_conventions:
-            warnings.append(phrase("fitted in spite of this: {error}", error=each.text))
+            warnings.append(IN_SPITE(error=each))
         else:
-            raise ConventionError(each.text)
+            raise ConventionError(each)
     return warnings
 
 
-def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[str]:
+def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[Finding]:
     """Return what limits the use of a fit, or refuse one that the data had no part in."""
     _require_data_decide(problem, calibrated.compliance)
-    warnings: list[str] = []
+    warnings: list[Finding] = []
     missing = reach - calibrated.observability.rank
     if missing > 0:
-        warnings.append(
-            phrase(
-                "poses and load cases determine {rank} of the {reach} directions that more of them"
-                " would: predictions elsewhere are not covered",
-                rank=calibrated.observability.rank,
-                reach=reach,
-            )
-        )
+        warnings.append(NOT_DETERMINED(rank=calibrated.observability.rank, reach=reach))
     left = calibrated.unexplained
     if left > MOST_UNEXPLAINED:
-        warnings.append(
-            phrase(
-                "at left-out poses the model leaves {left} of the deflection unexplained, more than"
-                " half: it is not fit for use, and is not exported",
-                left=f"{left:.0%}",
-            )
-        )
-        if left >= 1.0:
-            warnings[-1] = sentences(
-                (warnings[-1], phrase("it predicts no better than none at all")), "; "
-            )
+        warnings.append((UNFIT if left < 1.0 else WORSE_THAN_NONE)(left=left))
     return warnings
 
 
@@ -329,14 +334,8 @@ def _require_data_decide(problem: Problem, compliance: FloatArray) -> None:
         )
 
 
-def _unsettled(solution: Solution, loss: str) -> list[str]:
+def _unsettled(solution: Solution, loss: str) -> list[Finding]:
     """Return the warning of a loss whose weights still changed when reweighting ended."""
     if solution.settled:
         return []
-    return [
-        phrase(
-            "the {loss} loss had not settled when reweighting ended: its weights, and so the"
-            " springs, depend on where it stopped",
-            loss=loss,
-        )
-    ]
+    return [NOT_SETTLED(loss=loss)]

@@ -20,13 +20,13 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
+from elastocal.findings import Finding, Kind, as_number
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.mistakes import name_joint_mistake, still
 from elastocal.identification.options import FitOptions, FreeFrame
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
 from elastocal.robot import JointReading, Robot, other_joint_readings
-from elastocal.wording import phrase
 
 POOR_FIT = 0.35
 """Part of the median deflection that may stay unexplained without a warning."""
@@ -182,7 +182,20 @@ FORCE_MISTAKES = (
 """Mistakes of forces, the likeliest first; those of joints come after them."""
 
 
-def check_joints(robot: Robot, readings: Readings) -> tuple[str, ...]:
+OUTSIDE = Kind(
+    "calibration.joint-outside-limits",
+    "{joint} at pose {pose} is {position} {unit}, outside the robot's {lower} to {upper} {unit}",
+    shown=dict.fromkeys(("position", "lower", "upper"), as_number(".4g")),
+)
+LIMITS_ASSUMED = Kind("calibration.limits-assumed", "{message} (limits assumed, no source)")
+ELSEWHERE = Kind(
+    "calibration.tcp-elsewhere",
+    "recorded tcp_position is {distance} mm (median) from that of the joints of {name} at {tip}",
+    shown={"distance": as_number(".1f", 1e3), "tip": repr},
+)
+
+
+def check_joints(robot: Robot, readings: Readings) -> tuple[Finding, ...]:
     """Return warnings about recorded joints, or refuse them.
 
     Raises
@@ -194,7 +207,7 @@ def check_joints(robot: Robot, readings: Readings) -> tuple[str, ...]:
     return (*_limits(robot, readings), *_positions(robot, readings))
 
 
-def _limits(robot: Robot, readings: Readings) -> list[str]:
+def _limits(robot: Robot, readings: Readings) -> list[Finding]:
     """Return a warning for each joint that is ever outside its limits, or refuse them."""
     limits, margin = robot.limits, robot.limits.margin(readings.joint_position)
     # Joint by joint: a rail's metres and a wrist's radians have no common worst.
@@ -213,23 +226,18 @@ def _limits(robot: Robot, readings: Readings) -> list[str]:
         raise DatasetError(f"{'; '.join(clearly)}: degrees, another joint order, or another robot?")
     if not assumed:
         return list(found.values())
-    return [
-        phrase("{message} (limits assumed, no source)", message=message)
-        for message in found.values()
-    ]
+    return [LIMITS_ASSUMED(message=message) for message in found.values()]
 
 
-def _outside(robot: Robot, readings: Readings, reading: int, joint: int) -> str:
-    limits, unit = robot.limits, _unit(robot, joint)
-    return phrase(
-        "{joint} at pose {pose} is {position} {unit}, outside the robot's {lower}"
-        " to {upper} {unit}",
+def _outside(robot: Robot, readings: Readings, reading: int, joint: int) -> Finding:
+    limits = robot.limits
+    return OUTSIDE(
         joint=robot.joint_names[joint],
-        pose=readings.pose[reading],
-        position=f"{readings.joint_position[reading, joint]:.4g}",
-        unit=unit,
-        lower=f"{limits.lower[joint]:.4g}",
-        upper=f"{limits.upper[joint]:.4g}",
+        pose=int(readings.pose[reading]),
+        position=float(readings.joint_position[reading, joint]),
+        unit=_unit(robot, joint),
+        lower=float(limits.lower[joint]),
+        upper=float(limits.upper[joint]),
     )
 
 
@@ -237,20 +245,14 @@ def _unit(robot: Robot, joint: int) -> str:
     return "rad" if robot.revolute[joint] else "m"
 
 
-def _positions(robot: Robot, readings: Readings) -> list[str]:
+def _positions(robot: Robot, readings: Readings) -> list[Finding]:
     if readings.tcp_position is None:
         return []
     computed = robot.forward(readings.joint_position)[:, :3, 3]
     recorded = readings.tcp_position + readings.controller_displacement
     distance = np.linalg.norm(computed - recorded, axis=1)
     median = float(np.median(distance))
-    message = phrase(
-        "recorded tcp_position is {distance} mm (median) from that of the joints of {name} at"
-        " {tip}",
-        distance=f"{1e3 * median:.1f}",
-        name=robot.name,
-        tip=repr(robot.tip),
-    )
+    message = ELSEWHERE(distance=median, name=robot.name, tip=robot.tip)
     if median > _TCP_WRONG:
         raise DatasetError(f"{message}: {_cause(robot, readings, recorded, median)}")
     return [message] if median > _TCP_OFF else []

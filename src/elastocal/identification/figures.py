@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import KnownSpring, Spring
+from elastocal.findings import Finding
 from elastocal.identification.budget import ErrorBudget
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration
@@ -145,7 +146,7 @@ class SuspiciousReading:
 
 
 @brief_repr
-@record("elastocal.calibration/1")
+@record("elastocal.calibration/2", reads=("elastocal.calibration/1",))
 class CalibrationSummary:
     """The figures of a calibration (docs/reference/commands/identify.md)."""
 
@@ -167,7 +168,8 @@ class CalibrationSummary:
     held_out: HeldOutSummary
     draws: int
     interval_widening: float
-    warnings: tuple[str, ...]
+    warnings: tuple[Finding, ...]
+    """Sentences alone in files of version 1."""
     settings: FitSettings | None = None
     """With these a report makes the calibration again."""
     comparison: ComparisonSummary | None = None

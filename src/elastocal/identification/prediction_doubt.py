@@ -21,6 +21,7 @@ from scipy.special import stdtrit
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel
+from elastocal.findings import Finding, Kind
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import solve
 from elastocal.identification.uncertainty import CONFIDENCE, leave_poses_out
@@ -58,6 +59,14 @@ class ProductionRows:
             loaded = loaded[np.unique(np.linspace(0, len(loaded) - 1, DOUBT_ROWS).astype(np.intp))]
         moment = None if self.moment is None else self.moment[loaded]
         return ProductionRows(self.joint_position[loaded], self.force[loaded], moment)
+
+
+DOUBTFUL = Kind(
+    "calibration.production-doubtful",
+    "on production the model predicts {figures}: it does not know what it predicts, a"
+    " correction may do harm; press in the directions of production, or take fewer"
+    " springs (--springs bearing)",
+)
 
 
 @record()
@@ -110,18 +119,9 @@ class PredictionDoubt:
         )
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Finding, ...]:
         """What a person has to know before a correction by it; nothing where it is small."""
-        if self.is_small:
-            return ()
-        return (
-            phrase(
-                "on production the model predicts {figures}: it does not know what it predicts, a"
-                " correction may do harm; press in the directions of production, or take fewer"
-                " springs (--springs bearing)",
-                figures=self.figures,
-            ),
-        )
+        return () if self.is_small else (DOUBTFUL(figures=self.figures),)
 
 
 @brief_repr

@@ -2,6 +2,7 @@
 
 import dataclasses
 import enum
+import functools
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -13,6 +14,7 @@ import numpy as np
 from elastocal import files
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
+from elastocal.findings import Finding
 from elastocal.records._json import SEAL, json_sha256, parse_json, require_seal
 
 T = TypeVar("T")
@@ -21,7 +23,12 @@ _CONFIG = {"extra": "forbid", "allow_inf_nan": False}
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
 def record(
-    schema: str = "", *, eq: bool = True, kw_only: bool = False, sealed: bool = False
+    schema: str = "",
+    *,
+    eq: bool = True,
+    kw_only: bool = False,
+    sealed: bool = False,
+    reads: tuple[str, ...] = (),
 ) -> Callable[[type[T]], type[T]]:
     """Make a class a frozen dataclass that the codec reads and writes.
 
@@ -36,6 +43,8 @@ def record(
         Whether fields are given by name only.
     sealed : bool
         Whether its file states the hash of its own content.
+    reads : tuple of str
+        Schemas of earlier versions whose files are read too.
     """
 
     def mark(cls: type[T]) -> type[T]:
@@ -45,6 +54,7 @@ def record(
         made.__pydantic_config__ = _CONFIG  # type: ignore[attr-defined]
         made.__schema__ = schema  # type: ignore[attr-defined]
         made.__sealed__ = sealed  # type: ignore[attr-defined]
+        made.__reads__ = reads  # type: ignore[attr-defined]
         return made
 
     return mark
@@ -55,26 +65,36 @@ def schema_of(cls: type) -> str:
     return str(cls.__dict__.get("__schema__", ""))
 
 
-def to_data(value: Any) -> Any:
+def to_data(value: Any, *, stored: bool = False) -> Any:
     """Return a record as JSON-ready data; one with a schema states it first.
 
     Arrays and tuples become lists, enumerations their values, paths their text.
+
+    Parameters
+    ----------
+    value : object
+        A record, or whatever a record holds.
+    stored : bool
+        Whether findings become what files hold of them; by default they are their sentences.
     """
+    inner_data = functools.partial(to_data, stored=stored)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         schema = schema_of(type(value))
         stated = {"schema": schema} if schema else {}
         fields = dataclasses.fields(value)
-        return stated | {each.name: to_data(getattr(value, each.name)) for each in fields}
+        return stated | {each.name: inner_data(getattr(value, each.name)) for each in fields}
     if isinstance(value, Mapping):
-        return {key: to_data(inner) for key, inner in value.items()}
+        return {key: inner_data(inner) for key, inner in value.items()}
     if isinstance(value, tuple | list):
-        return [to_data(inner) for inner in value]
+        return [inner_data(inner) for inner in value]
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, enum.Enum):
         return value.value
     if isinstance(value, Path):
         return str(value)
+    if stored and isinstance(value, Finding):
+        return value.stored()
     dump = getattr(value, "model_dump", None)
     return dump(mode="json") if dump else value
 
@@ -118,7 +138,7 @@ def write_json(path: Path, value: Any) -> None:
 
 def sealed_data(value: Any) -> Any:
     """Return a record as JSON-ready data, with the hash of its content where its files state it."""
-    data = to_data(value)
+    data = to_data(value, stored=True)
     if type(value).__dict__.get("__sealed__"):
         data[SEAL] = json_sha256(data)
     return data
@@ -174,7 +194,8 @@ def _unstated(cls: Any, data: Any, what: str, schema: str = "") -> Any:
         if not isinstance(data, dict):
             raise SchemaError(f"{what} must hold keys and values, among them the schema {schema!r}")
         data = dict(data)
-        check_schema(data.pop("schema", None), schema, what)
+        older = cls.__dict__.get("__reads__", ())
+        check_schema(data.pop("schema", None), schema, what, older)
         if cls.__dict__.get("__sealed__"):
             data.pop(SEAL, None)
     if isinstance(data, dict) and dataclasses.is_dataclass(cls):

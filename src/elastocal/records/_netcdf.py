@@ -6,7 +6,7 @@ data model is theirs, the conventions are CF (https://cfconventions.org).
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from io import BytesIO
@@ -105,7 +105,7 @@ class LabelledArrays:
         return self.variables[name]
 
 
-def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
+def read_arrays(path: Path, schema: str = "", older: Sequence[str] = ()) -> LabelledArrays:
     """Return the contents of a NetCDF4 file.
 
     Parameters
@@ -114,6 +114,8 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
         The file.
     schema : str
         What the file must state; nothing by default.
+    older : sequence of str
+        Schemas of earlier versions that are read too.
 
     Raises
     ------
@@ -138,7 +140,7 @@ def read_arrays(path: Path, schema: str = "") -> LabelledArrays:
         # Pydantic comes with it, which datasets do without.
         from elastocal.records._validation import check_schema
 
-        check_schema(found.attributes.get("schema"), schema, str(path))
+        check_schema(found.attributes.get("schema"), schema, str(path), older)
     if SEAL in found.attributes:
         require_seal(found.attributes[SEAL], arrays_sha256(found), str(path))
     return found

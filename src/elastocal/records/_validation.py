@@ -22,15 +22,15 @@ _MOST_PROBLEMS = 10_000
 """Each takes a kilobyte as soon as one of them is looked at."""
 
 
-def check_schema(found: object, known: str, what: str) -> None:
-    """Refuse a missing or unknown schema by name.
+def check_schema(found: object, known: str, what: str, older: Sequence[str] = ()) -> None:
+    """Refuse a missing or unknown schema by name; older ones that are still read pass.
 
     Raises
     ------
     SchemaError
-        If ``found`` is not ``known``.
+        If ``found`` is neither ``known`` nor among the older ones.
     """
-    if found != known:
+    if found != known and found not in older:
         raise SchemaError(f"{what} has schema {found!r}; this version reads {known!r}")
 
 

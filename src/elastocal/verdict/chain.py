@@ -16,6 +16,7 @@ from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.dataset import Dataset, content_sha256, read_made_from
 from elastocal.errors import ElastocalError, SchemaError, present
 from elastocal.files import read_text, sha256
+from elastocal.findings import Kind, group_alike
 from elastocal.logs import import_streams, log_sha256, read_map, site
 from elastocal.procedure import (
     JOURNAL,
@@ -29,12 +30,12 @@ from elastocal.procedure import (
 from elastocal.procedure.record import check_stream
 from elastocal.progress import silent
 from elastocal.records import read_json_data, record, require_written, to_data
-from elastocal.results import counted_alike
 from elastocal.verdict._differences import changed_place, changed_reading, changed_text
 from elastocal.verdict.evidence import Evidence, Seal
 from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
 from elastocal.wording import counted
 
+CHANGED_RECORDING = Kind("verdict.changed-recording", "{reason}")
 _OLD = "made before files stated it"
 _ADVICE = "; `elastocal {command}` makes it again"
 
@@ -186,9 +187,9 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         try:
             check_stream(run.streams / name, stated_hash)
         except ElastocalError as error:
-            wrong.append(files.plain(error))
+            wrong.append(CHANGED_RECORDING(reason=files.plain(error)))
     if wrong:
-        yield from (_broken("streams", text) for text in counted_alike(wrong))
+        yield from (_broken("streams", text) for text in group_alike(wrong))
     else:
         found = counted(len(known), "recording")
         yield _whole("streams", f"{found}: those that the journal names, by their SHA-256")

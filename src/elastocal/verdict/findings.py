@@ -1,19 +1,20 @@
 """Findings: what a reader of the verdict has to know, part by part, in the order of the report."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from elastocal.codec import Saturation
+from elastocal.findings import Finding, Grade, Kind, as_count, as_number, group_alike
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.procedure import commits
-from elastocal.results import counted_alike
-from elastocal.verdict._finding import Finding as Finding
 from elastocal.verdict.chain import LinkState
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.history import history_findings
-from elastocal.wording import Phrase, counted, mm, phrase, sentences, spans
+from elastocal.wording import Phrase, mm, phrase, sentences, spans
 
 _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
               "calibrated model", "calibration made again", "process")  # fmt: skip
@@ -43,6 +44,21 @@ def place_of_reading(evidence: Evidence, pose: int, load_case: str) -> Phrase:
     )
 
 
+LEFT_OUT_BY_HAND = Kind(
+    "verdict.left-out-by-hand",
+    "{names} (pose, or pose:load case) was left out by hand: no figure of this report speaks of it",
+    advice="Measure again what was left out, so that nothing has to be.",
+)
+OF_CALIBRATION = Kind("verdict.of-the-calibration", "calibration: {warning}", grade=None)
+COVERED = Kind("verdict.production-covered", "{coverage}", grade=Grade.NOTE)
+NOT_COVERED = Kind(
+    "verdict.production-not-covered",
+    "{coverage}",
+    advice="Plan the calibration where production runs, and under its forces: name its path in"
+    " process.file of the cell file.",
+)
+
+
 def reading_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield findings on single readings: missing, suspicious, left out."""
     yield from _missing_poses(evidence)
@@ -52,76 +68,26 @@ def reading_findings(evidence: Evidence) -> Iterator[Finding]:
     yield from map(_suspicious, figures.suspicious)
     excluded = figures.settings.exclude if figures.settings else ()
     if excluded:
-        yield Finding(
-            phrase(
-                "{names} (pose, or pose:load case) was left out by hand: no figure of this report"
-                " speaks of it",
-                names=", ".join(map(str, excluded)),
-            ),
-            advice=phrase("Measure again what was left out, so that nothing has to be."),
-        )
-    for warning in counted_alike(figures.warnings):
-        yield Finding(phrase("calibration: {warning}", warning=warning))
-    yield from _outside(evidence)
+        yield LEFT_OUT_BY_HAND(names=excluded)
+    for warning in group_alike(figures.warnings):
+        yield OF_CALIBRATION(warning=warning)
+    covered, doubt = evidence.coverage, evidence.doubt_on_production
+    if covered is not None:
+        yield (COVERED if covered.is_enough else NOT_COVERED)(coverage=covered.sentence())
+        yield from doubt.warnings if doubt else ()
 
 
-def _outside(evidence: Evidence) -> Iterator[Finding]:
-    """Yield how much of production the calibration covers; too little holds the light back."""
-    covered = evidence.coverage
-    if covered is None:
-        return
-    yield Finding(
-        covered.sentence(),
-        holds_back=not covered.is_enough,
-        advice=""
-        if covered.is_enough
-        else phrase(
-            "Plan the calibration where production runs, and under its forces: name its path in"
-            " process.file of the cell file."
-        ),
-    )
-
-    doubt = evidence.doubt_on_production
-    yield from map(Finding, doubt.warnings if doubt else ())
-
-
-def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
-    if evidence.plan is None or evidence.dataset is None:
-        return
-    usable = evidence.dataset.readings(evidence.dataset.joint_names).pose
-    missing = sorted({pose.id for pose in evidence.plan.poses} - set(map(int, usable)))
-    if missing:
-        planned = counted(len(evidence.plan.poses), "planned pose")
-        yield Finding(
-            phrase(
-                "the run is partial: 1 of {planned} has no usable reading (pose {poses})",
-                planned=planned,
-                poses=spans(missing),
-            )
-            if len(missing) == 1
-            else phrase(
-                "the run is partial: {missing} of {planned} have no usable reading (pose {poses})",
-                missing=len(missing),
-                planned=planned,
-                poses=spans(missing),
-            ),
-            advice=_advice_on_missing(evidence, missing),
-        )
-
-
-def _advice_on_missing(evidence: Evidence, missing: list[int]) -> str:
+def _advice_on_missing(values: Mapping[str, Any]) -> str:
     """Return what to do about poses without a usable reading: not all of it can be resumed."""
-    if not evidence.journal:
+    if values["committed"] is None:
         return phrase("Measure them in another run, and calibrate with both datasets.")
-    committed = {log.pose for log in commits(evidence.journal)}
-    left, spoiled = set(missing) - committed, set(missing) & committed
-    texts = []
-    if left:
+    spoiled, texts = values["committed"], []
+    if left := sorted(set(values["poses"]).difference(spoiled)):
         texts.append(
             phrase(
                 "Finish the run: `elastocal run --resume` measures pose {poses}, with the cell"
                 " file and the plan that it was begun with.",
-                poses=spans(sorted(left)),
+                poses=spans(left),
             )
         )
     if spoiled:
@@ -132,52 +98,90 @@ def _advice_on_missing(evidence: Evidence, missing: list[int]) -> str:
                 if len(spoiled) == 1
                 else "Pose {poses} are committed and --resume does not repeat them: mend what"
                 " spoiled the readings, and measure in a new run; calibrate takes both datasets.",
-                poses=spans(sorted(spoiled)),
+                poses=spans(spoiled),
             )
         )
     return sentences(texts)
 
 
-def _suspicious(each: SuspiciousReading) -> Finding:
-    name = phrase("pose {pose} {load_case}", pose=each.pose, load_case=each.load_case)
-    if each.set_aside:
-        return Finding(
-            phrase(
-                "reading {name} was set aside as a blunder ({error} off)",
-                name=name,
-                error=mm(each.residual),
-            ),
-            holds_back=False,
-            advice=phrase(
-                "Measure {name} again: its reading cannot be a measurement of this arm.", name=name
-            ),
-        )
-    return Finding(
-        phrase(
-            "reading {name} looks wrong and was kept in the fit ({error} off)",
-            name=name,
-            error=mm(each.residual),
-        ),
-        advice=phrase(
-            "Look at {name}, and leave it out with `--exclude {key}` if it is wrong.",
-            name=name,
-            key=f"{each.pose}:{each.load_case}",
-        ),
+PARTIAL = Kind(
+    "verdict.run-partial",
+    "the run is partial: {missing} of {planned} have no usable reading (pose {poses})",
+    advice=_advice_on_missing,
+    shown={"planned": as_count("planned pose"), "poses": spans},
+)
+PARTIAL_BY_ONE = replace(
+    PARTIAL,
+    name="verdict.run-partial-by-one",
+    template="the run is partial: 1 of {planned} has no usable reading (pose {poses})",
+)
+"""The same of one pose."""
+
+
+def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
+    if evidence.plan is None or evidence.dataset is None:
+        return
+    usable = evidence.dataset.readings(evidence.dataset.joint_names).pose
+    missing = sorted({pose.id for pose in evidence.plan.poses} - set(map(int, usable)))
+    if not missing:
+        return
+    committed = {log.pose for log in commits(evidence.journal)} if evidence.journal else None
+    yield (PARTIAL_BY_ONE if len(missing) == 1 else PARTIAL)(
+        missing=len(missing),
+        planned=len(evidence.plan.poses),
+        poses=missing,
+        committed=None if committed is None else sorted(committed.intersection(missing)),
     )
+
+
+SET_ASIDE = Kind(
+    "verdict.reading-set-aside",
+    "reading {name} was set aside as a blunder ({error} off)",
+    advice="Measure {name} again: its reading cannot be a measurement of this arm.",
+    grade=Grade.NOTE,
+    shown={"error": mm},
+)
+LOOKS_WRONG = Kind(
+    "verdict.reading-looks-wrong",
+    "reading {name} looks wrong and was kept in the fit ({error} off)",
+    advice="Look at {name}, and leave it out with `--exclude {key}` if it is wrong.",
+    shown={"error": mm},
+)
+
+
+def _suspicious(each: SuspiciousReading) -> Finding:
+    return (SET_ASIDE if each.set_aside else LOOKS_WRONG)(
+        name=phrase("pose {pose} {load_case}", pose=each.pose, load_case=each.load_case),
+        key=f"{each.pose}:{each.load_case}",
+        error=each.residual,
+    )
+
+
+OF_RUN = Kind("verdict.of-the-run", "run: {warning}", grade=None)
+GIVEN_UP = Kind("verdict.given-up", "run: pose {pose} was given up after its attempts failed")
 
 
 def instrument_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield findings on stations, sensor and tool: the warnings of the run."""
     if evidence.summary is None:
         return
-    for warning in counted_alike(evidence.summary.warnings):
-        moved = "moved between" in warning
-        advice = phrase(
-            "Fix the tracker's stand before the next run: a station that moves splits its poses."
-        )
-        yield Finding(phrase("run: {warning}", warning=warning), advice=advice if moved else "")
+    for warning in group_alike(evidence.summary.warnings):
+        yield OF_RUN(warning=warning)
     for pose in evidence.summary.attempts.given_up:
-        yield Finding(phrase("run: pose {pose} was given up after its attempts failed", pose=pose))
+        yield GIVEN_UP(pose=pose)
+
+
+BETTER_SPRINGS = Kind(
+    "verdict.better-springs",
+    "other springs predict left-out poses better than {springs}",
+    advice="Calibrate with `--springs auto`: it takes the model that the readings carry.",
+)
+NO_BEARINGS = Kind(
+    "verdict.no-bearing-springs",
+    "the model has one axial spring a joint and no bearing springs",
+    advice="Calibrate with `--springs bearing` (18 springs on a 6-axis arm) and compare.",
+    grade=Grade.NOTE,
+)
 
 
 def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -187,100 +191,95 @@ def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
     ladder = evidence.figures.ladder if evidence.figures else ()
     worse = [rung for rung in ladder if rung.chosen and rung.difference.low > 0.0]
     if worse:
-        yield Finding(
-            phrase(
-                "other springs predict left-out poses better than {springs}",
-                springs=worse[0].springs,
-            ),
-            advice=phrase(
-                "Calibrate with `--springs auto`: it takes the model that the readings carry."
-            ),
-        )
+        yield BETTER_SPRINGS(springs=worse[0].springs)
     springs = evidence.calibrated.model.model.springs
     if not any("." in each.name and not each.name.endswith(".axial") for each in springs):
-        yield Finding(
-            phrase("the model has one axial spring a joint and no bearing springs"),
-            holds_back=False,
-            advice=phrase(
-                "Calibrate with `--springs bearing` (18 springs on a 6-axis arm) and compare."
-            ),
-        )
+        yield NO_BEARINGS()
+
+
+NO_CODEC = Kind(
+    "verdict.no-codec",
+    "whether there were enough poses was not verified (no codec)",
+    advice="Make a codec with `elastocal codec`: it tells whether more poses would help.",
+)
+# Or to delete the codec that counts would leave the word to one that does not.
+CODEC_OF_OTHERS = Kind(
+    "verdict.codec-of-others",
+    "no codec has the springs and the loads of the calibration: whether there were"
+    " enough poses was not verified for it",
+    advice="Make a codec with the calibration's springs: `elastocal codec --compare springs=…`.",
+)
+UNEXPLAINED = Kind(
+    "verdict.codec-unexplained",
+    "it is not shown that there were enough poses: in a check that fitted up to {last}"
+    " of the {poses}, the springs left more than half of the deflection",
+    advice="Calibrate with other springs, or look at the readings: more poses do not help.",
+    shown={"poses": as_count("pose")},
+)
+STILL_FALLING = Kind(
+    "verdict.codec-still-falling",
+    "there were not enough poses: in a check that fitted up to {last} of the {poses},"
+    " the error was still falling",
+    advice="Measure more poses: the error still falls with every one.",
+    shown={"poses": as_count("pose")},
+)
+NOT_SETTLED = Kind(
+    "verdict.codec-not-settled",
+    "whether more poses would help is not known: fits to up to {last} of the {poses} do"
+    " not show that the error has levelled off",
+    advice="Measure some more poses to see that the error no longer falls.",
+    shown={"poses": as_count("pose")},
+)
+ENOUGH = Kind(
+    "verdict.codec-enough",
+    "there were enough poses: in a check that fitted up to {last} of the {poses}, the error"
+    " no longer fell from {enough} on (95 % interval {low} to {high})",
+    grade=Grade.NOTE,
+    shown={"poses": as_count("pose")},
+)
 
 
 def codec_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield whether there were enough poses."""
     best = evidence.saturation
     if not evidence.codecs:
-        yield Finding(
-            phrase("whether there were enough poses was not verified (no codec)"),
-            advice=phrase(
-                "Make a codec with `elastocal codec`: it tells whether more poses would help."
-            ),
-        )
+        yield NO_CODEC()
     if best is None:
         return
-    yield from _codec_of_others(evidence)
-    yield _saturation(best, len(evidence.codecs[0].data.contact))
-
-
-def _codec_of_others(evidence: Evidence) -> Iterator[Finding]:
     if evidence.figures is not None and not evidence.has_codec_alike:
-        # Or to delete the codec that counts would leave the word to one that does not.
-        yield Finding(
-            phrase(
-                "no codec has the springs and the loads of the calibration: whether there were"
-                " enough poses was not verified for it"
-            ),
-            advice=phrase(
-                "Make a codec with the calibration's springs: `elastocal codec --compare"
-                " springs=…`."
-            ),
-        )
+        yield CODEC_OF_OTHERS()
+    yield _saturation(best, len(evidence.codecs[0].data.contact))
 
 
 def _saturation(best: Saturation, poses: int) -> Finding:
     """Return whether the error had stopped to fall."""
-    check = {"last": best.last, "poses": counted(poses, "pose")}
     if not best.explains:
-        return Finding(
-            phrase(
-                "it is not shown that there were enough poses: in a check that fitted up to {last}"
-                " of the {poses}, the springs left more than half of the deflection",
-                **check,
-            ),
-            advice=phrase(
-                "Calibrate with other springs, or look at the readings: more poses do not help."
-            ),
-        )
+        return UNEXPLAINED(last=best.last, poses=poses)
     if best.n_train == best.last:
-        return Finding(
-            phrase(
-                "there were not enough poses: in a check that fitted up to {last} of the {poses},"
-                " the error was still falling",
-                **check,
-            ),
-            advice=phrase("Measure more poses: the error still falls with every one."),
-        )
+        return STILL_FALLING(last=best.last, poses=poses)
     if not best.settled:
-        return Finding(
-            phrase(
-                "whether more poses would help is not known: fits to up to {last} of the {poses} do"
-                " not show that the error has levelled off",
-                **check,
-            ),
-            advice=phrase("Measure some more poses to see that the error no longer falls."),
-        )
-    return Finding(
-        phrase(
-            "there were enough poses: in a check that fitted up to {last} of the {poses}, the error"
-            " no longer fell from {enough} on (95 % interval {low} to {high})",
-            enough=best.n_train,
-            low=best.low,
-            high=best.high,
-            **check,
-        ),
-        holds_back=False,
-    )
+        return NOT_SETTLED(last=best.last, poses=poses)
+    return ENOUGH(last=best.last, poses=poses, enough=best.n_train, low=best.low, high=best.high)
+
+
+PROCESS = Kind(
+    "verdict.process",
+    "in simulation, which is no evidence for a real cell, the mean deviation on the process"
+    " path in the direction that counts (section 9) fell by {share}, from {before} to {after},"
+    " largest left {most}; in space {mean_in_space} are left on average, {most_in_space} at"
+    " most",
+    grade=Grade.NOTE,
+    shown={"share": as_number(".1%")}
+    | dict.fromkeys(("before", "after", "most", "mean_in_space", "most_in_space"), mm),
+)
+PROCESS_BEYOND = Kind(
+    "verdict.process-beyond",
+    "{process}, beyond the tolerance of {tolerance}",
+    shown={"tolerance": mm},
+)
+PROCESS_OF_OTHERS = Kind(
+    "verdict.process-of-others", "not valid for this report: {process}", grade=None
+)
 
 
 def has_own_process(evidence: Evidence) -> bool:
@@ -295,25 +294,29 @@ def process_findings(evidence: Evidence) -> Iterator[Finding]:
         return
     table, tolerance = evidence.process.table, evidence.limits.tolerance
     line, space = table.lines[-1], table.spatial[-1]
-    text = phrase(
-        "in simulation, which is no evidence for a real cell, the mean deviation on the process"
-        " path in the direction that counts (section 9) fell by {share}, from {before} to {after},"
-        " largest left {most}; in space {mean_in_space} are left on average, {most_in_space} at"
-        " most",
-        share=f"{line.reduction.mean:.1%}",
-        before=mm(line.before.mean),
-        after=mm(line.after.mean),
-        most=mm(line.after.max),
-        mean_in_space=mm(space.after.mean),
-        most_in_space=mm(space.after.max),
+    found = PROCESS(
+        share=line.reduction.mean,
+        before=line.before.mean,
+        after=line.after.mean,
+        most=line.after.max,
+        mean_in_space=space.after.mean,
+        most_in_space=space.after.max,
     )
-    if not has_own_process(evidence):
-        text = phrase("not valid for this report: {text}", text=text)
     if tolerance is not None and not line.after.max <= tolerance:
-        beyond = phrase("beyond the tolerance of {tolerance}", tolerance=mm(tolerance))
-        yield Finding(sentences([text, beyond], ", "))
-    else:
-        yield Finding(text, holds_back=False)
+        found = PROCESS_BEYOND(process=found, tolerance=tolerance)
+    yield found if has_own_process(evidence) else PROCESS_OF_OTHERS(process=found)
+
+
+SAME_AS_EARLIER = Kind(
+    "verdict.as-earlier", "against the earlier calibration: {reason}", grade=Grade.NOTE
+)
+NOT_AS_EARLIER = replace(SAME_AS_EARLIER, name="verdict.not-as-earlier", grade=Grade.WARNING)
+SPRINGS_MOVED = Kind(
+    "verdict.springs-moved",
+    "{springs} moved since the earlier calibration, and no limit was given",
+    grade=Grade.NOTE,
+    shown={"springs": as_count("spring")},
+)
 
 
 def recertification_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -321,58 +324,45 @@ def recertification_findings(evidence: Evidence) -> Iterator[Finding]:
     found = evidence.recertification
     if found is None:
         return
-    if found.verdict is Recertified.PASS:
-        yield Finding(_against_earlier(found.reason), holds_back=False)
-    elif found.verdict is not None:
-        yield Finding(_against_earlier(found.reason))
+    if found.verdict is not None:
+        passed = found.verdict is Recertified.PASS
+        yield (SAME_AS_EARLIER if passed else NOT_AS_EARLIER)(reason=found.reason)
     elif found.moved:
-        yield Finding(
-            phrase(
-                "{springs} moved since the earlier calibration, and no limit was given",
-                springs=counted(len(found.moved), "spring"),
-            ),
-            holds_back=False,
-        )
+        yield SPRINGS_MOVED(springs=len(found.moved))
 
 
-def _against_earlier(reason: str) -> Phrase:
-    return phrase("against the earlier calibration: {reason}", reason=reason)
+DAMAGED = Kind("verdict.damaged", "the {name} cannot be used: {reason}")
+MISSING = Kind("verdict.missing", "the {name} is missing: {reason}", grade=Grade.NOTE)
+ESSENTIAL_MISSING = replace(MISSING, name="verdict.essential-missing", grade=Grade.WARNING)
+TOOL_MISSING = replace(
+    MISSING,
+    name="verdict.tool-file-missing",
+    advice="Run `elastocal tool`: without it the compensation relies on the cell file's tool.",
+)
+CONTRADICTION = Kind("verdict.contradiction", "{doubt}", grade=Grade.REFUSAL)
+UNSTATED = Kind(
+    "verdict.not-verifiable",
+    "not verifiable by hashes: {names} (see Provenance)",
+    advice="Derive, calibrate and make the codec again: today's files state what they were"
+    " made from.",
+    grade=Grade.NOTE,
+)
 
 
 def missing_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield what is missing, damaged or contradictory."""
     for each in evidence.missing:
-        if each.name in _TOLD_ELSEWHERE and not each.damaged:
-            continue
-        advice = ""
-        if each.name == "tool file" and not each.damaged:
-            advice = phrase(
-                "Run `elastocal tool`: without it the compensation relies on the cell file's tool."
-            )
-        holds_back = each.damaged or each.name in _ESSENTIAL
-        text = phrase(
-            "the {name} cannot be used: {reason}"
-            if each.damaged
-            else "the {name} is missing: {reason}",
-            name=each.name,
-            reason=each.reason,
-        )
-        yield Finding(text, holds_back, advice)
+        if each.damaged:
+            yield DAMAGED(name=each.name, reason=each.reason)
+        elif each.name not in _TOLD_ELSEWHERE:
+            kind = ESSENTIAL_MISSING if each.name in _ESSENTIAL else MISSING
+            kind = TOOL_MISSING if each.name == "tool file" else kind
+            yield kind(name=each.name, reason=each.reason)
     for doubt in evidence.doubts:
-        yield Finding(doubt, breaks_trust=True)
+        yield CONTRADICTION(doubt=doubt)
     unstated = [link.name for link in evidence.chain if link.state is LinkState.UNSTATED]
     if unstated:
-        yield Finding(
-            phrase(
-                "not verifiable by hashes: {names} (see Provenance)",
-                names=", ".join(dict.fromkeys(unstated)),
-            ),
-            holds_back=False,
-            advice=phrase(
-                "Derive, calibrate and make the codec again: today's files state what they were"
-                " made from."
-            ),
-        )
+        yield UNSTATED(names=list(dict.fromkeys(unstated)))
 
 
 FINDINGS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (

@@ -8,9 +8,9 @@ import contextlib
 from collections.abc import Iterator
 
 from elastocal.errors import ElastocalError
+from elastocal.findings import Finding, Grade, Kind
 from elastocal.procedure import RunFolder, RunRecord
 from elastocal.procedure.record import HISTORY, EarlierRun, copies_sha256, note_run, read_history
-from elastocal.verdict._finding import Finding
 from elastocal.verdict.chain import Link, LinkState
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.manifest import read_manifest
@@ -90,18 +90,18 @@ def history_link(record: RunRecord, run: RunFolder, cell: str) -> Link | None:
     return Link("history", LinkState.WHOLE, text)
 
 
+EARLIER_RUNS = Kind(
+    "verdict.earlier-runs",
+    "this is run {number} of its cell; before it: {earlier}",
+    grade=Grade.NOTE,
+)
+
+
 def history_findings(evidence: Evidence) -> Iterator[Finding]:
     """Yield that a cell was measured before, and what came of it."""
     record = evidence.run_record
     if record is not None and record.earlier_runs:
-        yield Finding(
-            phrase(
-                "this is run {number} of its cell; before it: {earlier}",
-                number=record.run_number,
-                earlier=_listed(record.earlier_runs),
-            ),
-            holds_back=False,
-        )
+        yield EARLIER_RUNS(number=record.run_number, earlier=_listed(record.earlier_runs))
 
 
 def _listed(earlier: tuple[EarlierRun, ...]) -> Phrase:

@@ -10,10 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from elastocal.findings import Finding, Grade
 from elastocal.identification import MOST_UNEXPLAINED, UnseenErrors
 from elastocal.results import brief_repr
 from elastocal.verdict.evidence import AcceptanceLimits, Evidence
-from elastocal.verdict.findings import Finding, find_everything, place_of_reading
+from elastocal.verdict.findings import find_everything, place_of_reading
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
 _LOUD = 0.3
@@ -67,9 +68,9 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
         Advice that no single part can give; it follows that of the findings.
     """
     unseen, tolerance = evidence.unseen, evidence.limits.tolerance
-    held = list(dict.fromkeys(each.text for each in findings if each.holds_back))
-    broken = [each.text for each in findings if each.breaks_trust]
-    notes = list(dict.fromkeys(each.text for each in findings if not each.holds_back))
+    held = list(dict.fromkeys(each for each in findings if each.holds_back))
+    broken = [each for each in findings if each.grade is Grade.REFUSAL]
+    notes = list(dict.fromkeys(each for each in findings if not each.holds_back))
     all_advice = dict.fromkeys((*(each.advice for each in findings if each.advice), *advice))
     light, own = _light(evidence, unseen, tolerance, bool(held))
     left = evidence.figures.unexplained if evidence.figures is not None else 0.0

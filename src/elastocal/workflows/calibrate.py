@@ -13,6 +13,7 @@ from elastocal.cell import ProcessFile, ProductionPath, read_production
 from elastocal.dataset import Dataset, content_sha256, merge, read, without
 from elastocal.elastic import known_springs
 from elastocal.errors import DatasetError, ElastocalError, present
+from elastocal.findings import Finding, Kind
 from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
@@ -162,9 +163,16 @@ def _as_built(
     return built, settings
 
 
+PRODUCTION_UNKNOWN = Kind(
+    "calibration.production-unknown",
+    "production is not known, though the cell of {folder} may name it: {error};"
+    " name its path (--process)",
+)
+
+
 def _production(
     settings: CalibrateSettings, robot: Robot
-) -> tuple[ProductionPath | None, tuple[str, ...]]:
+) -> tuple[ProductionPath | None, tuple[Finding, ...]]:
     """Return the path of production as the arm runs it, and why it is not known where it should be.
 
     One that is asked for must fit; one that the cell of a run names is no reason to refuse data.
@@ -177,10 +185,7 @@ def _production(
         try:
             cell = _cell_of_run(path)
         except ElastocalError as error:
-            return None, (
-                f"production is not known, though the cell of {path.parent} may name it: {error};"
-                " name its path (--process)",
-            )
+            return None, (PRODUCTION_UNKNOWN(folder=str(path.parent), error=str(error)),)
         if cell is not None and cell.process is not None and same_joints(cell.robot, robot):
             return cell.process, ()
     return None, ()

@@ -127,7 +127,7 @@ def test_deriving_again_gives_the_same_files(run, derived):
     again = derive_run(run.path)
     write_derived(run.path, again)
     assert first.to_xarray().identical(read(folder.dataset).to_xarray())
-    assert json.loads(folder.summary.read_text())["schema"] == "elastocal.run-summary/1"
+    assert json.loads(folder.summary.read_text())["schema"] == "elastocal.run-summary/2"
 
 
 def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.cell import Limits
 from elastocal.identification import CalibrationSummary, describe
 from elastocal.procedure import Event, RunSummary
+from elastocal.procedure.derive._kinds import MOVED
 from elastocal.records import from_data, to_data
 from elastocal.report.document.page import SECTIONS
 from elastocal.report.document.sections import PAPER
@@ -40,7 +41,7 @@ def words(section, parts):
 
 
 def findings(found, parts, holds_back=True):
-    return [each.text for each in found(parts) if each.holds_back is holds_back]
+    return [each for each in found(parts) if each.holds_back is holds_back]
 
 
 def with_figures(parts, **changes):
@@ -206,8 +207,10 @@ def test_a_station_that_moved_holds_back_with_advice(parts):
         "log10_probability_of_chance": -9.0,
     }  # fmt: skip
     registration = {**to_data(parts.summary.registration), "moves": [move]}
-    warning = "station station_1 moved between poses 3 and 4: the marker seemed to jump"
-    found = with_summary(parts, registration=registration, warnings=[warning])
+    warning = MOVED(
+        station="station_1", before=3, pose=4, jump=2e-3, half=1e-4, angle=0.0, runs=9.0
+    )
+    found = with_summary(parts, registration=registration, warnings=[warning.stored()])
     assert f"run: {warning}" in findings(instrument_findings, found)
     assert "Fix the tracker's stand" in next(instrument_findings(found)).advice
     assert "moved before pose 4: the marker seemed to jump by 2.000 mm" in words(instruments, found)
@@ -333,9 +336,9 @@ def test_provenance_has_versions_hashes_seeds_and_every_setting(parts):
 def test_a_process_of_another_model_is_not_evidence_for_this_one(parts):
     broken = Link("process", LinkState.BROKEN, "the process was run with another model")
     (finding,) = process_findings(replace(parts, chain=(broken,)))
-    assert finding.text.startswith("not valid for this report: in simulation, which is no evidence")
+    assert finding.startswith("not valid for this report: in simulation, which is no evidence")
     (finding,) = process_findings(parts)
-    assert finding.text.startswith("in simulation, which is no evidence")
+    assert finding.startswith("in simulation, which is no evidence")
 
 
 def test_a_codec_that_was_changed_is_not_confirmed_by_the_dataset_that_it_names(parts):

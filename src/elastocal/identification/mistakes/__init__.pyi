@@ -1,5 +1,4 @@
 from ._motion import name_joint_mistake as name_joint_mistake, still as still
-from ._suspicion import Suspicion as Suspicion
 from .plausibility import find_implausible as find_implausible
 from .sizes import (
     find_wrong_units as find_wrong_units,

@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
-from elastocal.identification.mistakes._suspicion import AXES, Suspicion, median_norm
+from elastocal.findings import Finding, Grade, Kind, as_number
+from elastocal.identification.mistakes._common import AXES, MM, median_norm
 from elastocal.robot import Robot, other_joint_readings
-from elastocal.wording import phrase
 
 _DEAD = 5e-3
 """Part of the motion below which a controller displacement is none."""
@@ -40,7 +40,30 @@ _COARSE = 1.5e-4
 """Difference in m that makes joints and controller contradict each other without a known cause."""
 
 
-def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iterator[Suspicion]:
+UNDONE = Kind(
+    "mistakes.joints-undone",
+    "{message}: joints and controller displacement are {apart} mm apart, of {size} mm;"
+    " with that undone they agree to {left}",
+    grade=Grade.REFUSAL,
+    shown={"apart": MM, "size": MM, "left": as_number(".1%")},
+)
+NO_DISPLACEMENT = Kind(
+    "mistakes.no-controller-displacement",
+    "controller_displacement is missing (zero): by the joints the tcp moved by"
+    " {travel} mm; export the controller's tcp, or compute it from the joints",
+    grade=Grade.REFUSAL,
+    shown={"travel": MM},
+)
+CONTRADICTION = Kind(
+    "mistakes.joints-contradict",
+    "joints and controller displacement contradict each other: {apart} mm apart, of"
+    " {size} mm{still}; another robot of the family, joints of other rows, or a"
+    " displacement in another frame?",
+    shown={"apart": MM, "size": MM},
+)
+
+
+def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iterator[Finding]:
     """Yield that joints and controller displacement contradict each other.
 
     Parameters
@@ -61,37 +84,13 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
     if not apart > max(_CLOSE * size, _FINE):
         return
     left, message = _likeliest(robot, readings, offset, moved)
-    values = {"apart": f"{1e3 * apart:.2f}", "size": f"{1e3 * size:.2f}"}
     if left < _LEFT * min(apart / max(size, _FINE), 1.0):
-        yield Suspicion(
-            phrase(
-                "{message}: joints and controller displacement are {apart} mm apart, of {size} mm;"
-                " with that undone they agree to {left}",
-                message=message,
-                left=f"{left:.1%}",
-                **values,
-            ),
-            certain=True,
-        )
+        yield UNDONE(message=message, left=left, apart=apart, size=size)
     elif size < _DEAD * travel and travel > _COARSE:
-        yield Suspicion(
-            phrase(
-                "controller_displacement is missing (zero): by the joints the tcp moved by"
-                " {travel} mm; export the controller's tcp, or compute it from the joints",
-                travel=f"{1e3 * travel:.2f}",
-            ),
-            certain=True,
-        )
+        yield NO_DISPLACEMENT(travel=travel)
     elif apart > max(_APART * size, _COARSE):
-        yield Suspicion(
-            phrase(
-                "joints and controller displacement contradict each other: {apart} mm apart, of"
-                " {size} mm{still}; another robot of the family, joints of other rows, or a"
-                " displacement in another frame?",
-                still=still(robot, readings.joint_position),
-                **values,
-            )
-        )
+        repeated = still(robot, readings.joint_position)
+        yield CONTRADICTION(apart=apart, size=size, still=repeated)
 
 
 def _likeliest(

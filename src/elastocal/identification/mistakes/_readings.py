@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.identification.conventions import FORCE_MISTAKES
+from elastocal.identification.mistakes._common import AXES, median_norm
 from elastocal.identification.mistakes._rows import OtherReading, Rows, beside, fitted
-from elastocal.identification.mistakes._suspicion import AXES, median_norm
 
 _CLEAR, _LIKELY, _FITTED = 0.9, 0.75, 0.85
 """Part of the error that may be left: by forces and rows, by markers, by estimated numbers."""

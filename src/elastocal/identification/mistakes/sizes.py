@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, actuated
-from elastocal.identification.mistakes._suspicion import Suspicion, median_norm
+from elastocal.findings import Finding, Kind, as_number
+from elastocal.identification.mistakes._common import median_norm
 from elastocal.robot import Robot
 from elastocal.wording import phrase
 
@@ -40,9 +41,30 @@ _REACHES = 40.0
 """In N·m per m to the fifth."""
 
 
+UNIT_OF_FORCE = Kind(
+    "mistakes.unit-of-force",
+    "forces look like {unit} in a column of N: they load the arm with {share} of"
+    " its torques, and it seems {times} times as compliant as the rule of thumb for"
+    " such arms; check the unit of the sensor",
+    shown={"share": as_number(".1%"), "times": as_number(".2g")},
+)
+COUNTS = Kind(
+    "mistakes.counts",
+    "forces look like counts, or another unit than N: they load a joint with {share}"
+    " of what it carries; check the unit of the sensor (`counts` in a map)",
+    shown={"share": as_number(".0%")},
+)
+UNIT_OF_DISPLACEMENT = Kind(
+    "mistakes.unit-of-displacement",
+    "displacements look like {unit}: the arm seems {times} times as compliant as"
+    " the rule of thumb for such arms; check the unit of tracker and controller",
+    shown={"times": as_number(".2g")},
+)
+
+
 def find_wrong_units(
     robot: Robot, readings: Readings, marker_offset: ArrayLike | None = None
-) -> Iterator[Suspicion]:
+) -> Iterator[Finding]:
     """Yield units in which forces or displacements would be of the size that they have on arms.
 
     Parameters
@@ -54,31 +76,17 @@ def find_wrong_units(
     if sizes is None:
         return
     ratio, share = sizes
-    r, s, times = np.log(ratio) - _RATIO, np.log(share) - _SHARE, f"{ratio:.2g}"
+    r, s = np.log(ratio) - _RATIO, np.log(share) - _SHARE
     likelier = {
         unit: (r**2 - (r - k) ** 2) / _RATIO_SPREAD**2 + (s**2 - (s + k) ** 2) / _SHARE_SPREAD**2
         for unit, k in _FORCE_UNITS
     }
     if units := [unit for unit, gain in likelier.items() if gain > _LIKELIER]:
-        yield Suspicion(
-            phrase(
-                "forces look like {unit} in a column of N: they load the arm with {share} of"
-                " its torques, and it seems {times} times as compliant as the rule of thumb for"
-                " such arms; check the unit of the sensor",
-                unit=" or ".join(units[:2] if likelier["kN"] < likelier["lbf"] else units[-1:]),
-                share=f"{share:.1%}",
-                times=times,
-            )
-        )
+        likeliest = units[:2] if likelier["kN"] < likelier["lbf"] else units[-1:]
+        yield UNIT_OF_FORCE(unit=" or ".join(likeliest), share=share, times=ratio)
         return
     if share > _TOO_MUCH:
-        yield Suspicion(
-            phrase(
-                "forces look like counts, or another unit than N: they load a joint with {share}"
-                " of what it carries; check the unit of the sensor (`counts` in a map)",
-                share=f"{share:.0%}",
-            )
-        )
+        yield COUNTS(share=share)
         return
     for word, k in (
         (phrase("inches in a column of mm"), np.log(25.4)),
@@ -86,14 +94,7 @@ def find_wrong_units(
     ):
         gain = (r**2 - (r + k) ** 2) / _RATIO_SPREAD**2
         if gain > _LIKELIER:
-            yield Suspicion(
-                phrase(
-                    "displacements look like {unit}: the arm seems {times} times as compliant as"
-                    " the rule of thumb for such arms; check the unit of tracker and controller",
-                    unit=word,
-                    times=times,
-                )
-            )
+            yield UNIT_OF_DISPLACEMENT(unit=word, times=ratio)
 
 
 def _sizes(

@@ -13,7 +13,7 @@ Thresholds are measured on sound campaigns (docs/decisions/0105-mistakes-undone.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
@@ -23,13 +23,12 @@ from scipy.special import stdtr
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.errors import IdentificationError
+from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.mistakes._readings import other_readings
 from elastocal.identification.mistakes._rows import OtherReading, Rows, apart, fitted
-from elastocal.identification.mistakes._suspicion import Suspicion
 from elastocal.identification.problem import Problem
 from elastocal.identification.uncertainty import leave_poses_out
 from elastocal.robot import Robot
-from elastocal.wording import phrase
 
 _TRIMMED = 0.9
 """Part of the readings, those with the smallest residuals, that rank readings of the data."""
@@ -59,7 +58,7 @@ _ALIKE = 1.25
 
 def find_undone(
     robot: Robot, readings: Readings, marker_offset: ArrayLike | None = None
-) -> tuple[Suspicion, ...]:
+) -> tuple[Finding, ...]:
     """Return the mistake whose undoing explains readings far better; none of sound readings.
 
     Parameters
@@ -93,10 +92,25 @@ def find_undone(
     undone = next(filter(None, (_judged(stated, rows, *each) for each in tried)), None)
     changed = _parted(stated, readings.pose[rows.kept])
     found = [each for each in (undone, changed) if each is not None]
-    return (min(found, key=lambda each: each.left).suspicion,) if found else ()
+    return (min(found, key=lambda each: each.left).mistake,) if found else ()
 
 
 _Ranked = tuple[float, int, OtherReading]
+
+
+READ_SO = Kind(
+    "mistakes.read-so",
+    "{mistake}: read so, the error at poses left out falls from {before} to {after} mm",
+    shown=dict.fromkeys(("before", "after"), as_number(".3f", 1e3)),
+)
+CERTAINLY_READ_SO = replace(READ_SO, name="mistakes.certainly-read-so", grade=Grade.REFUSAL)
+PARTED = Kind(
+    "mistakes.parted",
+    "readings from pose {pose} on are not like those before: fitted apart, the error at poses"
+    " left out falls from {before} to {after} mm; was a sensor or tracker plugged, turned or"
+    " set otherwise there?",
+    shown=dict.fromkeys(("before", "after"), as_number(".3f", 1e3)),
+)
 
 
 @dataclass(frozen=True)
@@ -104,7 +118,7 @@ class _Found:
     """A mistake, and the part of the error that is left with it undone."""
 
     left: float
-    suspicion: Suspicion
+    mistake: Finding
 
 
 def _plainest(possible: Sequence[_Ranked]) -> tuple[OtherReading, Sequence[str]]:
@@ -130,13 +144,12 @@ def _judged(
         return None
     deflection = float(np.linalg.norm(undone.d, axis=1).mean()) * max(reading.louder, 1.0)
     certain = reading.certain and left < _CERTAIN and float(after.mean()) < _FITS_WELL * deflection
-    text = phrase(
-        "{mistake}: read so, the error at poses left out falls from {before} to {after} mm",
+    found = (CERTAINLY_READ_SO if certain else READ_SO)(
         mistake="; or ".join((reading.message, *others)),
-        before=f"{1e3 * before.mean():.3f}",
-        after=f"{1e3 * after.mean() / max(reading.louder, 1.0):.3f}",
+        before=float(before.mean()),
+        after=float(after.mean()) / max(reading.louder, 1.0),
     )
-    return _Found(left, Suspicion(text, certain))
+    return _Found(left, found)
 
 
 def _change(stated: Problem, undone: Problem) -> float:
@@ -181,15 +194,8 @@ def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
     if not found:
         return None
     left, late, after = min(found, key=itemgetter(0))
-    text = phrase(
-        "readings from pose {pose} on are not like those before: fitted apart, the error at poses"
-        " left out falls from {before} to {after} mm; was a sensor or tracker plugged, turned or"
-        " set otherwise there?",
-        pose=int(pose[late][0]),
-        before=f"{1e3 * before.mean():.3f}",
-        after=f"{1e3 * after.mean():.3f}",
-    )
-    return _Found(left * _ALIKE, Suspicion(text))
+    parted = PARTED(pose=int(pose[late][0]), before=float(before.mean()), after=float(after.mean()))
+    return _Found(left * _ALIKE, parted)
 
 
 def _residual(problem: Problem) -> float:

@@ -28,6 +28,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import CONDITIONING, SENSOR_CORRECTED, Cell, SensorLoad
 from elastocal.dataset import MADE_FROM, STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
+from elastocal.findings import Finding
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive._rows import LoadRow, load_rows, unloaded_references
 from elastocal.procedure.derive.findings import RunFindings, summarise
@@ -93,7 +94,7 @@ class CommittedRun:
     plan: PlanResult
     poses: tuple[PoseReadings, ...]
     """In the order of time, the last one of each."""
-    signs: tuple[str, ...]
+    signs: tuple[Finding, ...]
     """Signs that the journal has lost its end; see `signs_of_a_cut`."""
 
 

@@ -10,15 +10,15 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray
 from elastocal.cell import LIGHT_CONTACT, LineCounts, SensorLoad
 from elastocal.dataset import Dataset
+from elastocal.findings import Finding
 from elastocal.planning import PlanResult
-from elastocal.procedure.derive import summary
+from elastocal.procedure.derive import _kinds, summary
 from elastocal.procedure.derive._rows import LoadRow, LoadValues
 from elastocal.procedure.derive.readings import PoseReadings, weighed_poses
 from elastocal.procedure.derive.tool import Interval, ToolEstimate
 from elastocal.procedure.record import Entry, Event, ReadingStatus
 from elastocal.procedure.registration import Registration, StationFit
 from elastocal.results import brief_repr
-from elastocal.wording import phrase
 
 _SIGMAS = ("force_sigma", "marker_sigma")
 _MASS_SHARE = 0.1
@@ -32,8 +32,6 @@ _LEVER = 5e-3
 """Difference from the cell file's lever arm that is warned of, in m."""
 _HALF = 2.0
 """Standard deviations in half a 95 % interval."""
-_MANY = 9
-"""Power of ten of the runs beyond which a test on assumed distributions says no more."""
 _LARGE_ROTATION = 5e-3
 """Standard deviation of a station's rotation that is warned of, in rad: 5 µm for each mm."""
 
@@ -239,7 +237,7 @@ def run_warnings(
     estimate: ToolEstimate,
     load_cases: Sequence[str],
     weighed: Sequence[int],
-) -> list[str]:
+) -> list[Finding]:
     """Return the warnings of a run.
 
     Parameters
@@ -263,125 +261,62 @@ def run_warnings(
     ]
 
 
-def _about_readings(rows: Sequence[LoadRow], load_cases: Sequence[str]) -> Iterator[str]:
+def _about_readings(rows: Sequence[LoadRow], load_cases: Sequence[str]) -> Iterator[Finding]:
     had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
     for case in load_cases:
         if case not in had:
-            yield phrase(
-                "load case {case} has no usable reading at any pose: the dataset leaves it out",
-                case=repr(case),
-            )
+            yield _kinds.NO_READING_OF_CASE(case=case)
     if lost := len(_not_ok(rows)):
-        yield phrase(
-            "{lost} of {rows} readings are not ok; the list says why", lost=lost, rows=len(rows)
-        )
+        yield _kinds.NOT_OK(lost=lost, rows=len(rows))
     for name in _SIGMAS:
         if any(not np.all(getattr(numbers, name) > 0) for numbers in _good(rows)):
-            yield phrase(
-                "{name} is left out: some readings show no scatter and no maker's value", name=name
-            )
+            yield _kinds.NO_SCATTER(name=name)
 
 
-def _about_stations(registration: Registration) -> Iterator[str]:
+def _about_stations(registration: Registration) -> Iterator[Finding]:
     for station, reason in registration.unregistered.items():
-        yield phrase(
-            "station {station} is not registered, its readings are missing: {reason}",
-            station=station,
-            reason=reason,
-        )
+        yield _kinds.UNREGISTERED(station=station, reason=reason)
     for move in registration.moves:
-        jump, half = 1e3 * move.distance, 1e3 * _HALF * move.distance_sigma
-        runs = _power_of_ten(-move.improbability)
-        yield phrase(
-            "station {station} moved between poses {before} and {pose}: the marker seemed to"
-            " jump by {jump} ± {half} mm, the station turned by {angle} mrad; scatter and"
-            " errors of the arm look like this in one run of {runs}; both stretches are"
-            " registered by themselves",
+        yield _kinds.MOVED(
             station=move.station,
             before=move.before,
             pose=move.pose,
-            jump=f"{jump:.2f}",
-            half=f"{half:.2f}",
-            angle=f"{1e3 * move.angle:.2f}",
-            runs=runs,
+            jump=move.distance,
+            half=_HALF * move.distance_sigma,
+            angle=move.angle,
+            runs=-move.improbability,
         )
     for blunder in registration.blunders:
-        yield phrase(
-            "pose {pose}: the unloaded marker reading of station {station} is {distance} mm"
-            " off: its displacements are doubtful",
-            pose=blunder.pose,
-            station=blunder.station,
-            distance=f"{1e3 * blunder.distance:.2f}",
-        )
+        yield _kinds.BLUNDER(pose=blunder.pose, station=blunder.station, distance=blunder.distance)
     for fit in registration.stations:
         if not fit.rotation_sigma <= _LARGE_ROTATION:
-            yield phrase(
-                "station {station}: its rotation is known to {angle} mrad only, an error of"
-                " {angle} µm for each mm of displacement",
-                station=fit.station,
-                angle=f"{1e3 * fit.rotation_sigma:.1f}",
-            )
+            yield _kinds.ROTATION(station=fit.station, angle=fit.rotation_sigma)
 
 
-def _power_of_ten(exponent: float) -> str:
-    """Return a large number to the power of ten, of which none is told beyond a billion."""
-    return f"more than 10^{_MANY}" if exponent > _MANY else f"10^{exponent:.0f}"
-
-
-def _about_lever(registration: Registration) -> Iterator[str]:
+def _about_lever(registration: Registration) -> Iterator[Finding]:
     if registration.undetermined_lever:
-        yield phrase(
-            "the orientations of the poses are too similar to tell the lever arm of the marker"
-            " along {axes} of the tcp: there it is the cell file's",
-            axes=", ".join(registration.undetermined_lever),
-        )
+        yield _kinds.LEVER_UNKNOWN(axes=registration.undetermined_lever)
     away = float(np.linalg.norm(registration.lever_arm - registration.lever_prior))
     if not away <= _LEVER:
-        yield phrase(
-            "the marker is {away} mm from where the cell file has it ({place} in the tcp frame)",
-            away=f"{1e3 * away:.1f}",
-            place=_millimetres(registration.lever_arm),
-        )
+        yield _kinds.LEVER_AWAY(away=away, place=registration.lever_arm.tolist())
 
 
-def _about_tool(tool: SensorLoad, estimate: ToolEstimate, weighed: Sequence[int]) -> Iterator[str]:
+def _about_tool(
+    tool: SensorLoad, estimate: ToolEstimate, weighed: Sequence[int]
+) -> Iterator[Finding]:
     if estimate.change is not None:
-        yield phrase(
-            "the tool weight changed near pose {pose}, by about {mass} kg (or the sensor's"
-            " zero by as much): no one mass fits the run",
-            pose=weighed[estimate.change.reading],
-            mass=f"{estimate.change.mass:+.1f}",
+        yield _kinds.TOOL_CHANGED(
+            pose=weighed[estimate.change.reading], mass=float(estimate.change.mass)
         )
         return
     mass, half = float(estimate.mass.value), float(estimate.mass.half_width)
+    weights = {"mass": mass, "half": half, "stated": float(tool.mass)}
     if mass + half < _ZEROED * tool.mass:
-        yield phrase(
-            "the sensor shows {mass} ± {half} kg of the tool's {stated} kg: it seems to take"
-            " the tool weight away itself",
-            mass=f"{mass:.1f}",
-            half=f"{half:.1f}",
-            stated=f"{tool.mass:.1f}",
-        )
+        yield _kinds.TOOL_ZEROED(**weights)
     elif abs(mass - tool.mass) > max(half, _MASS_SHARE * tool.mass):
-        yield phrase(
-            "the tool weighs {mass} ± {half} kg by {count} unloaded references, {stated} kg by"
-            " the cell file",
-            mass=f"{mass:.1f}",
-            half=f"{half:.1f}",
-            count=estimate.count,
-            stated=f"{tool.mass:.1f}",
-        )
+        yield _kinds.TOOL_MASS(**weights, count=estimate.count)
     away = np.abs(estimate.centre.value - tool.centre)
     far = away > np.maximum(estimate.centre.half_width, _CENTRE)
     if np.any(far):
         axis = int(np.argmax(np.where(far, away, 0.0)))
-        yield phrase(
-            "the tool's centre of mass is {away} mm along {axis} of the sensor from where the"
-            " cell file has it",
-            away=f"{1e3 * away[axis]:.0f}",
-            axis="xyz"[axis],
-        )
-
-
-def _millimetres(point: np.ndarray) -> str:
-    return ", ".join(f"{1e3 * value:.1f} mm" for value in point)
+        yield _kinds.TOOL_CENTRE(away=float(away[axis]), axis="xyz"[axis])

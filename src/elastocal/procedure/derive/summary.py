@@ -8,6 +8,7 @@ from pathlib import Path
 
 from elastocal.cell import LineCounts
 from elastocal.errors import SchemaError
+from elastocal.findings import Finding
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder
 from elastocal.records import read_json, record
@@ -213,7 +214,7 @@ class TimeSummary:
     total: Number
 
 
-@record("elastocal.run-summary/1", sealed=True)
+@record("elastocal.run-summary/2", sealed=True, reads=("elastocal.run-summary/1",))
 class RunSummary(Result):
     """Findings on the way to the dataset of a run."""
 
@@ -228,8 +229,8 @@ class RunSummary(Result):
     noise: NoiseSummary
     attempts: AttemptSummary
     times: TimeSummary
-    warnings: tuple[str, ...]
-    """For people, a line each."""
+    warnings: tuple[Finding, ...]
+    """What a person should know of it; sentences alone in files of version 1."""
     lines: tuple[LineCounts, ...] = ()
     """What was counted on the lines of the devices, all sessions together; none of simulated ones,
     and of runs before it was."""

@@ -13,12 +13,20 @@ from pathlib import Path
 from elastocal.cell import Cell, fingerprint, load_cell, named_files
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.files import read_bytes, read_text, replacing, sha256
+from elastocal.findings import Finding, Kind, as_count
 from elastocal.planning import PLAN, POOL, PlanResult, read_plan
 from elastocal.procedure.record.history import RunRecord
 from elastocal.procedure.record.journal import Entry
-from elastocal.wording import counted
 
 JOURNAL = "journal.jsonl"
+
+_TORN = Kind("run.journal-torn", "line {line} of {journal}, its last, is torn and left out")
+_CUT = Kind(
+    "run.journal-cut",
+    "{journal} was cut, or is not of this run: it does not name {lost} of {recordings}"
+    " ({first} the first): their poses are left out",
+    shown={"recordings": as_count("recording")},
+)
 
 
 @dataclass(frozen=True)
@@ -225,7 +233,7 @@ def check_plan(folder: RunFolder, record: RunRecord) -> None:
     _refuse_changed(plan, sha256(read_text(plan)), record.plan)
 
 
-def signs_of_a_cut(folder: RunFolder, entries: Sequence[Entry]) -> tuple[str, ...]:
+def signs_of_a_cut(folder: RunFolder, entries: Sequence[Entry]) -> tuple[Finding, ...]:
     """Return the signs that a journal has lost its end, a sentence each; none as a rule.
 
     Every attempt at a pose is in the journal before it moves anything, so that no recording is
@@ -251,7 +259,7 @@ def signs_of_a_cut(folder: RunFolder, entries: Sequence[Entry]) -> tuple[str, ..
     signs = []
     if not data.endswith(b"\n"):
         last = data.count(b"\n") + 1
-        signs.append(f"line {last} of {JOURNAL}, its last, is torn and left out")
+        signs.append(_TORN(line=last, journal=JOURNAL))
     named = {entry.log.streams for entry in entries if entry.log is not None}
     named |= {
         folder.stream(entry.pose, entry.attempt).name
@@ -259,11 +267,8 @@ def signs_of_a_cut(folder: RunFolder, entries: Sequence[Entry]) -> tuple[str, ..
         if entry.pose is not None and entry.attempt is not None
     }
     if lost := sorted(recorded - named):
-        signs.append(
-            f"{JOURNAL} was cut, or is not of this run: it does not name {len(lost)} of"
-            f" {counted(len(recorded), 'recording')} ({lost[0]} the first): their poses are left"
-            " out"
-        )
+        count = len(recorded)
+        signs.append(_CUT(journal=JOURNAL, lost=len(lost), recordings=count, first=lost[0]))
     return tuple(signs)
 
 

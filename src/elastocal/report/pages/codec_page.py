@@ -16,6 +16,7 @@ from elastocal.codec import (
     Verdicts,
 )
 from elastocal.files import write_text
+from elastocal.findings import group_alike
 from elastocal.parallel import map_in_processes, process_count
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import (
@@ -34,7 +35,6 @@ from elastocal.report.plots import (
     variant_styles,
     write_kinds,
 )
-from elastocal.results import counted_alike
 
 KINDS = (".svg", ".png")
 """In which kinds every figure is written."""
@@ -158,7 +158,7 @@ def write_codec_page(
         saturations=verdicts.sentences[:first],
         pairs=verdicts.sentences[first:],
         pair_count=len(verdicts.pairs),
-        findings=counted_alike(data.findings),
+        findings=group_alike(data.findings),
         how=how_to_read(data),
         last=data.n_train[-1],
         names=names,

@@ -8,10 +8,10 @@ import numpy as np
 from elastocal import blocks
 from elastocal.cell import Cell, Limits
 from elastocal.compensation.conditioning import ToolResult
+from elastocal.findings import group_alike
 from elastocal.procedure.derive import RegistrationSummary, RunSummary, ToolSummary
 from elastocal.report.document.section import Section
 from elastocal.report.plots import StationResiduals, station_figure
-from elastocal.results import counted_alike
 from elastocal.verdict import Evidence
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, point, spans, um
 
@@ -164,7 +164,7 @@ def _stations_sensor_tool(evidence: Evidence) -> Iterator[blocks.Block]:
     yield _tool_file(evidence.tool, evidence.cell)
     yield blocks.Heading(phrase("Warnings of the run"))
     none = blocks.Paragraph(phrase("The run gave no warning."))
-    warnings = tuple(counted_alike(summary.warnings))
+    warnings = tuple(group_alike(summary.warnings))
     yield blocks.Bullets(warnings) if warnings else none
 
 
