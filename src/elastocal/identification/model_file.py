@@ -3,11 +3,13 @@
 from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import AnySpring, ElasticModel, require_possible
+from elastocal.elastic import KINDS, AnySpring, ElasticModel, require_possible
 from elastocal.errors import SchemaError, nearest
 from elastocal.files import sha256
 from elastocal.identification.calibrated import CalibratedModel, ToolChange
@@ -15,6 +17,7 @@ from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
+from elastocal.plugins import require_distributions
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot, parse_urdf
@@ -41,6 +44,11 @@ class CalibrateResult(Result):
     """A calibrated model as its file holds it: what ``calibrate`` returns and writes."""
 
     robot: RobotRecord
+    needs: Annotated[dict[str, str], AfterValidator(require_distributions)] = field(
+        default_factory=dict, kw_only=True
+    )
+    """Distributions of its springs beside elastocal, with their versions. It stands before the
+    springs, so that what is missing is told first."""
     springs: tuple[AnySpring, ...]
     compliance: FloatArray
     """Shape (parameter,), in rad/(N·m) or m/N of hinges."""
@@ -115,6 +123,7 @@ class CalibrateResult(Result):
             robot=RobotRecord(
                 robot.name, robot.urdf, robot.urdf_hash, robot.base, robot.tip, gravity
             ),
+            needs=KINDS.sources(spring.kind for spring in calibrated.model.springs),
             springs=calibrated.model.springs,
             compliance=calibrated.compliance,
             draws=calibrated.draws,

@@ -1,22 +1,26 @@
 """Every kind of spring by the word that files have for it."""
 
+import json
 from collections.abc import Mapping, Sequence
-from functools import reduce
-from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from functools import partial
+from typing import Annotated, Any, TypeAlias
 
-from pydantic import Discriminator, Tag
+from pydantic import GetCoreSchemaHandler, TypeAdapter
+from pydantic_core import core_schema
 
 from elastocal.elastic.springs.gear import Gear
 from elastocal.elastic.springs.hinge import Hinge
 from elastocal.elastic.springs.spring import Spring, Unit
 from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SpringError
+from elastocal.plugins import Registry
 
 DEFAULT_KIND = "hinge"
 """Kind of a spring whose kind a file does not name."""
 
-KINDS: dict[str, type[Spring]] = {DEFAULT_KIND: Hinge, "gear": Gear, "tensor": Tensor}
+KINDS: Registry[type[Spring]] = Registry(
+    "kind of spring", {DEFAULT_KIND: Hinge, "gear": Gear, "tensor": Tensor}, SpringError
+)
 """Kinds of springs by the word that files have for them."""
 
 
@@ -26,18 +30,33 @@ def _tag(spring: Any) -> str:
     return f"<{kind}>"
 
 
-if TYPE_CHECKING:
-    AnySpring: TypeAlias = Spring
-else:
-    AnySpring = Annotated[
-        reduce(or_, (Annotated[kind, Tag(f"<{word}>")] for word, kind in KINDS.items())),
-        Discriminator(
+class _OfAnyKind:
+    """Reads a spring as its kind; made when the first file is read, not when this is imported."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        choices = {f"<{word}>": handler.generate_schema(kind) for word, kind in KINDS.own.items()}
+        for word in KINDS:
+            # Of another package: loaded by the first file that has one.
+            choices.setdefault(
+                f"<{word}>", core_schema.no_info_plain_validator_function(partial(_read_as, word))
+            )
+        return core_schema.tagged_union_schema(
+            choices,
             _tag,
             custom_error_type="kind",
             custom_error_message=f"unknown kind of spring (allowed: {', '.join(KINDS)})",
-        ),
-    ]
-    """A spring of any kind, as a field of a file's record."""
+        )
+
+
+def _read_as(word: str, data: Any) -> Spring:
+    found: Spring = TypeAdapter(KINDS[word]).validate_json(json.dumps(data), strict=True)
+    return found
+
+
+AnySpring: TypeAlias = Annotated[Spring, _OfAnyKind()]
+"""A spring of any kind, as a field of a file's record."""
 
 
 def unit_of(si: str) -> Unit:
