@@ -95,22 +95,30 @@ def source_of(entry: "EntryPoint") -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
 
 
-def require_distributions(needed: Mapping[str, str]) -> Mapping[str, str]:
-    """Return what a file says that it needs: distributions with the version that made it.
+def require_distributions(needed: object, what: str) -> None:
+    """Refuse a file that needs distributions which are not installed.
+
+    Parameters
+    ----------
+    needed : object
+        What the file says: distributions with the versions that made it. What is no mapping is left
+        to whoever reads the file.
+    what : str
+        The file, for messages.
 
     Raises
     ------
-    ValueError
-        If one is not installed.
+    PluginError
+        With the first that is missing.
     """
-    if needed:
-        from importlib.metadata import distributions
+    if not needed or not isinstance(needed, Mapping):
+        return
+    from importlib.metadata import distributions
 
-        installed = {each.name for each in distributions()}
-        for name, version in needed.items():
-            if name not in installed:
-                raise ValueError(f"a plug-in of {name} {version}, which is not installed")
-    return needed
+    installed = {each.name for each in distributions()}
+    for name, version in needed.items():
+        if name not in installed:
+            raise PluginError(f"{what} needs {name} (made with {version}), which is not installed")
 
 
 def load(kind: str, name: str) -> Any:

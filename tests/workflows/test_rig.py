@@ -86,9 +86,7 @@ def test_a_driver_is_asked_only_for_what_it_makes(bench):
 
 def test_a_driver_that_cannot_be_loaded_says_why(tmp_path, monkeypatch):
     drivers.install(tmp_path, monkeypatch, "lame", "import no_such_package")
-    with pytest.raises(
-        PluginError, match=r"^driver 'lame' of lame 1.0 cannot be .*no_such_pac"
-    ):
+    with pytest.raises(PluginError, match=r"^driver 'lame' of lame 1.0 cannot be .*no_such_pac"):
         DRIVERS.named("lame")
 
 

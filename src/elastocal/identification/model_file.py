@@ -3,10 +3,8 @@
 from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic import KINDS, AnySpring, ElasticModel, require_possible
@@ -17,7 +15,6 @@ from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
-from elastocal.plugins import require_distributions
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot, parse_urdf
@@ -44,11 +41,6 @@ class CalibrateResult(Result):
     """A calibrated model as its file holds it: what ``calibrate`` returns and writes."""
 
     robot: RobotRecord
-    needs: Annotated[dict[str, str], AfterValidator(require_distributions)] = field(
-        default_factory=dict, kw_only=True
-    )
-    """Distributions of its springs beside elastocal, with their versions. It stands before the
-    springs, so that what is missing is told first."""
     springs: tuple[AnySpring, ...]
     compliance: FloatArray
     """Shape (parameter,), in rad/(N·m) or m/N of hinges."""
@@ -68,6 +60,9 @@ class CalibrateResult(Result):
     made_from: dict[str, str] = field(default_factory=dict)
     """SHA-256 of what each dataset says (`elastocal.dataset.content_sha256`), by its file; empty
     in files before it was written."""
+    needs: dict[str, str] = field(default_factory=dict)
+    """Distributions that its springs are of, beside elastocal, with the versions that made it; what
+    reads it asks for them first (`elastocal.plugins.require_distributions`)."""
 
     def __post_init__(self) -> None:
         """Refuse parts that contradict one another.

@@ -51,7 +51,7 @@ class _OfAnyKind:
 
 
 def _read_as(word: str, data: Any) -> Spring:
-    found: Spring = TypeAdapter(KINDS[word]).validate_json(json.dumps(data), strict=True)
+    found: Spring = TypeAdapter(KINDS.named(word)).validate_json(json.dumps(data), strict=True)
     return found
 
 
