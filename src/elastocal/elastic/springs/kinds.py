@@ -2,11 +2,11 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Annotated, Any, TypeAlias
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from pydantic import GetCoreSchemaHandler, TypeAdapter
-from pydantic_core import core_schema
+from pydantic import Discriminator, PlainValidator, Tag, TypeAdapter
 
 from elastocal.elastic.springs.gear import Gear
 from elastocal.elastic.springs.hinge import Hinge
@@ -24,39 +24,31 @@ KINDS: Registry[type[Spring]] = Registry(
 """Kinds of springs by the word that files have for them."""
 
 
+_OTHER = "<other>"
+
+
 def _tag(spring: Any) -> str:
     """Return the tag of the class that a spring in a file is read as."""
     kind = spring.get("kind", DEFAULT_KIND) if isinstance(spring, Mapping) else DEFAULT_KIND
-    return f"<{kind}>"
+    return f"<{kind}>" if str(kind) in KINDS.own else _OTHER
 
 
-class _OfAnyKind:
-    """Reads a spring as its kind; made when the first file is read, not when this is imported."""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        choices = {f"<{word}>": handler.generate_schema(kind) for word, kind in KINDS.own.items()}
-        for word in KINDS:
-            # Of another package: loaded by the first file that has one.
-            choices.setdefault(
-                f"<{word}>", core_schema.no_info_plain_validator_function(partial(_read_as, word))
-            )
-        return core_schema.tagged_union_schema(
-            choices,
-            _tag,
-            custom_error_type="kind",
-            custom_error_message=f"unknown kind of spring (allowed: {', '.join(KINDS)})",
-        )
-
-
-def _read_as(word: str, data: Any) -> Spring:
-    found: Spring = TypeAdapter(KINDS.named(word)).validate_json(json.dumps(data), strict=True)
+def _of_another_package(data: Any) -> Spring:
+    """Return the spring of a plug-in, which is loaded now."""
+    kind = KINDS.named(str(data["kind"]))
+    found: Spring = TypeAdapter(kind).validate_json(json.dumps(data), strict=True)
     return found
 
 
-AnySpring: TypeAlias = Annotated[Spring, _OfAnyKind()]
-"""A spring of any kind, as a field of a file's record."""
+if TYPE_CHECKING:
+    AnySpring: TypeAlias = Spring
+else:
+    AnySpring = Annotated[
+        reduce(or_, (Annotated[kind, Tag(f"<{word}>")] for word, kind in KINDS.own.items()))
+        | Annotated[Any, PlainValidator(_of_another_package), Tag(_OTHER)],
+        Discriminator(_tag),
+    ]
+    """A spring of any kind, as a field of a file's record."""
 
 
 def unit_of(si: str) -> Unit:
