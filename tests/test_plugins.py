@@ -1,6 +1,7 @@
 """Plug-ins of other packages: found by their entry points, in every process."""
 
 import importlib
+import json
 import multiprocessing
 import os
 import subprocess
@@ -15,8 +16,10 @@ from elastocal.errors import ElastocalError, PluginError, SchemaError
 from elastocal.identification import LOSSES, CalibratedModel, Observability, read_model, write_model
 from elastocal.planning.search import CRITERIA, TECHNIQUES
 from elastocal.plugins import KINDS as KINDS_OF_PLUGINS, Registry
+from elastocal.report.language import language_of
 from support import plugged
 from support.cells import robot
+from support.cli import elastocal
 from support.pools import choice
 
 
@@ -49,6 +52,8 @@ def test_every_kind_has_a_registry_of_its_own_and_a_class_that_is_expected(kind)
         assert hasattr(importlib.import_module(module), name), place
     module, _, name = form.home.partition(":")
     registry = getattr(importlib.import_module(module), name)
+    if kind in ("command", "words"):  # of its own form: typer's, and catalogues
+        return
     assert isinstance(registry, Registry)
     assert registry.kind == kind
     assert len(registry) >= len(registry.own) > 0
@@ -168,3 +173,51 @@ class TestAPlugInThatCannotBeUsed:
         offered(tmp_path, monkeypatch, "THING = len", name="huber")
         assert LOSSES["huber"] is own
         assert list(LOSSES) == ["linear", "huber", "cauchy"]
+
+
+@pytest.mark.usefixtures("examples")
+class TestACommandOfAPlugIn:
+    def test_help_lists_it_without_importing_it(self):
+        shown = elastocal("--help").out
+        assert "softest" in shown
+        assert "elastocal-softest 1.0" in shown
+        assert "elastocal_softest" not in sys.modules
+
+    def test_its_arguments_and_options_are_those_of_its_settings(self):
+        shown = elastocal("softest", "--help").out
+        for text in ("Model file", "--most", "How many springs", "--json", "List the springs of a"):
+            assert text in shown
+        assert elastocal("softest", "--moist", 3).code == 2
+
+    def test_it_shows_blocks_and_prints_json(self, tmp_path):
+        made = model_with_a_spring_of_another_package(tmp_path / "model.json")
+        shown = elastocal("softest", tmp_path / "model.json", "--most", 2)
+        assert shown.code == 0
+        assert "yield most" in shown.err
+        last = made.model.parameter_names[-1]
+        assert f"{last} 0.200" in " ".join(shown.err.replace("│", " ").split())
+        printed = json.loads(elastocal("softest", tmp_path / "model.json", "--json").out)
+        assert next(iter(printed["springs"])) == last
+
+    def test_what_it_refuses_is_one_line(self, tmp_path):
+        refused = elastocal("softest", tmp_path / "model.json", "--most", 0)
+        assert refused.code == 1
+        assert refused.reason.endswith("--most 0 springs: must be at least 1")
+
+    def test_one_that_cannot_be_imported_names_its_distribution(self, tmp_path, monkeypatch):
+        offered(tmp_path, monkeypatch, "1 / 0", "elastocal.commands")
+        assert "odd" in elastocal("--help").out
+        reason = elastocal("odd").reason
+        assert "command 'odd' of odd-things 1.0 cannot be loaded: ZeroDivisionError" in reason
+
+    def test_its_phrases_are_said_in_german(self):
+        language_of.cache_clear()
+        import elastocal_softest
+
+        first, *_ = elastocal_softest.show(elastocal_softest.Softest("Arm", {}))
+        try:
+            assert (
+                language_of("de").say(first.text) == "Diese Federn von Arm geben am meisten nach."
+            )
+        finally:
+            language_of.cache_clear()

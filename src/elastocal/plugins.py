@@ -44,6 +44,20 @@ class Kind:
     """Whether the entry point names a subclass of it, not an object."""
 
 
+@dataclass(frozen=True)
+class Command(Generic[_T]):
+    """A command of the command line: settings in, a result out, shown as blocks."""
+
+    settings: type
+    """A frozen dataclass. A field without a default is an argument, one with a default an option;
+    a text in its `typing.Annotated` is its help. Its docstring is the help of the command."""
+    run: Callable[[Any], _T]
+    """Does the work; what it raises is an `ElastocalError`."""
+    show: Callable[[_T], Iterable[Any]]
+    """Returns what a person sees of the result, as `elastocal.blocks`; ``--json`` prints the result
+    itself, a record."""
+
+
 _FUNCTION = "collections.abc:Callable"
 KINDS = {
     "kind of spring": Kind(
@@ -67,6 +81,12 @@ KINDS = {
         "elastocal.programs",
         "elastocal.compensation.programs:PROGRAM_WRITERS",
         "elastocal.compensation.programs:ProgramWriter",
+    ),
+    "command": Kind(
+        "elastocal.commands", "elastocal.cli.main:COMMANDS", "elastocal.plugins:Command"
+    ),
+    "words": Kind(
+        "elastocal.words", "elastocal.report.language:LANGUAGES", "collections.abc:Mapping"
     ),
 }  # fmt: skip
 """Every kind, by the word that messages have for it."""
@@ -134,6 +154,22 @@ def load(kind: str, name: str) -> Any:
     if others:
         sources = " and ".join(sorted(map(source_of, (entry, *others))))
         raise PluginError(f"{kind} {name!r} is in {sources}: one of them has to be removed")
+    return _loaded(kind, entry)
+
+
+def load_all(kind: str, name: str) -> list[Any]:
+    """Return what every distribution has under a name, where several may, as words of a language.
+
+    Raises
+    ------
+    PluginError
+        As by `load`, for each.
+    """
+    return [_loaded(kind, entry) for entry in entries(kind).get(name, ())]
+
+
+def _loaded(kind: str, entry: "EntryPoint") -> Any:
+    name = entry.name
     what = f"{kind} {name!r} of {source_of(entry)}"
     try:
         found = entry.load()

@@ -24,7 +24,9 @@ from typing import Any, get_args, get_type_hints
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from elastocal import plugins
 from elastocal.cli import commands
+from elastocal.cli._plugged import PluggedCommand, loaded_command, plugged_command
 from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
 from elastocal.units import parse_number
@@ -49,6 +51,23 @@ class _Commands(TyperGroup):
         finally:
             for name in absent:
                 del sys.modules[name]
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands, those of other packages last."""
+        return list(dict.fromkeys((*super().list_commands(ctx), *plugins.entries("command"))))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command; of another package only its name and where it is from."""
+        found = super().get_command(ctx, cmd_name)
+        entries = plugins.entries("command").get(cmd_name, ()) if found is None else ()
+        return found or (entries and plugged_command(cmd_name, entries[0])) or None
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that is called; one of another package is loaded now."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if isinstance(command, PluggedCommand):
+            command = loaded_command(command.name or "", _Command)
+        return name, command, rest
 
 
 class _Command(TyperCommand):
