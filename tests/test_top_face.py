@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import elastocal as ec
-from elastocal.cli.main import COMMANDS
+from elastocal.cli.commands import COMMANDS
 
 OTHERWISE = {"import": "import_logs"}
 """Commands whose name is a word of Python."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from elastocal.cli.main import COMMANDS
+from elastocal.cli.commands import COMMANDS
 from elastocal.errors import FileAccessError
 from elastocal.workflows import Chapter, InitResult
 from elastocal.workflows.demo import README, begin, chapters

@@ -7,8 +7,8 @@ import sys
 import pytest
 
 from elastocal.cli import output
-from elastocal.cli.commands.demo import _log_console
 from elastocal.cli.output import bold, console
+from elastocal.cli.story import _log_console
 from elastocal.errors import FileAccessError
 from support.cli import elastocal
 

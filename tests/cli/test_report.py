@@ -75,8 +75,8 @@ def test_the_tolerance_on_the_command_line_is_the_one_that_counts(
     [
         ("--tolerance", "0.3", "--tolerance: '0.3' is not a length with its unit"),
         ("--tolerance", "0.3 N", "--tolerance: unit 'N' is not a length"),
-        ("--tolerance", "-1 mm", "--tolerance: '-1 mm' is not above 0"),
-        ("--tolerance", "0 mm", "--tolerance: '0 mm' is not above 0"),
+        ("--tolerance", "-1 mm", "--tolerance '-1 mm' must be above 0"),
+        ("--tolerance", "0 mm", "--tolerance '0 mm' must be above 0"),
         ("--limit", "3", "--limit: '3' is not a length with its unit"),
         ("--model", "no.json", "no.json"),
         ("--old", "no.json", "no.json"),

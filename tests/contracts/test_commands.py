@@ -1,5 +1,7 @@
 """What every command has: a group in help, short forms, choices that a shell completes, JSON."""
 
+import dataclasses
+import importlib
 import json
 import os
 import subprocess
@@ -11,13 +13,15 @@ import pytest
 import typer
 
 from elastocal.cell.examples import EXAMPLES
-from elastocal.cli import options
-from elastocal.cli.main import _GROUPS, COMMANDS, app, run
+from elastocal.cli.commands import _PURPOSES, COMMANDS
+from elastocal.cli.generator import _quantity
+from elastocal.cli.main import app, run
 from elastocal.compensation.process import PROCESSES
 from elastocal.compensation.programs.languages import PROGRAM_WRITERS
 from elastocal.elastic import LAYOUTS
 from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
+from elastocal.options import CHOICES, OWN, REQUIRED, settings_fields
 from elastocal.planning.search import TECHNIQUES
 from elastocal.report.language import LANGUAGES
 from elastocal.robot import catalogue
@@ -37,16 +41,15 @@ ELSEWHERE = {
 
 def options_of(command: str) -> dict[str, list[str]]:
     """Return the texts by which each parameter is given."""
-    return {param.name: [*param.opts] for param in GROUP.commands[command].params}
+    return {param.name: [*param.opts] for param in GROUP.get_command(None, command).params}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 class TestEveryCommand:
     def test_stands_in_a_group_of_the_help(self, command):
-        members = [
-            name.rstrip("_").replace("_", "-") for group in _GROUPS.values() for name in group
-        ]
-        assert members.count(command) == 1
+        text = elastocal("--help").out
+        above = text[: text.index(f"│ {command} ")]
+        assert f"╭─ {COMMANDS[command].group} ─" in above
 
     @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="/dev/full is Linux's")
     def test_begins_nothing_where_its_output_is_full(self, command, monkeypatch, capfd, tmp_path):
@@ -70,7 +73,8 @@ class TestEveryCommand:
         shown = elastocal(command, "-h")
         assert shown.code == 0
         assert f"elastocal {command}" in shown.out
-        assert [*options_of(command).get("out", ["--out", "-o"])] == ["--out", "-o"]
+        shorts = [opts for opts in options_of(command).values() if "--out" in opts]
+        assert shorts in ([], [["--out", "-o"]])
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +156,34 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "posture": (PROGRAMMED, STIFFEST),
         "target": EXPORT_TARGETS,
         "page language": tuple(LANGUAGES),
-    } == options.CHOICES
+        "purpose": _PURPOSES,
+    } == CHOICES
+
+
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"robots"}))
+def test_what_is_read_from_the_source_is_what_the_settings_are(command):
+    found = COMMANDS[command]
+    settings = getattr(importlib.import_module(found.module), found.settings)
+    real = {each.name: each for each in dataclasses.fields(settings)}
+    read = settings_fields(found.module, found.settings)
+    assert {each.name for each in read} == set(real)
+    for each in read:
+        if each.default is REQUIRED:
+            assert real[each.name].default is dataclasses.MISSING
+        elif each.default is not OWN:
+            assert real[each.name].default == each.default
+        if each.option.default and not each.option.read:
+            assert str(real[each.name].default) == each.option.default
+        elif each.option.default:
+            flag = each.option.name or f"--{each.name}"
+            assert _quantity(each.option.read)(each.option.default, flag) == real[each.name].default
+
+
+def test_every_option_has_a_sentence():
+    for name, found in COMMANDS.items():
+        for param in GROUP.get_command(None, name).params:
+            assert param.help, (name, param.name)
+            assert found.summary.endswith(".")
 
 
 class TestCompletion:

@@ -161,7 +161,7 @@ def _absurd_command(rng: random.Random) -> str:
     """Return the words of a command with one or two absurd options or arguments, as JSON."""
     name = rng.choice([*list(_PLAIN)] + 12 * [each for each in _PLAIN if each not in _SLOW])
     words = _PLAIN[name].split()
-    command = _commands().commands[name]
+    command = _commands().get_command(None, name)
     options = [
         each for each in command.params if each.param_type_name == "option" and each.name != "help"
     ]

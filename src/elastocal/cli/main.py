@@ -11,22 +11,17 @@ from elastocal.cli._signals import ended_cleanly, heard_again
 import atexit
 import contextlib
 import gc
-import importlib
 import inspect
 import os
-import pkgutil
 import sys
 import warnings
-from collections.abc import Callable
 from types import ModuleType
-from typing import Any, get_args, get_type_hints
+from typing import Any, cast, get_args
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from elastocal import plugins
-from elastocal.cli import commands
-from elastocal.cli._plugged import PluggedCommand, loaded_command, plugged_command
+from elastocal.cli.commands import COMMANDS
 from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
 from elastocal.units import parse_number
@@ -38,7 +33,17 @@ _UNUSED_BY_HELP = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
 
 
 class _Commands(TyperGroup):
-    """The commands; their help is drawn without importing a parser of Markdown first."""
+    """The commands, each made when it is asked for; help asks for their names and groups alone."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - as click asks
+        """Return the names of the commands, in the order of the work."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:  # noqa: ARG002
+        """Return a command; None where there is none of that name."""
+        if cmd_name not in self.commands and cmd_name in COMMANDS:
+            self.commands[cmd_name] = _made(cmd_name)
+        return cast("TyperCommand | None", self.commands.get(cmd_name))
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Draw the help; stand-ins for `_UNUSED_BY_HELP` halve what is imported for it."""
@@ -46,28 +51,18 @@ class _Commands(TyperGroup):
         for name, kind in absent.items():
             sys.modules[name] = ModuleType(name)
             setattr(sys.modules[name], kind, type(kind, (), {}))
+        # A line each is drawn: their parameters are not looked for.
+        whole = self.commands
+        self.commands = dict(whole) | {
+            name: TyperCommand(name, help=each.summary, rich_help_panel=each.group)
+            for name, each in COMMANDS.items()
+        }
         try:
             super().format_help(ctx, formatter)
         finally:
+            self.commands = whole
             for name in absent:
                 del sys.modules[name]
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of all commands, those of other packages last."""
-        return list(dict.fromkeys((*super().list_commands(ctx), *plugins.entries("command"))))
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command; of another package only its name and where it is from."""
-        found = super().get_command(ctx, cmd_name)
-        entries = plugins.entries("command").get(cmd_name, ()) if found is None else ()
-        return found or (entries and plugged_command(cmd_name, entries[0])) or None
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command that is called; one of another package is loaded now."""
-        name, command, rest = super().resolve_command(ctx, args)
-        if isinstance(command, PluggedCommand):
-            command = loaded_command(command.name or "", _Command)
-        return name, command, rest
 
 
 class _Command(TyperCommand):
@@ -85,7 +80,7 @@ class _Command(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse what Python would take for a number and `parse_number` does not."""
         given = self.make_parser(ctx).parse_args(args=list(args))[0]
-        hints = get_type_hints(inspect.unwrap(self.callback)) if self.callback else {}
+        hints = inspect.get_annotations(self.callback) if self.callback else {}
         for param in self.params:
             kind, text = hints.get(str(param.name)), given.get(str(param.name))
             if isinstance(text, str) and {int, float} & {kind, *get_args(kind)}:
@@ -96,46 +91,25 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, args)
 
 
+_HELP_BY = {"help_option_names": ["-h", "--help"]}
 app = typer.Typer(
     name="elastocal",
     cls=_Commands,
     help="In-situ elastic calibration of industrial robots.",
     no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=_HELP_BY,
     pretty_exceptions_enable=False,
 )
-_GROUPS = {
-    "Prepare": ("robots", "new", "init", "check", "watch", "studio", "plan", "study"),
-    "Measure": ("run", "release", "simulate", "krc_config", "measure_delay", "derive", "import_"),
-    "Identify": ("tool", "geometry", "calibrate", "codec"),
-    "Use": ("predict", "compensate", "live", "stiffness", "simulate_process", "export"),
-    "Judge and hand over": ("report", "compare", "verify"),
-    "See all of it": ("demo",),
-}
-"""The order in which help lists commands: that of the work."""
-_OTHERS = "Further commands"
-"""Where help lists commands of no group, by name."""
 
 
-def _found_commands() -> dict[str, Callable[..., None]]:
-    """Return the function of each file in ``commands``, by the name that people type.
-
-    Each is added to the program, in its group.
-    """
-    names = {module.name for module in pkgutil.iter_modules(commands.__path__)}
-    others = names.difference(*_GROUPS.values())
-    found: dict[str, Callable[..., None]] = {}
-    for group, members in {**_GROUPS, _OTHERS: tuple(sorted(others))}.items():
-        for name in members:
-            module = importlib.import_module(f"{commands.__name__}.{name}")
-            # A module cannot be named as a word of Python: the command import is in import_.py.
-            command = name.rstrip("_")
-            function = found[command.replace("_", "-")] = getattr(module, f"_{command}")
-            app.command(command.replace("_", "-"), cls=_Command, rich_help_panel=group)(function)
-    return found
-
-
-COMMANDS = _found_commands()
+def _made(name: str) -> TyperCommand:
+    """Return a command with its parameters, as typer makes it of a function."""
+    single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    found = COMMANDS[name]
+    single.command(name, cls=_Command, rich_help_panel=found.group, context_settings=_HELP_BY)(
+        found.callback()
+    )
+    return cast("TyperCommand", typer.main.get_command(single))
 
 
 def _version(wanted: bool) -> None:

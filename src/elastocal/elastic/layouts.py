@@ -36,8 +36,7 @@ from elastocal.elastic.springs import (
     axial,
     coordinate_axis,
 )
-from elastocal.errors import SpringError
-from elastocal.plugins import Registry
+from elastocal.errors import SpringError, nearest
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
 from elastocal.units import parse_quantity
@@ -170,7 +169,7 @@ def orthogonal_axes(axis: ArrayLike) -> dict[str, tuple[float, float, float]]:
     return dict(sorted(made.items()))
 
 
-_OWN: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
+LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
     "actuated": actuated,
     "bearing": bearing,
     "bearing-joint": bearing_joint,
@@ -178,9 +177,6 @@ _OWN: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
     "links": links,
     "tensor": tensor,
 }
-LAYOUTS: Registry[Callable[[Robot], tuple[Spring, ...]]] = Registry(
-    "spring layout", _OWN, SpringError
-)
 """Layouts by name."""
 
 
@@ -201,9 +197,15 @@ def layout(robot: Robot, name: str, beside: Sequence[str] = ()) -> tuple[Spring,
     SpringError
         If the name is neither a layout nor a file.
     """
+    if name in LAYOUTS:
+        return LAYOUTS[name](robot)
     path = Path(name)
-    if name in LAYOUTS or path.suffix not in (".yaml", ".yml"):
-        return LAYOUTS.named(name, beside, ", or a .yaml file")(robot)
+    if path.suffix not in (".yaml", ".yml"):
+        known = list(dict.fromkeys((*beside, *LAYOUTS)))
+        raise SpringError(
+            f"unknown spring layout {name!r}{nearest(name, known)}"
+            f" (allowed: {', '.join(known)}, or a .yaml file)"
+        )
     return tuple(spring for spring, _ in _springs_of(robot, read_springs(path)))
 
 

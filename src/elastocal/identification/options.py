@@ -9,14 +9,14 @@ the constants are quantiles of that. A new one is a function and an entry in `LO
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, nearest
-from elastocal.plugins import Registry
+from elastocal.options import Option
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.units import parse_number
@@ -74,7 +74,7 @@ class FitOptions:
     """Number of pose-block bootstrap draws."""
 
     def __post_init__(self) -> None:
-        LOSSES.named(self.loss)
+        check_loss(self.loss)
         if self.weights not in _WEIGHTS:
             raise IdentificationError(
                 f"unknown weights {self.weights!r} (allowed: {', '.join(_WEIGHTS)})"
@@ -137,28 +137,43 @@ def bounds(
 class FitSettings:
     """Choices of a user about springs, readings and fit; the defaults are the paper's."""
 
-    springs: str = "auto"
+    springs: Annotated[str, Option(choices="springs", file=True)] = "auto"
     """Spring layout: a name, or a YAML file; ``auto``: the model that the readings carry."""
-    loss: str = "linear"
+    loss: Annotated[str, Option(choices="loss", help="How much readings far off count.")] = "linear"
     """``linear``, ``huber`` or ``cauchy``."""
-    weights: Weights = "none"
+    weights: Annotated[
+        Weights, Option(choices="weights", help="Weigh readings by the dataset's sigmas.")
+    ] = "none"
     """``sigma``: weigh by the measured standard deviations of the dataset."""
-    bounds: str | tuple[float, float] = "0,inf"
+    bounds: Annotated[
+        str | tuple[float, float], Option(help="Lowest and highest compliance in SI units.")
+    ] = "0,inf"
     """Lowest and highest compliance in SI units: two numbers, or a text of them; kept as a text,
     since JSON has no infinity."""
-    marker: tuple[float, float, float] | None = None
+    marker: Annotated[
+        tuple[float, float, float] | None,
+        Option(
+            read="point",
+            help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's.",
+        ),
+    ] = None
     """Metrology marker in the tcp frame, in m; none: the dataset's."""
-    exclude: tuple[str, ...] = ()
+    exclude: Annotated[
+        tuple[str, ...], Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
+    ] = ()
     """Readings left out by name, ``POSE`` or ``POSE:LOAD_CASE``."""
     keep_blunders: bool = False
     """Fit also what cannot be a measurement."""
     trust_conventions: bool = False
     """Fit data that fit far better with a sign read otherwise."""
-    free_frame: FreeFrame = "none"
+    free_frame: Annotated[
+        FreeFrame,
+        Option(choices="free frame", help="Estimate a frame of tracker and marker for each."),
+    ] = "none"
     """``load_case`` or ``campaign``: estimate a frame of tracker and marker for each."""
-    draws: int = 200
+    draws: Annotated[int, Option(most=100_000)] = 200
     """Bootstrap draws."""
-    seed: int = 0
+    seed: Annotated[int, Option(least=0)] = 0
     """Seed of the bootstrap."""
 
     def __post_init__(self) -> None:
@@ -243,7 +258,22 @@ def cauchy(u: FloatArray) -> FloatArray:
     return np.asarray(1.0 / (1.0 + np.square(u / _CAUCHY_SCALE)))
 
 
-LOSSES: Registry[Callable[[FloatArray], FloatArray]] = Registry(
-    "loss", {"linear": linear, "huber": huber, "cauchy": cauchy}, IdentificationError
-)
-"""Losses by name."""
+LOSSES: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "linear": linear,
+    "huber": huber,
+    "cauchy": cauchy,
+}
+
+
+def check_loss(name: str) -> None:
+    """Refuse an unknown loss by name.
+
+    Raises
+    ------
+    IdentificationError
+        With the known ones.
+    """
+    if name not in LOSSES:
+        raise IdentificationError(
+            f"unknown loss {name!r}{nearest(name, LOSSES)} (allowed: {', '.join(LOSSES)})"
+        )

@@ -12,7 +12,6 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from elastocal import plugins
 from elastocal.errors import ReportError
 from elastocal.records import parse_json
 from elastocal.wording import Phrase
@@ -105,10 +104,7 @@ def language_of(code: str, option: str = "--language") -> Language:
     if code == "en":
         return Language(code)
     file = resources.files("elastocal.report").joinpath("words", f"{code}.json")
-    catalogue = parse_json(file.read_text(encoding="utf-8"), file.name)
-    for words in plugins.load_all("words", code):
-        catalogue = {**words, **catalogue}
-    return Language(code, catalogue)
+    return Language(code, parse_json(file.read_text(encoding="utf-8"), file.name))
 
 
 ENGLISH = language_of("en")

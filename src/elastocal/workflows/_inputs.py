@@ -7,6 +7,7 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +29,7 @@ from elastocal.identification import (
     read_model,
     unseen_groups,
 )
+from elastocal.options import Option
 from elastocal.robot import (
     Robot,
     T_from_xyzabc,
@@ -132,7 +134,7 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
 class NewTool:
     """Settings of every command that may work at another tool than the one calibrated with."""
 
-    tool_frame: str | None = None
+    tool_frame: Annotated[str | None, Option("--tool")] = None
     """New tcp in the calibrated tcp's frame, ``"x, y, z, a, b, c"`` with units (Z-Y'-X''); none:
     the calibrated tool."""
     tool_mass: str | None = None

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from elastocal.identification import (
     summary,
     with_knowledge,
 )
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
@@ -48,15 +49,18 @@ _SAME_MARKER = 0.03
 class CalibrateSettings(FitSettings):
     """What to calibrate, from which readings, and how."""
 
-    data: str | PathLike[str] | Sequence[str | PathLike[str]]
+    data: Annotated[str | PathLike[str] | Sequence[str | PathLike[str]], Option(argument=True)]
     """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are numbered anew."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(required=True, help="Model file to write.")] = None
     """Model file to write; none: the result is only returned."""
-    robot: str | None = None
+    robot: Annotated[str | None, Option(choices="robot")] = None
     """URDF file or catalogue name; by default the dataset's own."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
-    tool_frame: str | None = None
+    tool_frame: Annotated[
+        str | None,
+        Option("--tool", help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
+    ] = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
     geometry: Path | None = None
     """Model file of `geometry` of the same arm: springs are fitted on the arm as built, with the

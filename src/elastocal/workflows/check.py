@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal import planning, verdict, workflows
 from elastocal.cell import Cell, load_cell
@@ -17,6 +18,7 @@ from elastocal.compensation.online import LIVE_LOG_SCHEMA, is_live_log, read_liv
 from elastocal.compensation.process import TABLE
 from elastocal.dataset import require_joint_names
 from elastocal.errors import DatasetError, RobotError, SchemaError, nearest
+from elastocal.options import Option
 from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
@@ -173,15 +175,15 @@ _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
 class CheckSettings:
     """Which file to validate."""
 
-    file: str | PathLike[str]
+    file: Annotated[str | PathLike[str], Option(argument=True)]
     """Any file of ours, a dataset, a robot, or a folder that a command made."""
     tcp: str | None = None
     """Link of a robot at the tool centre point; by default that behind the most joints."""
-    preview: str | PathLike[str] | None = None
+    preview: Annotated[str | PathLike[str] | None, Option(metavar="PAGE.html")] = None
     """Page (.html) to write of a cell: a view in three dimensions of a first few poses."""
     force: bool = False
     """Replace a file that is there by the page."""
-    language: str = "en"
+    language: Annotated[str, Option(choices="page language")] = "en"
     """Language of that page, see `elastocal.report.LANGUAGES`."""
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from elastocal.codec import (
     VERDICTS,
@@ -25,6 +25,7 @@ from elastocal.codec import (
 )
 from elastocal.dataset import content_sha256, read, without
 from elastocal.files import filling
+from elastocal.options import Option
 from elastocal.parallel import one_blas_thread
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
@@ -37,22 +38,40 @@ from elastocal.workflows._workflow import workflow
 class CodecSettings:
     """The readings that are cross-validated, what is compared, and where the files go."""
 
-    data: str | PathLike[str]
+    data: Annotated[str | PathLike[str], Option(argument=True)]
     """Dataset, ``.nc`` or ``.csv``."""
-    out: Path
+    out: Annotated[Path, Option(metavar="DIR")]
     """Folder to write the codec into."""
-    compare: tuple[str, ...] = ()
+    compare: Annotated[
+        tuple[str, ...],
+        Option(
+            metavar="KEY=A,B",
+            help="What to compare: search, springs, load_cases or solver; repeatable, then every"
+            " combination. Springs as for calibrate; default: auto.",
+        ),
+    ] = ()
     """What to compare, each ``"KEY=A,B"`` with a key of `codec.KEYS`; every combination is a
     variant."""
-    robot: str | None = None
+    robot: Annotated[str | None, Option(choices="robot")] = None
     """URDF file or catalogue name; by default the dataset's own."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
-    tool_frame: str | None = None
+    tool_frame: Annotated[
+        str | None,
+        Option("--tool", help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
+    ] = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
-    marker: tuple[float, float, float] | None = None
+    marker: Annotated[
+        tuple[float, float, float] | None,
+        Option(
+            read="point",
+            help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's.",
+        ),
+    ] = None
     """Metrology marker in the tcp frame, in m; none: the dataset's."""
-    exclude: tuple[str, ...] = ()
+    exclude: Annotated[
+        tuple[str, ...], Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
+    ] = ()
     """Readings to leave out, each ``POSE`` or ``POSE:LOAD_CASE``."""
     options: CodecOptions = field(default_factory=CodecOptions)
     """Number of splits, ratio, seed; whether blunders are set aside and conventions trusted."""
@@ -62,7 +81,7 @@ class CodecSettings:
     """Correlate observability indices and covering radius with accuracy."""
     per_axis: bool = False
     """Also draw the errors along x, y and z."""
-    jobs: int | None = None
+    jobs: Annotated[int | None, Option(least=1, most=1024)] = None
     """Processes; by default all cores for long work."""
     force: bool = False
     """Replace the files of a codec that is there."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal import dataset
 from elastocal.dataset import PathTable, find_columns, in_file
@@ -14,6 +15,7 @@ from elastocal.identification.recertification import (
     check_same_robot,
     recertify_files,
 )
+from elastocal.options import Option
 from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
 from elastocal.records import write_json
@@ -27,13 +29,18 @@ __all__ = ["CompareResult", "CompareSettings", "compare", "measured_rows"]
 class CompareSettings:
     """The calibrations that are compared, over which rows, against which limit."""
 
-    old: str | PathLike[str]
+    old: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of the earlier calibration."""
-    new: str | PathLike[str]
+    new: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of the later one."""
     rows: Path | None = None
     """Poses and forces that matter: CSV as for `predict`, or a dataset; none: springs only."""
-    limit: float | None = None
+    limit: Annotated[
+        float | None,
+        Option(
+            read="length", help='Largest accepted change of deflection at the rows, e.g. "0.1 mm".'
+        ),
+    ] = None
     """Largest accepted change of deflection at the rows, in m."""
     out: Path | None = None
     """Comparison file to write, ``.json``."""

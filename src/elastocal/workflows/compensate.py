@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from elastocal.compensation.programs import (
 )
 from elastocal.errors import FileAccessError, PlanningError
 from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -49,9 +51,9 @@ _PROGRAM_MARKS = ("NOT TRIED ON A ROBOT", "DECL E6AXIS XBEFORE=")
 class CompensateSettings(NewTool, ArmAsBuilt):
     """Which model corrects which path."""
 
-    model: str | PathLike[str]
+    model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
-    path: Path
+    path: Annotated[Path, Option(argument=True)]
     """Path, ``.csv``, or program of a controller, such as a KUKA ``.src`` beside its ``.dat``."""
     out: Path
     """File of the same kind to write."""
@@ -61,13 +63,23 @@ class CompensateSettings(NewTool, ArmAsBuilt):
     """A program's frame in the model's base, ``"x, y, z, a, b, c"`` with units."""
     start: str | None = None
     """Posture before the first row, a quantity a joint from base to tip."""
-    largest: float = LARGEST_DEFLECTION
+    largest: Annotated[
+        float,
+        Option(
+            "--limit",
+            read="length",
+            default="20 mm",
+            help="Largest correction, deflection and geometry together.",
+        ),
+    ] = LARGEST_DEFLECTION
     """Largest correction, whatever it is made of, in m."""
     program: str | None = None
     """Name of a robot program of a path, to be written beside ``out``; none: no program."""
-    language: str | None = None
+    language: Annotated[str | None, Option(choices="language")] = None
     """Its language; by default that of the robot's maker."""
-    speed: float = LIN_SPEED
+    speed: Annotated[
+        float, Option(read="speed", default="50 mm/s", help="Speed of the tool in that program.")
+    ] = LIN_SPEED
     """Speed of the tool along the path in that program, in m/s."""
     force: bool = False
     """Replace a file that is no former output of this command."""

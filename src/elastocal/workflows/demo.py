@@ -7,13 +7,14 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol, TextIO
+from typing import Annotated, Any, Protocol, TextIO
 
 from elastocal import __version__
 from elastocal.cell import PROCESS_FILE, require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError, of_kind
 from elastocal.files import write_text
+from elastocal.options import Option
 from elastocal.parallel import process_count, process_pool
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
@@ -121,11 +122,11 @@ MakeDisplay = Callable[[TextIO, Sequence[Chapter]], AbstractContextManager[DemoD
 class DemoSettings:
     """Which story, and where its files go."""
 
-    kind: str = "afp"
+    kind: Annotated[str, Option(argument=True, metavar="[afp|machining]")] = "afp"
     """``afp``, fibre placement on a dome, or ``machining``, roughing of a block."""
-    out: str | PathLike[str] = "demo"
+    out: Annotated[str | PathLike[str], Option(metavar="DIR")] = "demo"
     """Folder for the results."""
-    seed: int = 0
+    seed: Annotated[int, Option(least=0)] = 0
     """Seed of the simulated cell."""
     force: bool = False
     """Remove an earlier demo from the folder first."""

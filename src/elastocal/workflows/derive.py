@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.cell import SensorLoad
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.dataset import Dataset
 from elastocal.errors import ProcedureError
+from elastocal.options import Option
 from elastocal.procedure import (
     RunFolder,
     RunSummary,
@@ -26,7 +28,7 @@ from elastocal.workflows._workflow import workflow
 class DeriveSettings:
     """Which run to derive."""
 
-    run: str | PathLike[str]
+    run: Annotated[str | PathLike[str], Option(argument=True)]
     """Folder of the run; dataset and summary in it are replaced."""
     tool: Path | None = None
     """Tool file of `tool`, whose sensor rotation and matrix correct the readings; the compensator

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from elastocal.drivers.kuka_rsi import DRIVER as KUKA, PostureReader
 from elastocal.drivers.net_ft import NetFtSettings
 from elastocal.errors import CompensationError, nearest
 from elastocal.identification import PredictionDoubt
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
@@ -38,15 +40,15 @@ EXPORT_TARGETS = ("linux",)
 class ExportSettings(NewTool):
     """Which model is written, and how it corrects."""
 
-    model: str | PathLike[str]
+    model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
-    out: Path
+    out: Annotated[Path, Option("--c")]
     """Folder to write the C files into."""
-    compensator: Path | None = None
+    compensator: Annotated[Path | None, Option("--settings")] = None
     """Settings of the compensator (.yaml)."""
     tool: Path | None = None
     """Tool file of `tool`: weight, bias, sensor."""
-    platform: str | None = None
+    platform: Annotated[str | None, Option("--target", choices="target")] = None
     """Besides, a program for a real-time Linux: RSI and Net F/T around the compensator."""
     cell: Path | None = None
     """Cell file, whose addresses and limits that program holds."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from elastocal.geometry import (
     plausible_ladder,
     read_positions,
 )
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.report import drawn, error_maps, language_of
@@ -43,30 +44,30 @@ _TABLE = ("joint", "number", "unit", "nominal", "calibrated", "difference", "low
 class GeometrySettings:
     """Which positions, of which robot."""
 
-    positions: str | PathLike[str]
+    positions: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV of joints and markers."""
-    robot: str | None = None
+    robot: Annotated[str | None, Option(choices="robot")] = None
     """URDF file or catalogue name."""
     tcp: str | None = None
     """Link that carries the markers."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(required=True, help="Model file (.json) to write.")] = None
     """Model file to write; none: the model is only returned."""
     urdf: Path | None = None
     """Calibrated URDF to write."""
-    report_file: Path | None = None
+    report_file: Annotated[Path | None, Option("--report")] = None
     """Report to write, ``.html``."""
     table: Path | None = None
     """Table of links as drawn and as built to write, ``.csv``."""
-    markers: tuple[str, ...] = ()
+    markers: Annotated[tuple[str, ...], Option("--marker")] = ()
     """Where on the tool each marker is, ``"x, y, z"`` in the tcp with units, where that is known:
     then an error of the tcp is found too."""
-    draws: int = 200
+    draws: Annotated[int, Option(least=40, most=100_000)] = 200
     """Draws of the bootstrap over blocks of poses."""
-    seed: int = 0
+    seed: Annotated[int, Option(least=0)] = 0
     """Of these draws."""
     force: bool = False
     """Replace a file that this command did not write."""
-    language: str = "en"
+    language: Annotated[str, Option(choices="page language")] = "en"
     """Language of the report, see `elastocal.report.LANGUAGES`."""
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from elastocal.dataset import MADE_FROM, Dataset, write
 from elastocal.errors import FileAccessError, LogError
 from elastocal.files import write_text
 from elastocal.logs import ClockFit, GuessedLog, ImportedLogs, log_sha256
+from elastocal.options import Option
 from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -28,7 +30,7 @@ from elastocal.workflows._workflow import workflow
 class ImportLogsSettings:
     """Which logs, what they are, and where the dataset goes."""
 
-    logs: Sequence[str | PathLike[str]]
+    logs: Annotated[Sequence[str | PathLike[str]], Option(argument=True)]
     """Files; folders of ROS 2 bags."""
     map: Path
     """What their columns are."""

@@ -3,12 +3,14 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.cell import PROCESS_FILE, load_cell, name_process, write_example
 from elastocal.compensation.process import PROCESSES, process_courses, write_programmed_path
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import FileAccessError
 from elastocal.files import read_text, write_text
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.results import Result
 from elastocal.workflows._workflow import workflow
@@ -21,9 +23,9 @@ _SEED = 0
 class InitSettings:
     """Which example goes where."""
 
-    out: str | PathLike[str]
+    out: Annotated[str | PathLike[str], Option(argument=True, metavar="DIR")]
     """Folder to write into."""
-    kind: str = "afp"
+    kind: Annotated[str, Option("--like", choices="example")] = "afp"
     """``afp``, ``machining`` or ``ur20``."""
     force: bool = False
     """Replace files that are there."""

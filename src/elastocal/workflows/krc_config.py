@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.cell import LOOPBACK, Cell, load_cell
 from elastocal.drivers.kuka_rsi import (
@@ -16,6 +17,7 @@ from elastocal.drivers.kuka_rsi import (
 )
 from elastocal.errors import DeviceError, present
 from elastocal.files import read_text
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record, validate
 from elastocal.results import Result
@@ -28,11 +30,11 @@ _DRIVER = "kuka_rsi"
 class KrcConfigSettings:
     """Which cell's controller, and where to."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm is a KUKA."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(metavar="DIR")] = None
     """Folder to write into."""
-    check: Path | None = None
+    check: Annotated[Path | None, Option(metavar="FILE")] = None
     """ETHERNET file or RSI context of a controller, to be checked instead."""
     force: bool = False
     """Replace files that are there."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from elastocal.compensation.online import LiveCounts, design
 from elastocal.errors import CompensationError, DeviceError
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel
+from elastocal.options import Option
 from elastocal.procedure.derive import sensor_load
 from elastocal.progress import Progress
 from elastocal.records import record, validate, write_json
@@ -45,17 +47,17 @@ _FADE = 0.005
 class LiveSettings(NewTool):
     """Which cell is corrected by which model, and who watches."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm takes corrections of a path."""
-    model: Path
+    model: Annotated[Path, Option(metavar="MODEL.json")]
     """Model file of `calibrate`."""
     arm: bool = False
     """Somebody has looked at the cell, and the arm may be corrected; refused without."""
     duration: str | float | None = None
     """Time with its unit, or in s, after which it ends; none: when it is interrupted."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(metavar="FOLDER")] = None
     """Folder for log and record; none: neither is written."""
-    compensator: Path | None = None
+    compensator: Annotated[Path | None, Option("--settings")] = None
     """Settings of the compensator (.yaml); default: the limits of the cell file."""
     tool: Path | None = None
     """Tool file of `tool`; none: the tool of the cell file, and the bias that the sensor has at

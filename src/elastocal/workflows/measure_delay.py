@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from elastocal.drivers.kuka_rsi import (
     estimate_delay,
 )
 from elastocal.errors import DeviceError, of_kind, present
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result
@@ -39,15 +41,15 @@ _SLACK = 10.0
 class MeasureDelaySettings:
     """Which cell's arm is measured, and who watches."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm is a KUKA in mode ``contact``."""
-    out: str | PathLike[str]
+    out: Annotated[str | PathLike[str], Option(metavar="RECORD.json")]
     """Commissioning record, ``.json``."""
     amplitude: str = "0.5 mm"
     """Of the movement, about where the tool stands."""
     seconds: float = 6.0
     """Duration of each of the three movements, in s."""
-    confirmed: bool = False
+    confirmed: Annotated[bool, Option("--yes")] = False
     """A person has looked at the cell: do not ask."""
     operator: Operator = field(default_factory=Unattended)
     force: bool = False

@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import product
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import process_forces
 from elastocal.errors import FileAccessError, RobotError, SchemaError, UnitError
 from elastocal.meshes import load_triangles
+from elastocal.options import Option
 from elastocal.planning.surface import arm_reach
 from elastocal.robot import Robot, catalogue, read_urdf, refusals_naming, tool_link, with_tool
 from elastocal.units import parse_point, parse_quantity
@@ -42,9 +44,9 @@ class NewSettings:
     `filled` says what is guessed.
     """
 
-    out: str | PathLike[str]
+    out: Annotated[str | PathLike[str], Option(metavar="CELL.yaml")] = "cell.yaml"
     """Cell file to write."""
-    robot: str | None = None
+    robot: Annotated[str | None, Option(choices="robot")] = None
     """Name in the catalogue, or a URDF file."""
     mesh: str | PathLike[str] | None = None
     """Surface that the tool presses on: STL, OBJ or PLY."""
@@ -70,11 +72,11 @@ class NewSettings:
     """Its largest moments, likewise."""
     tracker: str | None = None
     """Place of the tracker in base, ``"x, y, z"``, or ``none``: no tracker."""
-    marker_place: str | None = None
+    marker_place: Annotated[str | None, Option("--marker")] = None
     """Marker in the tcp frame, ``"x, y, z"``."""
-    accepted: str | None = None
+    accepted: Annotated[str | None, Option("--tolerance")] = None
     """Largest error of a predicted deflection that the report lets pass, or ``none``."""
-    poses: int = 15
+    poses: Annotated[int, Option(least=1, most=100_000)] = 15
     """Number of poses."""
     force: bool = False
     """Replace a file that is there."""

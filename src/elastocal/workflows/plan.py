@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from elastocal.compensation.programs import (
 from elastocal.errors import PlanningError
 from elastocal.files import filling
 from elastocal.geometry import PositionPlan, plan_positions as choose_positions
+from elastocal.options import Option
 from elastocal.planning import PLAN, PlanResult, ProductionRecord, SpreadRecord
 from elastocal.planning.export import PLAN_TABLE, write_table as write_plan_table
 from elastocal.progress import Progress
@@ -55,29 +57,29 @@ _FREE_SEARCH = "i_optimal"
 class PlanSettings:
     """Which cell to plan, and where the files go."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
-    out: str | PathLike[str]
+    out: Annotated[str | PathLike[str], Option(metavar="DIR")]
     """Folder to write the plan into."""
-    compare: str | None = None
+    compare: Annotated[str | None, Option(choices="technique or none")] = None
     """Search technique to lay beside the cell's, or ``none``; by default ``ioops`` beside
     ``cover``, else ``cover``."""
     program: str = "calib"
     """Name of the robot program."""
-    jobs: int | None = None
+    jobs: Annotated[int | None, Option(least=1, most=1024)] = None
     """Processes for large pools; by default all cores."""
     force: bool = False
     """Replace the files of a plan that is there."""
     dry_run: bool = False
     """Make the plan, and write nothing."""
-    poses: int | None = None
+    poses: Annotated[int | None, Option(least=1, most=100_000)] = None
     """Number of poses in place of the cell's ``search.poses``."""
-    language: str | None = None
+    language: Annotated[str | None, Option(choices="language")] = None
     """Language of the robot program, or ``none``; by default that of the robot's maker."""
-    free_poses: int | None = None
+    free_poses: Annotated[int | None, Option("--positions", least=1, most=100_000)] = None
     """Number of poses in free space for `geometry`, after the presses and in the same program;
     none: presses alone."""
-    page_language: str = "en"
+    page_language: Annotated[str, Option(choices="page language")] = "en"
     """Language of ``plan.html``, see `elastocal.report.LANGUAGES`."""
 
 

@@ -3,12 +3,14 @@
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import PathTable, find_columns, in_file, new_rows
 from elastocal.identification import CoveredRows, DeflectionSummary, Prediction, ProductionCoverage
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
@@ -20,11 +22,11 @@ from elastocal.workflows._workflow import workflow
 class PredictSettings(NewTool, ArmAsBuilt):
     """Which model predicts which rows."""
 
-    model: str | PathLike[str]
+    model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
-    rows: str | PathLike[str]
+    rows: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(required=True, help="CSV to write.")] = None
     """CSV to write: the rows with their deflections and intervals."""
     force: bool = False
     """Replace a file that is no former output of this command."""

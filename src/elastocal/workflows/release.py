@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from elastocal.cell import (
     load_cell,
 )
 from elastocal.errors import DeviceError, ElastocalError, ProcedureError
+from elastocal.options import Option
 from elastocal.procedure.run import FaultError, ForceTap, LeavingWatch, ToolLoad, leave_surface
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -53,11 +55,11 @@ _LIMIT_PER_LOAD = 1.3
 class ReleaseSettings:
     """Which cell's tool is brought off the surface, and who watches."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
     arm: bool = False
     """Move the arm; without it only what would be done is said. Simulated arms move anyway."""
-    confirmed: bool = False
+    confirmed: Annotated[bool, Option("--yes")] = False
     """A person has looked at the cell: do not ask."""
     operator: Operator = field(default_factory=Unattended)
 

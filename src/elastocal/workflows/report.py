@@ -6,9 +6,11 @@ from datetime import UTC, datetime
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.errors import FileAccessError
 from elastocal.identification.recertification import Estimate
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report import language_of
@@ -39,35 +41,57 @@ from elastocal.workflows._workflow import workflow
 class ReportSettings:
     """What to report on, and where to."""
 
-    run: str | PathLike[str]
+    run: Annotated[str | PathLike[str], Option(argument=True, metavar="RUN")]
     """Folder of a run, a folder that holds one, or a model file."""
-    out: str | PathLike[str]
+    out: Annotated[str | PathLike[str], Option(metavar="REPORT.html")]
     """HTML file to write."""
     model: Path | None = None
     """Model file; by default ``model.json`` beside the run."""
     tool: Path | None = None
     """Tool file; by default ``tool.json`` beside the run."""
-    codec: Path | None = None
+    codec: Annotated[Path | None, Option(metavar="DIR")] = None
     """Codec; by default ``codec`` beside the run."""
-    process: Path | None = None
+    process: Annotated[Path | None, Option(metavar="DIR")] = None
     """Simulated process; by default ``process`` beside the run."""
-    old: Path | None = None
+    old: Annotated[Path | None, Option(metavar="MODEL")] = None
     """Model file of an earlier calibration."""
-    tolerance: float | None = None
+    tolerance: Annotated[
+        float | None,
+        Option(
+            metavar="LENGTH",
+            read="length",
+            help="Largest error at unseen poses, e.g. '0.3 mm'; default: the cell file's.",
+        ),
+    ] = None
     """Largest error at unseen poses in m; by default the cell file's."""
-    limit: float | None = None
+    limit: Annotated[
+        float | None,
+        Option(
+            metavar="LENGTH",
+            read="length",
+            help="Largest change since --old, e.g. '0.1 mm'; default: the cell file's drift.",
+        ),
+    ] = None
     """Largest change since ``old`` in m; by default the cell file's drift."""
     pdf: bool = False
     """Also print a PDF beside it; needs a Chromium."""
     force: bool = False
     """Replace a report that is there."""
-    sign: Path | None = None
+    sign: Annotated[Path | None, Option(metavar="KEY")] = None
     """Private key that signs the report; see `elastocal.verdict.make_key`."""
-    language: str = "en"
+    language: Annotated[str, Option(choices="page language")] = "en"
     """Language of the report, see `elastocal.report.LANGUAGES`."""
     xlsx: bool = False
     """Also write its tables beside it, as a workbook."""
-    state: Mapping[str, str] = field(default_factory=dict)
+    state: Annotated[
+        Mapping[str, str],
+        Option(
+            metavar="KEY=VALUE",
+            read="statements",
+            repeated=True,
+            help="For the certificate, e.g. sensor.serial=FT-7; may be repeated.",
+        ),
+    ] = field(default_factory=dict)
     """For the certificate, beside what cell file and run state; see
     `elastocal.cell.read_statements`."""
 

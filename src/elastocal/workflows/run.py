@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from elastocal import procedure, verdict
 from elastocal.cell import Arming, Cell, Devices, LineCounts, certificate_of, load_cell, unstated
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
+from elastocal.options import Option
 from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.planning.export import pose_lines
 from elastocal.procedure import Event, Journal, LastKnown, RunEnd, RunFolder, RunSummary, Session
@@ -41,22 +42,30 @@ POSES_MEASURED = "poses measured"
 class RunSettings:
     """Which cell carries out which plan, and who watches."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
-    plan: str | PathLike[str]
+    plan: Annotated[str | PathLike[str], Option(metavar="DIR")]
     """Folder with the cell's plan."""
-    out: str | PathLike[str]
+    out: Annotated[str | PathLike[str], Option(metavar="RUN")]
     """Folder of the run."""
     resume: bool = False
     """Go on with the run that is in the folder."""
-    confirmed: bool = False
+    confirmed: Annotated[bool, Option("--yes")] = False
     """A person has looked at the cell: do not ask. On real devices this arms the arm."""
-    seed: int | None = None
+    seed: Annotated[int | None, Option(least=0)] = None
     """Seed of simulated devices; by default the cell's."""
     operator: Operator = field(default_factory=Unattended)
-    sign: Path | None = None
+    sign: Annotated[Path | None, Option(metavar="KEY")] = None
     """Private key that signs the journal at the end; see `elastocal.verdict.make_key`."""
-    state: Mapping[str, str] = field(default_factory=dict)
+    state: Annotated[
+        Mapping[str, str],
+        Option(
+            metavar="KEY=VALUE",
+            read="statements",
+            repeated=True,
+            help="For the certificate, e.g. sensor.serial=FT-7; may be repeated.",
+        ),
+    ] = field(default_factory=dict)
     """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
     arming: Arming | None = None
     """Of a person who agreed before: the cell file must still be the same, to the byte."""

@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.cell import LOOPBACK, SIMULATED, WallClock, load_cell
 from elastocal.errors import DeviceError, nearest
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
 from elastocal.results import Result, brief_repr
@@ -24,16 +26,21 @@ from elastocal.workflows._workflow import workflow
 class SimulateSettings:
     """Which cell is put on the wire, and for how long."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option("--ports", metavar="FILE")] = None
     """JSON file for the ports; none: they are only returned."""
-    devices: tuple[str, ...] = ()
+    devices: Annotated[
+        tuple[str, ...],
+        Option(
+            read="list", help="Drivers to answer, with commas; default: those of the cell file."
+        ),
+    ] = ()
     """Drivers whose devices are served; by default those that the cell file names, and where it
     names none but simulated ones all that can carry its robot."""
     rate: float | None = None
     """Seconds of the cell a second of the wall; by default `clock_rate` of the cell file."""
-    seed: int | None = None
+    seed: Annotated[int | None, Option(least=0)] = None
     """By default the cell's."""
     force: bool = False
     """Replace a file that is no former output of this command."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError, present
 from elastocal.files import filling, read_text, sha256
 from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.sim import truth_of
@@ -48,37 +49,47 @@ _SUDDEN = 0.1
 class SimulateProcessSettings(NewTool):
     """Which process on which cell, corrected by which models."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file."""
-    models: tuple[Path, ...]
+    models: Annotated[tuple[Path, ...], Option("--model")]
     """Model files of this cell; one, or one for each seed."""
-    out: Path
+    out: Annotated[Path, Option(metavar="DIR")]
     """Folder to write into."""
-    kind: str | None = None
+    kind: Annotated[str | None, Option("--process", choices="process")] = None
     """``afp`` (courses) or ``machining`` (rings of a dome); none: a process of one's own."""
     path: Path | None = None
     """That process: CSV as for `compensate`, with columns ``course`` and ``time[s]``."""
-    speed: float | None = None
+    speed: Annotated[
+        float | None,
+        Option(read="speed", help="Of --path, '0.1 m/s'; default: its column time[s]."),
+    ] = None
     """Of the tool along `path`, in m/s; by default its column ``time[s]`` says it."""
-    direction: str = process.LATERAL
+    direction: Annotated[str, Option(default="lateral")] = process.LATERAL
     """What the deviation of `path` counts along: ``lateral``, ``normal`` or ``"1,0,0"``."""
     start: str | None = None
     """Posture before the first row of a path of poses, a quantity a joint from base to tip."""
-    loads: tuple[float, ...] = ()
+    loads: Annotated[
+        tuple[float, ...],
+        Option(
+            "--load",
+            read="numbers",
+            help="Also at these shares of the force: '0.5,-1'; -1 turns it aside.",
+        ),
+    ] = ()
     """Further shares of the force to run the same courses under; see `process.at_load`."""
     tools: tuple[Path, ...] = ()
     """Tool files; as ``models``. None: the cell's tool, and a sensor zeroed in the air."""
-    posture: str = PROGRAMMED
+    posture: Annotated[str, Option(choices="posture", default="programmed")] = PROGRAMMED
     """``programmed``, or ``stiffest``: the tool turned about its axis as the first model says."""
-    seeds: tuple[int, ...] = (0,)
+    seeds: Annotated[tuple[int, ...], Option("--seed", least=0)] = (0,)
     """Seeds of forces and devices."""
-    compensator: Path | None = None
+    compensator: Annotated[Path | None, Option("--settings")] = None
     """Settings of the compensator (.yaml); by default those that suit the process."""
-    courses: int | None = None
+    courses: Annotated[int | None, Option(least=1, most=1000)] = None
     """Courses or rings; by default those of the process."""
     budget: bool = False
     """Switch each effect off in turn, for the first seed."""
-    jobs: int | None = None
+    jobs: Annotated[int | None, Option(least=1, most=1024)] = None
     """Processes; by default all cores."""
     force: bool = False
     """Replace files that are there."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from elastocal.compensation import PathPostures, PathStations, PostureChoice, Po
 from elastocal.errors import PathError
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
 from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_figure
@@ -36,19 +37,21 @@ _FILES = ("postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", _SUMMA
 class StiffnessSettings(NewTool):
     """Which model, along which path, and what may be chosen."""
 
-    model: str | PathLike[str]
+    model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
-    path: Path
+    path: Annotated[Path, Option(argument=True)]
     """CSV as for `compensate`; forces are not needed."""
-    out: Path | None = None
+    out: Annotated[
+        Path | None, Option(required=True, metavar="DIR", help="Folder to write into.")
+    ] = None
     """Folder to write tables and figures into; none: they are only returned."""
     direction: str = "normal"
     """``normal`` (axis of the tool) or a vector in base, ``"1,0,0"``."""
-    spins: int = 36
+    spins: Annotated[int, Option(least=1, most=3600)] = 36
     """Turns about the tool's axis to try."""
-    external_positions: int = 9
+    external_positions: Annotated[int, Option("--stands", least=1, most=1000)] = 9
     """Positions of each external axis to try; with a cell, its own are taken."""
-    stations: int = 60
+    stations: Annotated[int, Option(least=1, most=100_000)] = 60
     """Rows of the path to look at."""
     cell: Path | None = None
     """Cell file, for its margins, tooling and fixtures."""

@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.cell import LOOPBACK, SIMULATED, Arming, Cell, DeviceReading, load_cell
 from elastocal.errors import DeviceError
+from elastocal.options import Option
 from elastocal.planning import read_plan
 from elastocal.procedure import Progress as RunProgress, RunEnd
 from elastocal.procedure.run import PlannedStep
@@ -54,13 +56,13 @@ _PAUSE = 0.1
 class StudioSettings:
     """Which cell the studio opens, and who may see it."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``; edits are written back to it."""
     model: Path | None = None
     """Model file of `calibrate`, of the same robot; none: default springs."""
-    host: str = LOOPBACK
+    host: Annotated[str, Option(default="127.0.0.1")] = LOOPBACK
     """Address to answer on; another than this machine's own lets its network in."""
-    port: int = 0
+    port: Annotated[int, Option(least=0, most=65535)] = 0
     """0: one that is free."""
     arm: bool = False
     """Let a run move devices that are not simulated."""

@@ -11,7 +11,7 @@ from functools import partial
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from elastocal.elastic import LAYOUTS, ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
 from elastocal.files import sha256
 from elastocal.identification import AUTO, RUNGS, FitOptions, choose_model
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import to_data
 from elastocal.report import drawn, study_figure, write_study_figures
@@ -55,24 +56,27 @@ _SIMULATION = "elastocal.workflows.study"
 class StudySettings:
     """The cell that is studied, what is varied, and where it is simulated."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
-    out: Path
+    out: Annotated[Path, Option(metavar="DIR")]
     """Folder of the study; one that is there goes on."""
-    samples: int = 200
+    samples: Annotated[int, Option(most=1_000_000)] = 200
     """Simulated arms, each calibrated anew."""
-    vary: tuple[str, ...] = (DEFAULT_VARIATION,)
+    vary: Annotated[tuple[str, ...], Option(metavar="KEY=A,B")] = (DEFAULT_VARIATION,)
     """What to vary, each ``"KEY=A,B"``; see `codec.study.FACTORS`. Every combination is a
     condition; what is not varied is as the cell file has it."""
-    target: float | None = None
+    target: Annotated[
+        float | None,
+        Option(metavar="LENGTH", read="length", help="Error that is good enough, e.g. '0.05 mm'."),
+    ] = None
     """Error that is good enough, in m."""
-    verification: int = 25
+    verification: Annotated[int, Option(most=10_000)] = 25
     """Poses at which every calibration is judged; none of them is chosen."""
-    seed: int = 0
+    seed: Annotated[int, Option(least=0)] = 0
     """Seed of arms and noise."""
-    jobs: int | None = None
+    jobs: Annotated[int | None, Option(least=1, most=1024)] = None
     """Processes; all cores by default."""
-    dask: str | None = None
+    dask: Annotated[str | None, Option(metavar="ADDRESS")] = None
     """Address of a Dask scheduler to work on."""
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from elastocal.compensation import conditioning
 from elastocal.compensation.conditioning import SensorMount, StaticPostures, ToolModel, ToolResult
 from elastocal.errors import CompensationError, FileAccessError, ProcedureError
 from elastocal.identification import read_model
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.robot import GRAVITY, Robot
 from elastocal.units import parse_quantity
@@ -36,22 +38,27 @@ _LEVER = 0.1
 class ToolSettings:
     """Which static postures, and how the sensor was mounted."""
 
-    postures: str | PathLike[str]
+    postures: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV of postures with raw wrenches, or the folder of a run."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(required=True, help="Tool file (.json) to write.")] = None
     """Tool file to write; none: the result is only returned."""
-    robot: str | None = None
+    robot: Annotated[str | None, Option(choices="robot")] = None
     """URDF file, catalogue name or model file, for a CSV with joints."""
     flange: str | None = None
     """Link that the sensor sits on, for a CSV; by default ``flange``."""
     sensor: str | None = None
     """Sensor in that link as mounted, ``"x, y, z, a, b, c"`` with units (Z-Y'-X''), for a CSV; by
     default the link itself."""
-    down: tuple[float, float, float] | None = None
+    down: Annotated[
+        tuple[float, float, float] | None,
+        Option(
+            read="direction", help="Direction of gravity in base: 'x, y, z'; default: 0, 0, -1."
+        ),
+    ] = None
     """Direction of gravity in base, of any length, for a CSV; by default along -z."""
     mass: str | None = None
     """Mass of the tool as weighed, with its unit, for a CSV; a cell says it itself."""
-    free_rotation: bool = False
+    free_rotation: Annotated[bool, Option("--free-rotation/--keep-rotation")] = False
     """Find the sensor's rotation where unseen postures speak for it; else it is as mounted."""
     matrix: bool = False
     """Correct readings by the calibration matrix, too; the data that a model is calibrated from

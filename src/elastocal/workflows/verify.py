@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.errors import ElastocalError, FileAccessError, VerificationError
+from elastocal.options import Option
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.results import Result
@@ -38,11 +40,11 @@ class VerifySettings:
 
     file: str | PathLike[str]
     """A report, or the folder of a run, or a folder that holds one."""
-    key: Path | None = None
+    key: Annotated[Path | None, Option(metavar="PUBLIC")] = None
     """Public key that must have signed it; by default none need have."""
-    run: Path | None = None
+    run: Annotated[Path | None, Option(metavar="DIR")] = None
     """Folder of the run that a report shows; by default the report's own."""
-    expect: str | None = None
+    expect: Annotated[str | None, Option(metavar="HASH")] = None
     """Hash of the run that it must be, or its first 8 digits or more; by default any."""
 
 

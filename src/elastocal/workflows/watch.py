@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
 from elastocal.cell import (
     KINDS,
@@ -20,6 +21,7 @@ from elastocal.cell import (
     polled_readings,
 )
 from elastocal.errors import ElastocalError
+from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
@@ -76,9 +78,9 @@ class WatchResult(Result):
 class WatchSettings:
     """Which cell's devices are watched, and for how long."""
 
-    cell: str | PathLike[str]
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
-    duration: str | float | None = None
+    duration: Annotated[str | float | None, Option("--for")] = None
     """Time with its unit, or in s, after which it ends; none: when it is interrupted."""
     show: Callable[[WatchResult], None] = lambda _result: None
     """Called five times a second."""

@@ -6,7 +6,6 @@ from .cover import (
 )
 from .criteria import (
     CRITERIA as CRITERIA,
-    Criterion as Criterion,
     IOptimal as IOptimal,
     o1 as o1,
 )

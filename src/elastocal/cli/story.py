@@ -1,46 +1,36 @@
-"""``elastocal demo``: the whole story on a simulated cell, command by command."""
+"""How ``elastocal demo`` shows its chapters, and what their commands print."""
 
 import io
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
-
-import typer
+from typing import TYPE_CHECKING, Any, TextIO
 
 from elastocal import workflows
-from elastocal.cli import options, output, tables
+from elastocal.cli import output, tables
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from elastocal.progress import Progress
     from elastocal.results import Result
-    from elastocal.workflows import Chapter
+    from elastocal.workflows import Chapter, DemoResult
 
 _WIDTH = 100
 """Columns of the log."""
 
 
-def _demo(
-    kind: Annotated[
-        str,
-        typer.Argument(
-            metavar="[afp|machining]", help="Fibre placement on a dome, or roughing of a block."
-        ),
-    ] = "afp",
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the results.")] = Path(
-        "demo"
-    ),
-    *,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated cell.")] = 0,
-    force: Annotated[
-        bool, typer.Option("--force", help="Remove an earlier demo from the folder first.")
-    ] = False,
-    as_json: options.KeyFigures = False,
-) -> None:
-    """Show the whole story on a simulated cell: from an empty folder to a signed-off report."""
+def shown(*, out: Path, **settings: Any) -> "DemoResult":
+    """Return the result of a demo whose chapters are shown while they are at work.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the demo.
+    **settings : object
+        The other fields of `workflows.DemoSettings`.
+    """
     screen = output.console()
 
     @contextmanager
@@ -51,12 +41,7 @@ def _demo(
         else:
             yield _Display(log, out, _lines(screen, story))
 
-    result = workflows.demo(kind, out=out, seed=seed, force=force, display=display)
-    if as_json:
-        output.print_json({"folder": str(out), "process": result.process})
-        return
-    for line in result.closing():
-        screen.print(line, soft_wrap=True)
+    return workflows.demo(out=out, display=display, **settings)
 
 
 class _Display:

@@ -1,0 +1,699 @@
+"""What each command does with what a person has given: its work, and how the result is shown.
+
+The options are those of the settings (`elastocal.cli.generator`); only what belongs to a terminal
+alone stands here.
+"""
+
+import sys
+import webbrowser
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from elastocal import workflows
+from elastocal.cli import output, tables
+from elastocal.cli.generator import Command, Given
+from elastocal.options import Option
+from elastocal.wording import mm
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+COMMANDS: dict[str, Command] = {}
+"""By the name that people type, in the order of help."""
+
+
+def command(
+    group: str,
+    *,
+    module: str = "",
+    settings: str = "",
+    function: str = "",
+    more: type | None = None,
+    hidden: tuple[str, ...] = (),
+) -> Callable[[Callable[[Given], None]], Callable[[Given], None]]:
+    """Make a command of a function; by default it is that of the workflow of its name.
+
+    Parameters
+    ----------
+    group : str
+        Where help lists it.
+    module, settings, function : str, optional
+        Module of the settings, their class, and the function whose docstring is the command's.
+    more : type, optional
+        Class of the parameters that the command line alone has.
+    hidden : tuple of str, optional
+        Fields that those stand for in another form.
+    """
+
+    def mark(run: Callable[[Given], None]) -> Callable[[Given], None]:
+        name = run.__name__.strip("_")
+        COMMANDS[name.replace("_", "-")] = Command(
+            group,
+            module or f"{workflows.__name__}.{name}",
+            settings or f"{name.title().replace('_', '')}Settings",
+            function or name,
+            run,
+            more,
+            hidden,
+        )
+        return run
+
+    return mark
+
+
+def _say(text: str) -> None:
+    output.console().print(text, soft_wrap=True)
+
+
+def _say_facts(facts: Iterable[tuple[str, str]]) -> None:
+    for label, text in facts:
+        _say(f"{label}: {text}")
+
+
+def _show(given: Given, data: Any, show: "Callable[[Console], None]") -> None:
+    """Print data as JSON where that was asked for, else what a person reads."""
+    if given.as_json:
+        output.print_json(data)
+    else:
+        show(output.console())
+
+
+def _worked(work: Callable[..., Any], given: Given, **more: Any) -> Any:
+    """Return the result of long work, whose progress is shown."""
+    with output.progress_bars() as progress:
+        return work(progress=progress, **given.settings, **more)
+
+
+@dataclass(frozen=True)
+class _Robots:
+    name: Annotated[str | None, Option(argument=True, choices="robot")] = None
+    """Show one robot in full."""
+    urdf: bool = False
+    """Print the named robot's URDF on standard output."""
+
+
+@command("Prepare", module=__name__, settings="_Robots", function="_robots")
+def _robots(given: Given) -> None:
+    """List the robots that elastocal knows, with the source of each number."""
+    from elastocal.errors import RobotError
+    from elastocal.robot import catalogue
+
+    name = given.settings.get("name")
+    if given.settings["urdf"]:
+        if name is None:
+            raise RobotError("--urdf needs the name of a robot (see `elastocal robots`)")
+        text = catalogue.urdf(name)
+        if given.as_json:
+            output.print_json({"robot": catalogue.entry(name).name, "urdf": text})
+        else:
+            typer.echo(text, nl=False)
+        return
+    chosen = [catalogue.entry(name).name] if name else list(catalogue.names())
+    rows = [tables.robot_facts(robot) for robot in chosen]
+
+    def show(screen: "Console") -> None:
+        if name:
+            tables.show_robot(screen, rows[0])
+        else:
+            tables.show_robots(screen, rows)
+
+    _show(given, {"robots": rows}, show)
+
+
+@dataclass(frozen=True)
+class _New:
+    ask: Annotated[bool | None, Option("--ask/--no-ask")] = None
+    """Ask for what is not given; default: on a terminal."""
+    browser: Annotated[bool, Option("--browser/--no-browser")] = True
+    """Show a preview of the cell."""
+
+
+@command("Prepare", more=_New)
+def _new(given: Given) -> None:
+    from elastocal.cli.questions import answered
+
+    settings = workflows.NewSettings(**given.settings)
+    settings.require_free()
+    people = sys.stdin.isatty() and not given.as_json
+    ask = given.here["ask"]
+    if ask if ask is not None else people:
+        settings = answered(settings)
+    result = workflows.new(settings)
+    if given.as_json:
+        output.print_json(result)
+        return
+    out = Path(settings.out)
+    _say(f"wrote {output.bold(str(out))}: look at every line")
+    output.print_remarks(output.console(), "note", result.findings)
+    page = out.with_suffix(".html")
+    plan = f"elastocal plan {out} --out {out.with_name('plan')}"
+    if not (given.here["browser"] and people):
+        _say(f"to see it: `elastocal check {out} --preview {page}`")
+        _say(f"then: `{plan}`")
+        return
+    workflows.check(out, preview=page, force=settings.force)
+    _say(f"preview: {page}; then: `{plan}`")
+    webbrowser.open(page.resolve().as_uri())
+
+
+@command("Prepare")
+def _init(given: Given) -> None:
+    result = workflows.init(**given.settings)
+    _show(given, result, lambda screen: tables.show_example(screen, result))
+
+
+@dataclass(frozen=True)
+class _Check:
+    browser: Annotated[bool, Option("--browser/--no-browser")] = False
+    """Show that page in a browser."""
+
+
+@command("Prepare", more=_Check)
+def _check(given: Given) -> None:
+    result, preview = workflows.check(**given.settings), given.settings.get("preview")
+    if preview is not None and given.here["browser"]:
+        webbrowser.open(preview.resolve().as_uri())
+
+    def show(screen: "Console") -> None:
+        screen.print(f"{output.green('ok')} {result.file} is a {result.kind}")
+        for name, text in result.lines():
+            screen.print(f"   {name}: {text}", soft_wrap=True)
+        if preview is not None:
+            screen.print(f"preview: {preview}", soft_wrap=True)
+
+    _show(given, {"file": result.file, "kind": result.kind, **result.holds}, show)
+
+
+@command("Prepare")
+def _watch(given: Given) -> None:
+    from elastocal.cli._operator import DevicesView, interruption
+    from elastocal.errors import DeviceError
+
+    with interruption() as interrupted, DevicesView(output.console()) as view:
+        result = workflows.watch(**given.settings, show=view.tell, interrupted=interrupted)
+        ended = not interrupted()
+    _show(given, result.figures, lambda _: _say_facts(result.facts()))
+    if ended and result.problem is not None:
+        raise DeviceError(result.problem)
+
+
+@dataclass(frozen=True)
+class _Studio:
+    no_browser: bool = False
+    """Only print the address."""
+
+
+@command("Prepare", more=_Studio)
+def _studio(given: Given) -> None:
+    def show(found: workflows.StudioResult) -> None:
+        if given.as_json:
+            output.print_json(found.figures)
+        else:
+            output.print_lines([found.figures.address])
+        output.print_remarks(output.console(), "warning", found.figures.notes)
+        _say("Ctrl-C ends it; whoever has the address can use it")
+        if not given.here["no_browser"]:
+            found.open_page()
+        try:
+            found.wait()
+        finally:
+            if found.session.is_running:
+                _say("stopping the run: the arm is brought to safety")
+
+    workflows.studio(**given.settings, while_open=show)
+
+
+_PURPOSES = ("elasticity", "geometry", "both")
+
+
+@dataclass(frozen=True)
+class _Plan:
+    purpose: Annotated[str, Option("--for", choices="purpose")] = "elasticity"
+    """elasticity: presses on the tooling; geometry: positions in free space for elastocal geometry;
+    both: presses, then positions, in one program."""
+    search: Annotated[str | None, Option(choices="technique")] = None
+    """With --for geometry: search technique; default: i_optimal."""
+    program: str | None = None
+    """Name of the robot program; default: calib, or positions."""
+
+
+@command("Prepare", more=_Plan, hidden=("program",))
+def _plan(given: Given) -> None:
+    from elastocal.errors import PlanningError
+
+    asked, here = given.settings, given.here
+    purpose, free_poses = here["purpose"], asked.pop("free_poses", None)
+    if purpose not in _PURPOSES:
+        raise typer.BadParameter(f"{purpose!r} is not one of {', '.join(_PURPOSES)}.",
+                                 param_hint="--for")  # fmt: skip
+    if free_poses is not None and purpose != "both":
+        raise PlanningError("--positions is for --for both")
+    if purpose == "geometry":
+        if asked.pop("dry_run") or asked.pop("compare", None) or asked.pop("jobs", None):
+            raise PlanningError("--dry-run, --compare and --jobs are for presses, not for geometry")
+        asked.pop("page_language")
+        chosen = {name: here[name] for name in ("search", "program") if here[name]}
+        found = _worked(workflows.plan_positions, given, **chosen)
+        out = asked["out"]
+        _show(given, found, lambda screen: tables.show_position_plan(screen, found, out))
+        return
+    if here["search"] is not None:
+        raise PlanningError("--search is for --for geometry: the cell file names its technique")
+    settings = workflows.PlanSettings(
+        **asked,
+        program=here["program"] or "calib",
+        free_poses=(free_poses or 60) if purpose == "both" else None,
+    )
+    with output.progress_bars() as progress:
+        presses = workflows.plan(settings, progress)
+    _show_plan(given, settings, presses)
+
+
+def _show_plan(
+    given: Given, settings: "workflows.PlanSettings", found: "workflows.PlanResult"
+) -> None:
+    from elastocal.geometry import PositionPlan
+    from elastocal.planning.export import pose_lines
+    from elastocal.records import read_json
+
+    out, free = Path(settings.out), None
+    if settings.free_poses is not None:
+        free = read_json(out / workflows.POSITION_PLAN, PositionPlan)
+    figures = workflows.plan_figures(found, out, settings.program, settings.language, free)
+    if settings.dry_run:
+        figures = replace(figures, files=())
+        if not given.as_json:
+            output.print_lines(pose_lines(found))
+
+    def show(screen: "Console") -> None:
+        tables.show_plan(screen, found, figures)
+        if free is not None:
+            tables.show_position_plan(screen, free, out)
+
+    _show(given, figures, show)
+
+
+@command("Prepare")
+def _study(given: Given) -> None:
+    from elastocal.records import to_data
+
+    result, out = _worked(workflows.study, given), given.settings["out"]
+    figures = to_data(result.summary)
+    del figures["schema"]
+    _show(
+        given,
+        {"folder": str(out), "files": result.files, **figures},
+        lambda screen: tables.show_study(screen, result.summary, out, result.files),
+    )
+
+
+@dataclass(frozen=True)
+class _Run:
+    dry_run: bool = False
+    """A line a pose on standard output: id, time, joints; nothing moves."""
+
+
+@command("Measure", more=_Run)
+def _run(given: Given) -> None:
+    from elastocal.cli._operator import TerminalOperator
+    from elastocal.procedure import RunEnd
+
+    asks = not (given.settings["confirmed"] or given.as_json)
+    operator = TerminalOperator(output.console(), asks=asks)
+    settings = workflows.RunSettings(**given.settings, operator=operator)
+    if given.here["dry_run"]:
+        rehearsed = workflows.dry_run(settings)
+        if not given.as_json:
+            output.print_lines(rehearsed.pose_lines())
+        figures = tables.dry_figures(rehearsed)
+        _show(given, figures, lambda screen: tables.show_itinerary(screen, rehearsed))
+        return
+    finished = workflows.run(settings)
+    if given.as_json and finished.end is RunEnd.DONE:
+        output.print_json(finished.figures)
+    else:
+        tables.show_run(output.console(), finished)
+    if finished.problem is not None:
+        raise finished.problem
+    if finished.end is RunEnd.INTERRUPTED:
+        raise typer.Exit(130)
+
+
+@command("Measure")
+def _release(given: Given) -> None:
+    from elastocal.cli._operator import TerminalOperator
+
+    operator = TerminalOperator(output.console())
+    result = workflows.release(**given.settings, operator=operator)
+    _show(given, result.figures, lambda _: _say_facts(result.facts()))
+
+
+@command("Measure")
+def _simulate(given: Given) -> None:
+    def show(found: workflows.SimulateResult) -> None:
+        if given.as_json:
+            output.print_json(found)
+        else:
+            output.print_lines(found.lines())
+        _say("Ctrl-C ends it")
+        found.wait()
+
+    workflows.simulate(**given.settings, meanwhile=show)
+
+
+@command("Measure")
+def _krc_config(given: Given) -> None:
+    result = workflows.krc_config(**given.settings)
+    _show(given, result, lambda _: _say_facts(result.facts()))
+
+
+@command("Measure")
+def _measure_delay(given: Given) -> None:
+    from elastocal.cli._operator import TerminalOperator
+
+    operator = TerminalOperator(output.console())
+    result = _worked(workflows.measure_delay, given, operator=operator)
+    _show(given, result.measured, lambda _: _say_facts(result.facts()))
+
+
+@command("Measure")
+def _derive(given: Given) -> None:
+    result = workflows.derive(**given.settings)
+
+    def show(screen: "Console") -> None:
+        folder = result.folder
+        screen.print(f"{result.poses()}, readings: {result.counts()}")
+        screen.print(f"wrote {folder.dataset} and {folder.summary.name}", soft_wrap=True)
+        output.print_remarks(screen, "warning", result.summary.warnings)
+
+    _show(given, result.summary, show)
+
+
+@dataclass(frozen=True)
+class _Import:
+    map: Annotated[Path, Option("--map")]
+    """What the columns are (.yaml); --guess writes one."""
+    out: Path | None = None
+    """Dataset (.nc or .csv) to write."""
+    guess: bool = False
+    """Write a first map to --map, and show it."""
+    cell: Path | None = None
+    """With --guess: cell file that says robot, tool, sensor."""
+
+
+@command(
+    "Measure",
+    module="elastocal.workflows.import_logs",
+    settings="ImportLogsSettings",
+    function="import_logs",
+    more=_Import,
+    hidden=("map", "out"),
+)
+def _import(given: Given) -> None:
+    asked, here = given.settings, given.here
+    if here["guess"]:
+        ask = _ask if sys.stdin.isatty() else None
+        settings = workflows.GuessMapSettings(
+            asked["logs"], out=here["map"], cell=here["cell"], force=asked["force"], ask=ask
+        )
+        guessed = workflows.guess_map(settings)
+
+        def show(_: "Console") -> None:
+            _say_facts(guessed.facts())
+            _say(f"wrote {here['map']}: look at every line")
+
+        _show(given, {"map": str(here["map"]), "logs": guessed.logs}, show)
+        return
+    if here["cell"] is not None:
+        raise typer.BadParameter("is for --guess: the map names the cell", param_hint="--cell")
+    if here["out"] is None:
+        raise typer.BadParameter("is missing: the dataset to write", param_hint="--out")
+    result = _worked(workflows.import_logs, given, map=here["map"], out=here["out"])
+
+    def show_result(_: "Console") -> None:
+        _say_facts(result.facts())
+        _say(f"wrote {result.figures.dataset}, look at {result.figures.picture}")
+
+    _show(given, result.figures, show_result)
+
+
+def _ask(question: str) -> str:
+    """Return what a person answers on the terminal; empty leaves the question open."""
+    answer: str = typer.prompt(question, default="", show_default=False, err=True)
+    return answer
+
+
+@command("Identify")
+def _tool(given: Given) -> None:
+    from elastocal.records import to_data
+
+    result = workflows.tool(**given.settings)
+    # What this command always printed: the file without its schema.
+    data = {key: value for key, value in to_data(result).items() if key != "schema"}
+    _show(given, data, lambda screen: tables.show_tool(screen, result, given.settings["out"]))
+
+
+@command("Identify")
+def _geometry(given: Given) -> None:
+    from elastocal.records import to_data
+
+    result, out = _worked(workflows.geometry, given), given.settings["out"]
+    model, found = to_data(result.model), result.accuracy
+    data = {
+        **{key: model[key] for key in ("held_out", "ladder", "parameters", "fixed", "blunders")},
+        **{"axes": to_data(found.axes), "iso_9283": to_data(found.poses)},
+    }
+    _show(given, data, lambda screen: tables.show_geometry(screen, result.model, found, out))
+
+
+@command("Identify")
+def _calibrate(given: Given) -> None:
+    result, out = workflows.calibrate(**given.settings), given.settings["out"]
+    _show(given, result.calibration, lambda screen: tables.show_calibration(screen, result, out))
+
+
+@dataclass(frozen=True)
+class _Codec:
+    keep_blunders: bool = False
+    """Use also what cannot be a measurement."""
+    trust_conventions: bool = False
+    """Use data that fit far better with a sign read otherwise."""
+    splits: Annotated[int | None, Option(most=100_000)] = None
+    """Verification sets; default: as many as poses."""
+    poses: Annotated[int, Option(most=1_000_000)] = 100
+    """Most poses; of a larger dataset as many are drawn by the seed."""
+    ratio: Annotated[str, Option(metavar="A/B", read="ratio")] = "70/30"
+    """Training to verification poses."""
+    seed: Annotated[int, Option(least=0)] = 0
+    """Seed of searches and intervals."""
+    tolerance: Annotated[str, Option(metavar="PART,LENGTH", read="tolerance")] = "5 %, 5 um"
+    """Errors this near to the last count as saturated: the larger of a part of it and a length."""
+
+
+@command("Identify", more=_Codec, hidden=("options", "saturation"))
+def _codec(given: Given) -> None:
+    from elastocal.codec import CodecOptions
+    from elastocal.records import to_data
+
+    here, out = given.here, given.settings["out"]
+    options = CodecOptions(
+        *(here["splits"], here["ratio"], here["seed"], not here["keep_blunders"]),
+        *(here["trust_conventions"], here["poses"]),
+    )
+    result = _worked(workflows.codec, given, options=options, saturation=here["tolerance"])
+    _show(
+        given,
+        {"folder": str(out), "files": result.files, **to_data(result.summary)},
+        lambda screen: tables.show_codec(screen, result.summary, out, result.files),
+    )
+
+
+@dataclass(frozen=True)
+class _ToolOrFile:
+    tool: tuple[str, ...] = ()
+    """Tool file from `elastocal tool` (weight, bias, sensor); and, given again, another tool: its
+    tcp in the calibrated tcp's frame, 'x, y, z, a, b, c' with units."""
+
+
+_TOOL = ("tool", "tools", "tool_frame")
+"""Fields that this one option stands for."""
+
+
+def _tools(given: Given) -> tuple[tuple[Path, ...], str | None]:
+    """Return the tool files, and the frame of another tool, among the values of ``--tool``."""
+    from elastocal.errors import CompensationError
+
+    texts = given.here["tool"] or ()
+    frames = [text for text in texts if "," in text and not Path(text).exists()]
+    if len(frames) > 1:
+        raise CompensationError(f"--tool names {len(frames)} tcps: a model is for one tool")
+    files = tuple(Path(text) for text in texts if text not in frames)
+    return files, frames[0] if frames else None
+
+
+def _only_tool(given: Given) -> dict[str, Any]:
+    """Return the only tool file and the frame, as settings."""
+    from elastocal.errors import CompensationError
+
+    files, frame = _tools(given)
+    if len(files) > 1:
+        raise CompensationError(f"--tool names {len(files)} tool files: a compensator has one")
+    return {"tool": files[0] if files else None, "tool_frame": frame}
+
+
+@command("Use")
+def _predict(given: Given) -> None:
+    result = workflows.predict(**given.settings)
+    figures, size = result.summary, result.summary.deflection
+
+    def show(screen: "Console") -> None:
+        _say(
+            f"{figures.rows} rows: predicted deflection {mm(size.mean)} mean, {mm(size.max)} max;"
+            f" written to {given.settings['out']}"
+        )
+        _say(f"tool: {figures.tool}")
+        notes = figures.notes
+        if figures.misfit is None:
+            notes = (*notes, _NO_MISFIT)
+        for note in notes:
+            _say(f"Note: {note}")
+        output.print_remarks(screen, "warning", [figures.warning] if figures.warning else [])
+
+    _show(given, figures, show)
+
+
+_NO_MISFIT = (
+    "the model does not know its errors at left-out poses, so that there are no intervals of what"
+    " would be measured; calibrate again to have them"
+)
+
+
+@command("Use")
+def _compensate(given: Given) -> None:
+    result, out = _worked(workflows.compensate, given), given.settings["out"]
+    _show(given, result, lambda screen: tables.show_compensation(screen, result, out))
+
+
+@command("Use", more=_ToolOrFile, hidden=_TOOL)
+def _live(given: Given) -> None:
+    from elastocal.cli._operator import LiveView, interruption
+    from elastocal.errors import DeviceError
+
+    screen = output.console()
+    with interruption() as interrupted, LiveView(screen) as view:
+        result = workflows.live(
+            **given.settings,
+            **_only_tool(given),
+            report=view.tell,
+            warn=lambda text: output.print_remarks(screen, "warning", [text]),
+            interrupted=interrupted,
+        )
+    _show(given, result, lambda _: _say_facts(result.facts()))
+    if result.problem is not None:
+        raise DeviceError(result.problem)
+
+
+@command("Use")
+def _stiffness(given: Given) -> None:
+    from elastocal.records import to_data
+
+    result, out = _worked(workflows.stiffness, given), given.settings["out"]
+
+    def show(screen: "Console") -> None:
+        tables.show_stiffness(screen, result)
+        screen.print(f"written to {out}: {', '.join(result.summary.files)}")
+
+    _show(given, to_data(result.summary) | {"folder": str(out)}, show)
+
+
+@command("Use", more=_ToolOrFile, hidden=_TOOL)
+def _simulate_process(given: Given) -> None:
+    from elastocal.records import to_data
+
+    (files, frame), out = _tools(given), given.settings["out"]
+    result = _worked(workflows.simulate_process, given, tools=files, tool_frame=frame)
+
+    def show(screen: "Console") -> None:
+        tables.show_process(screen, result)
+        screen.print(f"written to {out}")
+
+    _show(given, to_data(result) | {"folder": str(out)}, show)
+
+
+@command("Use", more=_ToolOrFile, hidden=_TOOL)
+def _export(given: Given) -> None:
+    chosen = _only_tool(given)
+    result = workflows.export(**given.settings, **chosen)
+    with_tool = chosen["tool"] is not None
+    _show(given, result, lambda screen: tables.show_export(screen, result, with_tool))
+
+
+@command("Judge and hand over")
+def _report(given: Given) -> None:
+    result = workflows.report(**given.settings)
+    _show(given, result.figures, lambda screen: tables.show_report(screen, result))
+
+
+@command("Judge and hand over")
+def _compare(given: Given) -> None:
+    asked = given.settings
+    found = workflows.compare(**asked)
+
+    def show(screen: "Console") -> None:
+        unseen = "limit" in asked and "rows" not in asked
+        hint = workflows.measured_rows(found.summary.new_provenance) if unseen else None
+        tables.show_comparison(screen, found, hint)
+        for path in (asked[name] for name in ("out", "figure") if name in asked):
+            screen.print(f"written to {path}", soft_wrap=True)
+
+    _show(given, found.summary, show)
+
+
+@dataclass(frozen=True)
+class _Verify:
+    target: Annotated[Path | None, Option(argument=True, metavar="REPORT|RUN")] = None
+    """A report (.html), or the folder of a run."""
+    new_key: Annotated[Path | None, Option(metavar="KEY")] = None
+    """Make a key pair instead: KEY and KEY.pub."""
+
+
+@command("Judge and hand over", more=_Verify, hidden=("file",))
+def _verify(given: Given) -> None:
+    target, new_key = given.here["target"], given.here["new_key"]
+    if (target is None) == (new_key is None):
+        raise typer.BadParameter("name a report or a run, or a file for a new key", param_hint="")
+    if new_key is not None:
+        from elastocal.verdict import make_key
+
+        public = make_key(new_key)
+        written = f"wrote {new_key} (keep it secret) and {public} (give it away)"
+        _show(given, {"private": str(new_key), "public": str(public)}, lambda _: _say(written))
+        return
+    found = workflows.verify(target, **given.settings)
+
+    def show(screen: "Console") -> None:
+        for link in found.links:
+            # A line each: the words of a forged report must not look like a link of their own.
+            said = " ".join(f"{link.name}: {link.text}".split())
+            screen.print(f"{link.state.value:<14} {said}", soft_wrap=True)
+
+    _show(given, {"whole": found.broken is None, "links": found.links}, show)
+    found.require_whole()
+
+
+@command("See all of it")
+def _demo(given: Given) -> None:
+    from elastocal.cli.story import shown
+
+    result = shown(**given.settings)
+    data = {"folder": str(given.settings["out"]), "process": result.process}
+
+    def show(_: "Console") -> None:
+        for line in result.closing():
+            _say(line)
+
+    _show(given, data, show)

@@ -1,0 +1,296 @@
+"""Commands made from settings: a parameter of the command line for each field that it has.
+
+What a field says (`elastocal.options`) becomes a parameter of typer's; what is given is handed to
+the command by the names of the fields, and what is not given is left to the settings.
+"""
+
+import inspect
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from elastocal.options import CHOICES, OWN, REQUIRED, SettingsField, settings_fields, summary_of
+
+_NARROW = 20
+"""Characters that help shows of what an option takes, where a terminal has 80 columns."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a person has given to a command."""
+
+    settings: dict[str, Any]
+    """Fields of the settings, by name; only those that were given."""
+    here: dict[str, Any]
+    """Parameters of the command line alone, all of them."""
+    as_json: bool
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of the program."""
+
+    group: str
+    """Where help lists it."""
+    module: str
+    """Module of its settings, and of the function whose docstring is the command's."""
+    settings: str
+    """Class of its settings in that module."""
+    function: str
+    """The function."""
+    run: Callable[[Given], None]
+    """What it does."""
+    more: type | None = None
+    """Class of the parameters that the command line alone has."""
+    hidden: tuple[str, ...] = ()
+    """Fields that its parameters stand for in another form."""
+
+    @property
+    def summary(self) -> str:
+        """What help says of it."""
+        return summary_of(self.module, self.function)
+
+    def callback(self) -> Callable[..., None]:
+        """Return the function that typer makes a command of."""
+        fields = [
+            each
+            for each in settings_fields(self.module, self.settings)
+            if each.name not in self.hidden and _is_shown(each)
+        ]
+        here = (
+            () if self.more is None else settings_fields(self.more.__module__, self.more.__name__)
+        )
+        made = {each.name: _parameter(each) for each in _in_order(fields, here)}
+        made["as_json"] = inspect.Parameter(
+            "as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_JSON
+        )
+
+        def call(**given: Any) -> None:
+            as_json = given.pop("as_json")
+            read = {
+                each.name: value
+                for each in fields
+                if (value := _read(each, given[each.name])) is not None
+            }
+            own = {each.name: _read(each, given[each.name]) for each in here}
+            self.run(Given(read, own, as_json))
+
+        call.__doc__ = self.summary
+        call.__signature__ = inspect.Signature(list(made.values()))  # type: ignore[attr-defined]
+        call.__annotations__ = {name: each.annotation for name, each in made.items()}
+        return call
+
+
+_JSON = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
+
+
+def _in_order(
+    fields: Iterable[SettingsField], here: Iterable[SettingsField]
+) -> list[SettingsField]:
+    """Return fields as help lists them: places, what has to be given, and the rest."""
+    every = [*fields, *here]
+    order = {True: 0, False: 1}
+    every.sort(key=lambda each: (order[_is_argument(each)], order[_is_required(each)]))
+    # What guards files is read last.
+    return sorted(every, key=lambda each: each.name == "force")
+
+
+def _is_argument(each: SettingsField) -> bool:
+    return each.option.argument
+
+
+def _is_required(each: SettingsField) -> bool:
+    return each.default is REQUIRED or each.option.required
+
+
+def _parameter(each: SettingsField) -> inspect.Parameter:
+    """Return the parameter of a field."""
+    option, kind = each.option, _type(each)
+    help = option.help or each.doc
+    if option.default and not option.required:
+        help = f"{help} [default: {option.default}]"
+    words: dict[str, Any] = {"help": help}
+    if option.metavar:
+        words["metavar"] = option.metavar
+    if option.choices:
+        words |= _choice(option.choices, option.file, help)
+    if kind in (int, float):
+        words |= {"min": option.least, "max": option.most}
+    default: Any = each.default
+    if default in (REQUIRED, OWN) or option.required or isinstance(default, tuple):
+        default = None
+    required = _is_required(each)
+    if not required and not isinstance(default, bool):
+        words["show_default"] = default is not None
+    # `typer` takes an option without a value for a value that is not given.
+    hint: Any = list[kind] if _is_repeated(each) else kind  # type: ignore[valid-type]
+    if default is None and not required:
+        hint = hint | None
+    if option.argument:
+        note = typer.Argument(**words)
+    else:
+        flag = option.name or f"--{each.name.replace('_', '-')}"
+        note = typer.Option(flag, **words)
+    return inspect.Parameter(
+        each.name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=inspect.Parameter.empty if required else default,
+        annotation=Annotated[hint, note],
+    )
+
+
+def _choice(kind: str, file: bool, help: str) -> dict[str, Any]:
+    """Return what shows choices and completes them; the work refuses what is none of them."""
+    if kind == "robot":
+        return {"autocompletion": robot_names}
+    names = CHOICES[kind]
+    shown = f"[{'|'.join(names)}]"
+    if file or len(shown) > _NARROW:
+        # Help would break it in the middle of a name.
+        help = f"{help} One of {', '.join(names)}{', or a .yaml file' if file else ''}."
+        shown = "NAME|FILE" if file else "NAME"
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return {"metavar": shown, "autocompletion": complete, "help": help}
+
+
+def robot_names(incomplete: str) -> list[str]:
+    """Return the robots of the catalogue that begin with a text, for a shell."""
+    from elastocal.robot import catalogue  # not for help
+
+    return [name for name in catalogue.names() if name.casefold().startswith(incomplete.casefold())]
+
+
+def _type(each: SettingsField) -> type:
+    """Return the type that typer reads."""
+    if each.option.read:
+        return str
+    return next((kind for name, kind in _TYPES.items() if name in each.kind), str)
+
+
+_TYPES: dict[str, type] = {"Path": Path, "bool": bool, "str": str, "int": int, "float": float}
+"""Types of options, by a word in the type of a field; the first counts."""
+
+
+def _is_shown(each: SettingsField) -> bool:
+    """Return whether a person can type what a field holds."""
+    typed = not re.search("Callable|Mapping", each.kind) and any(n in each.kind for n in _TYPES)
+    return each.option.shown and (typed or bool(each.option.choices or each.option.read))
+
+
+def _is_repeated(each: SettingsField) -> bool:
+    several = "..." in each.kind or "Sequence[" in each.kind
+    return each.option.repeated or (several and not each.option.read)
+
+
+def _read(each: SettingsField, given: Any) -> Any:
+    """Return what a field is to hold; None where nothing was given."""
+    if given is None or given == []:
+        return None
+    if each.option.read:
+        flag = each.option.name or f"--{each.name.replace('_', '-')}"
+        return _READERS.get(each.option.read, _quantity(each.option.read))(given, flag)
+    return tuple(given) if isinstance(given, list) else given
+
+
+def _quantity(dimension: str) -> Callable[[str, str], float]:
+    """Return what reads a quantity above zero."""
+
+    def read(text: str, flag: str) -> float:
+        from elastocal.errors import UnitError
+        from elastocal.units import parse_quantity
+
+        try:
+            value = parse_quantity(text, dimension)
+        except UnitError as error:
+            raise UnitError(f"{flag}: {error}") from error
+        if not value > 0.0:
+            raise UnitError(f"{flag} {text!r} must be above 0")
+        return value
+
+    return read
+
+
+def _point(text: str, _flag: str) -> tuple[float, float, float]:
+    from elastocal.units import parse_point
+
+    return parse_point(text)
+
+
+def _numbers(text: str, flag: str) -> tuple[float, ...]:
+    from elastocal.errors import CompensationError
+    from elastocal.units import parse_number
+
+    try:
+        return tuple(parse_number(part) for part in text.split(",") if text)
+    except ValueError as error:
+        raise CompensationError(f"{flag} {text!r} must be numbers, e.g. '0.5,-1'") from error
+
+
+def _direction(text: str, flag: str) -> tuple[float, float, float]:
+    from elastocal.errors import CompensationError
+
+    try:
+        x, y, z = _numbers(text, flag)
+    except (CompensationError, ValueError) as error:
+        raise CompensationError(
+            f"direction {text!r} must be three numbers, e.g. '0, 0, -1'"
+        ) from error
+    return x, y, z
+
+
+def _statements(texts: list[str], _flag: str) -> Any:
+    from elastocal.cell import read_statements
+
+    return read_statements(tuple(texts))
+
+
+def _names(text: str, _flag: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(","))
+
+
+def _ratio(text: str, _flag: str) -> float:
+    """Return training over verification poses from ``"A/B"`` or a number."""
+    from elastocal.errors import CodecError
+    from elastocal.units import parse_number
+
+    above, _, below = text.partition("/")
+    try:
+        return parse_number(above) / parse_number(below or "1")
+    except (ValueError, ZeroDivisionError) as error:
+        raise CodecError(f"ratio {text!r} must be two numbers above 0, e.g. '70/30'") from error
+
+
+def _tolerance(text: str, _flag: str) -> Any:
+    """Return a tolerance from ``"PART %, LENGTH"``; the length may be left out."""
+    from elastocal.codec import Tolerance
+    from elastocal.errors import CodecError, UnitError
+    from elastocal.units import parse_number, parse_quantity
+
+    part, _, length = (each.strip() for each in text.partition(","))
+    percent = part.endswith("%")
+    try:
+        relative = parse_number(part.removesuffix("%")) / (100.0 if percent else 1.0)
+        floor = parse_quantity(length, "length") if length else Tolerance.floor
+    except (ValueError, UnitError) as error:
+        raise CodecError(
+            f"tolerance {text!r} must be a part and a length, e.g. '5 %, 5 um'"
+        ) from error
+    return Tolerance(relative, floor)
+
+
+_READERS: dict[str, Callable[[Any, str], Any]] = {
+    "point": _point,
+    "numbers": _numbers,
+    "direction": _direction,
+    "statements": _statements,
+    "list": _names,
+    "ratio": _ratio,
+    "tolerance": _tolerance,
+}

@@ -1,0 +1,74 @@
+"""The questions of ``elastocal new``, on a terminal."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from elastocal.cli import output
+
+if TYPE_CHECKING:
+    from elastocal.workflows import NewSettings
+
+_QUESTIONS = {
+    "robot": "Robot: name of the catalogue, or a URDF file",
+    "flange": "Link that carries the tool, its z axis out of the arm",
+    "mesh": "Surface that the tool presses on (.stl, .obj, .ply)",
+    "unit": "Unit of its numbers (mm, m, in)",
+    "place": "Its frame in the robot's base: x, y, z, a, b, c",
+    "tcp": "Tool tip in the flange, z out of the tool: x, y, z, a, b, c",
+    "tool_mass": "Mass of all that hangs on the flange",
+    "tool_centre": "Its centre in the flange: x, y, z",
+    "process": "Production path (.csv) that poses and presses are chosen for, or none",
+    "press": "Largest force onto the surface",
+    "force_range": "Force sensor, its largest forces: fx, fy, fz, or none",
+    "moment_range": "Its largest moments: mx, my, mz",
+    "tracker": "Laser tracker, its place in the robot's base: x, y, z, or none",
+    "marker_place": "Marker from the tool tip: x, y, z",
+    "accepted": "Largest error of a predicted deflection that the report lets pass, or none",
+}
+"""What is asked, in this order; the key is the field."""
+
+
+def answered(settings: "NewSettings") -> "NewSettings":
+    """Return settings with the answers of a person; an empty answer takes what is offered."""
+    for name, question in _QUESTIONS.items():
+        if getattr(settings, name) is not None or _needless(settings, name):
+            continue
+        answer: dict[str, Any] = {name: _answer(settings, name, question)}
+        settings = replace(settings, **answer)
+    return settings
+
+
+def _needless(settings: "NewSettings", name: str) -> bool:
+    """Return whether a question has been answered by another: a catalogue says the flange."""
+    if name == "flange":
+        return not Path(str(settings.robot)).is_file()
+    return (name, "none") in (
+        ("moment_range", settings.force_range),
+        ("marker_place", settings.tracker),
+    )
+
+
+def _answer(settings: "NewSettings", name: str, question: str) -> str:
+    """Return a valid answer to one question; one that is not is refused, and asked again."""
+    from elastocal.errors import ElastocalError, ProcedureError
+
+    offered = None if name in ("robot", "mesh") else settings.offered(name)
+    while True:
+        try:
+            text: str = typer.prompt(question, default=offered, err=True)
+        except (typer.Abort, OSError) as end:
+            output.console().print()  # the question has no end of its line
+            if isinstance(end, typer.Abort) and not isinstance(end.__context__, EOFError):
+                raise KeyboardInterrupt from end
+            raise ProcedureError(
+                "nobody answers: standard input has ended; give options instead"
+            ) from end
+        try:
+            settings.require_answer(name, text.strip())
+        except ElastocalError as error:
+            output.console().print(f"   {error}", soft_wrap=True)
+        else:
+            return text.strip()

@@ -1,0 +1,191 @@
+"""Settings as a person gives them on a command line: what stands at a field, read from its source.
+
+A class of settings says each option once: the field's name, type, default and docstring, and by
+``Annotated[..., Option(...)]`` what a command line has otherwise. `settings_fields` reads that from
+the source, so that help imports no numerical library.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Option:
+    """How an option differs from its field; written with literals only."""
+
+    name: str = ""
+    """In place of the field's name, such as ``--limit``; ``--on/--off`` for both of a switch."""
+    argument: bool = False
+    """Whether it is given by its place."""
+    required: bool = False
+    """Whether a command line has to give it, though settings in Python need not."""
+    shown: bool = True
+    """Whether a command line has it at all."""
+    metavar: str = ""
+    """What help shows for the value."""
+    choices: str = ""
+    """Key of `CHOICES`, which help lists and a shell completes; or ``robot``: the catalogue's."""
+    file: bool = False
+    """Whether a file may be given in place of a choice."""
+    read: str = ""
+    """How a text becomes the value: ``point``, ``direction``, ``numbers``, ``statements``, ``list``
+    (with commas) or a dimension, ``length`` or ``speed``, of a quantity above zero."""
+    repeated: bool = False
+    """Whether it may be given several times."""
+    default: str = ""
+    """What help shows as the default, where the field has another form of it."""
+    help: str = ""
+    """In place of the docstring, where a command line has other words for the same."""
+    least: float | None = None
+    most: float | None = None
+
+
+@dataclass(frozen=True)
+class SettingsField:
+    """A field of settings as its source has it."""
+
+    name: str
+    kind: str
+    """Its type, such as ``tuple[Path, ...]``."""
+    default: Any
+    """A literal; `REQUIRED` without any, `OWN` where it is none."""
+    doc: str
+    """Its docstring on one line, without markup."""
+    option: Option = Option()
+
+
+REQUIRED, OWN = object(), object()
+"""Marks of a field without default, and of a default that only the class knows."""
+_TECHNIQUES = (
+    "cover", "ioops", "i_optimal", "random", "exchange-d", "exchange-a", "exchange-e",
+    "exchange-o2", "exchange-o3", "exchange-o4", "exchange-o5",
+)  # fmt: skip
+CHOICES: dict[str, tuple[str, ...]] = {
+    "technique": _TECHNIQUES,
+    "technique or none": (*_TECHNIQUES, "none"),
+    "springs": (
+        "auto", "actuated", "bearing", "bearing-joint", "bearing-ends", "links", "tensor", "gears",
+    ),
+    "process": ("afp", "machining"),
+    "example": ("afp", "machining", "ur20"),
+    "language": ("krl", "rapid", "fanuc", "urscript", "none"),
+    "page language": ("en", "de", "fr"),
+    "loss": ("linear", "huber", "cauchy"),
+    "weights": ("none", "sigma"),
+    "free frame": ("none", "load_case", "campaign"),
+    "posture": ("programmed", "stiffest"),
+    "target": ("linux",),
+    "purpose": ("elasticity", "geometry", "both"),
+}  # fmt: skip
+"""What help lists without importing what knows them; tests/contracts/test_commands.py holds it."""
+
+
+@cache
+def settings_fields(module: str, name: str) -> tuple[SettingsField, ...]:
+    """Return the fields of a class of settings, its own before those of its bases.
+
+    Parameters
+    ----------
+    module : str
+        Module that has the class; it is read, not imported.
+    name : str
+        Of the class.
+
+    Raises
+    ------
+    LookupError
+        If the module has no such class.
+    """
+    tree = _source(module)
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef) and node.name == name:
+            own = tuple(_own_fields(node))
+            bases = (base.id for base in node.bases if isinstance(base, ast.Name))
+            above = (each for base in bases for each in settings_fields(module, base))
+            names = {each.name for each in own}
+            return (*own, *(each for each in above if each.name not in names))
+        if isinstance(node, ast.ImportFrom) and name in (alias.name for alias in node.names):
+            return settings_fields(_defining(node.module or "", name), name)
+    raise LookupError(f"module {module} has no class {name}")
+
+
+def summary_of(module: str, name: str) -> str:
+    """Return the docstring of a function up to its first section, by the module's source.
+
+    Raises
+    ------
+    LookupError
+        If the module has no such function.
+    """
+    # A list of all commands asks for thirty: a pattern is quicker than a parser.
+    pattern = rf'^def {name}\(.*?"""(.*?)(?:\n\s*\n    [A-Z]\w+\n    ---|""")'
+    found = re.search(pattern, _text(module), re.DOTALL | re.MULTILINE)
+    if found is None:
+        raise LookupError(f"module {module} has no function {name}")
+    return _plain(found[1])
+
+
+@cache
+def _source(module: str) -> ast.Module:
+    return ast.parse(_text(module))
+
+
+def _text(module: str) -> str:
+    found = find_spec(module)
+    if found is None or found.origin is None:
+        raise LookupError(f"there is no module {module}")
+    return Path(found.origin).read_text(encoding="utf-8")
+
+
+def _defining(module: str, name: str) -> str:
+    """Return the module that a name comes from: a face of a package takes it from another."""
+    found = find_spec(module)
+    stub = Path(str(found.origin if found else "")).with_suffix(".pyi")
+    if stub.name != "__init__.pyi" or not stub.is_file():
+        return module
+    for node in ast.parse(stub.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and name in (alias.name for alias in node.names):
+            return _defining(f"{module}.{node.module}", name)
+    return module
+
+
+def _own_fields(node: ast.ClassDef) -> Iterator[SettingsField]:
+    for each, after in zip(node.body, [*node.body[1:], None], strict=True):
+        if not isinstance(each, ast.AnnAssign) or not isinstance(each.target, ast.Name):
+            continue
+        kind, option = _option(each.annotation)
+        default: Any = REQUIRED
+        if each.value is not None:
+            try:
+                default = ast.literal_eval(each.value)
+            except ValueError:
+                default = OWN
+        text = after.value if isinstance(after, ast.Expr) else None
+        doc = str(text.value) if isinstance(text, ast.Constant) else ""
+        yield SettingsField(each.target.id, kind, default, _plain(doc), option)
+
+
+def _option(annotation: ast.expr) -> tuple[str, Option]:
+    """Return the type of a field, and what ``Annotated`` says of its option."""
+    if isinstance(annotation, ast.Subscript) and ast.unparse(annotation.value) == "Annotated":
+        parts = annotation.slice.elts if isinstance(annotation.slice, ast.Tuple) else []
+        kind, notes = parts[0], parts[1:]
+        for note in notes:
+            if isinstance(note, ast.Call) and ast.unparse(note.func) == Option.__name__:
+                places = dict(zip(("name",), map(ast.literal_eval, note.args), strict=False))
+                words = {str(word.arg): ast.literal_eval(word.value) for word in note.keywords}
+                return ast.unparse(kind), Option(**places, **words)
+        return ast.unparse(kind), Option()
+    return ast.unparse(annotation), Option()
+
+
+def _plain(text: str) -> str:
+    """Return a docstring on one line, as it is read on a terminal."""
+    paragraphs = (" ".join(part.split()) for part in text.replace("``", "").split("\n\n"))
+    return "\n\n".join(paragraphs).strip()
