@@ -279,7 +279,7 @@ def test_check_says_what_a_good_file_is(folder, name):
         (
             "a.json",
             '{"a": "' + 300 * "b" + '", "schema": "elastocal.plan/9"}',
-            "'elastocal.plan/1'",
+            "'elastocal.plan/2'",
         ),
         ("a.json", '{"schema": "elastocal.modle/1"}', "did you mean 'elastocal.model'? (known: "),
         ("a.json", "{}", "states no schema (known: elastocal.codec_verdicts, "),

@@ -1,5 +1,6 @@
 """The plan's record: lossless, and refused by name when it contradicts itself."""
 
+import hashlib
 import json
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import pytest
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.planning import PLAN, PlanResult, read_plan, write_plan
 from elastocal.planning.plan_result import _SCHEMA as SCHEMA, check_plan
+from elastocal.planning.surface.findings import DEGENERATE
 from support import plans
 
 
@@ -58,6 +60,28 @@ def test_a_plan_of_an_earlier_version_is_read(tmp_path):
     assert plans.plan().contact.straight_time is None
 
 
+def test_a_plan_of_before_findings_had_kinds_is_read_with_its_hash(tmp_path):
+    def as_then(data):
+        data["schema"] = "elastocal.plan/1"
+        del data["sha256"], data["contact"]["straight_time"], data["production"]
+        text = json.dumps(data, separators=(",", ":"))
+        data["sha256"] = hashlib.sha256(text.encode()).hexdigest()
+
+    folder = edited(write_plan(tmp_path, plans.plan()), as_then)
+    assert read_plan(folder) == plans.plan()
+    change = edited(folder / PLAN, lambda data: data["findings"].append("another"))
+    assert "was changed by hand" in refusal(change)
+
+
+def test_findings_keep_their_kinds_and_count_in_the_hash(tmp_path):
+    finding = DEGENERATE(name="dome.stl", count=3)
+    path = write_plan(tmp_path, altered(findings=(finding,)))
+    (read,) = read_plan(tmp_path).findings
+    assert (read.kind, dict(read.values)) == (finding.kind, {"name": "dome.stl", "count": 3})
+    change = edited(path, lambda data: data["findings"][0]["values"].update(count=4))
+    assert "was changed by hand" in refusal(change)
+
+
 def test_the_time_of_the_straight_ways_counts_in_the_hash(tmp_path):
     plan = plans.plan()
     plan = replace(plan, contact=replace(plan.contact, straight_time=10.5))
@@ -73,7 +97,7 @@ def test_the_load_cases_keep_their_order(written):
 
 def test_the_keys_of_the_contract_stand_in_the_file(written):
     data = json.loads(written.read_text())
-    assert data["schema"] == SCHEMA == "elastocal.plan/1"
+    assert data["schema"] == SCHEMA == "elastocal.plan/2"
     keys = {"id", "joints", "approach_joints", "tcp_position", "normal", "margins"}
     assert keys <= set(data["poses"][0])
     assert {"name", "covering_radius", "order"} <= set(data["search"])
@@ -123,7 +147,7 @@ def test_a_folder_without_plan_is_named(tmp_path):
 def test_an_unknown_schema_is_refused_by_name(written):
     folder = edited(written, lambda data: data.update(schema="elastocal.plan/9"))
     assert "'elastocal.plan/9'" in refusal(folder)
-    assert "'elastocal.plan/1'" in refusal(folder)
+    assert "'elastocal.plan/2'" in refusal(folder)
 
 
 def test_an_unknown_key_is_refused_with_the_nearest_one(written):

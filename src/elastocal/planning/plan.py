@@ -11,11 +11,12 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
+from elastocal.findings import Finding, Kind, as_number
 from elastocal.parallel import one_blas_thread
 from elastocal.planning.checks import (
     SightCheck,
     registration_shortages,
-    shortage_text,
+    station_shortage,
     unseen_bumps,
 )
 from elastocal.planning.motion import (
@@ -56,9 +57,8 @@ from elastocal.planning.scene import (
 )
 from elastocal.planning.search import Cover, CoverSelection, Selection, technique
 from elastocal.planning.search_pool import SearchPool
-from elastocal.planning.surface import Finding, Surface
+from elastocal.planning.surface import OF_WRONG_MESHES, Surface
 from elastocal.progress import Progress, silent
-from elastocal.wording import phrase, sentences
 
 _SURFACE, _SEARCH = "surface", "search"
 """Stages under which progress is reported, beside `CANDIDATES` and `VISITING`."""
@@ -161,7 +161,7 @@ def make_plan(
         comparison=compared,
         pool=_pool(sampled.pool),
         findings=(
-            *(each.message for each in findings),
+            *findings,
             *_notes(cell, sampled.pool, search),
             *_shortages(poses),
             *unseen_bumps([pose.seen_by for pose in poses]),
@@ -179,7 +179,7 @@ def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, .
     if found >= wanted:
         return
     refused = ", ".join(f"{name} {pool.refused[name]}" for name in pool.commonest_refusals)
-    odd = [f.message for f in findings if f.kind in ("tiny", "inches", "inverted")]
+    odd = [each for each in findings if each.kind in OF_WRONG_MESHES]
     why = "; ".join([*odd, pool.advice])
     short = f", and {wanted} poses are wanted (search.poses)" if wanted > 1 else ""
     raise PlanningError(
@@ -215,59 +215,71 @@ def _choose(
     )
 
 
-def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[str, ...]:
+FEW_CANDIDATES = Kind(
+    "plan.few-candidates",
+    "only {found} of {wanted} candidates were found among {sampled} points; most of"
+    " the others were refused by {checks}; {advice}",
+    shown={"checks": " and ".join},
+)
+NOT_COVERED = Kind(
+    "plan.not-covered",
+    "d_max of {d_max} mm was not reached: the worst-covered candidate is {radius} mm"
+    " from the nearest of {poses} poses",
+    shown=dict.fromkeys(("d_max", "radius"), as_number(".4g", 1e3)),
+)
+NO_D_MAX = Kind(
+    "plan.no-d-max", "{name} knows no d_max: it chose as many poses as cover needs for it"
+)
+ASSUMED = Kind("plan.assumed", "assumed, {field}: {reason}")
+MOVE_STATION = Kind(
+    "plan.move-station",
+    "{shortage}; no station sees enough poses beside: move or add one, or plan more poses",
+)
+
+
+def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[Finding, ...]:
     """Return what a user should know of how the poses were found, a line each."""
-    notes: list[str] = []
+    notes: list[Finding] = []
     wanted = cell.file.search.pool
     if len(pool.postures) < wanted:
         notes.append(
-            phrase(
-                "only {found} of {wanted} candidates were found among {sampled} points; most of"
-                " the others were refused by {checks}; {advice}",
+            FEW_CANDIDATES(
                 found=len(pool.postures),
                 wanted=wanted,
                 sampled=pool.sampled,
-                checks=" and ".join(pool.commonest_refusals[:2]),
+                checks=pool.commonest_refusals[:2],
                 advice=pool.advice,
             )
         )
     if search.d_max is not None and not search.covered:
         notes.append(
-            phrase(
-                "d_max of {d_max} mm was not reached: the worst-covered candidate is {radius} mm"
-                " from the nearest of {poses} poses",
-                d_max=f"{1e3 * search.d_max:.4g}",
-                radius=f"{1e3 * search.covering_radius:.4g}",
-                poses=len(search.order),
-            )
+            NOT_COVERED(d_max=search.d_max, radius=search.covering_radius, poses=len(search.order))
         )
     if search.d_max is not None and not isinstance(technique(search.name), Cover):
-        notes.append(
-            phrase(
-                "{name} knows no d_max: it chose as many poses as cover needs for it",
-                name=search.name,
-            )
-        )
-    notes.extend(f"assumed, {text}" for text in _assumptions(cell))
+        notes.append(NO_D_MAX(name=search.name))
+    notes.extend(_assumptions(cell))
     notes.extend(unjudged_limits(cell))
     return tuple(notes)
 
 
-def _shortages(poses: tuple[PoseRecord, ...]) -> Iterator[str]:
+def _shortages(poses: tuple[PoseRecord, ...]) -> Iterator[Finding]:
     """Yield each station that no choice of stations gives enough poses to be registered."""
     for station, few in registration_shortages([pose.seen_by for pose in poses]).items():
-        advice = phrase("no station sees enough poses beside: move or add one, or plan more poses")
-        yield sentences((shortage_text(station, few), advice), "; ")
+        yield MOVE_STATION(shortage=station_shortage(station, few))
 
 
-def _assumptions(cell: Cell) -> list[str]:
+def _assumptions(cell: Cell) -> list[Finding]:
     """Return what the robot's description assumes and the cell file does not replace."""
     given = set()
     if cell.file.limits.torque.values:
         given.add("effort")
     if cell.file.motion.speed:
         given.add("velocity")
-    return [f"{a.field}: {a.reason}" for a in cell.robot.assumptions if a.field not in given]
+    return [
+        ASSUMED(field=each.field, reason=each.reason)
+        for each in cell.robot.assumptions
+        if each.field not in given
+    ]
 
 
 def robot_record(cell: Cell) -> RobotRecord:

@@ -17,11 +17,13 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.files import sha256, write_json
+from elastocal.findings import Finding
 from elastocal.planning.production import ProductionRecord
 from elastocal.records import read_json, record, to_data
 from elastocal.results import Result, brief_repr
 
-_SCHEMA = "elastocal.plan/1"
+_SCHEMA = "elastocal.plan/2"
+_OLDER = ("elastocal.plan/1",)
 PLAN = "plan.json"
 """Name of the plan in its folder."""
 POOL = "pool.nc"
@@ -202,7 +204,7 @@ class PoolRecord:
     """The check that refused most points."""
 
 
-@record(_SCHEMA)
+@record(_SCHEMA, reads=_OLDER)
 class PlanResult(Result):
     """The calibration poses of a cell: what ``plan.json`` holds, but for its hash."""
 
@@ -218,8 +220,8 @@ class PlanResult(Result):
     search: SearchRecord
     comparison: ComparisonRecord | None
     pool: PoolRecord
-    findings: tuple[str, ...]
-    """Findings that a user should know, a line each."""
+    findings: tuple[Finding, ...]
+    """What a user should know; sentences alone in files of version 1."""
     production: ProductionRecord | None = None
     """None in a cell that names no process."""
 
@@ -250,7 +252,7 @@ class PlanResult(Result):
         return self.total_time * poses / len(self.poses)
 
 
-@record(_SCHEMA)
+@record(_SCHEMA, reads=_OLDER)
 class _WrittenPlan(PlanResult):
     """A plan as it stands in its file."""
 
@@ -258,14 +260,14 @@ class _WrittenPlan(PlanResult):
     """See `_content_hash`."""
 
 
-def _content_hash(plan: PlanResult) -> str:
+def _content_hash(plan: PlanResult, schema: str = _SCHEMA) -> str:
     """Return a SHA-256 over everything that a plan says, by which a change by hand is found.
 
     It is taken over the numbers as they are read: line breaks and the way a number is written do
     not count, the order of load cases does. A key that earlier versions did not write counts only
     where it says something.
     """
-    data = to_data(plan)
+    data = to_data(plan, stored=True) | {"schema": schema}
     if plan.contact.straight_time is None:
         del data["contact"]["straight_time"]
     if plan.production is None:
@@ -287,7 +289,7 @@ def write_plan(folder: Path, plan: PlanResult) -> Path:
     """
     path = Path(folder) / PLAN
     check_plan(plan, str(path))
-    data = to_data(plan)
+    data = to_data(plan, stored=True)
     write_json(path, {"schema": data.pop("schema"), "sha256": _content_hash(plan), **data})
     return path
 
@@ -308,7 +310,7 @@ def read_plan(folder: Path) -> PlanResult:
     written = read_json(path, _WrittenPlan)
     plan = PlanResult(**{each.name: getattr(written, each.name) for each in fields(PlanResult)})
     check_plan(plan, str(path))
-    if written.sha256 != _content_hash(plan):
+    if written.sha256 not in [_content_hash(plan, schema) for schema in (_SCHEMA, *_OLDER)]:
         raise SchemaError(f"{path} was changed by hand: make it anew with `elastocal plan`")
     return plan
 

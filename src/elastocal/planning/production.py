@@ -18,6 +18,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import present
+from elastocal.findings import Finding, Kind, as_number
 from elastocal.identification import (
     LEVEL_REACH,
     CalibratedLoads,
@@ -229,7 +230,46 @@ def expected_error(cell: Cell, count: int, value: float) -> ExpectedError:
     return ExpectedError(count, noise, math.hypot(noise, search.floor or 0.0))
 
 
-def _load_findings(cell: Cell) -> Iterator[str]:
+_NEWTON = as_number(".0f")
+CASE_MISSING = Kind(
+    "plan.load-case-missing",
+    "load case {case} is missing: production pushes the robot with {force} N to"
+    ' that side; add it to load_cases.cases, with {key}: "{amplitude} N"',
+    shown={"force": _NEWTON},
+)
+PUSHES_ASIDE = Kind(
+    "plan.production-pushes-aside",
+    "production pushes aside with {lateral} N, the load cases with {known} N: ask for"
+    ' load_cases.fx and fy of "{amplitude} N", which friction holds from fz of "{held}'
+    ' N" on',
+    shown={"lateral": _NEWTON, "known": _NEWTON},
+)
+PRESSES = Kind(
+    "plan.production-presses",
+    "production presses with {press} N, the load cases with {fz} N: ask for"
+    ' load_cases.fz of "{amplitude} N"',
+    shown={"press": _NEWTON, "fz": _NEWTON},
+)
+PULLS = Kind(
+    "plan.production-pulls",
+    "production pulls the tool with {force} N, which no press on a surface does: the"
+    " calibration does not cover it",
+    shown={"force": _NEWTON},
+)
+PRODUCTION_NOT_COVERED = Kind(
+    "plan.production-not-covered",
+    "production is not covered: {found}; let the external axes be searched, widen"
+    " surface.region towards it, or ask for more poses (search.poses)",
+)
+NOT_ACCURATE = Kind(
+    "plan.accuracy-not-expected",
+    "an error of {wanted} (search.accuracy) is not expected from {poses} poses:"
+    " {error} is; raise search.poses, or press harder",
+    shown={"wanted": mm, "error": mm},
+)
+
+
+def _load_findings(cell: Cell) -> Iterator[Finding]:
     """Yield where production pushes harder than the load cases, with the amplitudes to ask for."""
     process, loads = cell.process, cell.file.load_cases
     if process is None:
@@ -244,65 +284,33 @@ def _load_findings(cell: Cell) -> Iterator[str]:
     pushed = np.stack([x, -x, y, -y]).max(axis=1)
     for case, (side, key) in _SIDES.items():
         if pushed[side] > _NOTHING and not pressed.largest[0, side] > 0.0:
-            yield phrase(
-                "load case {case} is missing: production pushes the robot with {force} N to"
-                ' that side; add it to load_cases.cases, with {key}: "{amplitude} N"',
-                case=case,
-                force=f"{pushed[side]:.0f}",
-                key=key,
-                amplitude=_up(pushed[side]),
-            )
+            force = float(pushed[side])
+            yield CASE_MISSING(case=case, force=force, key=key, amplitude=_up(force))
     lateral = float(np.hypot(x, y).max())
     known = float(pressed.largest[0, :4].max())
     press = float((-z).max())
     if known > 0.0 and lateral > LEVEL_REACH * known:
         held = _up(lateral * loads.safety / loads.friction)
-        yield phrase(
-            "production pushes aside with {lateral} N, the load cases with {known} N: ask for"
-            ' load_cases.fx and fy of "{amplitude} N", which friction holds from fz of "{held}'
-            ' N" on',
-            lateral=f"{lateral:.0f}",
-            known=f"{known:.0f}",
-            amplitude=_up(lateral),
-            held=max(held, _up(loads.fz)),
+        yield PUSHES_ASIDE(
+            lateral=lateral, known=known, amplitude=_up(lateral), held=max(held, _up(loads.fz))
         )
     if press > LEVEL_REACH * loads.fz:
-        yield phrase(
-            "production presses with {press} N, the load cases with {fz} N: ask for"
-            ' load_cases.fz of "{amplitude} N"',
-            press=f"{press:.0f}",
-            fz=f"{loads.fz:.0f}",
-            amplitude=_up(press),
-        )
+        yield PRESSES(press=press, fz=float(loads.fz), amplitude=_up(press))
     if float(z.max()) > (LEVEL_REACH - 1.0) * loads.fz:
-        yield phrase(
-            "production pulls the tool with {force} N, which no press on a surface does: the"
-            " calibration does not cover it",
-            force=f"{z.max():.0f}",
-        )
+        yield PULLS(force=float(z.max()))
 
 
 def _up(force: float) -> int:
     return int(math.ceil(force / _STEP) * _STEP)
 
 
-def production_findings(cell: Cell, record: ProductionRecord | None) -> Iterator[str]:
+def production_findings(cell: Cell, record: ProductionRecord | None) -> Iterator[Finding]:
     """Yield what a user should know of production before the robot moves."""
     yield from _load_findings(cell)
     if record is None:
         return
     if not record.coverage.is_enough:
-        yield phrase(
-            "production is not covered: {found}; let the external axes be searched, widen"
-            " surface.region towards it, or ask for more poses (search.poses)",
-            found=record.coverage.sentence(),
-        )
+        yield PRODUCTION_NOT_COVERED(found=record.coverage.sentence())
     wanted, found = record.accuracy, record.expected_of(record.poses)
     if wanted is not None and found is not None and found.error > wanted:
-        yield phrase(
-            "an error of {wanted} (search.accuracy) is not expected from {poses} poses:"
-            " {error} is; raise search.poses, or press harder",
-            wanted=mm(wanted),
-            poses=record.poses,
-            error=mm(found.error),
-        )
+        yield NOT_ACCURATE(wanted=wanted, poses=record.poses, error=found.error)

@@ -7,6 +7,7 @@ import numpy as np
 
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
+from elastocal.findings import Finding, Kind
 from elastocal.planning.checks import (
     EdgeCheck,
     FlatnessCheck,
@@ -17,7 +18,6 @@ from elastocal.planning.checks import (
 from elastocal.planning.search import technique
 from elastocal.planning.surface import Surface, arm_reach, sample_uniform, tiny_finding
 from elastocal.robot import has_wrist
-from elastocal.wording import phrase
 
 _POINTS = 200
 """Points of the surface at which a place for the contact disk is looked for."""
@@ -110,7 +110,7 @@ def _require_place_for_disk(cell: Cell, surface: Surface) -> None:
         if not best > 0.0:
             short = f"{-1e3 * best:.3g} mm" if check.unit == "m" else f"{-np.degrees(best):.3g} deg"
             doubts = tiny_finding(surface, arm_reach(cell.robot))
-            advice = doubts[0].message if doubts else check.advice
+            advice = doubts[0] if doubts else check.advice
             raise PlanningError(
                 f"engagement: no place of the surface takes the contact disk (radius {radius:.4g}"
                 f" mm): of {_POINTS} points the best is {short} short of check {check.name!r};"
@@ -118,21 +118,17 @@ def _require_place_for_disk(cell: Cell, surface: Surface) -> None:
             )
 
 
-def unjudged_limits(cell: Cell) -> list[str]:
+TORQUES_UNKNOWN = Kind("plan.torques-unknown", "torques of {joints} are not known and not judged")
+NO_WRIST = Kind(
+    "plan.no-wrist",
+    "limits.wrist_angle is not judged: {name} has no six joints of which the fourth"
+    " and the sixth turn",
+)
+
+
+def unjudged_limits(cell: Cell) -> list[Finding]:
     """Return what a limit of the cell file asks for and no check can judge on this robot."""
-    notes: list[str] = []
     known = zip(cell.robot.joint_names, np.isfinite(cell.torque_limits), strict=True)
     unknown = [name for name, is_known in known if not is_known]
-    if unknown:
-        notes.append(
-            phrase("torques of {joints} are not known and not judged", joints=", ".join(unknown))
-        )
-    if not has_wrist(cell.robot):
-        notes.append(
-            phrase(
-                "limits.wrist_angle is not judged: {name} has no six joints of which the fourth"
-                " and the sixth turn",
-                name=cell.robot.name,
-            )
-        )
-    return notes
+    notes = [TORQUES_UNKNOWN(joints=unknown)] if unknown else []
+    return notes if has_wrist(cell.robot) else [*notes, NO_WRIST(name=cell.robot.name)]

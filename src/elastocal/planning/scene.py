@@ -22,8 +22,8 @@ from elastocal.cell import (
     Sphere as SphereEntry,
 )
 from elastocal.errors import PlanningError, RobotError
+from elastocal.findings import Finding, Grade, Kind
 from elastocal.planning.surface import (
-    Finding,
     ReachableFrom,
     Surface,
     arm_reach,
@@ -40,7 +40,6 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot, collision_model, tool_link
 from elastocal.robot.inverse import inverse_for
 from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere, solid_of
-from elastocal.wording import phrase
 
 _TILTED = np.radians(60.0)
 """Angle in rad between tool and last axis from which on a user is asked about it."""
@@ -223,6 +222,19 @@ def cell_surface(cell: Cell) -> Surface:
     return flipped(surface) if entry.flip_normals else surface
 
 
+NO_MASSES = Kind(
+    "plan.no-link-masses",
+    "torques are not judged: the links of robot {name} have no masses (<inertial> in its URDF)",
+    shown={"name": repr},
+)
+TILTED = Kind(
+    "plan.tool-tilted",
+    "z of the tcp, and of link {link}, points {direction}: if the tool points out of the arm,"
+    " {advice}",
+    shown={"link": repr},
+)
+
+
 def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Finding, ...]:
     """Return what a user should know of the meshes, of where the surface stands, and of the arm.
 
@@ -252,16 +264,7 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
         if key != "surface":
             found += size_findings(path, mesh.metres, key, arm_reach(cell.robot))
     if not cell.robot.has_masses and np.isfinite(cell.torque_limits).any():
-        found.append(
-            Finding(
-                "masses",
-                phrase(
-                    "torques are not judged: the links of robot {name} have no masses (<inertial>"
-                    " in its URDF)",
-                    name=repr(cell.robot.name),
-                ),
-            )
-        )
+        found.append(NO_MASSES(name=cell.robot.name))
     found += _tilted_findings(cell)
     found += mesh_findings(surface) + placement_findings(
         surface,
@@ -271,8 +274,8 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
         rng,
     )
     for finding in found:
-        if finding.fatal:
-            raise PlanningError(finding.message)
+        if finding.grade is Grade.REFUSAL:
+            raise PlanningError(finding)
     return tuple(found)
 
 
@@ -283,8 +286,7 @@ def _tilted_findings(cell: Cell) -> tuple[Finding, ...]:
         return ()
     other = tool_link(urdf)  # the flange is none of the candidates: the tcp hangs on it
     advice = "tcp.abc turns it" if other == tcp.tip else f"robot.flange is {other!r}"
-    text = f"z of the tcp, and of link {flange!r}, points {tcp.tip_direction}"
-    return (Finding("tilted", f"{text}: if the tool points out of the arm, {advice}"),)
+    return (TILTED(link=flange, direction=tcp.tip_direction, advice=advice),)
 
 
 def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:

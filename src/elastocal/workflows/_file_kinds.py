@@ -67,7 +67,7 @@ def cell_file(path: Path) -> FileDescription:
         "trackers": [tracker.name for tracker in cell.file.trackers],
         "technique": cell.technique,
         "faces": len(surface.mesh.faces),
-        "findings": [finding.message for finding in findings] + doors + refused,
+        "findings": [str(finding) for finding in findings] + doors + refused,
     }
 
 
@@ -75,7 +75,7 @@ def plan_file(path: Path) -> FileDescription:
     """Describe a plan."""
     plan = planning.read_plan(path)
     return "plan", {
-        "schema": "elastocal.plan/1",
+        "schema": "elastocal.plan/2",
         "cell": plan.cell.name,
         "robot": plan.robot.name,
         "poses": len(plan.poses),

@@ -51,7 +51,7 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
         seen = ", ".join(f"{name} {count}" for name, count in figures.stations.items())
         console.print(f"marker seen by: {seen}")
     print_remarks(console, "note", plan.findings)
-    program = figures.program.removeprefix("no program: ")
+    program = getattr(figures.program, "values", {}).get("reason", figures.program)
     console.print(f"robot program: {program}", soft_wrap=True)
     written = f"written to {figures.folder}: {', '.join(figures.files)}"
     console.print(written if figures.files else "Nothing was written.", soft_wrap=True)

@@ -8,6 +8,7 @@ from elastocal.compensation.programs.rapid_writer import RapidWriter
 from elastocal.compensation.programs.urscript_writer import UrScriptWriter
 from elastocal.compensation.programs.writer import ProgramWriter
 from elastocal.errors import PlanningError, nearest
+from elastocal.findings import Grade, Kind
 from elastocal.robot import Robot
 from elastocal.robot.catalogue import maker_of
 
@@ -40,6 +41,9 @@ def writer_named(language: str) -> ProgramWriter:
     return writer
 
 
+NOT_WRITTEN = Kind("program.not-written", "no program: {reason}", grade=Grade.NOTE)
+
+
 def choose_writer(robot: Robot, language: str | None = None) -> tuple[ProgramWriter | None, str]:
     """Return the writer for a robot, and in words why it is that one or none.
 
@@ -57,24 +61,24 @@ def choose_writer(robot: Robot, language: str | None = None) -> tuple[ProgramWri
     """
     if language is not None:
         if language.casefold() == NO_PROGRAM:
-            return None, "no program: none was asked for"
+            return None, NOT_WRITTEN(reason="none was asked for")
         writer = writer_named(language)
         writer.require_robot(robot)
         return writer, f"{writer.title}, as asked for"
     maker = maker_of(robot.name)
     if maker is None:
-        return None, (
-            f"no program: the maker of robot {robot.name!r} is not known by its name; give"
+        return None, NOT_WRITTEN(
+            reason=f"the maker of robot {robot.name!r} is not known by its name; give"
             f" --language {'|'.join(PROGRAM_WRITERS)}"
         )
     if maker not in _LANGUAGES:
-        return None, (
-            f"no program: none is written for robots of {maker}; the table (.csv) has every point,"
+        return None, NOT_WRITTEN(
+            reason=f"none is written for robots of {maker}; the table (.csv) has every point,"
             f" and --language {'|'.join(PROGRAM_WRITERS)} writes another maker's"
         )
     writer = PROGRAM_WRITERS[_LANGUAGES[maker]]
     try:
         writer.require_robot(robot)
     except PlanningError as error:
-        return None, f"no program: {error}"
+        return None, NOT_WRITTEN(reason=str(error))
     return writer, f"{writer.title}, for a robot of {maker}"

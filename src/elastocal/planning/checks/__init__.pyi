@@ -26,7 +26,7 @@ from .sight import (
     Station as Station,
     assign_stations as assign_stations,
     registration_shortages as registration_shortages,
-    shortage_text as shortage_text,
+    station_shortage as station_shortage,
     unseen_bumps as unseen_bumps,
 )
 from .singularity import SingularityCheck as SingularityCheck, WristCheck as WristCheck

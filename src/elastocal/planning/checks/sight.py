@@ -18,13 +18,14 @@ import trimesh
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import RobotError, of_kind
+from elastocal.findings import Finding, Kind, as_count
 from elastocal.planning.checks.check import PostureCheck
 from elastocal.planning.postures import Postures
 from elastocal.planning.scene import CollisionScene, fixture_bodies, tool_bodies
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
 from elastocal.shapes import Beams, Body, Mesh, SightSolid
-from elastocal.wording import counted, phrase
+from elastocal.wording import phrase
 
 MARKER_SEAT_LENGTH = 5e-3
 """Distance from the marker, in m, from which on arm and tool count: a marker sits on something."""
@@ -254,19 +255,25 @@ def registration_shortages(seen_by: Sequence[str | None]) -> dict[str, tuple[int
     return {name: few for name, few in poses.items() if len(few) < REGISTRATION_POSES}
 
 
-def shortage_text(station: str, poses: tuple[int, ...]) -> str:
+SHORTAGE = Kind(
+    "plan.station-shortage",
+    "station {station} sees {seen} of the {needed} poses that it needs to be"
+    " registered: the readings at pose {poses} will be missing",
+)
+BUMPS_UNSEEN = Kind(
+    "plan.bumps-unseen",
+    "{poses} cannot show that a tracker station was bumped by less than about 2 mm (some"
+    " thirty show 0.3 mm): see that nobody touches its stand",
+    shown={"poses": as_count("pose")},
+)
+
+
+def station_shortage(station: str, poses: tuple[int, ...]) -> Finding:
     """Return what becomes of the poses of a station that cannot be registered."""
-    return phrase(
-        "station {station} sees {seen} of the {needed} poses that it needs to be"
-        " registered: the readings at pose {poses} will be missing",
-        station=station,
-        seen=len(poses),
-        needed=REGISTRATION_POSES,
-        poses=", ".join(map(str, poses)),
-    )
+    return SHORTAGE(station=station, seen=len(poses), needed=REGISTRATION_POSES, poses=poses)
 
 
-def unseen_bumps(seen_by: Sequence[str | None]) -> tuple[str, ...]:
+def unseen_bumps(seen_by: Sequence[str | None]) -> tuple[Finding, ...]:
     """Return what poses that are so few do not show of their stations, if anything.
 
     How large a bump half way is found from 8 and from 30 poses was tried on simulated cells: the
@@ -278,15 +285,7 @@ def unseen_bumps(seen_by: Sequence[str | None]) -> tuple[str, ...]:
         The station of each pose.
     """
     count = len(seen_by)
-    if count > _FEW or not any(seen_by):
-        return ()
-    return (
-        phrase(
-            "{poses} cannot show that a tracker station was bumped by less than about 2 mm (some"
-            " thirty show 0.3 mm): see that nobody touches its stand",
-            poses=counted(count, "pose"),
-        ),
-    )
+    return () if count > _FEW or not any(seen_by) else (BUMPS_UNSEEN(poses=count),)
 
 
 def _best(margins: FloatArray, open_: BoolArray) -> IndexArray:

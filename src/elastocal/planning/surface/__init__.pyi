@@ -8,7 +8,7 @@ from .distances import (
     geodesic_distance as geodesic_distance,
 )
 from .findings import (
-    Finding as Finding,
+    OF_WRONG_MESHES as OF_WRONG_MESHES,
     ReachableFrom as ReachableFrom,
     arm_reach as arm_reach,
     first_joint_positions as first_joint_positions,

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray
+from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.meshes import load_triangles, says_inches
 from elastocal.planning.surface.contact import contact_frames
 from elastocal.planning.surface.sampling import sample_uniform
@@ -37,17 +38,65 @@ Reachable = Callable[[FloatArray], BoolArray]
 """Whether the robot reaches poses T_base_tcp, shape (pose, 4, 4), within its limits."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing that a user should know."""
-
-    kind: str
-    """``open``, ``non-manifold``, ``winding``, ``degenerate``, ``duplicate``, ``far``, ``huge``,
-    ``tiny``, ``inches``, ``inverted``, ``masses`` or ``tilted``."""
-    message: str
-    """One line."""
-    fatal: bool = False
-    """Whether planning on this surface cannot lead anywhere."""
+DEGENERATE = Kind("surface.degenerate", "{name}: {count} faces without area were left out")
+DUPLICATE = Kind("surface.duplicate", "{name}: {count} faces stood twice and were left out once")
+WINDING = Kind(
+    "surface.winding", "{name}: {count} faces were wound against their neighbours and were turned"
+)
+NON_MANIFOLD = Kind(
+    "surface.non-manifold",
+    "{name} is not a manifold: {count} edges have three faces or more, or none that"
+    " agree; the contact disk keeps away from them",
+)
+OPEN = Kind(
+    "surface.open",
+    "{name} is an open mesh with {count} edges at its border; the contact disk keeps"
+    " away from them",
+)
+FAR = Kind(
+    "surface.far",
+    "{name}: its nearest point is {gap} m from the robot, whose reach is {reach} m: is the"
+    " mesh in {unit} (surface.unit), or its pose wrong?",
+    grade=Grade.REFUSAL,
+    shown=dict.fromkeys(("gap", "reach"), as_number(".3g")),
+)
+HUGE = Kind(
+    "surface.huge",
+    "{name} is {size} m across; the reach of the robot is {reach} m: is the mesh in {unit}"
+    " (surface.unit)?",
+    grade=Grade.REFUSAL,
+    shown=dict.fromkeys(("size", "reach"), as_number(".3g")),
+)
+TINY = Kind(
+    "surface.tiny",
+    "{name} is only {size} mm across; the reach of the robot is {reach} m: is the mesh in"
+    " {unit} (surface.unit)?",
+    shown={"size": as_number(".3g", 1e3), "reach": as_number(".3g")},
+)
+INCHES = Kind(
+    "surface.inches",
+    "{name} speaks of inches and is read in {unit}: write {key}.unit: in, if it is so",
+)
+SOLID_TINY = Kind(
+    "solid.tiny",
+    "{name} is {size} m across; the reach of the robot is {reach} m: is the mesh in {unit}"
+    " ({key}.unit)?",
+    shown=dict.fromkeys(("size", "reach"), as_number(".3g")),
+)
+SOLID_HUGE = replace(SOLID_TINY, name="solid.huge")
+INSIDE_OUT = Kind(
+    "surface.inside-out",
+    "{name} is closed and inside out: its normals point inwards; set surface.flip_normals:"
+    " true to turn them",
+)
+INVERTED = Kind(
+    "surface.inverted",
+    "{name}: the normals point away from the robot's side: it reaches {front} of the points"
+    " along them and {back} against them; set surface.flip_normals: true to turn them",
+    shown=dict.fromkeys(("front", "back"), as_number(".0%")),
+)
+OF_WRONG_MESHES = frozenset(kind.name for kind in (TINY, SOLID_TINY, INCHES, INSIDE_OUT, INVERTED))
+"""Kinds that may be why no pose is found."""
 
 
 def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
@@ -58,50 +107,15 @@ def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
     surface : Surface
         The surface.
     """
-    mesh, name = surface.mesh, surface.name
-    odd = {
-        "degenerate": (
-            mesh.degenerate,
-            phrase(
-                "{name}: {count} faces without area were left out", name=name, count=mesh.degenerate
-            ),
-        ),
-        "duplicate": (
-            mesh.duplicate,
-            phrase(
-                "{name}: {count} faces stood twice and were left out once",
-                name=name,
-                count=mesh.duplicate,
-            ),
-        ),
-        "winding": (
-            surface.turned,
-            phrase(
-                "{name}: {count} faces were wound against their neighbours and were turned",
-                name=name,
-                count=surface.turned,
-            ),
-        ),
-        "non-manifold": (
-            surface.non_manifold_edges,
-            phrase(
-                "{name} is not a manifold: {count} edges have three faces or more, or none that"
-                " agree; the contact disk keeps away from them",
-                name=name,
-                count=surface.non_manifold_edges,
-            ),
-        ),
-        "open": (
-            surface.open_edges,
-            phrase(
-                "{name} is an open mesh with {count} edges at its border; the contact disk keeps"
-                " away from them",
-                name=name,
-                count=surface.open_edges,
-            ),
-        ),
-    }
-    return tuple(Finding(kind, text) for kind, (count, text) in odd.items() if count)
+    mesh = surface.mesh
+    odd = (
+        (DEGENERATE, mesh.degenerate),
+        (DUPLICATE, mesh.duplicate),
+        (WINDING, surface.turned),
+        (NON_MANIFOLD, surface.non_manifold_edges),
+        (OPEN, surface.open_edges),
+    )
+    return tuple(kind(name=surface.name, count=int(count)) for kind, count in odd if count)
 
 
 def placement_findings(
@@ -123,28 +137,12 @@ def placement_findings(
         Seeded source of randomness, for the points that are tried.
     """
     name, vertices = surface.name, surface.mesh.vertices
-    gap = np.linalg.norm(vertices[:, None] - first_joints[None], axis=2).min()
+    gap = float(np.linalg.norm(vertices[:, None] - first_joints[None], axis=2).min())
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     if not gap <= _FAR * reach:
-        text = phrase(
-            "{name}: its nearest point is {gap} m from the robot, whose reach is {reach} m: is the"
-            " mesh in {unit} (surface.unit), or its pose wrong?",
-            name=name,
-            gap=f"{gap:.3g}",
-            reach=f"{reach:.3g}",
-            unit=_misread(size, reach),
-        )
-        return (Finding("far", text, fatal=True),)
+        return (FAR(name=name, gap=gap, reach=reach, unit=_misread(size, reach)),)
     if not size <= _HUGE * reach:
-        text = phrase(
-            "{name} is {size} m across; the reach of the robot is {reach} m: is the mesh in {unit}"
-            " (surface.unit)?",
-            name=name,
-            size=f"{size:.3g}",
-            reach=f"{reach:.3g}",
-            unit=_misread(size, reach),
-        )
-        return (Finding("huge", text, fatal=True),)
+        return (HUGE(name=name, size=size, reach=reach, unit=_misread(size, reach)),)
     return tiny_finding(surface, reach) + inverted_finding(surface, reachable, rng)
 
 
@@ -159,15 +157,9 @@ def tiny_finding(surface: Surface, reach: float) -> tuple[Finding, ...]:
         Of the arm with its tool, in m.
     """
     size = float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
-    text = phrase(
-        "{name} is only {size} mm across; the reach of the robot is {reach} m: is the mesh in"
-        " {unit} (surface.unit)?",
-        name=surface.name,
-        size=f"{1e3 * size:.3g}",
-        reach=f"{reach:.3g}",
-        unit=_misread(size, reach),
-    )
-    return (Finding("tiny", text),) if size < _TINY * reach else ()
+    if not size < _TINY * reach:
+        return ()
+    return (TINY(name=surface.name, size=size, reach=reach, unit=_misread(size, reach)),)
 
 
 def _misread(size: float, reach: float) -> str:
@@ -195,13 +187,7 @@ def unit_findings(path: Path, unit: str, key: str) -> tuple[Finding, ...]:
     """
     if unit == "in" or not says_inches(path):
         return ()
-    text = phrase(
-        "{name} speaks of inches and is read in {unit}: write {key}.unit: in, if it is so",
-        name=path.name,
-        unit=unit,
-        key=key,
-    )
-    return (Finding("inches", text),)
+    return (INCHES(name=path.name, unit=unit, key=key),)
 
 
 def size_findings(path: Path, unit: float, key: str, reach: float) -> tuple[Finding, ...]:
@@ -228,16 +214,8 @@ def size_findings(path: Path, unit: float, key: str, reach: float) -> tuple[Find
     largest = _LARGEST_TOOL if key.startswith("tool") else _LARGEST_FIXTURE
     if not size > 0.0 or _SMALLEST_SOLID * reach <= size <= largest * reach:
         return ()
-    text = phrase(
-        "{name} is {size} m across; the reach of the robot is {reach} m: is the mesh in {unit}"
-        " ({key}.unit)?",
-        name=path.name,
-        size=f"{size:.3g}",
-        reach=f"{reach:.3g}",
-        unit=_misread(size, reach),
-        key=key,
-    )
-    return (Finding("tiny" if size < reach else "huge", text),)
+    kind, mistake = SOLID_TINY if size < reach else SOLID_HUGE, _misread(size, reach)
+    return (kind(name=path.name, size=size, reach=reach, unit=mistake, key=key),)
 
 
 def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> tuple[Finding, ...]:
@@ -259,26 +237,12 @@ def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> 
     if not surface.orientable:
         return ()
     if surface.closed:
-        if surface.signed_volume >= 0.0:
-            return ()
-        text = phrase(
-            "{name} is closed and inside out: its normals point inwards; set surface.flip_normals:"
-            " true to turn them",
-            name=surface.name,
-        )
-        return (Finding("inverted", text),)
+        return () if surface.signed_volume >= 0.0 else (INSIDE_OUT(name=surface.name),)
     points = sample_uniform(surface, _POINTS, rng)
     front, back = (_reached(points, sign, reachable) for sign in (1.0, -1.0))
     if not back - front > _CLEARLY:
         return ()
-    text = phrase(
-        "{name}: the normals point away from the robot's side: it reaches {front} of the points"
-        " along them and {back} against them; set surface.flip_normals: true to turn them",
-        name=surface.name,
-        front=f"{front:.0%}",
-        back=f"{back:.0%}",
-    )
-    return (Finding("inverted", text),)
+    return (INVERTED(name=surface.name, front=front, back=back),)
 
 
 def _reached(points: SurfacePoints, sign: float, reachable: Reachable) -> float:

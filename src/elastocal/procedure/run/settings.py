@@ -13,8 +13,9 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import LIGHT_CONTACT, Cell, CollisionWatch, ProcedureSettings
 from elastocal.errors import ProcedureError, present
+from elastocal.findings import Finding
 from elastocal.planning import PlanResult
-from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, shortage_text
+from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, station_shortage
 from elastocal.planning.motion import AxisMotion
 from elastocal.procedure.run.leaving import ToolLoad
 from elastocal.results import brief_repr
@@ -210,7 +211,7 @@ def check_compatible(plan: PlanResult, cell: Cell) -> None:
             raise ProcedureError(f"the plan does not fit {cell.path}: {text}; plan again")
 
 
-def registration_warnings(plan: PlanResult) -> tuple[str, ...]:
+def registration_warnings(plan: PlanResult) -> tuple[Finding, ...]:
     """Return a warning for each station that sees too few poses to be registered.
 
     Parameters
@@ -231,7 +232,7 @@ def registration_warnings(plan: PlanResult) -> tuple[str, ...]:
             f" {max(count.values())} at most: none could be registered, and no reading used; plan"
             " more poses"
         )
-    return tuple(shortage_text(station, poses) for station, poses in few.items())
+    return tuple(station_shortage(station, poses) for station, poses in few.items())
 
 
 def _about_robot(plan: PlanResult, cell: Cell) -> Iterator[str]:
