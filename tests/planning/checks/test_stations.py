@@ -7,7 +7,7 @@ from elastocal.planning.checks import (
     REGISTRATION_POSES,
     assign_stations,
     registration_shortages,
-    shortage_text,
+    station_shortage,
     unseen_bumps,
 )
 
@@ -62,4 +62,4 @@ def test_few_poses_do_not_show_a_small_bump_and_many_do():
 
 def test_a_shortage_names_station_and_poses():
     assert registration_shortages(["a", "b", "a", None, "a", "b"]) == {"b": (1, 5)}
-    assert shortage_text("b", (1, 5)).startswith("station b sees 2 of the 3 poses")
+    assert station_shortage("b", (1, 5)).startswith("station b sees 2 of the 3 poses")
