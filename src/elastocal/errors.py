@@ -88,6 +88,10 @@ class VerificationError(ElastocalError, ValueError):
     """A file that is not what it was when it was made, or not signed as it should be."""
 
 
+class PluginError(ElastocalError, RuntimeError):
+    """A plug-in of another package that cannot be used; the message names its distribution."""
+
+
 class FileAccessError(ElastocalError, OSError):
     """A file that cannot be read or written."""
 

@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import PlanningError
 from elastocal.planning.search import CRITERIA, Information, build_information
-from elastocal.planning.search.criteria import Criterion, criterion_class
+from elastocal.planning.search.criteria import Criterion
 from elastocal.planning.search.information import EPSILON
 from support.pools import RANK, dome
 
@@ -49,7 +49,7 @@ def test_an_unknown_criterion_is_refused_with_all_known_ones():
     with pytest.raises(
         PlanningError, match=r"unknown criterion 'o22'; did you mean 'o2'\? .*o5, i"
     ):
-        criterion_class("o22")
+        CRITERIA.named("o22")
 
 
 @pytest.mark.parametrize("name", DEFINITIONS)

@@ -1,13 +1,10 @@
 """The contracts that every driver keeps, and every set of devices, simulated or real."""
 
-import importlib
 import itertools
 import json
 import pkgutil
 import struct
-import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,12 +19,12 @@ from elastocal.cell import (
     polled_readings,
 )
 from elastocal.cell.devices import BeamState, Devices, Motion, SensorStatus
+from elastocal.drivers import DRIVERS
 from elastocal.drivers.net_ft.protocol import CountScale
 from elastocal.drivers.net_ft.sensor import NetFtSensor
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.records import to_data, validate
 from elastocal.sim.wire.net_ft import NetFtBox
-from elastocal.workflows._operator_and_devices import GROUP, driver_names, find_driver
 from support.simulated import CYCLE, Place, Session, example_cell, places
 
 PRESS = np.array([0.0, 0.0, -300.0])
@@ -62,32 +59,22 @@ RIGS = {
 }
 
 
-PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))
-DRIVERS = PROJECT["project"]["entry-points"][GROUP]
-"""Where each driver of ours is, by name."""
-
-
-def test_every_driver_of_ours_is_an_entry_point():
-    assert set(driver_names()) >= set(DRIVERS)
+def test_every_package_of_drivers_is_one():
     packages = {each.name for each in pkgutil.iter_modules(drivers.__path__) if each.ispkg}
     assert packages | {SIMULATED} == set(DRIVERS)
 
 
 @pytest.mark.parametrize("name", DRIVERS)
 class TestEveryDriver:
-    def test_it_is_the_object_that_its_entry_point_names(self, name):
-        module, _, attribute = DRIVERS[name].partition(":")
-        assert find_driver(name) is getattr(importlib.import_module(module), attribute)
-
     def test_it_says_what_it_makes_and_whether_it_can_hurt(self, name):
-        driver = find_driver(name)
+        driver = DRIVERS[name]
         assert driver.kinds
         assert driver.kinds <= set(KINDS)
         assert isinstance(driver.real, bool)
         assert driver.real or "arm" not in driver.kinds or name == SIMULATED
 
     def test_its_settings_are_strict_and_on_this_machine_by_default(self, name):
-        driver = find_driver(name)
+        driver = DRIVERS[name]
         for kind in driver.kinds:
             settings = driver.settings(kind)
             assert issubclass(settings, DeviceSettings)

@@ -304,7 +304,7 @@ def test_hinges_are_what_a_file_means_that_names_no_kind(tmp_path):
     name = '"name": "joint_3.x"'
     assert name in text
     (tmp_path / "odd.json").write_text(text.replace(name, f'"kind": "odd", {name}'))
-    with pytest.raises(SchemaError, match=r"springs\.2: unknown kind of spring \(allowed: hinge"):
+    with pytest.raises(SchemaError, match=r"springs\.2: unknown kind of spring 'odd' \(allowed: h"):
         read_model(tmp_path / "odd.json")
 
 

@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import chi
 
 from elastocal.errors import IdentificationError
-from elastocal.identification.options import MEDIAN_NORM, cauchy, check_loss, huber, linear
+from elastocal.identification.options import LOSSES, MEDIAN_NORM, cauchy, huber, linear
 
 
 def test_the_median_is_that_of_three_normal_components():
@@ -35,4 +35,4 @@ def test_an_unknown_loss_is_refused_with_the_nearest():
     with pytest.raises(
         IdentificationError, match=r"'couchy'; did you mean 'cauchy'.*linear, huber"
     ):
-        check_loss("couchy")
+        LOSSES.named("couchy")

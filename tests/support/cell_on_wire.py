@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 
 from elastocal.cell import BeamState, DeviceSet, DeviceSettings, Metrology, RigContext
+from elastocal.drivers import DRIVERS
 from elastocal.drivers.operator_entry.entry import OperatorEntry, OperatorEntrySettings
 from elastocal.sim.wire import LiveCell, Told, wire_servers
 from elastocal.sim.workcell import SimClock, SimulatedCell
-from elastocal.workflows._operator_and_devices import find_driver
 from support import drivers
 from support.run_cells import PlannedCell
 
@@ -67,7 +67,7 @@ class _LoopCell:
         live = LiveCell(cell, context.seed, clock)
         server = wire_servers()[asked.tracker](live, Told())
         server.start()
-        driver = find_driver(asked.tracker)
+        driver = DRIVERS.named(asked.tracker)
         settings = driver.settings("metrology").model_validate({"port": server.ports["tcp"]})
         tracker = driver.connect(
             cell, {"metrology": settings}, RigContext(clock, 0, context.start, None)

@@ -2,13 +2,12 @@
 
 from pathlib import Path
 
+from support.plugged import describe
+
 
 def install(folder: Path, monkeypatch, name: str, source: str) -> None:
     """Put a package with a driver on the path; its module has an object ``DRIVER``."""
-    info = folder / f"{name}-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[elastocal.drivers]\n{name} = {name}:DRIVER\n")
+    describe(folder, name, {"elastocal.drivers": {name: f"{name}:DRIVER"}})
     (folder / f"{name}.py").write_text(source)
     monkeypatch.syspath_prepend(str(folder))
 

@@ -23,7 +23,8 @@ from elastocal.identification import write_model
 from elastocal.procedure.derive import sensor_load
 from elastocal.robot import parse_urdf
 from elastocal.workflows.live import LiveResult
-from support import compensated, drivers
+from support import compensated
+from support.plugged import describe
 from support.simulated import example_cell
 
 CYCLE = 0.004
@@ -108,9 +109,10 @@ DRIVER = BenchDriver()
 
 def install(folder: Path, monkeypatch) -> None:
     """Let cells name the driver ``live_bench``."""
-    drivers.install(folder, monkeypatch, "live_bench_driver", "")
-    info = folder / "live_bench_driver-1.0.dist-info" / "entry_points.txt"
-    info.write_text("[elastocal.drivers]\nlive_bench = support.live_bench:DRIVER\n")
+    entry = {"live_bench": "support.live_bench:DRIVER"}
+    monkeypatch.syspath_prepend(
+        str(describe(folder, "live_bench_driver", {"elastocal.drivers": entry}))
+    )
 
 
 def write_cell(path: Path, arm: object = "live_bench", sensor: object = "live_bench") -> Path:

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from elastocal.elastic import ElasticModel, layout
-from elastocal.planning.search import Candidates
+from elastocal.planning.search import Candidates, technique
 from elastocal.sim.arm import measurement as scene
 from support import cells
 
@@ -37,3 +37,8 @@ def scattered(size: int, seed: int = 0) -> Candidates:
     """Return points of a wavy sheet, without rows."""
     u, v = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, size))
     return Candidates(np.column_stack([u, v, 0.3 * np.cos(2.0 * u) * np.sin(v)]))
+
+
+def choice(name: str) -> list[int]:
+    """Return what a technique chooses, in whatever process."""
+    return technique(name).search(dome(12), 5, np.random.default_rng(4)).order.tolist()

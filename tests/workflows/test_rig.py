@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from elastocal.cell import KINDS, DeviceSet, WallClock
-from elastocal.errors import DeviceError, SchemaError
+from elastocal.drivers import DRIVERS
+from elastocal.errors import DeviceError, PluginError, SchemaError
 from elastocal.sim.workcell import simulated_devices
-from elastocal.workflows._operator_and_devices import driver_names, find_driver, rig_of
+from elastocal.workflows._operator_and_devices import rig_of
 from support import drivers
 from support.simulated import example_cell, places
 
@@ -66,8 +67,8 @@ def mixed(**devices):
 
 
 def test_a_driver_of_another_maker_is_found_by_its_entry_point(bench):
-    assert "bench_sensor" in driver_names()
-    assert find_driver("bench_sensor") is bench.DRIVER
+    assert "bench_sensor" in DRIVERS
+    assert DRIVERS["bench_sensor"] is bench.DRIVER
 
 
 def test_what_stands_under_a_device_is_checked_by_its_driver(bench):
@@ -85,8 +86,8 @@ def test_a_driver_is_asked_only_for_what_it_makes(bench):
 
 def test_a_driver_that_cannot_be_loaded_says_why(tmp_path, monkeypatch):
     drivers.install(tmp_path, monkeypatch, "lame", "import no_such_package")
-    with pytest.raises(DeviceError, match=r"driver 'lame' cannot be loaded.*no_such_package"):
-        find_driver("lame")
+    with pytest.raises(PluginError, match=r"^driver 'lame' of lame 1.0 cannot be .*no_such_pac"):
+        DRIVERS.named("lame")
 
 
 def test_devices_of_two_drivers_share_the_clock_and_the_arm_comes_last(bench):

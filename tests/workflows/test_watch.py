@@ -292,7 +292,7 @@ def test_a_watch_of_a_cell_that_names_no_driver_is_refused(tmp_path):
     data = yaml.safe_load(example_cell("afp").path.read_text()) | {"devices": {"arm": "kuka"}}
     cell = example_cell("afp").path.with_name("other.yaml")
     cell.write_text(yaml.safe_dump(data))
-    assert "devices.arm: 'kuka' is not configured" in elastocal("watch", cell).reason
+    assert "devices.arm: unknown driver 'kuka'" in elastocal("watch", cell).reason
 
 
 def test_the_studio_shows_the_same_rows_and_ends_the_watch():

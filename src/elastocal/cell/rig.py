@@ -10,7 +10,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 from pydantic import (
     ConfigDict,
@@ -254,6 +254,7 @@ class DeviceSet:
     and connected anew. None: arm, sensor and metrology are asked."""
 
 
+@runtime_checkable
 class Driver(Protocol):
     """Makes devices of one family. An entry point of the group ``elastocal.drivers`` names it."""
 

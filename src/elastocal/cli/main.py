@@ -21,6 +21,8 @@ from typing import Any, cast, get_args
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from elastocal import plugins
+from elastocal.cli._plugged import listed_command, loaded_command
 from elastocal.cli.commands import COMMANDS
 from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
@@ -36,13 +38,15 @@ class _Commands(TyperGroup):
     """The commands, each made when it is asked for; help asks for their names and groups alone."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - as click asks
-        """Return the names of the commands, in the order of the work."""
-        return list(COMMANDS)
+        """Return the names of the commands, in the order of the work; of other packages last."""
+        return list(dict.fromkeys((*COMMANDS, *plugins.entries("command"))))
 
     def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:  # noqa: ARG002
         """Return a command; None where there is none of that name."""
         if cmd_name not in self.commands and cmd_name in COMMANDS:
             self.commands[cmd_name] = _made(cmd_name)
+        if cmd_name not in self.commands and cmd_name in plugins.entries("command"):
+            return loaded_command(cmd_name, _Command)
         return cast("TyperCommand | None", self.commands.get(cmd_name))
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -53,7 +57,8 @@ class _Commands(TyperGroup):
             setattr(sys.modules[name], kind, type(kind, (), {}))
         # A line each is drawn: their parameters are not looked for.
         whole = self.commands
-        self.commands = dict(whole) | {
+        others = plugins.entries("command").items()
+        self.commands = {name: listed_command(name, each[0]) for name, each in others} | {
             name: TyperCommand(name, help=each.summary, rich_help_panel=each.group)
             for name, each in COMMANDS.items()
         }

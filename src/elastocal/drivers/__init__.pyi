@@ -1,0 +1,1 @@
+from .registry import DRIVERS as DRIVERS

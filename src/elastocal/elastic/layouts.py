@@ -36,7 +36,8 @@ from elastocal.elastic.springs import (
     axial,
     coordinate_axis,
 )
-from elastocal.errors import SpringError, nearest
+from elastocal.errors import SpringError
+from elastocal.plugins import Registry
 from elastocal.records import StrictModel, read_yaml
 from elastocal.robot import ChainJoint, Robot
 from elastocal.units import parse_quantity
@@ -169,7 +170,7 @@ def orthogonal_axes(axis: ArrayLike) -> dict[str, tuple[float, float, float]]:
     return dict(sorted(made.items()))
 
 
-LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
+_OWN: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
     "actuated": actuated,
     "bearing": bearing,
     "bearing-joint": bearing_joint,
@@ -177,6 +178,9 @@ LAYOUTS: dict[str, Callable[[Robot], tuple[Spring, ...]]] = {
     "links": links,
     "tensor": tensor,
 }
+LAYOUTS: Registry[Callable[[Robot], tuple[Spring, ...]]] = Registry(
+    "spring layout", _OWN, SpringError
+)
 """Layouts by name."""
 
 
@@ -197,15 +201,9 @@ def layout(robot: Robot, name: str, beside: Sequence[str] = ()) -> tuple[Spring,
     SpringError
         If the name is neither a layout nor a file.
     """
-    if name in LAYOUTS:
-        return LAYOUTS[name](robot)
     path = Path(name)
-    if path.suffix not in (".yaml", ".yml"):
-        known = list(dict.fromkeys((*beside, *LAYOUTS)))
-        raise SpringError(
-            f"unknown spring layout {name!r}{nearest(name, known)}"
-            f" (allowed: {', '.join(known)}, or a .yaml file)"
-        )
+    if name in LAYOUTS or path.suffix not in (".yaml", ".yml"):
+        return LAYOUTS.named(name, beside, ", or a .yaml file")(robot)
     return tuple(spring for spring, _ in _springs_of(robot, read_springs(path)))
 
 

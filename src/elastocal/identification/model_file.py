@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import AnySpring, ElasticModel, require_possible
+from elastocal.elastic import KINDS, AnySpring, ElasticModel, require_possible
 from elastocal.errors import SchemaError, nearest
 from elastocal.files import sha256
 from elastocal.identification.calibrated import CalibratedModel, ToolChange
@@ -60,6 +60,9 @@ class CalibrateResult(Result):
     made_from: dict[str, str] = field(default_factory=dict)
     """SHA-256 of what each dataset says (`elastocal.dataset.content_sha256`), by its file; empty
     in files before it was written."""
+    needs: dict[str, str] = field(default_factory=dict)
+    """Distributions that its springs are of, beside elastocal, with the versions that made it; what
+    reads it asks for them first (`elastocal.plugins.require_distributions`)."""
 
     def __post_init__(self) -> None:
         """Refuse parts that contradict one another.
@@ -115,6 +118,7 @@ class CalibrateResult(Result):
             robot=RobotRecord(
                 robot.name, robot.urdf, robot.urdf_hash, robot.base, robot.tip, gravity
             ),
+            needs=KINDS.sources(spring.kind for spring in calibrated.model.springs),
             springs=calibrated.model.springs,
             compliance=calibrated.compliance,
             draws=calibrated.draws,

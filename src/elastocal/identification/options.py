@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, nearest
 from elastocal.options import Option
+from elastocal.plugins import Registry
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.units import parse_number
@@ -74,7 +75,7 @@ class FitOptions:
     """Number of pose-block bootstrap draws."""
 
     def __post_init__(self) -> None:
-        check_loss(self.loss)
+        LOSSES.named(self.loss)
         if self.weights not in _WEIGHTS:
             raise IdentificationError(
                 f"unknown weights {self.weights!r} (allowed: {', '.join(_WEIGHTS)})"
@@ -258,22 +259,7 @@ def cauchy(u: FloatArray) -> FloatArray:
     return np.asarray(1.0 / (1.0 + np.square(u / _CAUCHY_SCALE)))
 
 
-LOSSES: dict[str, Callable[[FloatArray], FloatArray]] = {
-    "linear": linear,
-    "huber": huber,
-    "cauchy": cauchy,
-}
-
-
-def check_loss(name: str) -> None:
-    """Refuse an unknown loss by name.
-
-    Raises
-    ------
-    IdentificationError
-        With the known ones.
-    """
-    if name not in LOSSES:
-        raise IdentificationError(
-            f"unknown loss {name!r}{nearest(name, LOSSES)} (allowed: {', '.join(LOSSES)})"
-        )
+LOSSES: Registry[Callable[[FloatArray], FloatArray]] = Registry(
+    "loss", {"linear": linear, "huber": huber, "cauchy": cauchy}, IdentificationError
+)
+"""Losses by name."""

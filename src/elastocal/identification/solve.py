@@ -18,7 +18,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification._least_squares import minimise, minimise_certified
-from elastocal.identification.options import LOSSES, MEDIAN_NORM, check_loss
+from elastocal.identification.options import LOSSES, MEDIAN_NORM
 from elastocal.identification.problem import Problem, column_scaling
 from elastocal.results import brief_repr
 
@@ -82,10 +82,9 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
     IdentificationError
         If nothing can be identified, or the solver did not reach the optimum.
     """
-    check_loss(loss)
+    weigh = LOSSES.named(loss)
     if loss == "linear":
         return _solve_linear(problem, np.ones(len(problem)))
-    weigh = LOSSES[loss]
     weight, settled = np.ones(len(problem)), False
     for _ in range(_ITERATIONS):
         solution = _solve_linear(problem, weight)

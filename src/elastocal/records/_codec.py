@@ -15,6 +15,7 @@ from elastocal import files
 from elastocal.errors import SchemaError
 from elastocal.files import read_text
 from elastocal.findings import Finding
+from elastocal.plugins import require_distributions
 from elastocal.records._json import SEAL, json_sha256, parse_json, require_seal
 
 T = TypeVar("T")
@@ -198,6 +199,8 @@ def _unstated(cls: Any, data: Any, what: str, schema: str = "") -> Any:
         check_schema(data.pop("schema", None), schema, what, older)
         if cls.__dict__.get("__sealed__"):
             data.pop(SEAL, None)
+        # First, or what they added would be told to be unknown.
+        require_distributions(data.get("needs"), what)
     if isinstance(data, dict) and dataclasses.is_dataclass(cls):
         for name, inner in _stating_fields(cls):
             if data.get(name) is not None:

@@ -12,6 +12,7 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
+from elastocal import plugins
 from elastocal.errors import ReportError
 from elastocal.records import parse_json
 from elastocal.wording import Phrase
@@ -104,7 +105,10 @@ def language_of(code: str, option: str = "--language") -> Language:
     if code == "en":
         return Language(code)
     file = resources.files("elastocal.report").joinpath("words", f"{code}.json")
-    return Language(code, parse_json(file.read_text(encoding="utf-8"), file.name))
+    catalogue = parse_json(file.read_text(encoding="utf-8"), file.name)
+    for words in plugins.load_all("words", code):
+        catalogue = {**words, **catalogue}
+    return Language(code, catalogue)
 
 
 ENGLISH = language_of("en")

@@ -1,24 +1,18 @@
 """The operator and the devices that a run needs.
 
-The person at the cell is an argument, never a question asked from below. `find_driver` is the only
+The person at the cell is an argument, never a question asked from below. `rig_of` is the only
 place that picks simulator or driver.
 """
 
 import contextlib
-import importlib
-import importlib.util
-import pkgutil
 import socket
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from importlib.metadata import entry_points
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
-from elastocal import drivers
 from elastocal.cell import (
     KINDS,
-    SIMULATED,
     Arming,
     Cell,
     Clock,
@@ -34,7 +28,8 @@ from elastocal.cell import (
     RobotArm,
     WallClock,
 )
-from elastocal.errors import DeviceError, ElastocalError, ProcedureError, nearest
+from elastocal.drivers import DRIVERS
+from elastocal.errors import DeviceError, ElastocalError, PluginError, ProcedureError
 from elastocal.procedure import Progress as RunProgress
 from elastocal.records import validate
 from elastocal.results import brief_repr
@@ -96,44 +91,6 @@ class Unattended:
     def supervise(self, poses: int) -> Iterator[Supervision]:  # noqa: ARG002 - the protocol's form
         """Watch nothing."""
         yield Supervision(lambda _step: None, lambda: False)
-
-
-GROUP = "elastocal.drivers"
-"""Group of entry points that name drivers."""
-
-
-def driver_names() -> tuple[str, ...]:
-    """Return the names of all drivers: ours, then those of packages that are installed here."""
-    found = pkgutil.iter_modules(drivers.__path__)
-    # What several drivers share is a module beside their packages.
-    own = [SIMULATED, *sorted(module.name for module in found if module.ispkg)]
-    others = {entry.name for entry in entry_points(group=GROUP)} - set(own)
-    return (*own, *sorted(others))
-
-
-def find_driver(name: str) -> Driver:
-    """Return the driver of a name.
-
-    Ours are found in the source tree too, where nothing is installed.
-
-    Raises
-    ------
-    DeviceError
-        If there is none, or it lacks a package that it needs.
-    """
-    known = driver_names()
-    if name not in known:
-        listed = f"{nearest(name, known)} (known: {', '.join(known)})"
-        raise DeviceError(f"{name!r} is not configured{listed}")
-    try:
-        if name == SIMULATED:
-            return cast("Driver", importlib.import_module("elastocal.sim").DRIVER)
-        if importlib.util.find_spec(f"{drivers.__name__}.{name}") is not None:
-            return cast("Driver", importlib.import_module(f"{drivers.__name__}.{name}").DRIVER)
-        (entry,) = entry_points(group=GROUP, name=name)
-        return cast("Driver", entry.load())
-    except ImportError as error:
-        raise DeviceError(f"driver {name!r} cannot be loaded: {error}") from error
 
 
 @brief_repr
@@ -362,8 +319,8 @@ def rig_of(cell: Cell) -> Rig:
     for kind in ("sensor", "metrology", "arm"):
         choice, place = choices.by_kind[kind], f"{cell.path}: devices.{kind}"
         try:
-            driver = found.get(choice.driver) or find_driver(choice.driver)
-        except DeviceError as error:
+            driver = found.get(choice.driver) or DRIVERS.named(choice.driver)
+        except (DeviceError, PluginError) as error:
             raise DeviceError(f"{place}: {error}") from error
         if kind not in driver.kinds:
             makes = ", ".join(sorted(driver.kinds))

@@ -4,6 +4,7 @@ from .correct import (
 )
 from .languages import (
     NO_PROGRAM as NO_PROGRAM,
+    PROGRAM_WRITERS as PROGRAM_WRITERS,
     choose_writer as choose_writer,
 )
 from .path_program import (

@@ -1,21 +1,24 @@
 """Languages of robot controllers, and which one a robot is programmed in."""
 
-from collections.abc import Mapping
-
 from elastocal.compensation.programs.fanuc_writer import FanucWriter
 from elastocal.compensation.programs.krl_writer import KrlWriter
 from elastocal.compensation.programs.rapid_writer import RapidWriter
 from elastocal.compensation.programs.urscript_writer import UrScriptWriter
 from elastocal.compensation.programs.writer import ProgramWriter
-from elastocal.errors import PlanningError, nearest
+from elastocal.errors import PlanningError
 from elastocal.findings import Grade, Kind
+from elastocal.plugins import Registry
 from elastocal.robot import Robot
 from elastocal.robot.catalogue import maker_of
 
-PROGRAM_WRITERS: Mapping[str, ProgramWriter] = {
-    writer.language: writer
-    for writer in (KrlWriter(), RapidWriter(), FanucWriter(), UrScriptWriter())
-}
+PROGRAM_WRITERS: Registry[ProgramWriter] = Registry(
+    "program language",
+    {
+        writer.language: writer
+        for writer in (KrlWriter(), RapidWriter(), FanucWriter(), UrScriptWriter())
+    },
+    PlanningError,
+)
 """Writers of programs by their language."""
 NO_PROGRAM = "none"
 """Asks for no program, where a language is asked for."""
@@ -31,14 +34,7 @@ def writer_named(language: str) -> ProgramWriter:
     PlanningError
         If there is none, with those that there are.
     """
-    writer = PROGRAM_WRITERS.get(language.casefold())
-    if writer is None:
-        known = ", ".join((*PROGRAM_WRITERS, NO_PROGRAM))
-        raise PlanningError(
-            f"no programs are written in {language!r}: the languages are {known}"
-            f"{nearest(language, (*PROGRAM_WRITERS, NO_PROGRAM))}"
-        )
-    return writer
+    return PROGRAM_WRITERS.named(language.casefold(), (NO_PROGRAM,))
 
 
 NOT_WRITTEN = Kind("program.not-written", "no program: {reason}", grade=Grade.NOTE)

@@ -1,41 +1,52 @@
 """Every kind of spring by the word that files have for it."""
 
+import json
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from pydantic import Discriminator, Tag
+from pydantic import Discriminator, PlainValidator, Tag, TypeAdapter
 
 from elastocal.elastic.springs.gear import Gear
 from elastocal.elastic.springs.hinge import Hinge
 from elastocal.elastic.springs.spring import Spring, Unit
 from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SpringError
+from elastocal.plugins import Registry
 
 DEFAULT_KIND = "hinge"
 """Kind of a spring whose kind a file does not name."""
 
-KINDS: dict[str, type[Spring]] = {DEFAULT_KIND: Hinge, "gear": Gear, "tensor": Tensor}
+KINDS: Registry[type[Spring]] = Registry(
+    "kind of spring", {DEFAULT_KIND: Hinge, "gear": Gear, "tensor": Tensor}, SpringError
+)
 """Kinds of springs by the word that files have for them."""
+
+
+_OTHER = "<other>"
 
 
 def _tag(spring: Any) -> str:
     """Return the tag of the class that a spring in a file is read as."""
     kind = spring.get("kind", DEFAULT_KIND) if isinstance(spring, Mapping) else DEFAULT_KIND
-    return f"<{kind}>"
+    return f"<{kind}>" if str(kind) in KINDS.own else _OTHER
+
+
+def _of_another_package(data: Any) -> Spring:
+    """Return the spring of a plug-in, which is loaded now."""
+    kind = KINDS.named(str(data["kind"]))
+    found: Spring = TypeAdapter(kind).validate_json(json.dumps(data), strict=True)
+    return found
 
 
 if TYPE_CHECKING:
     AnySpring: TypeAlias = Spring
 else:
     AnySpring = Annotated[
-        reduce(or_, (Annotated[kind, Tag(f"<{word}>")] for word, kind in KINDS.items())),
-        Discriminator(
-            _tag,
-            custom_error_type="kind",
-            custom_error_message=f"unknown kind of spring (allowed: {', '.join(KINDS)})",
-        ),
+        reduce(or_, (Annotated[kind, Tag(f"<{word}>")] for word, kind in KINDS.own.items()))
+        | Annotated[Any, PlainValidator(_of_another_package), Tag(_OTHER)],
+        Discriminator(_tag),
     ]
     """A spring of any kind, as a field of a file's record."""
 

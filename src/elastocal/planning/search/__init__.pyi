@@ -6,6 +6,7 @@ from .cover import (
 )
 from .criteria import (
     CRITERIA as CRITERIA,
+    Criterion as Criterion,
     IOptimal as IOptimal,
     o1 as o1,
 )

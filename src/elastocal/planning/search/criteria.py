@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import PlanningError, nearest
+from elastocal.errors import PlanningError
 from elastocal.planning.search.information import Information
+from elastocal.plugins import Registry
 from elastocal.results import brief_repr
 
 _CHUNK = 4096
@@ -379,22 +380,8 @@ class IOptimal(Criterion):
         return self.value(matrix) + information.products(np.linalg.solve(matrix, weighed.T))
 
 
-CRITERIA: dict[str, type[Criterion]] = {
-    criterion.name: criterion
-    for criterion in (DOptimal, AOptimal, EOptimal, O2, O3, O4, O5, IOptimal)
-}
-
-
-def criterion_class(name: str) -> type[Criterion]:
-    """Return a criterion by name.
-
-    Raises
-    ------
-    PlanningError
-        If there is none of that name.
-    """
-    if name not in CRITERIA:
-        raise PlanningError(
-            f"unknown criterion {name!r}{nearest(name, CRITERIA)} (allowed: {', '.join(CRITERIA)})"
-        )
-    return CRITERIA[name]
+_CLASSES: tuple[type[Criterion], ...] = (DOptimal, AOptimal, EOptimal, O2, O3, O4, O5, IOptimal)
+CRITERIA: Registry[type[Criterion]] = Registry(
+    "criterion", {criterion.name: criterion for criterion in _CLASSES}, PlanningError
+)
+"""Criteria by name."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PlanningError
-from elastocal.planning.search.criteria import Criterion, criterion_class
+from elastocal.planning.search.criteria import CRITERIA, Criterion
 from elastocal.planning.search.information import Information, build_information
 from elastocal.planning.search.protocol import Candidates, Selection, check_count
 from elastocal.results import brief_repr
@@ -101,7 +101,7 @@ class ExchangeSearch:
     kept: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        criterion_class(self.criterion)
+        CRITERIA.named(self.criterion)
         for what, number in (("starts", self.starts), ("cap", self.cap)):
             if not number >= 1:
                 raise PlanningError(f"{what} {number} of an exchange search: must be at least 1")
@@ -144,7 +144,7 @@ class ExchangeSearch:
             If the pool lacks the rows that the criterion needs.
         """
         rng = np.random.default_rng(0) if rng is None else rng
-        criterion = criterion_class(self.criterion).of(information)
+        criterion = CRITERIA.named(self.criterion).of(information)
         kept = _indices(list(self.kept[:count]))
         starts = [
             _with_kept(kept, rng.permutation(len(information)), count) for _ in range(self.starts)

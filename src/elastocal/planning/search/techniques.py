@@ -6,7 +6,7 @@ from functools import partial
 from numpy.random import Generator
 
 from elastocal.arrays import IndexArray
-from elastocal.errors import PlanningError, nearest
+from elastocal.errors import PlanningError
 from elastocal.planning.search.cover import Cover
 from elastocal.planning.search.criteria import CRITERIA
 from elastocal.planning.search.exchange import ExchangeSearch
@@ -17,14 +17,23 @@ from elastocal.planning.search.protocol import (
     SearchTechnique,
     check_count,
 )
+from elastocal.plugins import Registry
 
-TECHNIQUES: dict[str, Callable[[], SearchTechnique]] = {
-    "cover": Cover,
-    "ioops": partial(ExchangeSearch, "d", label="ioops"),
-    "i_optimal": partial(ExchangeSearch, "i", label="i_optimal"),
-    "random": RandomChoice,
-    **{f"exchange-{name}": partial(ExchangeSearch, name) for name in CRITERIA if name != "i"},
-}
+
+def _own_techniques() -> dict[str, Callable[[], SearchTechnique]]:
+    return {
+        "cover": Cover,
+        "ioops": partial(ExchangeSearch, "d", label="ioops"),
+        "i_optimal": partial(ExchangeSearch, "i", label="i_optimal"),
+        "random": RandomChoice,
+        # By criteria of other packages, too.
+        **{f"exchange-{name}": partial(ExchangeSearch, name) for name in CRITERIA if name != "i"},
+    }
+
+
+TECHNIQUES: Registry[Callable[[], SearchTechnique]] = Registry(
+    "search technique", _own_techniques, PlanningError
+)
 """Techniques by name, with their default options; the first is the default. ``ioops`` and
 ``exchange-d`` are the same search, under the paper's name and the criterion's."""
 
@@ -37,12 +46,7 @@ def technique(name: str) -> SearchTechnique:
     PlanningError
         If there is none of that name.
     """
-    if name not in TECHNIQUES:
-        raise PlanningError(
-            f"unknown search technique {name!r}{nearest(name, TECHNIQUES)}"
-            f" (allowed: {', '.join(TECHNIQUES)})"
-        )
-    return TECHNIQUES[name]()
+    return TECHNIQUES.named(name)()
 
 
 def growing_choices(

@@ -1,0 +1,223 @@
+"""Plug-ins of other packages: found by their entry points, in every process."""
+
+import importlib
+import json
+import multiprocessing
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from elastocal.elastic import KINDS, ElasticModel, bearing
+from elastocal.errors import ElastocalError, PluginError, SchemaError
+from elastocal.identification import LOSSES, CalibratedModel, Observability, read_model, write_model
+from elastocal.planning.search import CRITERIA, TECHNIQUES
+from elastocal.plugins import KINDS as KINDS_OF_PLUGINS, Registry
+from elastocal.report.language import language_of
+from support import plugged
+from support.cells import robot
+from support.cli import elastocal
+from support.pools import choice
+
+
+@pytest.fixture
+def examples(tmp_path, monkeypatch):
+    """The examples as if they were installed; forgotten afterwards."""
+    before = set(sys.modules)
+    for name in plugged.NAMES:
+        for folder in plugged.example(tmp_path / name, name):
+            monkeypatch.syspath_prepend(folder)
+    yield os.pathsep.join(sys.path)
+    for name in set(sys.modules) - before:
+        if name.startswith("elastocal_"):
+            del sys.modules[name]
+
+
+def offered(tmp_path, monkeypatch, source, group="elastocal.losses", name="odd"):
+    """Install a module with an entry point ``odd_module:THING``."""
+    folder = plugged.describe(tmp_path / "site", "odd-things", {group: {name: "odd_module:THING"}})
+    (folder / "odd_module.py").write_text(source)
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.delitem(sys.modules, "odd_module", raising=False)
+
+
+@pytest.mark.parametrize("kind", KINDS_OF_PLUGINS)
+def test_every_kind_has_a_registry_of_its_own_and_a_class_that_is_expected(kind):
+    form = KINDS_OF_PLUGINS[kind]
+    for place in (form.home, form.expected):
+        module, _, name = place.partition(":")
+        assert hasattr(importlib.import_module(module), name), place
+    module, _, name = form.home.partition(":")
+    registry = getattr(importlib.import_module(module), name)
+    if kind in ("command", "words"):  # of its own form: typer's, and catalogues
+        return
+    assert isinstance(registry, Registry)
+    assert registry.kind == kind
+    assert len(registry) >= len(registry.own) > 0
+
+
+def model_with_a_spring_of_another_package(path: Path) -> CalibratedModel:
+    spring = KINDS["softening"]("joint_2.soft", "joint_2", (1.0, 0.0, 0.0))
+    model = ElasticModel(robot(), (*bearing(robot()), spring))
+    n = len(model.parameters)
+    c = np.linspace(1e-7, 2e-7, n)
+    made = CalibratedModel(model, c, np.tile(c, (40, 1)), Observability(n, 1.0, (True,) * n, ()))
+    write_model(path, made)
+    return made
+
+
+def test_a_model_file_with_a_spring_of_a_plug_in_is_read_by_a_fresh_process(examples, tmp_path):
+    made = model_with_a_spring_of_another_package(tmp_path / "model.json")
+    code = (
+        "from elastocal.identification import read_model; from pathlib import Path; import sys\n"
+        "assert 'elastocal_softening' not in sys.modules\n"
+        f"print(read_model(Path({str(tmp_path / 'model.json')!r})).model.springs[-1])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": examples},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == repr(made.model.springs[-1])
+
+
+def test_a_model_file_names_the_distribution_that_it_needs(examples, tmp_path, monkeypatch):
+    file = tmp_path / "model.json"
+    made = model_with_a_spring_of_another_package(file)
+    assert read_model(file).model.springs == made.model.springs
+    with monkeypatch.context() as without:
+        without.setattr(sys, "path", [each for each in sys.path if "elastocal-" not in each])
+        with pytest.raises(PluginError, match=r"needs elastocal-softening \(made with 1\.0\), wh"):
+            read_model(file)
+
+
+def test_a_key_that_a_spring_of_a_plug_in_does_not_have_is_refused_by_its_place(examples, tmp_path):
+    file = tmp_path / "model.json"
+    model_with_a_spring_of_another_package(file)
+    text = file.read_text()
+    assert text.count('"opening": 1000.0') == 1
+    file.write_text(text.replace('"opening": 1000.0', '"opening": "wide"'))
+    with pytest.raises(SchemaError, match=r"springs\.18\.opening: Input should be a valid number"):
+        read_model(file)
+
+
+def test_a_technique_of_a_plug_in_works_in_other_processes(examples):
+    """They know it by its name, as those of a study do."""
+    assert "exchange-t" in TECHNIQUES
+    assert CRITERIA.sources(["d", "t"]) == {"elastocal-trace": "1.0"}
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(choice, ["exchange-t"]) == choice("exchange-t")
+
+
+def test_names_are_known_without_importing_a_package(examples):
+    assert {"softening", "gear"} < set(KINDS)
+    assert "softening" in KINDS
+    assert "elastocal_softening" not in sys.modules
+
+
+class TestAPlugInThatCannotBeUsed:
+    def refused(self, name="odd"):
+        with pytest.raises(PluginError) as caught:
+            LOSSES.named(name)
+        assert "\n" not in str(caught.value)
+        assert isinstance(caught.value, ElastocalError)
+        return str(caught.value)
+
+    @pytest.mark.parametrize(
+        ("source", "reason"),
+        [
+            ("import no_such_package", "ModuleNotFoundError: No module named 'no_such_package'"),
+            ("THING = ", "SyntaxError: invalid syntax"),
+            ("OTHER = 1", "AttributeError: module 'odd_module' has no attribute 'THING'"),
+            ("1 / 0", "ZeroDivisionError: division by zero"),
+        ],
+    )
+    def test_one_that_cannot_be_imported_names_its_distribution_and_why(
+        self, tmp_path, monkeypatch, source, reason
+    ):
+        offered(tmp_path, monkeypatch, source)
+        start = f"loss 'odd' of odd-things 1.0 cannot be loaded: {reason}"
+        assert self.refused().startswith(start)
+
+    def test_one_of_another_kind_names_what_it_is_not(self, tmp_path, monkeypatch):
+        offered(tmp_path, monkeypatch, "THING = 3")
+        assert self.refused() == (
+            "loss 'odd' of odd-things 1.0: odd_module:THING is not a Callable"
+        )
+        offered(tmp_path / "b", monkeypatch, "THING = len", "elastocal.springs")
+        with pytest.raises(PluginError, match="odd_module:THING is not a subclass of Spring"):
+            KINDS["odd"]
+
+    def test_two_of_one_name_are_refused_with_both_distributions(self, tmp_path, monkeypatch):
+        for name in ("first", "second"):
+            losses = {"elastocal.losses": {"odd": "math:e"}}
+            monkeypatch.syspath_prepend(str(plugged.describe(tmp_path / name, name, losses)))
+        assert self.refused() == (
+            "loss 'odd' is in first 1.0 and second 1.0: one of them has to be removed"
+        )
+
+    def test_it_harms_nothing_that_does_not_ask_for_it(self, tmp_path, monkeypatch):
+        offered(tmp_path, monkeypatch, "1 / 0")
+        assert LOSSES.named("huber") is LOSSES["huber"]
+        with pytest.raises(ElastocalError, match=r"'huber'\? .*linear, huber, cauchy, odd"):
+            LOSSES.named("hubr")
+
+    def test_a_name_of_elastocal_stays_its_own(self, tmp_path, monkeypatch):
+        own = LOSSES["huber"]
+        offered(tmp_path, monkeypatch, "THING = len", name="huber")
+        assert LOSSES["huber"] is own
+        assert list(LOSSES) == ["linear", "huber", "cauchy"]
+
+
+@pytest.mark.usefixtures("examples")
+class TestACommandOfAPlugIn:
+    def test_help_lists_it_without_importing_it(self):
+        shown = elastocal("--help").out
+        assert "softest" in shown
+        assert "elastocal-softest 1.0" in shown
+        assert "elastocal_softest" not in sys.modules
+
+    def test_its_arguments_and_options_are_those_of_its_settings(self):
+        shown = elastocal("softest", "--help").out
+        for text in ("Model file", "--most", "How many springs", "--json", "List the springs of a"):
+            assert text in shown
+        assert elastocal("softest", "--moist", 3).code == 2
+
+    def test_it_shows_blocks_and_prints_json(self, tmp_path):
+        made = model_with_a_spring_of_another_package(tmp_path / "model.json")
+        shown = elastocal("softest", tmp_path / "model.json", "--most", 2)
+        assert shown.code == 0
+        assert "yield most" in shown.err
+        last = made.model.parameter_names[-1]
+        assert f"{last} 0.200" in " ".join(shown.err.replace("│", " ").split())
+        printed = json.loads(elastocal("softest", tmp_path / "model.json", "--json").out)
+        assert next(iter(printed["springs"])) == last
+
+    def test_what_it_refuses_is_one_line(self, tmp_path):
+        refused = elastocal("softest", tmp_path / "model.json", "--most", 0)
+        assert refused.code == 1
+        assert refused.reason.endswith("--most 0 springs: must be at least 1")
+
+    def test_one_that_cannot_be_imported_names_its_distribution(self, tmp_path, monkeypatch):
+        offered(tmp_path, monkeypatch, "1 / 0", "elastocal.commands")
+        assert "odd" in elastocal("--help").out
+        reason = elastocal("odd").reason
+        assert "command 'odd' of odd-things 1.0 cannot be loaded: ZeroDivisionError" in reason
+
+    def test_its_phrases_are_said_in_german(self):
+        language_of.cache_clear()
+        import elastocal_softest
+
+        first, *_ = elastocal_softest.show(elastocal_softest.Softest("Arm", {}))
+        try:
+            assert (
+                language_of("de").say(first.text) == "Diese Federn von Arm geben am meisten nach."
+            )
+        finally:
+            language_of.cache_clear()
