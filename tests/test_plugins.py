@@ -4,6 +4,7 @@ import importlib
 import json
 import multiprocessing
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -221,3 +222,40 @@ class TestACommandOfAPlugIn:
             )
         finally:
             language_of.cache_clear()
+
+
+def passes(folder: str, python: Path | str, path: str) -> None:
+    """Run the tests of an example as its author does."""
+    done = subprocess.run(
+        [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", folder],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert " passed" in done.stdout
+
+
+@pytest.mark.parametrize("name", plugged.NAMES)
+def test_an_example_passes_the_suites_of_elastocal(name, tmp_path):
+    path = plugged.example(tmp_path, name)
+    passes(path[1], sys.executable, os.pathsep.join(path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", plugged.NAMES)
+def test_an_example_can_be_installed(name, tmp_path):
+    uv = shutil.which("uv", path=os.pathsep.join((str(Path(sys.executable).parent), os.defpath)))
+    if uv is None:
+        pytest.skip("needs uv")
+    source = shutil.copytree(plugged.EXAMPLES / name, tmp_path / name)
+    site = tmp_path / "site"
+    words = ("pip", "install", "--no-deps", "--target", site)
+    subprocess.run([uv, *words, "--python", sys.executable, source], check=True)
+    (test,) = source.glob("test_*.py")
+    alone = tmp_path / "tests"
+    alone.mkdir()
+    shutil.copy(test, alone)
+    passes(str(alone), sys.executable, str(site))

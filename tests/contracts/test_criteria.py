@@ -7,6 +7,7 @@ from elastocal.errors import PlanningError
 from elastocal.planning.search import CRITERIA, Information, build_information
 from elastocal.planning.search.criteria import Criterion
 from elastocal.planning.search.information import EPSILON
+from elastocal.testing import CriterionSuite
 from support.pools import RANK, dome
 
 NAMES = ("d", "a", "e", "o2", "o3", "o4", "o5", "i")
@@ -16,11 +17,6 @@ MONOTONIC = tuple(name for name in NAMES if name not in ("o2", "o4"))
 @pytest.fixture(scope="module")
 def information() -> Information:
     return build_information(dome(40))
-
-
-@pytest.fixture(params=NAMES)
-def criterion(request, information) -> Criterion:
-    return CRITERIA[request.param].of(information)
 
 
 def _singular_values(information, chosen) -> np.ndarray:
@@ -71,34 +67,15 @@ def test_the_i_value_is_the_mean_variance_of_predictions():
     assert value == pytest.approx(-np.mean(variance), rel=1e-9)
 
 
-class TestEveryCriterion:
-    def test_its_name_is_the_one_it_is_listed_under(self, criterion):
-        assert CRITERIA[criterion.name] is type(criterion)
+class TestEveryCriterion(CriterionSuite):
+    @pytest.fixture(params=NAMES)
+    def kind(self, request) -> type[Criterion]:
+        return CRITERIA[request.param]
 
-    @pytest.mark.parametrize("count", [0, 1, 3, 10])
-    def test_the_values_after_adding_are_those_of_the_sums(self, criterion, information, count):
-        matrix = information.matrix(np.arange(count))
-        expected = criterion.value(matrix + information.gram)
-        added = criterion.after_adding(matrix, information)
-        assert added.shape == (40,)
-        np.testing.assert_allclose(added, expected, rtol=1e-6)
-
-    @pytest.mark.parametrize("count", [0, 1, 3, 10, 30])
-    def test_no_value_after_adding_is_above_its_ceiling(self, criterion, information, count):
-        matrix = information.matrix(np.arange(count))
-        ceiling = criterion.ceiling(matrix, information)
-        if ceiling is not None:
-            values = criterion.after_adding(matrix, information)
-            assert np.all(values <= ceiling + 1e-6 * np.abs(values))
-
-    def test_many_matrices_have_the_values_of_each(self, criterion, information):
-        matrix = information.matrix(range(5)) + information.gram[:6].reshape(2, 3, RANK, RANK)
-        values = criterion.value(matrix)
-        assert values.shape == (2, 3)
-        assert values[1, 2] == pytest.approx(float(criterion.value(matrix[1, 2])), rel=1e-9)
-
-    def test_the_prior_alone_has_a_value(self, criterion, information):
-        assert np.isfinite(criterion.value(information.matrix(np.zeros(0, dtype=int))))
+    @pytest.fixture
+    def information(self, information) -> Information:
+        """Return that of an arm in place of made-up rows."""
+        return information
 
 
 @pytest.mark.parametrize("name", DEFINITIONS)

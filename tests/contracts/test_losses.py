@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.identification import LOSSES, solve
+from elastocal.testing import LossSuite
 from support.problems import planted
-
-SIZES = np.concatenate([[0.0], np.logspace(-6, 12, 400)])
 
 
 def tukey(u):
@@ -20,18 +19,10 @@ def _with_a_redescending_loss(monkeypatch):
 
 
 @pytest.mark.parametrize("name", [*LOSSES, "tukey"])
-class TestEveryLoss:
-    def test_a_perfect_reading_has_weight_one(self, name):
-        assert LOSSES[name](np.zeros(3)) == pytest.approx(1.0)
-
-    def test_weights_are_from_zero_to_one_and_never_rise(self, name):
-        weight = LOSSES[name](SIZES)
-        assert weight.shape == SIZES.shape
-        assert np.all((weight >= 0.0) & (weight <= 1.0))
-        assert np.all(np.diff(weight) <= 0.0)
-
-    def test_the_pull_of_a_reading_never_exceeds_its_size(self, name):
-        assert np.all(LOSSES[name](SIZES) * SIZES <= SIZES)
+class TestEveryLoss(LossSuite):
+    @pytest.fixture
+    def loss(self, name):
+        return LOSSES[name]
 
     def test_exact_data_give_the_planted_compliances(self, name):
         problem, truth = planted(sigma=0.0)

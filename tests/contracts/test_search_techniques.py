@@ -5,6 +5,7 @@ import pytest
 
 from elastocal.errors import ElastocalError, PlanningError
 from elastocal.planning.search import TECHNIQUES, Candidates, SearchTechnique, technique
+from elastocal.testing import TechniqueSuite
 from support.pools import dome
 
 NAMES = (
@@ -21,11 +22,6 @@ NAMES = (
     "exchange-o5",
 )
 NEEDS_ROWS = tuple(name for name in NAMES if name not in ("cover", "random"))
-
-
-@pytest.fixture(params=NAMES, scope="module")
-def searcher(request) -> SearchTechnique:
-    return technique(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -55,62 +51,15 @@ def test_an_unknown_technique_is_refused_with_the_nearest_and_all_known_ones():
         technique("iops")
 
 
-class TestEveryTechnique:
-    def test_nested_choices_begin_with_the_smaller_ones(self, searcher, pool):
-        orders = [searcher.search(pool, count, _rng()).order.tolist() for count in (3, 4, 9)]
-        if searcher.nested:
-            assert orders[2][:4] == orders[1]
-            assert orders[1][:3] == orders[0]
+class TestEveryTechnique(TechniqueSuite):
+    @pytest.fixture(params=NAMES)
+    def searcher(self, request) -> SearchTechnique:
+        return technique(request.param)
 
-    @pytest.mark.parametrize("count", [1, 2, 7, 29, 30])
-    def test_the_number_of_poses_wanted_is_chosen_none_twice(self, searcher, pool, count):
-        order = searcher.search(pool, count, _rng()).order
-        assert order.shape == (count,)
-        assert order.dtype == np.intp
-        assert len(set(order.tolist())) == count
-        assert set(order.tolist()) <= set(range(len(pool)))
-
-    def test_the_result_names_its_technique(self, searcher, pool):
-        assert searcher.search(pool, 3, _rng()).name == searcher.name
-
-    def test_every_trace_has_one_finite_value_a_pose(self, searcher, pool):
-        selection = searcher.search(pool, 8, _rng())
-        assert len(selection) == 8
-        for values in selection.trace.values():
-            assert values.shape == (8,)
-            assert np.isfinite(values).all()
-
-    def test_the_same_seed_gives_the_same_choice(self, searcher, pool):
-        first, again = (searcher.search(pool, 9, _rng()).order for _ in range(2))
-        np.testing.assert_array_equal(first, again)
-
-    def test_without_a_generator_the_choice_is_the_same_every_time(self, searcher, pool):
-        first, again = (searcher.search(pool, 5).order for _ in range(2))
-        np.testing.assert_array_equal(first, again)
-
-    def test_the_result_cannot_be_changed(self, searcher, pool):
-        selection = searcher.search(pool, 4, _rng())
-        with pytest.raises(ValueError, match="read-only"):
-            selection.order[0] = 1
-        with pytest.raises(TypeError):
-            selection.trace["more"] = np.zeros(4)
-
-    def test_poses_that_are_all_equal_are_still_chosen_once_each(self, searcher, pool):
-        same = pool.take(np.zeros(6, dtype=int))
-        assert sorted(searcher.search(same, 6, _rng()).order) == list(range(6))
-        assert len(set(searcher.search(same, 4, _rng()).order.tolist())) == 4
-
-    def test_a_pool_of_one_pose_gives_it(self, searcher, pool):
-        assert searcher.search(pool.take([3]), 1, _rng()).order.tolist() == [0]
-
-    @pytest.mark.parametrize("count", [0, -1, 31])
-    def test_a_count_that_the_pool_cannot_give_is_refused(self, searcher, pool, count):
-        with pytest.raises(PlanningError, match=rf"^{count} poses wanted from a pool of 30 cand"):
-            searcher.search(pool, count, _rng())
-
-    def test_an_empty_pool_is_refused(self, searcher):
-        with pytest.raises(PlanningError, match="1 poses wanted from a pool of 0 candidates"):
-            searcher.search(Candidates(np.zeros((0, 3))), 1, _rng())
+    @pytest.fixture
+    def pool(self, pool) -> Candidates:
+        """Return rows of an arm in place of made-up ones."""
+        return pool
 
 
 @pytest.mark.parametrize("name", NEEDS_ROWS)

@@ -10,7 +10,6 @@ import pytest
 from elastocal.compensation.online import Compensator, Reading, design
 from elastocal.elastic import KINDS, ElasticModel, Gear, Hinge, Spring, SpringLoad, Unit, unit_of
 from elastocal.elastic.known import Knowledge
-from elastocal.elastic.springs import Input
 from elastocal.elastic.springs.hinge import axial
 from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SchemaError, SpringError
@@ -24,7 +23,7 @@ from elastocal.identification import (
     write_model,
 )
 from elastocal.identification.displacement import displacement_blocks
-from elastocal.records import from_data, to_data
+from elastocal.testing import SpringSuite
 from support.cells import linkage, robot
 from support.exported import build as compiled_c, needs_gcc, written
 from support.geared import heavy_robot
@@ -95,21 +94,10 @@ def test_every_kind_of_the_library_has_a_case():
 
 
 @pytest.mark.parametrize("case", CASES)
-class TestEverySpring:
-    def test_parameters_have_names_units_scales_and_bounds(self, case):
-        spring = CASES[case]
-        names = [parameter.name for parameter in spring.parameters]
-        assert len(set(names)) == len(names)
-        if len(names) == 1:
-            assert names == [spring.name]
-        for parameter in spring.parameters:
-            assert parameter.name.startswith(spring.name)
-            assert parameter.joint == spring.joint
-            assert parameter.unit in spring.units
-            assert unit_of(parameter.unit.si) == parameter.unit
-            assert parameter.unit.shown
-            assert parameter.unit.factor > 0.0
-            assert parameter.lower < parameter.scale < np.inf
+class TestEverySpring(SpringSuite):
+    @pytest.fixture
+    def spring(self, case) -> Spring:
+        return CASES[case]
 
     def test_what_a_file_knows_of_it_is_one_number_or_a_data_sheet(self, case):
         """One number takes a stiffness, a gear K1 to K3, anything else says that it takes none."""
@@ -137,12 +125,6 @@ class TestEverySpring:
             turned = np.dot(np.array(spring.angles(load)[0], dtype=float), planted_of(spring))
             mean = np.dot(known.weights, planted_of(spring))
             assert mean == pytest.approx(turned / (high - low), rel=1e-12)
-
-    def test_it_is_a_value(self, case):
-        spring = CASES[case]
-        assert spring == replace(spring)
-        assert hash(spring) == hash(replace(spring))
-        assert spring != replace(spring, name="other")
 
     def test_columns_are_finite_differences_of_the_deflection(self, case):
         """The chain by matrix products, its virtual joints turned by what the law says."""
@@ -174,19 +156,6 @@ class TestEverySpring:
         together = ElasticModel(robot(), springs).observation_blocks(q, FORCE, MOMENT)
         alone = [ElasticModel(robot(), [s]).observation_blocks(q, FORCE, MOMENT) for s in springs]
         np.testing.assert_allclose(together, np.concatenate(alone, axis=-1), rtol=1e-12, atol=1e-9)
-
-    def test_tangents_are_finite_differences_of_the_law_and_symmetric(self, case):
-        spring = CASES[case]
-        n = len(spring.axes)
-        for torque in np.random.default_rng(4).normal(0.0, 500.0, (5, n)):
-            found = np.array(spring.tangents(SpringLoad(tuple(torque))), dtype=float)
-            for other, step in enumerate(1e-2 * np.eye(n)):
-                ahead, behind = (
-                    np.array(spring.angles(SpringLoad(tuple(torque + by)))) for by in (step, -step)
-                )
-                slope = (ahead - behind) / 2e-2
-                np.testing.assert_allclose(found[:, other], slope, rtol=1e-6, atol=1e-8)
-            np.testing.assert_allclose(found, np.swapaxes(found, 0, 1))
 
     def test_cartesian_compliance_is_the_derivative_of_the_deflection_by_the_load(self, case):
         """Of the tcp, and of a marker beside it, which a rotation moves as well."""
@@ -242,10 +211,6 @@ class TestEverySpring:
         inside = (predicted.low <= exact) & (exact <= predicted.high)
         assert inside.mean() > 0.5
 
-    def test_it_is_the_same_after_a_file(self, case):
-        spring = CASES[case]
-        assert from_data(type(spring), to_data(spring), "a file") == spring
-
     def test_names_make_statements_that_equal_the_model(self, case):
         """Load cases, each pressed from rest, and a whole step of the online compensator."""
         numbers = design(calibrated(case))
@@ -265,12 +230,6 @@ class TestEverySpring:
         reading = Reading(0.004, q.tolist(), (R.T @ FORCE[0]).tolist(), [0.0] * 3)
         _, corrected = compensator.step(compensator.start(), reading)
         assert np.all(np.isfinite(corrected.deflection))
-
-    def test_the_law_of_names_has_a_row_an_axis_and_an_entry_a_parameter(self, case):
-        spring = CASES[case]
-        names = tuple(Input(f"t{k}") for k in range(len(spring.axes)))
-        rows = spring.angles(SpringLoad(names))
-        assert [len(row) for row in rows] == [len(spring.parameters)] * len(spring.axes)
 
     @needs_gcc
     def test_exported_c_equals_python(self, case, tmp_path):
