@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.findings import Finding, Kind, as_count, as_number
 from elastocal.geometry.problem import GeometryProblem
 from elastocal.geometry.solve import GeometryFit
-from elastocal.wording import counted, phrase
 
 _NEAR = 0.02
 """Farther positions, in m, are broken beams and say nothing of where a station stands."""
@@ -23,21 +23,33 @@ _SIGMAS = 7.0
 _MOST_NAMED = 8
 
 
-def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[str, ...]:
+NO_MASSES = Kind(
+    "geometry.no-masses",
+    "the description of {name} has no masses: what the arm yields to its own weight is"
+    " not told from its geometry",
+)
+SWAPPED = Kind(
+    "geometry.markers-swapped",
+    "marker {a} and marker {b} are swapped in {rows} (counted from 0: {numbers}); they were"
+    " left out",
+    shown={"rows": as_count("row")},
+)
+MOVED = Kind(
+    "geometry.station-moved",
+    "station {name} seems to have moved by {shift} mm before row {row} (counted"
+    " from 0): give the rows from there on a name of their own in the column"
+    " 'station'",
+    shown={"name": repr, "shift": as_number(".2g", 1e3)},
+)
+
+
+def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[Finding, ...]:
     """Return what a person should know of positions, a sentence each."""
-    notes: list[str] = []
-    if not problem.robot.has_masses:
-        notes.append(
-            phrase(
-                "the description of {name} has no masses: what the arm yields to its own weight is"
-                " not told from its geometry",
-                name=problem.robot.name,
-            )
-        )
+    notes = [] if problem.robot.has_masses else [NO_MASSES(name=problem.robot.name)]
     return (*notes, *_swapped_markers(problem, fit), *_moved_stations(problem, fit))
 
 
-def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
+def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:
     """Return which markers were taken for one another, by rows whose positions were left out."""
     at, sigma, seen = fit.state, fit.sigma, problem.data.seen
     measured = np.full((*seen.shape, 3), np.nan)
@@ -46,7 +58,7 @@ def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
     in_base = np.einsum("nji,nj->ni", R, problem.measured - t)
     measured[problem.row, problem.marker] = in_base
     expected[problem.row, problem.marker] = in_base - fit.residual
-    notes: list[str] = []
+    notes: list[Finding] = []
     for a, b in combinations(range(seen.shape[1]), 2):
         apart = [
             np.linalg.norm(measured[:, one] - expected[:, other], axis=1)
@@ -55,27 +67,18 @@ def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
         swapped = (apart[0] < _SIGMAS * sigma) & (apart[1] < _SIGMAS * sigma)
         rows = np.flatnonzero(swapped & (apart[2] > _SIGMAS * sigma))
         if len(rows):
-            notes.append(
-                phrase(
-                    "marker {a} and marker {b} are swapped in {rows} (counted from 0: {numbers});"
-                    " they were left out",
-                    a=a + 1,
-                    b=b + 1,
-                    rows=counted(len(rows), "row"),
-                    numbers=_named(rows),
-                )
-            )
+            notes.append(SWAPPED(a=a + 1, b=b + 1, rows=len(rows), numbers=_named(rows)))
     return notes
 
 
-def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
+def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:
     """Return which stations stood elsewhere from some row on.
 
     What is left of the fit is explained by one rigid motion of the station, or by two with the
     best split between them; F says by how much better two are (E. S. Page, "A test for a change in
     a parameter occurring at an unknown point", Biometrika 42, 1955).
     """
-    notes: list[str] = []
+    notes: list[Finding] = []
     for index, name in enumerate(problem.data.stations):
         own = (problem.station == index) & (np.linalg.norm(fit.residual, axis=1) < _NEAR)
         points = np.flatnonzero(own)
@@ -84,16 +87,7 @@ def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[str]:
         split, F, shift = _best_split(problem, fit, points)
         if F > _STRONG and shift > _SHIFT * fit.sigma:
             row = int(problem.row[points[split]])
-            notes.append(
-                phrase(
-                    "station {name} seems to have moved by {shift} mm before row {row} (counted"
-                    " from 0): give the rows from there on a name of their own in the column"
-                    " 'station'",
-                    name=repr(name),
-                    shift=f"{1e3 * shift:.2g}",
-                    row=row,
-                )
-            )
+            notes.append(MOVED(name=name, shift=float(shift), row=row))
     return notes
 
 

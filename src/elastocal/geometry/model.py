@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, SchemaError
+from elastocal.findings import Finding
 from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
 from elastocal.geometry.ladder import GeometryLadder
 from elastocal.geometry.mistakes import findings
@@ -31,7 +32,7 @@ from elastocal.robot import (
     with_tool,
 )
 
-SCHEMA = "elastocal.geometry/1"
+SCHEMA = "elastocal.geometry/2"
 _OFFSET = MOTION.index("offset")
 _DRAWN_TOOL = "tool_as_drawn"
 _LINE = 1e-2
@@ -91,7 +92,7 @@ class FixedParameter:
 
 
 @brief_repr
-@record(SCHEMA)
+@record(SCHEMA, reads=("elastocal.geometry/1",))
 class GeometryModel:
     """A calibrated geometry, which is also its file."""
 
@@ -115,7 +116,7 @@ class GeometryModel:
     positions: int
     """Positions of markers, blunders included."""
     provenance: str
-    findings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     """What a person should know of the positions, a sentence each."""
     T_tcp_built: FloatArray | None = None
     """The tcp as built in the tcp as described, shape (4, 4), in m; none where nobody knew where on

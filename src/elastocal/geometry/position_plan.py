@@ -17,6 +17,7 @@ from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import PlanningError, present
+from elastocal.findings import Finding, Kind
 from elastocal.geometry.arm import ArmErrors
 from elastocal.geometry.positions import Payload, Positions
 from elastocal.geometry.problem import GeometryProblem, State
@@ -40,9 +41,8 @@ from elastocal.planning.search import Candidates, SearchTechnique, technique
 from elastocal.progress import Progress, silent
 from elastocal.records import record
 from elastocal.results import brief_repr
-from elastocal.wording import phrase
 
-_SCHEMA = "elastocal.position-plan/1"
+_SCHEMA = "elastocal.position-plan/2"
 _RUNG = "weight"
 """The errors that the poses are chosen for: places and zeros of the joints, and what they yield."""
 _POOL, _BATCH, _MOST_DRAWN = 500, 1000, 60_000
@@ -85,7 +85,7 @@ class PosesNeeded:
 
 
 @brief_repr
-@record(_SCHEMA)
+@record(_SCHEMA, reads=("elastocal.position-plan/1",))
 class PositionPlan:
     """Poses for `elastocal geometry`, in visiting order; also its file."""
 
@@ -107,7 +107,7 @@ class PositionPlan:
     """What they do not tell apart, and why."""
     expected: tuple[PosesNeeded, ...]
     """What a quarter, half and all of the poses give, taken in the order of the search."""
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
     @property
     def travel_time(self) -> float:
@@ -310,17 +310,15 @@ def _poses(cell: Cell, pool: _FreePool, visited: IndexArray) -> tuple[PositionPo
     return tuple(poses)
 
 
-def _findings(count: int, errors: int) -> tuple[str, ...]:
+FEW_POSES = Kind(
+    "positions.few-poses",
+    "{poses} poses give {coordinates} coordinates for {errors} errors of the arm: plan"
+    " {least} at least",
+)
+
+
+def _findings(count: int, errors: int) -> tuple[Finding, ...]:
     least = -(-_FEWEST * errors // 3)
     if count >= least:
         return ()
-    return (
-        phrase(
-            "{poses} poses give {coordinates} coordinates for {errors} errors of the arm: plan"
-            " {least} at least",
-            poses=count,
-            coordinates=3 * count,
-            errors=errors,
-            least=least,
-        ),
-    )
+    return (FEW_POSES(poses=count, coordinates=3 * count, errors=errors, least=least),)
