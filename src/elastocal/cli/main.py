@@ -46,7 +46,7 @@ class _Commands(TyperGroup):
         if cmd_name not in self.commands and cmd_name in COMMANDS:
             self.commands[cmd_name] = _made(cmd_name)
         if cmd_name not in self.commands and cmd_name in plugins.entries("command"):
-            return loaded_command(cmd_name, _Command)
+            return cast("TyperCommand", loaded_command(cmd_name, _Command))
         return cast("TyperCommand | None", self.commands.get(cmd_name))
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -58,10 +58,15 @@ class _Commands(TyperGroup):
         # A line each is drawn: their parameters are not looked for.
         whole = self.commands
         others = plugins.entries("command").items()
-        self.commands = {name: listed_command(name, each[0]) for name, each in others} | {
-            name: TyperCommand(name, help=each.summary, rich_help_panel=each.group)
-            for name, each in COMMANDS.items()
-        }
+        listed = {name: listed_command(name, each[0]) for name, each in others}
+        self.commands = (
+            dict(whole)
+            | listed
+            | {
+                name: TyperCommand(name, help=each.summary, rich_help_panel=each.group)
+                for name, each in COMMANDS.items()
+            }
+        )
         try:
             super().format_help(ctx, formatter)
         finally:
