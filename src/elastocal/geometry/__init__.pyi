@@ -31,3 +31,10 @@ from .positions import (
 from .problem import (
     GeometryProblem as GeometryProblem,
 )
+from .show import (
+    arm_error_table as arm_error_table,
+    axis_table as axis_table,
+    repeatability_facts as repeatability_facts,
+    rung_table as rung_table,
+    show_geometry as show_geometry,
+)

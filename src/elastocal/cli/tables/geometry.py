@@ -6,16 +6,15 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.cli.output import yellow
-from elastocal.geometry import GeometryAccuracy, GeometryModel, GeometryParameter, PositionPlan
+from elastocal.cli.output import print_blocks, yellow
+from elastocal.geometry import (
+    GeometryAccuracy,
+    GeometryModel,
+    PositionPlan,
+    show_geometry as shown_geometry,
+)
 from elastocal.wording import counted
 
-_UNITS = {
-    "m": (1e3, "mm"),
-    "rad": (1e3, "mrad"),
-    "rad/(N*m)": (1e6, "µrad/(N·m)"),
-    "1": (1e6, "ppm"),
-}
 _MOST_ROWS = 12
 """Rows with blunders that are named."""
 
@@ -24,22 +23,7 @@ def show_geometry(
     console: Console, model: GeometryModel, accuracy: GeometryAccuracy, out: Path
 ) -> None:
     """Print a calibrated geometry for a person."""
-    rungs = Table(title="errors at poses left out, mm", title_justify="left", box=None)
-    for heading in ("model", "unknowns", "mean", "95 %", "largest", ""):
-        rungs.add_column(heading, justify="left" if heading == "model" else "right")
-    for each in model.ladder:
-        figures = [f"{1e3 * x:.3f}" for x in vars(each.held_out).values()]
-        rungs.add_row(each.rung, str(each.unknowns), *figures, "chosen" if each.chosen else "")
-    console.print(rungs)
-    table = Table(title="errors of the arm", title_justify="left", box=None)
-    for heading in ("error", "value", "95 % interval", "unit", ""):
-        table.add_column(
-            heading, justify="right" if heading in ("value", "95 % interval") else "left"
-        )
-    for parameter in model.parameters:
-        table.add_row(*_cells(parameter))
-    console.print(table)
-    _show_accuracy(console, accuracy)
+    print_blocks(console, shown_geometry(model, accuracy))
     for finding in model.findings:
         console.print(f"{yellow('warning:')} {finding}", soft_wrap=True)
     blunders = model.blunders
@@ -54,24 +38,6 @@ def show_geometry(
     fixed = counted(len(model.fixed), "error")
     written = f"{fixed} not told apart from others; wrote {out}"
     console.print(written, soft_wrap=True)
-
-
-def _show_accuracy(console: Console, accuracy: GeometryAccuracy) -> None:
-    parts = (
-        f"{each.axis} {1e3 * each.registration.rms:.3f} to {1e3 * each.chosen.rms:.3f}"
-        for each in accuracy.axes
-    )
-    console.print(f"root mean square by axis before and after, mm: {', '.join(parts)}")
-    if poses := accuracy.poses:
-        largest = [
-            1e3 * max(getattr(each, name) for each in poses)
-            for name in ("registration", "chosen", "repeatability")
-        ]
-        console.print(
-            f"ISO 9283, {counted(len(poses), 'repeated pose')}: AP at most {largest[0]:.3f} mm"
-            f" before, {largest[1]:.3f} mm after; RP at most {largest[2]:.3f} mm",
-            soft_wrap=True,
-        )
 
 
 def show_position_plan(console: Console, plan: PositionPlan, folder: Path) -> None:
@@ -95,15 +61,3 @@ def show_position_plan(console: Console, plan: PositionPlan, folder: Path) -> No
     refused = ", ".join(f"{name} {number}" for name, number in plan.refused.items())
     console.print(f"{plan.drawn} postures drawn; refused by {refused}", soft_wrap=True)
     console.print(f"wrote {folder}: fill the markers into its table, then elastocal geometry")
-
-
-def _cells(parameter: GeometryParameter) -> tuple[str, ...]:
-    scale, unit = _UNITS.get(parameter.unit, (1.0, parameter.unit))
-    low, high = scale * parameter.low, scale * parameter.high
-    return (
-        parameter.name,
-        f"{scale * parameter.value:.3f}",
-        f"{low:.3f} to {high:.3f}",
-        unit,
-        "" if parameter.known else "not known",
-    )

@@ -10,7 +10,16 @@ import numpy as np
 from elastocal import __version__, blocks
 from elastocal.arrays import FloatArray
 from elastocal.files import write_text
-from elastocal.geometry import GeometryAccuracy, GeometryModel, LinkNumber, PoseAccuracy
+from elastocal.geometry import (
+    GeometryAccuracy,
+    GeometryModel,
+    LinkNumber,
+    PoseAccuracy,
+    arm_error_table,
+    axis_table,
+    repeatability_facts,
+    rung_table,
+)
 from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages import render
 from elastocal.report.plots import MANY_POSITIONS, error_maps, parameter_figure
@@ -22,21 +31,6 @@ REPORT_TITLE = "Geometry report"
 """How the title of every such page in English begins."""
 _MOST_ROWS = 200
 _DEGREES = float(np.degrees(1.0))
-_AXES = dict(
-    zip(
-        ("x", "y", "z", "norm"),
-        phrases("x of the base", "y of the base", "z of the base", "distance"),
-        strict=True,
-    )
-)
-_SHOWN = {
-    "m": (1e3, "mm", 3),
-    "rad": (1e3, "mrad", 3),
-    "rad/(N*m)": (1e6, "µrad/(N·m)", 3),
-    "m/N": (1e6, "µm/N", 3),
-    "1": (1e6, "ppm", 0),
-}
-"""Factor, unit and digits in which numbers are shown."""
 _LINKS = phrase(
     "A link goes from its joint's axis to the next by Rz(theta + q) Tz(d) Tx(a) Rx(alpha) (Denavit"
     " and Hartenberg, distal frames). Where both axes are parallel as drawn, Ry(beta) follows and d"
@@ -124,36 +118,8 @@ def _result(found: GeometryFindings) -> Iterator[blocks.Block]:
         )
     )
     yield blocks.Bullets(model.findings, "reasons")
-    rows: list[blocks.Row] = []
-    for each in accuracy.axes:
-        for when, figures in (
-            (phrase("before"), each.registration),
-            (phrase("after"), each.chosen),
-        ):
-            bias = "" if each.axis == "norm" else f"{1e3 * figures.bias:+.3f}"
-            values = (figures.mean, figures.rms, figures.p95, figures.max)
-            rows.append((_AXES[each.axis], when, bias, *(f"{1e3 * v:.3f}" for v in values)))
-    heads = (
-        phrase("Along"),
-        "",
-        *phrases("Bias", "Mean size", "Root mean square", "95 % below", "Largest"),
-    )
-    yield blocks.Table(
-        phrase("Errors by axis in mm, of poses left out"), heads, tuple(rows), texts=2
-    )
-    yield blocks.Table(
-        phrase("Models at the same left-out poses, mm"),
-        (*phrases("Model", "Unknowns", "Mean", "95 % below", "Largest"), ""),
-        tuple(
-            (
-                each.rung,
-                each.unknowns,
-                *(f"{1e3 * value:.3f}" for value in vars(each.held_out).values()),
-                phrase("taken") if each.chosen else "",
-            )
-            for each in model.ladder
-        ),
-    )
+    yield axis_table(accuracy)
+    yield rung_table(model)
 
 
 def _maps(found: GeometryFindings) -> Iterator[blocks.Block]:
@@ -197,17 +163,7 @@ def _iso(found: GeometryFindings) -> Iterator[blocks.Block]:
             )
         )
         return
-    worst = max(poses, key=lambda each: each.repeatability)
-    yield blocks.Facts(
-        (
-            (phrase("AP before, mean"), mm(sum(each.registration for each in poses) / len(poses))),
-            (phrase("AP before, largest"), mm(max(each.registration for each in poses))),
-            (phrase("AP after, mean"), mm(sum(each.chosen for each in poses) / len(poses))),
-            (phrase("AP after, largest"), mm(max(each.chosen for each in poses))),
-            (phrase("RP, mean"), mm(sum(each.repeatability for each in poses) / len(poses))),
-            (phrase("RP, largest"), mm(worst.repeatability)),
-        )
-    )
+    yield repeatability_facts(poses)
     fewest = min(each.visits for each in poses)
     yield blocks.Paragraph(
         phrase(
@@ -263,16 +219,9 @@ def _errors(found: GeometryFindings) -> Iterator[blocks.Block]:
             " replacement."
         ),
     )
-    rows = tuple(
-        (each.name, phrase(
-            "known") if each.known else phrase(
-            "not known"), *_number(each.value, each.unit),
-         _span(each.low, each.high, each.unit))
-        for each in model.parameters
-    )  # fmt: skip
-    heads = (phrase("Error"), "", *phrases("Value", "Unit", "95 % interval"))
-    table = blocks.Table(phrase("Errors of the arm"), heads, rows, texts=2)
-    yield blocks.Details(phrase("All errors in numbers ({rows})", rows=len(rows)), (table,))
+    table = arm_error_table(model)
+    count = len(table.rows)
+    yield blocks.Details(phrase("All errors in numbers ({rows})", rows=count), (table,))
     fixed = tuple((each.name, each.why) for each in model.fixed)
     if fixed:
         yield blocks.Paragraph(
@@ -373,17 +322,3 @@ def _pose(T: FloatArray) -> tuple[str, ...]:
     x, y, z, a, b, c = xyzabc_from_T(T).tolist()
     lengths = (f"{1e3 * value + 0.0:.3f}" for value in (x, y, z))
     return (*lengths, *(f"{_DEGREES * value + 0.0:.4f}" for value in (a, b, c)))
-
-
-def _number(value: float, unit: str) -> tuple[str, str]:
-    scale, shown, digits = _SHOWN[unit]
-    return f"{scale * value:+.{digits}f}", shown
-
-
-def _span(low: float, high: float, unit: str) -> str:
-    scale, _, digits = _SHOWN[unit]
-    return phrase(
-        "{low} to {high}",
-        low=f"{scale * low:+.{digits}f}",
-        high=f"{scale * high:+.{digits}f}",
-    )
