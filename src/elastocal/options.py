@@ -116,18 +116,18 @@ def settings_fields(module: str, name: str) -> tuple[SettingsField, ...]:
 
 
 def summary_of(module: str, name: str) -> str:
-    """Return the docstring of a function up to its first section, by the module's source.
+    """Return the docstring of a function, or class, up to its first section, by the source.
 
     Raises
     ------
     LookupError
-        If the module has no such function.
+        If the module has neither of that name.
     """
     # A list of all commands asks for thirty: a pattern is quicker than a parser.
-    pattern = rf'^def {name}\(.*?"""(.*?)(?:\n\s*\n    [A-Z]\w+\n    ---|""")'
+    pattern = rf'^(?:def|class) {name}\b.*?"""(.*?)(?:\n\s*\n    [A-Z]\w+\n    ---|""")'
     found = re.search(pattern, _text(module), re.DOTALL | re.MULTILINE)
     if found is None:
-        raise LookupError(f"module {module} has no function {name}")
+        raise LookupError(f"module {module} has no function or class {name}")
     return _plain(found[1])
 
 
@@ -177,6 +177,8 @@ def _option(annotation: ast.expr) -> tuple[str, Option]:
         parts = annotation.slice.elts if isinstance(annotation.slice, ast.Tuple) else []
         kind, notes = parts[0], parts[1:]
         for note in notes:
+            if isinstance(note, ast.Constant):
+                return ast.unparse(kind), Option(help=str(note.value))
             if isinstance(note, ast.Call) and ast.unparse(note.func) == Option.__name__:
                 places = dict(zip(("name",), map(ast.literal_eval, note.args), strict=False))
                 words = {str(word.arg): ast.literal_eval(word.value) for word in note.keywords}

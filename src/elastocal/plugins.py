@@ -50,7 +50,8 @@ class Command(Generic[_T]):
 
     settings: type
     """A frozen dataclass. A field without a default is an argument, one with a default an option;
-    a text in its `typing.Annotated` is its help. Its docstring is the help of the command."""
+    its docstring is its help, and `elastocal.options.Option` says what differs. The docstring of
+    the class is the help of the command."""
     run: Callable[[Any], _T]
     """Does the work; what it raises is an `ElastocalError`."""
     show: Callable[[_T], Iterable[Any]]

@@ -3,14 +3,14 @@
 import inspect
 import os
 import typing
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from typer.models import ArgumentInfo
 
-from elastocal.cli.main import COMMANDS
+from elastocal.cli.commands import COMMANDS
+from elastocal.cli.generator import Command
 from elastocal.errors import FileAccessError
 from elastocal.files import filling, read_text, write_text
 from elastocal.outputs import RUN_RECORD, OutputRule, ruled
@@ -19,7 +19,6 @@ from support.cli import elastocal
 
 WRITTEN = {"out", "c", "figure", "picture", "ports", "report", "table", "urdf"}
 """Parameters that name what is written; every other path is an input."""
-FLAGS = {"map_file": "map"}
 EITHER = {"robot", "springs"}
 """Parameters that take the name of something, or a file."""
 
@@ -34,19 +33,17 @@ class Place:
     required: bool
 
 
-def _places(command: Callable[..., None]) -> list[Place]:
-    hints = typing.get_type_hints(command, include_extras=True)
-    return [
-        Place(
-            each.name,
-            ""
-            if isinstance(hints[each.name].__metadata__[0], ArgumentInfo)
-            else f"--{FLAGS.get(each.name, each.name)}",
-            each.default is each.empty,
-        )
-        for each in inspect.signature(command).parameters.values()
-        if "Path" in str(hints[each.name]) or each.name in EITHER
-    ]
+def _places(command: Command) -> list[Place]:
+    signature = inspect.signature(command.callback())
+    found = []
+    for each in signature.parameters.values():
+        kind, note = typing.get_args(each.annotation)
+        flag = "" if isinstance(note, ArgumentInfo) else (note.param_decls or (note.default,))[0]
+        # What an argument names is made where nothing is: `init`.
+        name = flag.lstrip("-") or each.name.replace("out", "folder")
+        if "Path" in str(kind) or name in EITHER:
+            found.append(Place(name, flag, each.default is each.empty))
+    return found
 
 
 PLACES = {name: _places(command) for name, command in COMMANDS.items()}
@@ -75,7 +72,7 @@ def _words(name: str, **given: Path) -> list[object]:
 
 
 def _forced(name: str) -> list[str]:
-    return ["--force"] if "force" in inspect.signature(COMMANDS[name]).parameters else []
+    return ["--force"] if "force" in inspect.signature(COMMANDS[name].callback()).parameters else []
 
 
 def _linked(path: Path) -> Path:

@@ -221,7 +221,10 @@ class TestChoice:
         assert choose_writer(catalogue.load("UR20"), "none")[0] is None
 
     def test_an_unknown_language_is_refused_with_the_known_ones(self):
-        with pytest.raises(PlanningError, match="krl, rapid, fanuc, urscript, none; did you mean"):
+        with pytest.raises(
+            PlanningError,
+            match=r"did you mean .rapid.\? \(allowed: none, krl, rapid, fanuc, urscript\)",
+        ):
             choose_writer(catalogue.load("UR20"), "rapit")
 
     def test_a_language_that_cannot_program_the_robot_is_refused_when_asked_for(self):

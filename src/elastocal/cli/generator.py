@@ -7,12 +7,14 @@ the command by the names of the fields, and what is not given is left to the set
 import inspect
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from elastocal import plugins
+from elastocal.cli import output
 from elastocal.options import CHOICES, OWN, REQUIRED, SettingsField, settings_fields, summary_of
 
 _NARROW = 20
@@ -54,16 +56,15 @@ class Command:
         """What help says of it."""
         return summary_of(self.module, self.function)
 
+    def fields(self) -> list[SettingsField]:
+        """Return the fields of its settings that a person can type."""
+        every = settings_fields(self.module, self.settings)
+        return [each for each in every if each.name not in self.hidden and _is_shown(each)]
+
     def callback(self) -> Callable[..., None]:
         """Return the function that typer makes a command of."""
-        fields = [
-            each
-            for each in settings_fields(self.module, self.settings)
-            if each.name not in self.hidden and _is_shown(each)
-        ]
-        here = (
-            () if self.more is None else settings_fields(self.more.__module__, self.more.__name__)
-        )
+        fields, more = self.fields(), self.more
+        here = () if more is None else settings_fields(more.__module__, more.__name__)
         made = {each.name: _parameter(each) for each in _in_order(fields, here)}
         made["as_json"] = inspect.Parameter(
             "as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_JSON
@@ -83,6 +84,44 @@ class Command:
         call.__signature__ = inspect.Signature(list(made.values()))  # type: ignore[attr-defined]
         call.__annotations__ = {name: each.annotation for name, each in made.items()}
         return call
+
+
+OTHERS = "Of other packages"
+"""Where help lists commands of plug-ins."""
+
+
+def plugged(name: str) -> Command:
+    """Return a command of another package; a field without a default is given by its place.
+
+    Raises
+    ------
+    PluginError
+        If it cannot be used.
+    """
+    found: plugins.Command[Any] = plugins.load("command", name)
+
+    def run(given: Given) -> None:
+        result = found.run(found.settings(**given.settings))
+        if given.as_json:
+            output.print_json(result)
+        else:
+            output.print_blocks(output.console(), found.show(result))
+
+    settings = found.settings
+    return _Plugged(OTHERS, settings.__module__, settings.__name__, settings.__name__, run)
+
+
+class _Plugged(Command):
+    """A command of another package: its settings say what it is for."""
+
+    def fields(self) -> list[SettingsField]:
+        """Return the fields; what has to be given has its place."""
+        return [
+            replace(each, option=replace(each.option, argument=True))
+            if each.default is REQUIRED
+            else each
+            for each in super().fields()
+        ]
 
 
 _JSON = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]

@@ -15,6 +15,7 @@ import inspect
 import os
 import sys
 import warnings
+from collections.abc import Iterator
 from types import ModuleType
 from typing import Any, cast, get_args
 
@@ -22,8 +23,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from elastocal import plugins
-from elastocal.cli._plugged import listed_command, loaded_command
 from elastocal.cli.commands import COMMANDS
+from elastocal.cli.generator import OTHERS, Command, plugged
 from elastocal.cli.output import visible
 from elastocal.errors import ElastocalError, FileAccessError
 from elastocal.units import parse_number
@@ -38,15 +39,13 @@ class _Commands(TyperGroup):
     """The commands, each made when it is asked for; help asks for their names and groups alone."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - as click asks
-        """Return the names of the commands, in the order of the work; of other packages last."""
+        """Return the names of all commands, in the order of the work; those of others last."""
         return list(dict.fromkeys((*COMMANDS, *plugins.entries("command"))))
 
-    def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:  # noqa: ARG002
+    def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:
         """Return a command; None where there is none of that name."""
-        if cmd_name not in self.commands and cmd_name in COMMANDS:
-            self.commands[cmd_name] = _made(cmd_name)
-        if cmd_name not in self.commands and cmd_name in plugins.entries("command"):
-            return cast("TyperCommand", loaded_command(cmd_name, _Command))
+        if cmd_name not in self.commands and cmd_name in self.list_commands(ctx):
+            self.commands[cmd_name] = _made(cmd_name, COMMANDS.get(cmd_name) or plugged(cmd_name))
         return cast("TyperCommand | None", self.commands.get(cmd_name))
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -55,24 +54,26 @@ class _Commands(TyperGroup):
         for name, kind in absent.items():
             sys.modules[name] = ModuleType(name)
             setattr(sys.modules[name], kind, type(kind, (), {}))
-        # A line each is drawn: their parameters are not looked for.
+        # A line each is drawn: their parameters are not looked for, and no plug-in is imported.
         whole = self.commands
-        others = plugins.entries("command").items()
-        listed = {name: listed_command(name, each[0]) for name, each in others}
-        self.commands = (
-            dict(whole)
-            | listed
-            | {
-                name: TyperCommand(name, help=each.summary, rich_help_panel=each.group)
-                for name, each in COMMANDS.items()
-            }
-        )
+        self.commands = dict(whole) | {
+            name: TyperCommand(name, help=help, rich_help_panel=group)
+            for name, group, help in _lines()
+        }
         try:
             super().format_help(ctx, formatter)
         finally:
             self.commands = whole
             for name in absent:
                 del sys.modules[name]
+
+
+def _lines() -> Iterator[tuple[str, str, str]]:
+    """Yield name, group and sentence of each command."""
+    yield from ((name, each.group, each.summary) for name, each in COMMANDS.items())
+    for name, entries in plugins.entries("command").items():
+        if name not in COMMANDS:
+            yield name, OTHERS, f"Of {plugins.source_of(entries[0])}."
 
 
 class _Command(TyperCommand):
@@ -112,10 +113,9 @@ app = typer.Typer(
 )
 
 
-def _made(name: str) -> TyperCommand:
+def _made(name: str, found: Command) -> TyperCommand:
     """Return a command with its parameters, as typer makes it of a function."""
     single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    found = COMMANDS[name]
     single.command(name, cls=_Command, rich_help_panel=found.group, context_settings=_HELP_BY)(
         found.callback()
     )
