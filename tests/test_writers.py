@@ -24,7 +24,7 @@ from elastocal.dataset import write as write_dataset
 from elastocal.errors import FileAccessError
 from elastocal.files import filling, write_json, write_text
 from elastocal.identification import write_model
-from elastocal.procedure.record._mcap import Topic, write_mcap
+from elastocal.procedure.record.streams import Topic, write_mcap
 from elastocal.records import LabelledArray, LabelledArrays, write_arrays
 from elastocal.report.plots import write_figure
 from elastocal.tables import write_table

@@ -25,7 +25,7 @@ from elastocal.planning.checks import (
     WristCheck,
     check_margins,
 )
-from elastocal.planning.pool_sampling import CHECKS, POINT_CHECKS, point_checks, robot_checks
+from elastocal.planning.pool import CHECKS, POINT_CHECKS, point_checks, robot_checks
 from elastocal.planning.surface import DiskFit, sample_uniform
 from elastocal.robot import Rail, Robot, on_rail
 from elastocal.shapes import Body, Box

@@ -20,8 +20,8 @@ from elastocal.cell import (
 )
 from elastocal.cell.devices import BeamState, Devices, Motion, SensorStatus
 from elastocal.drivers import DRIVERS
+from elastocal.drivers.net_ft.driver import NetFtSensor
 from elastocal.drivers.net_ft.protocol import CountScale
-from elastocal.drivers.net_ft.sensor import NetFtSensor
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.records import to_data, validate
 from elastocal.sim.wire.net_ft import NetFtBox

@@ -7,8 +7,7 @@ from elastocal.errors import RobotError
 from elastocal.robot import Rail, Robot, T_from_xyzabc, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import InverseKinematics, OpwInverse
 from elastocal.robot.inverse.arm import nearest_zero
-from elastocal.robot.inverse.numerical import NumericalInverse
-from elastocal.robot.inverse.parallel import ParallelInverse
+from elastocal.robot.inverse.numerical import NumericalInverse, ParallelInverse
 from support.urdfs import (
     CEILING,
     HALF_TURN,

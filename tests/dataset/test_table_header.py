@@ -1,6 +1,6 @@
 import pytest
 
-from elastocal.dataset._header import parse_header
+from elastocal.dataset._store import parse_header
 from elastocal.errors import DatasetError
 
 CELLS = [

@@ -1,6 +1,6 @@
 import pytest
 
-from elastocal.dataset._header import attribute_lines, cut
+from elastocal.dataset._store import attribute_lines, cut
 from elastocal.errors import DatasetError
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from elastocal.cell import BeamState, RigContext
 from elastocal.drivers.emscon import DRIVER
-from elastocal.drivers.emscon.dialogue import Dialogue, EmsconSettings
+from elastocal.drivers.emscon.driver import Dialogue, EmsconSettings
 from elastocal.drivers.emscon.packets import Answer, Code, Complaint, StatusChange
 from elastocal.drivers.stations import StationFeed
 from elastocal.errors import DeviceError

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from elastocal.drivers.line_stream.lines import (
+from elastocal.drivers.line_stream.driver import (
     LONGEST_LINE,
     AdapterFault,
     BeamLine,

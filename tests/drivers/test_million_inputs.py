@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from elastocal.drivers.emscon.packets import Code, PacketReader, command
-from elastocal.drivers.line_stream.lines import LineReader
+from elastocal.drivers.line_stream.driver import LineReader
 from elastocal.errors import DeviceError
 
 Make = Callable[[], LineReader | PacketReader]

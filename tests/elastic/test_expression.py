@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.compensation.kernel import Call
-from elastocal.compensation.kernel._laws import written
+from elastocal.compensation.kernel._statics import written
 from elastocal.compensation.kernel.program import Program, Value
 from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
 from elastocal.elastic.springs.expression import atan2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.elastic import Gear, SpringLoad
-from elastocal.elastic.friction import FrictionElements
+from elastocal.elastic.model import FrictionElements
 from elastocal.errors import SpringError
 
 GEAR = Gear("a.gear", "a", (0.0, 0.0, 1.0), knees=(400.0,), slips=(50.0, 150.0))

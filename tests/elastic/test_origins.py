@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.elastic import LAYOUTS, ElasticModel, bearing, bearing_ends
-from elastocal.elastic.origins import joint_origins, link_middles
+from elastocal.elastic.layouts import joint_origins, link_middles
 from elastocal.robot import Robot, SerialChain, catalogue
 from support.virtual_chain import ARMS
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from elastocal.elastic import ElasticModel, Gear, Hinge, SpringLoad, layout
-from elastocal.elastic.friction import FrictionElements
 from elastocal.elastic.layouts import orthogonal_axes
+from elastocal.elastic.model import FrictionElements
 from elastocal.elastic.springs.hinge import axial
 from elastocal.elastic.springs.kinds import check_springs
 from elastocal.elastic.springs.spring import as_axis

@@ -19,10 +19,10 @@ except ImportError:
 
 with atheris.instrument_imports(include=["elastocal.drivers"]):
     from elastocal.drivers.emscon.packets import Code, PacketReader, command
-    from elastocal.drivers.kuka_rsi.context_reader import read_context
+    from elastocal.drivers.kuka_rsi.context import read_context
     from elastocal.drivers.kuka_rsi.ethernet_file import check_ethernet_file
     from elastocal.drivers.kuka_rsi.messages import read_rob
-    from elastocal.drivers.line_stream.lines import LineReader
+    from elastocal.drivers.line_stream.driver import LineReader
     from elastocal.drivers.net_ft.protocol import (
         parse_calibration,
         parse_configuration,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell import WallClock
-from elastocal.drivers.emscon.dialogue import Dialogue, EmsconSettings
+from elastocal.drivers.emscon.driver import Dialogue, EmsconSettings
 from elastocal.drivers.emscon.packets import Answer, Code
 from elastocal.drivers.stations import StationFeed
 from elastocal.sim.wire import LiveCell, Told

@@ -11,8 +11,7 @@ from elastocal.drivers.kuka_rsi.corrections import PathCorrections
 from elastocal.drivers.kuka_rsi.driver import connect_arm
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.sim.wire import LiveCell, Told
-from elastocal.sim.wire._rsi_robot import RsiContext
-from elastocal.sim.wire.rsi import rsi_server
+from elastocal.sim.wire.rsi import RsiContext, rsi_server
 from support.cli import PATIENCE
 from support.simulated import QUIET, example_cell, places
 

@@ -12,8 +12,7 @@ import pytest
 from elastocal.cell import WallClock
 from elastocal.sim.wire import LiveCell
 from elastocal.sim.wire._rsi_messages import EthernetConfig
-from elastocal.sim.wire._rsi_robot import RsiContext, corrected_program
-from elastocal.sim.wire.rsi import RsiServer
+from elastocal.sim.wire.rsi import RsiContext, RsiServer, corrected_program
 from support.simulated import QUIET, example_cell
 
 RSIPI = pytest.importorskip("RSIPI", reason="rsipi is not installed")

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.planning.checks import Checks, JointLimitsCheck
-from elastocal.planning.pool import PostureSolver
-from elastocal.planning.pool_sampling import rank_base_placements
+from elastocal.planning.pool import PostureSolver, rank_base_placements
 from elastocal.robot import Rail, Robot, catalogue, on_rail, with_tool
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.arm.measurement import SphericalCap

@@ -8,7 +8,7 @@ from elastocal.cell.examples import write_example
 from elastocal.errors import PlanningError
 from elastocal.planning import (
     cell_surface,
-    pool_sampling as gathering,
+    pool as gathering,
     sample_pool,
 )
 from elastocal.planning.surface import SurfaceError

@@ -13,7 +13,7 @@ from elastocal.compensation.process import process_courses
 from elastocal.identification.production import ENOUGH
 from elastocal.planning import PlanResult, make_plan, read_plan, write_plan
 from elastocal.planning.checks import registration_shortages
-from elastocal.planning.near_production import NearProduction
+from elastocal.planning.pool import NearProduction
 from elastocal.planning.production import plan_coverage, production_findings
 from elastocal.workflows import init
 from support.by_day import some_by_day

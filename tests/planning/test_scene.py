@@ -8,7 +8,7 @@ import pytest
 from elastocal.cell import TOOLING, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.planning import cell_surface, collision_scene
-from elastocal.planning.pool_sampling import PoolBuilder
+from elastocal.planning.pool import PoolBuilder
 from elastocal.planning.surface import sample_uniform
 
 POINTS = 150

@@ -23,9 +23,8 @@ from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
 from elastocal.procedure.run.steps import ArmLocation
 from elastocal.sim.wire import LiveCell, Told, wire_servers
-from elastocal.sim.wire._rsi_robot import RsiContext
 from elastocal.sim.wire.live_cell import TruePress
-from elastocal.sim.wire.rsi import RsiServer, rsi_server
+from elastocal.sim.wire.rsi import RsiContext, RsiServer, rsi_server
 from elastocal.workflows import _operator_and_devices
 from elastocal.workflows._operator_and_devices import Supervision, Unattended
 from support.live_on_wire import free

@@ -10,9 +10,8 @@ import yaml
 
 from elastocal.cell import WallClock, load_cell
 from elastocal.sim.wire import LiveCell, Told, wire_servers
-from elastocal.sim.wire._rsi_robot import RsiContext, corrected_program
 from elastocal.sim.wire.net_ft import NetFtServer
-from elastocal.sim.wire.rsi import IPOC_START, RsiServer, rsi_server
+from elastocal.sim.wire.rsi import IPOC_START, RsiContext, RsiServer, corrected_program, rsi_server
 from support import live_bench
 from support.simulated import QUIET, example_cell
 

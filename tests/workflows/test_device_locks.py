@@ -10,7 +10,7 @@ import yaml
 from elastocal import workflows
 from elastocal.cell import DevicePlace, LocalPort
 from elastocal.drivers import kuka_rsi
-from elastocal.drivers.emscon.dialogue import EmsconSettings
+from elastocal.drivers.emscon.driver import EmsconSettings
 from elastocal.drivers.line_stream.driver import LineStreamSettings
 from elastocal.drivers.rtde.driver import RtdeSettings
 from elastocal.errors import DeviceError

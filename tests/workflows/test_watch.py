@@ -10,9 +10,9 @@ import yaml
 
 from elastocal.cell import LocalPort, RigContext, WallClock, load_cell
 from elastocal.drivers.kuka_rsi import RsiSettings
-from elastocal.drivers.kuka_rsi._listener import KukaListener
+from elastocal.drivers.kuka_rsi.driver import KukaListener
 from elastocal.drivers.rtde.driver import RtdeDriver, RtdeSettings
-from elastocal.drivers.station_link import StationLink
+from elastocal.drivers.stations import StationLink
 from elastocal.errors import DeviceError
 from elastocal.sim.wire import LiveCell
 from elastocal.sim.wire.net_ft import NetFtServer
@@ -274,7 +274,7 @@ class Refusing(StationLink):
 
 
 def test_a_line_that_is_only_watched_is_tried_again_whatever_it_said(monkeypatch):
-    monkeypatch.setattr("elastocal.drivers.station_link._AGAIN", 0.01)
+    monkeypatch.setattr("elastocal.drivers.stations._AGAIN", 0.01)
     tried = {}
     for patience in (1.0, RigContext(WallClock(), 0, 0.0, None, watches=True).patience(1.0)):
         link = Refusing("line", (), WallClock(), patience)

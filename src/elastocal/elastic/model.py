@@ -15,8 +15,21 @@ a column of ``O`` is, the spring knows (`elastocal.elastic.springs`).
 The deflection is against the unloaded arm at the *same* joints, which gravity has bent already.
 Against the arm without weight it is ``(O + S) c`` with the sag ``S c``; a displacement between a
 reference and a loaded reading, millimetres apart, holds ``S(q) - S(q_0)`` besides ``O``.
+
+Springs of one law, evaluated together, and the chain that their axes are inserted into.
+
+Friction memory: what torque friction bears depends on the way the torque took.
+
+A stop operator (the building block of Prandtl-Ishlinskii hysteresis) follows the changes of a
+torque until it slides at its limit:
+
+    s_k = clip(s_{k-1} + tau_k - tau_{k-1}, -r, r).
+
+A free motion of the joint wears the memory off: after it the state is near zero, as far as is
+known. A press that changes the torque by more than ``2 r`` wipes out whatever came before.
 """
 
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
@@ -25,18 +38,210 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.elastic._groups import AlikeSprings, Columns, assembled, group_alike, insert_springs
-from elastocal.elastic.friction import FrictionElements
-from elastocal.elastic.springs import Parameter, Spring, check_springs
+from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
 from elastocal.errors import SpringError
 from elastocal.results import brief_repr
 from elastocal.robot import (
     ChainModel,
+    InsertedJoint,
     Jacobian,
     Robot,
+    build_model,
     evaluate_jacobian,
     evaluate_weight,
 )
+
+Columns = IndexArray | slice
+"""Columns of an array; those that lie side by side as a slice, which copies nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class AlikeSprings:
+    """Springs that share a law and so are evaluated together."""
+
+    law: Spring
+    """One of them."""
+    axes: tuple[Columns, ...]
+    """For each axis of the law, the column of the Jacobian of each spring."""
+    parameters: tuple[Columns, ...]
+    """For each parameter of the law, its place in the compliance vector for each spring."""
+    friction: tuple[Columns, ...]
+    """For each friction element of the law, its place among all for each spring."""
+
+    def load(
+        self,
+        torque: FloatArray,
+        weight: FloatArray | None = None,
+        friction: FloatArray | None = None,
+    ) -> SpringLoad[FloatArray]:
+        """Return the loads of these springs.
+
+        Of torques of load and weight of shape (..., axis), friction of shape (..., element).
+        """
+        return SpringLoad(
+            tuple(torque[..., axis] for axis in self.axes),
+            () if weight is None else tuple(weight[..., axis] for axis in self.axes),
+            () if friction is None else tuple(friction[..., place] for place in self.friction),
+        )
+
+
+def insert_springs(robot: Robot, springs: Sequence[Spring]) -> tuple[ChainModel, IndexArray]:
+    """Build the chain and find the column of each axis; axial ones share that of the joint."""
+    joints = {joint.name: index for index, joint in enumerate(robot.chain.joints)}
+    axes = [axis for spring in springs for axis in spring.axes]
+    own = [axis.is_axis_of(robot.chain.joints[joints[axis.joint]]) for axis in axes]
+    inserted = [
+        InsertedJoint(
+            axis.name,
+            joints[axis.joint],
+            np.array(axis.axis),
+            axis.revolute,
+            axis.distal,
+            np.array(axis.offset),
+        )
+        for axis, shares in zip(axes, own, strict=True)
+        if not shares
+    ]
+    chain = build_model(robot.chain, inserted)
+    virtual = iter(chain.inserted_columns)
+    columns = [
+        chain.joint_columns[joints[axis.joint]] if shares else next(virtual)
+        for axis, shares in zip(axes, own, strict=True)
+    ]
+    return chain, np.array(columns, dtype=np.intp)
+
+
+def group_alike(springs: Sequence[Spring]) -> Iterator[AlikeSprings]:
+    """Group springs by their law."""
+    members: dict[Hashable, list[int]] = {}
+    for index, spring in enumerate(springs):
+        members.setdefault(spring.law, []).append(index)
+    first_axis = np.cumsum([0, *(len(spring.axes) for spring in springs)])
+    first_parameter = np.cumsum([0, *(len(spring.parameters) for spring in springs)])
+    first_element = np.cumsum([0, *(len(spring.friction_limits) for spring in springs)])
+    for indices in members.values():
+        law = springs[indices[0]]
+        yield AlikeSprings(
+            law,
+            tuple(_side_by_side(first_axis[indices] + k) for k in range(len(law.axes))),
+            tuple(_side_by_side(first_parameter[indices] + k) for k in range(len(law.parameters))),
+            tuple(
+                _side_by_side(first_element[indices] + k) for k in range(len(law.friction_limits))
+            ),
+        )
+
+
+def assembled(columns: Sequence[FloatArray], places: Sequence[Columns]) -> FloatArray:
+    """Return columns of shape (..., 3, spring) as one array, each group at its places."""
+    n = sum(column.shape[-1] for column in columns)
+    blocks = np.empty((*columns[0].shape[:-1], n))
+    for place, column in zip(places, columns, strict=True):
+        blocks[..., place] = column
+    return blocks
+
+
+def _side_by_side(columns: IndexArray) -> Columns:
+    start, stop = int(columns[0]), int(columns[-1]) + 1
+    return slice(start, stop) if np.array_equal(columns, np.arange(start, stop)) else columns
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class FrictionElements:
+    """The friction elements of all springs of a model."""
+
+    axis: IndexArray
+    """Axis, counted through the springs, whose torque each element sees, shape (element,)."""
+    limit: FloatArray
+    """Torque at which each slides, shape (element,), in N·m or N."""
+
+    @classmethod
+    def of(cls, springs: Sequence[Spring]) -> "FrictionElements":
+        """Return the elements of springs, in their order."""
+        first = np.cumsum([0, *(len(spring.axes) for spring in springs)])
+        axis = [first[k] for k, spring in enumerate(springs) for _ in spring.friction_limits]
+        limit = [limit for spring in springs for limit in spring.friction_limits]
+        return cls(np.array(axis, dtype=np.intp), np.array(limit, dtype=float))
+
+    def __len__(self) -> int:
+        return len(self.limit)
+
+    def press(self, torque: FloatArray) -> FloatArray:
+        """Return the states after a press straight from rest.
+
+        Parameters
+        ----------
+        torque : ndarray, shape (..., axis)
+            Change of the torque about each axis since friction bore none, in N·m.
+
+        Returns
+        -------
+        ndarray, shape (..., element)
+        """
+        return np.clip(torque[..., self.axis], -self.limit, self.limit)
+
+    def path(self, torque: FloatArray, start: FloatArray | None = None) -> FloatArray:
+        """Return the states along a way.
+
+        Parameters
+        ----------
+        torque : ndarray, shape (step, ..., axis)
+            Total torque about each axis at each step, in order in time, in N·m.
+        start : ndarray, shape (..., element), optional
+            States at the first step; zero, free, by default.
+
+        Returns
+        -------
+        ndarray, shape (step, ..., element)
+            States, the first being the start.
+        """
+        seen = torque[..., self.axis]
+        states = np.zeros(seen.shape)
+        if start is not None:
+            states[0] = start
+        for step, change in enumerate(np.diff(seen, axis=0), start=1):
+            states[step] = np.clip(states[step - 1] + change, -self.limit, self.limit)
+        return states
+
+    def visits(
+        self,
+        weight: FloatArray,
+        load: FloatArray,
+        visit: ArrayLike | None = None,
+        memory: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the states under loads, those of one visit one after the other in time.
+
+        Parameters
+        ----------
+        weight, load : ndarray, shape (row, axis)
+            Torque of the arm's own weight and of the load about each axis, in N·m.
+        visit : array_like, shape (row,), optional
+            Rows with one value are a visit: free before its first row, under the weight alone.
+            Default: all rows are one.
+        memory : ndarray, shape (element,), optional
+            What the visit of the first row remembers from before: states less the whole torque.
+
+        Returns
+        -------
+        states : ndarray, shape (row, element)
+            In N·m.
+        memory : ndarray, shape (element,)
+            After the last row.
+        """
+        total = weight + load
+        states = np.zeros((len(total), len(self)))
+        if not len(total):
+            return states, np.zeros(len(self)) if memory is None else memory
+        labels = np.zeros(len(total)) if visit is None else np.asarray(visit)
+        _, number = np.unique(labels, return_inverse=True)
+        order = np.argsort(number, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(number[order])) + 1):
+            remembers = memory is not None and rows[0] == 0
+            before = memory if remembers else -weight[rows[0], self.axis]
+            way = np.concatenate([np.zeros((1, total.shape[1])), total[rows]])
+            states[rows] = self.path(way, before)[1:]
+        return states, states[-1] - total[-1, self.axis]
 
 
 @brief_repr

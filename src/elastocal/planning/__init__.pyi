@@ -22,16 +22,14 @@ from .plan_result import (
 )
 from .pool import (
     BasePlacement as BasePlacement,
+    PoolBuilder as PoolBuilder,
+    sample_pool as sample_pool,
 )
 from .pool_file import (
     PoolData as PoolData,
     check_pool_of as check_pool_of,
     read_pool as read_pool,
     write_pool as write_pool,
-)
-from .pool_sampling import (
-    PoolBuilder as PoolBuilder,
-    sample_pool as sample_pool,
 )
 from .postures import (
     Postures as Postures,

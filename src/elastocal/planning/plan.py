@@ -41,9 +41,8 @@ from elastocal.planning.plan_result import (
     SearchRecord,
     Vector,
 )
-from elastocal.planning.pool import REACH_ADVICE, Pool
+from elastocal.planning.pool import REACH_ADVICE, Pool, SampledPool, sample_pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
-from elastocal.planning.pool_sampling import SampledPool, sample_pool
 from elastocal.planning.production import production_findings
 from elastocal.planning.requirements import (
     require_loads_possible_anywhere,

@@ -12,9 +12,8 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import PlanningError, present
 from elastocal.identification import RUNGS
 from elastocal.planning.checks import REGISTRATION_POSES, SightCheck, assign_stations
-from elastocal.planning.near_production import NearProduction
 from elastocal.planning.plan_result import SpreadRecord
-from elastocal.planning.pool_sampling import SampledPool
+from elastocal.planning.pool import NearProduction, SampledPool
 from elastocal.planning.postures import Postures
 from elastocal.planning.production import (
     SIGMA,

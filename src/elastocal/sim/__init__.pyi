@@ -1,10 +1,8 @@
 from .driver import (
     DRIVER as DRIVER,
 )
-from .presets import (
+from .truth import (
     PRESET_FIGURES as PRESET_FIGURES,
     PRESETS as PRESETS,
-)
-from .truth import (
     truth_of as truth_of,
 )

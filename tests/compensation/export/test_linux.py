@@ -14,7 +14,7 @@ import pytest
 from elastocal import workflows
 from elastocal.cell import load_cell
 from elastocal.compensation.export import LinuxTarget
-from elastocal.drivers.kuka_rsi._held_correction import HeldCorrection
+from elastocal.drivers.kuka_rsi.corrections import HeldCorrection
 from elastocal.drivers.kuka_rsi.messages import Arrival, IpocWatch, RobMessage
 from elastocal.errors import CompensationError, DeviceError
 from support.cli import PATIENCE

@@ -18,8 +18,7 @@ from elastocal.drivers.kuka_rsi import (
     check_controller_file,
     controller_files,
 )
-from elastocal.drivers.kuka_rsi.context import CHOICES
-from elastocal.drivers.kuka_rsi.context_reader import read_context
+from elastocal.drivers.kuka_rsi.context import CHOICES, read_context
 from elastocal.drivers.kuka_rsi.controller_files import FORMS, PROGRAMS
 from elastocal.drivers.kuka_rsi.ethernet_file import MODES
 from elastocal.errors import DeviceError

@@ -8,8 +8,8 @@ from hypothesis import given, settings, strategies as st
 
 from elastocal.cell import SensorStatus
 from elastocal.compensation.online import every_sample
+from elastocal.drivers.net_ft.driver import NetFtSensor
 from elastocal.drivers.net_ft.protocol import CountScale
-from elastocal.drivers.net_ft.sensor import NetFtSensor
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell import SimClock
 

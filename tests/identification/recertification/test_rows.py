@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from elastocal.identification.recertification import ComparedRows
-from elastocal.identification.recertification._changes import Spread, compare_rows
+from elastocal.identification.recertification.comparison import Spread, compare_rows
 from support.problems import campaign
 from support.recertified import made_up
 

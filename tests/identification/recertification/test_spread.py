@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from elastocal.identification.recertification._changes import Spread
+from elastocal.identification.recertification.comparison import Spread
 from support.recertified import made_up
 
 

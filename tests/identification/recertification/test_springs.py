@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification.recertification._changes import Spread, compare_springs, critical
+from elastocal.identification.recertification.comparison import Spread, compare_springs, critical
 from support.recertified import made_up
 
 

@@ -7,7 +7,7 @@ from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.motion import clear_retreats, mover_for
-from elastocal.planning.pool_sampling import PoolBuilder
+from elastocal.planning.pool import PoolBuilder
 from elastocal.planning.postures import retreat_joints
 from elastocal.planning.surface import sample_uniform
 

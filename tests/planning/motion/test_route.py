@@ -12,7 +12,7 @@ from elastocal.errors import PlanningError, RobotError
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.planning.motion import mover_for, plan_route
 from elastocal.planning.motion.route import _Roadmap
-from elastocal.planning.pool_sampling import PoolBuilder
+from elastocal.planning.pool import PoolBuilder
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import sample_uniform
 from support.moving import BALL, CLEARANCE, HOME, box, chain, dense, mover, pressed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import PlanningError
-from elastocal.planning.motion.tour import (
+from elastocal.planning.motion.route import (
     _ALL_EDGES,
     _MOST_NODES,
     _nearest_neighbour,

@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.cell import SensorLoad
 from elastocal.procedure.derive import LoadRow
-from elastocal.procedure.derive.findings import run_warnings
+from elastocal.procedure.derive.derivation import run_warnings
 from elastocal.procedure.derive.tool import Interval, ToolChange, ToolEstimate
 from elastocal.procedure.record import ReadingStatus
 from elastocal.procedure.registration import Blunder, Registration, StationFit

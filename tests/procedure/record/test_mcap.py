@@ -11,7 +11,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from elastocal.errors import FileAccessError, SchemaError
-from elastocal.procedure.record._mcap import Topic, read_mcap, write_mcap
+from elastocal.procedure.record.streams import Topic, read_mcap, write_mcap
 
 COUNT = 12_000
 """Of the messages of /a: with those of /b they need two chunks, and the first holds all of /b."""

@@ -16,8 +16,7 @@ from elastocal.cell import (
 )
 from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure import STREAMS_SCHEMA, PoseRecorder, read_streams
-from elastocal.procedure.record._mcap import Topic, schemas, write_mcap
-from elastocal.procedure.record.streams import Mark
+from elastocal.procedure.record.streams import Mark, Topic, schemas, write_mcap
 from support.stations import station
 
 JOINTS = ("rail", "joint 100%s")

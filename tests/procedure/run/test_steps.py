@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from elastocal.procedure.run._sequence import ACTIONS
+from elastocal.procedure.run.runner import ACTIONS
 from elastocal.procedure.run.steps import (
     MAY_TOUCH,
     ON_APPROACH_LINE,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.cell import Limits
 from elastocal.identification import CalibrationSummary, describe
 from elastocal.procedure import Event, RunSummary
-from elastocal.procedure.derive._kinds import MOVED
+from elastocal.procedure.derive.derivation import MOVED
 from elastocal.records import from_data, to_data
 from elastocal.report.document.page import SECTIONS
 from elastocal.report.document.sections import PAPER

@@ -13,8 +13,15 @@ from elastocal.sim.arm.statics import EquilibriumError
 from elastocal.sim.wire import LiveCell, Told
 from elastocal.sim.wire._pos_corr import PosCorrLimits, RsiStopError
 from elastocal.sim.wire._rsi_messages import EthernetConfig, RobWriter, SenReader
-from elastocal.sim.wire._rsi_robot import RsiContext, RsiRobot, corrected_program
-from elastocal.sim.wire.rsi import IPOC_START, RsiServer, ethernet_config, rsi_server
+from elastocal.sim.wire.rsi import (
+    IPOC_START,
+    RsiContext,
+    RsiRobot,
+    RsiServer,
+    corrected_program,
+    ethernet_config,
+    rsi_server,
+)
 from elastocal.sim.workcell import SimClock
 from support.simulated import QUIET, example_cell, places
 

@@ -1,8 +1,3 @@
-from .doubts import (
-    other_centre as other_centre,
-    other_mass as other_mass,
-    tool_doubts as tool_doubts,
-)
 from .filters import (
     Duration as Duration,
     FilterChain as FilterChain,
@@ -11,8 +6,11 @@ from .filters import (
 )
 from .mistakes import (
     SENSOR_TURNED as SENSOR_TURNED,
+    other_centre as other_centre,
+    other_mass as other_mass,
     refuse_mistakes as refuse_mistakes,
     refuse_other_readings as refuse_other_readings,
+    tool_doubts as tool_doubts,
 )
 from .postures import (
     StaticPostures as StaticPostures,

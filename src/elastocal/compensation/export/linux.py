@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from elastocal import __version__
 from elastocal.compensation.export._constants import remark
-from elastocal.compensation.export._templates import filled
+from elastocal.compensation.export.writer import filled
 from elastocal.compensation.online import Design
 from elastocal.errors import CompensationError
 from elastocal.results import brief_repr

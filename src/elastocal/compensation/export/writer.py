@@ -1,6 +1,10 @@
-"""A compensator as a folder of C: model, header, self-test, CMake file and page for integrators."""
+"""A compensator as a folder of C: model, header, self-test, CMake file and page for integrators.
+
+The templates of the exported C: texts with places between two @.
+"""
 
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 
@@ -9,7 +13,6 @@ import numpy as np
 from elastocal import __version__
 from elastocal.compensation.export._constants import checksum, constants_of, remark, turns_arcs
 from elastocal.compensation.export._selftest import selftest_tables
-from elastocal.compensation.export._templates import filled, template
 from elastocal.compensation.kernel import (
     Assignment,
     Call,
@@ -24,6 +27,26 @@ from elastocal.compensation.kernel import (
 )
 from elastocal.compensation.online import Design
 from elastocal.files import filling
+
+
+def template(name: str) -> str:
+    """Return the text of a template."""
+    return (resources.files(__package__) / "templates" / name).read_text(encoding="utf-8")
+
+
+def filled(name: str, values: dict[str, str], remembers: bool = False) -> str:
+    """Return a template with its places filled.
+
+    Lines that begin with ``@FRICTION@`` are for models that remember friction only, those with
+    ``@PLAIN@`` for the others.
+    """
+    kept, dropped = ("@FRICTION@", "@PLAIN@") if remembers else ("@PLAIN@", "@FRICTION@")
+    lines = template(name).splitlines(keepends=True)
+    text = "".join(line.removeprefix(kept) for line in lines if not line.startswith(dropped))
+    for key, value in values.items():
+        text = text.replace(f"@{key}@", value)
+    return text
+
 
 _VECTORS = {"f": "force", "m": "moment"}
 _PARTS = ("head.c", "sin_cos.c", "arc.c", "condition.c", "correct.c", "selftest.c")

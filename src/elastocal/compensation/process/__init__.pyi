@@ -13,9 +13,10 @@ from .loop import (
     air_shifts as air_shifts,
     run_courses as run_courses,
 )
-from .placement import FibrePlacement as FibrePlacement
 from .postures import (
     PROCESSES as PROCESSES,
+    FibrePlacement as FibrePlacement,
+    Roughing as Roughing,
     StiffestPosture as StiffestPosture,
     process_courses as process_courses,
     require_process as require_process,
@@ -40,7 +41,6 @@ from .result import (
     read_table as read_table,
     write_process as write_process,
 )
-from .roughing import Roughing as Roughing
 from .statistics import (
     DeviationComparison as DeviationComparison,
     DeviationStatistics as DeviationStatistics,

@@ -89,7 +89,7 @@ class SimulateProcessResult(Result):
     """File of a user's own process; empty: one of the built-in ones."""
     path_sha256: str = ""
     preset: str = ""
-    """How hard the truth of the cell is; see `elastocal.sim.presets`."""
+    """How hard the truth of the cell is; see `elastocal.sim.truth`."""
     process_stiffness: float = 0.0
     """How the force reacts to a shift along the surface's normal, in N/m; 0: forces are given."""
     notes: tuple[str, ...] = ()

@@ -5,6 +5,15 @@ commands only note what is to be done. Joint moves are the controller's (``PTP``
 release and retract are relative corrections from here, so that the tool keeps its orientation. The
 PC is no safety function: what bounds the motion in the end are POSCORR, POSCORRMON, axis limits and
 SafeOperation of the controller.
+
+How the controller takes the place where the arm stands for the programmed one.
+
+Checks of what an arm is told, before anything is begun.
+
+What one connection to a controller knows of contact and place.
+
+Nothing is known at its beginning: the program may have been started where the tool presses, and
+then the place where the correction is zero is the surface.
 """
 
 import math
@@ -16,23 +25,31 @@ from functools import partial
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Arming, ArmState, Cell, Clock, Motion as MotionState, WrenchFeed
-from elastocal.drivers.kuka_rsi import motions
-from elastocal.drivers.kuka_rsi._adoption import ADOPTS, adopt
-from elastocal.drivers.kuka_rsi._commands import (
-    CHECKS,
-    OUT,
-    SILENT,
-    SOURCE,
-    StraightMoveRules,
-    require_ready,
+from elastocal.cell import (
+    Arming,
+    ArmState,
+    Cell,
+    Clock,
+    CollisionWatch,
+    CommandChecks,
+    Motion as MotionState,
+    WrenchFeed,
 )
-from elastocal.drivers.kuka_rsi._contact import ContactMemory, feeling
-from elastocal.drivers.kuka_rsi._cycle import EXACT, Cycle, Motion, Pace, Step
+from elastocal.drivers.kuka_rsi import motions
 from elastocal.drivers.kuka_rsi.commissioning import AnswerRecorder
 from elastocal.drivers.kuka_rsi.corrections import CorrectionGuard, as_millimetres
-from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
-from elastocal.drivers.kuka_rsi.link import RsiLink
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader, overshoot
+from elastocal.drivers.kuka_rsi.link import (
+    AMISS,
+    ANSWERS,
+    EXACT,
+    Cycle,
+    Motion,
+    Pace,
+    RsiLink,
+    Step,
+    guided,
+)
 from elastocal.drivers.kuka_rsi.messages import (
     Arrival,
     MoveTarget,
@@ -43,8 +60,266 @@ from elastocal.drivers.kuka_rsi.messages import (
 )
 from elastocal.drivers.kuka_rsi.motions import ContactGuard, Press
 from elastocal.drivers.kuka_rsi.posture import PostureReader
-from elastocal.drivers.kuka_rsi.settings import RsiSettings, bounds_of
+from elastocal.drivers.kuka_rsi.settings import Bounds, RsiSettings, bounds_of
 from elastocal.errors import DeviceError, present
+from elastocal.robot import inverse_transform
+
+ADOPTS = 5.0
+"""Longest time that the controller may take to switch RSI off and on again, in s."""
+
+
+def adopt(cycle: Cycle, number: int) -> Motion:
+    """Yield the steps by which the controller takes the present place for the programmed one.
+
+    It sends nothing while RSI is off. A program that does not know the order stands by.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        State at the beginning.
+    number : int
+        Of the command.
+
+    Raises
+    ------
+    DeviceError
+        If the controller does not do it, or the arm is somewhere else after it.
+    """
+    told, before = cycle.time, cycle.T_base_tcp[:3, 3]
+    taken = False
+    while cycle.command != number:
+        taken |= cycle.state == ProgramState.MOVING
+        if not taken and cycle.time - told > ANSWERS:
+            raise DeviceError(
+                f"the arm stands {1e3 * float(np.linalg.norm(cycle.offset)):.1f} mm from the"
+                " programmed place, which may be the surface, and the program on the controller"
+                " cannot take the present place for it: move the arm off by the pendant, or load"
+                " the new elcal_run (`elastocal krc-config`)"
+            )
+        if not cycle.time - told <= ADOPTS:
+            raise DeviceError(f"the controller did not switch RSI off and on in {ADOPTS:g} s")
+        cycle = yield Step(order=Order.ADOPT, target=MoveTarget(number))
+    cycle = yield from guided(cycle)
+    away = float(np.linalg.norm(cycle.T_base_tcp[:3, 3] - before))
+    left = float(np.linalg.norm(cycle.offset))
+    if not (away <= AMISS and left <= AMISS):
+        raise DeviceError(
+            f"RSI was switched off and on: the arm moved {1e3 * away:.2f} mm and has a correction"
+            f" of {1e3 * left:.2f} mm, limit {1e3 * AMISS:g} mm"
+        )
+
+
+_WRIST = math.radians(5.0)
+"""Least |A5| at which the tool is moved straight: near 0 axes 4 and 6 run away."""
+
+
+class RsiChecks(CommandChecks):
+    """Checks of commands, with those of corrections."""
+
+    def require_programmed_place(self, offset: FloatArray) -> None:
+        """Refuse a joint move on top of a correction, base, shape (3,), in m.
+
+        Raises
+        ------
+        DeviceError
+            With its length.
+        """
+        size = float(np.linalg.norm(offset))
+        self.require(
+            size <= AMISS,
+            "move_joints: correction at its begin",
+            f"{1e3 * size:.2f} mm",
+            f"at most {1e3 * AMISS:g} mm (adopt_position)",
+        )
+
+
+SOURCE = "kuka_rsi"
+CHECKS = RsiChecks(SOURCE)
+SILENT = 0.25
+"""Time without a message after which the arm counts as stopped, in s."""
+OUT = (ProgramState.ABSENT, ProgramState.ENDED)
+"""States of a program that is not in its loop."""
+
+
+def require_ready(cycle: Cycle, silent: float, mode: str) -> None:
+    """Refuse to enable an arm while anything stands against it.
+
+    Without a force it may be enabled: a tool must come off the surface without one.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        The newest state.
+    silent : float
+        Its age, in s.
+    mode : str
+        Of the settings.
+
+    Raises
+    ------
+    DeviceError
+        With what stands against it.
+    """
+    why = None
+    if mode != "contact":
+        why = f"mode {mode} moves nothing: devices.arm.mode must be contact"
+    elif not silent <= SILENT:
+        why = f"no message from the controller for {silent:.2f} s"
+    elif cycle.state in OUT:
+        why = "the program elcal_run on the controller is not in its loop: select and start it"
+    if why is not None:
+        raise DeviceError(f"{SOURCE} cannot be enabled: {why}")
+
+
+@dataclass(frozen=True)
+class StraightMoveRules:
+    """What straight moves keep to."""
+
+    bounds: Bounds
+    law: ForceLaw
+    delay: float
+    """From force to standstill, in s."""
+
+    def require_room(self, command: str, end: FloatArray, speed: float) -> None:
+        """Refuse a move that leaves what corrections may do.
+
+        Parameters
+        ----------
+        command : str
+            Name of the command.
+        end : ndarray, shape (3,)
+            Correction at its end, base, in m.
+        speed : float
+            In m/s.
+        """
+        bounds, size = self.bounds, float(np.linalg.norm(end))
+        CHECKS.require(
+            size <= bounds.correction,
+            f"{command}: correction at its end",
+            f"{1e3 * size:.1f} mm",
+            f"at most {1e3 * bounds.correction:g} mm (largest_correction)",
+        )
+        CHECKS.require(
+            speed <= bounds.speed,
+            f"{command} speed",
+            f"{1e3 * speed:g} mm/s",
+            f"at most {1e3 * bounds.speed:g} mm/s (correction_speed)",
+        )
+
+    def require_away(self, direction: FloatArray, approached: FloatArray | None) -> None:
+        """Refuse a retract along a direction of an approach that felt a surface, both (3,)."""
+        if approached is not None and not float(direction @ approached) < 0.0:
+            raise DeviceError(
+                f"{SOURCE}: retract direction {direction.tolist()} leads into the surface,"
+                f" which was approached along {np.round(approached, 4).tolist()}"
+            )
+
+    def require_bent_wrist(self, q: FloatArray) -> None:
+        """Refuse a move with axes 4 and 6 in line; joints of shape (joint,), A5 last but one."""
+        bend = abs(math.remainder(float(q[-2]), math.pi))
+        CHECKS.require(
+            bend >= _WRIST,
+            "A5",
+            f"{math.degrees(bend):.1f} deg from straight",
+            f"at least {math.degrees(_WRIST):g} deg for a straight move",
+        )
+
+    def require_gentle(self, speed: float, contact_force: float) -> None:
+        """Refuse a guarded move that would press too hard before it stands."""
+        if math.isinf(contact_force):
+            return
+        stiffness, room = self.law.stiffness, self.bounds.force - contact_force
+        further = overshoot(speed, stiffness, self.delay)
+        if not further <= room:
+            allowed = max(room, 0.0) / (stiffness * self.delay)
+            raise DeviceError(
+                f"kuka_rsi refuses approach: at {1e3 * speed:.3g} mm/s it would press"
+                f" {further:.0f} N beyond {contact_force:g} N before it stands (delay"
+                f" {1e3 * self.delay:.0f} ms, stiffness {1e-6 * stiffness:.3g} N/um), force limit"
+                f" {self.bounds.force:.0f} N: at most {1e3 * allowed:.2g} mm/s"
+            )
+
+
+_LET_GO = 0.3
+"""Part of the contact force below which the tool has left the surface at the end of a retract."""
+_SAME_ZERO = 1e-4
+"""How far the programmed place may be from where the last ``PTP`` ended, in m."""
+
+
+class ContactMemory:
+    """Remembers what was felt and where a joint move has ended."""
+
+    def __init__(self) -> None:
+        self.guard: ContactGuard | None = None
+        """What felt the contact that has not been left yet."""
+        self.touched_at: FloatArray = np.zeros(3)
+        """Correction there, base, shape (3,), in m."""
+        self._is_free = False
+        self._free_place: FloatArray | None = None
+
+    @property
+    def in_contact(self) -> bool | None:
+        """Whether the tool touches; None: nothing has been felt or left."""
+        return True if self.guard is not None else (False if self._is_free else None)
+
+    def approached(self, guard: ContactGuard, cycle: Cycle) -> None:
+        """Note how a guarded move ended."""
+        self._is_free = not guard.felt
+        if guard.felt:
+            self.guard, self.touched_at = guard, cycle.offset
+
+    def retracted(self, reader: ForceReader | None) -> None:
+        """Note the end of a retract; without a force nothing is known then."""
+        if self.guard is None or reader is None:
+            return
+        if reader.problem() is not None:
+            self.guard, self._is_free = None, False
+            return
+        left = float(np.linalg.norm(reader.force_tcp))
+        if left <= _LET_GO * self.guard.contact_force:
+            self.guard, self._is_free = None, True
+
+    def arrived(self, cycle: Cycle) -> None:
+        """Note the end of a joint move, which nothing was felt on."""
+        self._is_free, self._free_place = True, _programmed(cycle)
+
+    def forget_place(self) -> None:
+        """Note that the programmed place may become another one."""
+        self._is_free, self._free_place = False, None
+
+    def is_zero_free(self, cycle: Cycle) -> bool:
+        """Return whether the place where the correction is zero is known to be free.
+
+        A joint move of this connection has ended there. RSol is compared: a program that was
+        restarted elsewhere gives itself away even where its start was not seen.
+        """
+        if self._free_place is None:
+            return False
+        return float(np.linalg.norm(_programmed(cycle) - self._free_place)) <= _SAME_ZERO
+
+
+def _programmed(cycle: Cycle) -> FloatArray:
+    """Return the programmed place, base, shape (3,), in m."""
+    place: FloatArray = cycle.T_base_tcp[:3, 3] - cycle.offset
+    return place
+
+
+def feeling(
+    cell: Cell, settings: RsiSettings, feed: WrenchFeed | None
+) -> tuple[ForceReader | None, CollisionWatch | None]:
+    """Return what an arm that presses feels by; nothing where it does not press."""
+    if settings.mode != "contact":
+        return None, None
+    T_sensor_tcp = cell.T_sensor_tcp
+    if feed is None or T_sensor_tcp is None:
+        raise DeviceError(
+            f"{cell.path}: devices.arm: mode contact needs a force sensor whose driver"
+            " feeds the arm (section sensor, and devices.sensor)"
+        )
+    reader = ForceReader(feed, inverse_transform(T_sensor_tcp), settings.cycle)
+    weight = cell.file.tool.mass * cell.gravity_base
+    return reader, CollisionWatch(weight, settings.collision_force)
+
 
 _EDGE_AGAIN = 25
 """Cycles for which a program stays guided against its order before STOP rises again."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.drivers.kuka_rsi.link_statistics import LinkStatistics
+from elastocal.drivers.kuka_rsi.link import LinkStatistics
 from elastocal.errors import DeviceError, SchemaError
 from elastocal.records import record
 from elastocal.results import brief_repr

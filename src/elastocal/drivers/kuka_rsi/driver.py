@@ -1,11 +1,22 @@
-"""The driver of KUKA arms, as `elastocal run` finds it by its name ``kuka_rsi``."""
+"""The driver of KUKA arms, as `elastocal run` finds it by its name ``kuka_rsi``.
+
+An arm that is only listened to: what `elastocal watch` shows of it.
+
+RSI has to be answered, or the controller stops by its ``Timeout``. In mode ``contact`` the answer
+is the one of an arm that is not enabled: no movement, order HOLD. In mode ``compensation`` none is
+given: an answer would let the program go on along its path without corrections. In mode
+``measure`` the controller expects none.
+"""
 
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from elastocal.cell import (
     Cell,
+    DeviceReading,
     DeviceSet,
     DeviceSettings,
     LineCounts,
@@ -13,14 +24,147 @@ from elastocal.cell import (
     PathSource,
     RigContext,
     refused_telegrams,
+    three,
 )
-from elastocal.drivers.kuka_rsi._listener import KukaListener
+from elastocal.drivers.device_clock import DeviceClock
 from elastocal.drivers.kuka_rsi.arm import KukaArm
 from elastocal.drivers.kuka_rsi.corrections import CorrectedKuka
-from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
+from elastocal.drivers.kuka_rsi.link import Cycle, LinkAddress, RsiLink
+from elastocal.drivers.kuka_rsi.messages import (
+    Arrival,
+    MoveTarget,
+    Order,
+    ProgramState,
+    RobMessage,
+    SenMessage,
+)
+from elastocal.drivers.kuka_rsi.posture import PostureReader
 from elastocal.drivers.kuka_rsi.settings import RsiSettings, bounds_of
 from elastocal.errors import DeviceError, of_kind, present
 from elastocal.results import brief_repr
+from elastocal.robot import xyzabc_from_T
+
+_SILENT = 0.5
+"""Time without a message after which the controller counts as silent, in s of the wall."""
+_STATES = {
+    ProgramState.ABSENT: "program not in its loop",
+    ProgramState.STANDING: "program stands, corrections do not act",
+    ProgramState.GUIDED: "in RSI_MOVECORR, corrections act",
+    ProgramState.MOVING: "on a PTP",
+    ProgramState.ARRIVED: "a PTP is over",
+    ProgramState.BRAKED: "a PTP was given up on the way",
+    ProgramState.ENDED: "program ended",
+}
+
+
+class KukaListener:
+    """Handler of a link that moves nothing; see `elastocal.drivers.kuka_rsi.Handler`.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell.
+    settings : RsiSettings
+        Of its arm.
+    context : RigContext
+        Of the rig.
+
+    Raises
+    ------
+    DeviceError
+        If the port cannot be had, or the robot is none that RSI can carry.
+    """
+
+    def __init__(self, cell: Cell, settings: RsiSettings, context: RigContext) -> None:
+        self._settings, self._postures = settings, PostureReader(cell.robot, settings.signs)
+        self._cycle: Cycle | None = None
+        self._program: int | None = None
+        self._unusable = ""
+        (port,) = settings.own_ports()
+        answers = settings.mode == "contact"
+        place = LinkAddress(
+            settings.address, settings.port, settings.robot, settings.cycle, answers
+        )
+        self._link = RsiLink(place, self, context.clock, listener=context.listener(port))
+        self._stamps = DeviceClock(self._link.source)
+        self._link.start()
+
+    def devices(self) -> DeviceSet:
+        """Return what a rig has of it: readings, and no arm."""
+        return DeviceSet(close=self._link.close, readings=lambda: (self._reading(),))
+
+    def step(self, message: RobMessage, arrival: Arrival, now: float) -> SenMessage:
+        """Return the answer to a message, which moves nothing."""
+        if arrival is not Arrival.OUT_OF_ORDER:
+            self._note_time(message.ipoc, now)
+        self._program = message.state
+        try:
+            self._cycle = self._postures.read(message, now, self._settings.mode)
+            self._unusable = ""
+        except DeviceError as error:
+            self._unusable = str(error)
+        target = MoveTarget(message.command or 0)
+        return SenMessage(order=Order.HOLD, target=target, sentype=self._settings.sentype)
+
+    def _note_time(self, ipoc: int, now: float) -> None:
+        try:
+            self._stamps.rig_time(1e-3 * ipoc, now)
+        except DeviceError:
+            # A program that begins anew, a count that begins from zero, or one of messages.
+            self._stamps = DeviceClock(self._link.source)
+
+    def _reading(self) -> DeviceReading:
+        self._link.require()
+        cycle, found, between = self._cycle, self._link.statistics(), self._link.between
+        offset, drift = self._stamps.against_the_pc()
+        pose = None if cycle is None else xyzabc_from_T(cycle.T_base_tcp)
+        return DeviceReading(
+            kind="arm",
+            device=self._link.source,
+            heard=self._link.silent is not None,
+            problem=self._problem(),
+            state=self._state(),
+            counts=found.counts(0, self._link.source),
+            cycle=(float(np.median(between)), max(between)) if between else None,
+            delay=found.controller_delay,
+            offset=offset,
+            drift=drift,
+            position=None if pose is None else three(pose[:3]),
+            turn=None if pose is None else three(pose[3:]),
+        )
+
+    def _problem(self) -> str:
+        silent, found, settings = self._link.silent, self._link.statistics(), self._settings
+        if silent is None:
+            told = refused_telegrams(found.malformed, found.refused, found.foreign)
+            return (
+                f"nothing heard yet from {settings.robot} at {settings.address} port"
+                f" {self._link.port} ({told})"
+            )
+        if silent > _SILENT:
+            unanswered = ", which stops by its Timeout: watch answers no compensation"
+            why = unanswered if settings.mode == "compensation" else ""
+            return f"nothing from the controller for {silent:.1f} s{why}"
+        if self._unusable:
+            return self._unusable
+        try:
+            if self._cycle is not None:
+                self._postures.require_model(self._cycle, settings.model_tolerance)
+        except DeviceError as error:
+            return str(error).removeprefix("kuka_rsi: ")
+        return ""
+
+    def _state(self) -> str:
+        state, cycle = self._program, self._cycle
+        if self._link.silent is None:
+            return f"mode {self._settings.mode}"
+        known = [text for each, text in _STATES.items() if each == state]
+        told = known[0] if known else "program states nothing"
+        effect = (
+            "" if cycle is None else f", correction {1e3 * np.linalg.norm(cycle.offset):.3f} mm"
+        )
+        return f"mode {self._settings.mode}: {told}{effect}"
+
 
 _TO_THE_LOOP = 1.0
 """From RSI_ON to the loop of the controller's program, at most, in s of the wall."""

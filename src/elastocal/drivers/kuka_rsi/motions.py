@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.drivers.kuka_rsi._cycle import (
+from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
+from elastocal.drivers.kuka_rsi.link import (
     AMISS,
     ANSWERS,
     EXACT,
@@ -26,7 +27,6 @@ from elastocal.drivers.kuka_rsi._cycle import (
     does_not_answer,
     guided,
 )
-from elastocal.drivers.kuka_rsi.force_control import ForceLaw, ForceReader
 from elastocal.drivers.kuka_rsi.messages import MoveTarget, Order, ProgramState
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr

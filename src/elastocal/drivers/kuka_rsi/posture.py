@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.drivers.kuka_rsi._cycle import Cycle
+from elastocal.drivers.kuka_rsi.link import Cycle
 from elastocal.drivers.kuka_rsi.messages import NO_CORRECTION, ProgramState, RobMessage, Six
 from elastocal.errors import DeviceError
 from elastocal.robot import Robot, T_from_xyzabc

@@ -10,25 +10,386 @@ Rows are linear in the force: with the rows of three unit forces at each reading
 turned, exchanged or scaled costs a product, not a new model. What is a number, such as a constant
 in the force or a drift, is estimated beside the springs, linearised about their fit and repeated.
 Thresholds are measured on sound campaigns (docs/decisions/0105-mistakes-undone.md).
+
+Ways in which readings may be meant otherwise than stated, the plainest first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
 from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 from scipy.special import stdtr
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
-from elastocal.identification.mistakes._readings import other_readings
-from elastocal.identification.mistakes._rows import OtherReading, Rows, apart, fitted
+from elastocal.identification.conventions import FORCE_MISTAKES
+from elastocal.identification.mistakes._common import AXES, median_norm
+from elastocal.identification.mistakes._rows import OtherReading, Rows, apart, beside, fitted
 from elastocal.identification.problem import Problem
 from elastocal.identification.uncertainty import leave_poses_out
 from elastocal.robot import Robot
+
+_CLEAR, _LIKELY, _FITTED = 0.9, 0.75, 0.85
+"""Part of the error that may be left: by forces and rows, by markers, by estimated numbers."""
+_SHIFTS = (
+    (-1, "the row before"),
+    (1, "the row after"),
+    (-2, "two rows before"),
+    (2, "two rows after"),
+)
+_ROUNDS = 4
+_CONSTANT_ROUNDS = 10
+"""A constant as large as half the force takes more rounds to settle than a gain."""
+_SMALLEST = 0.05
+"""Part of the median force below which a constant is not worth naming."""
+_LEAST_GAIN = 0.05
+_FARTHEST = 2.0
+"""Distance in m between two places of a marker that is still believed."""
+_ANGLES = (90, -90, 180, 30, -30, 45, -45, 60, -60, 120, -120, 135, -135, 150, -150)
+"""Angles in deg by which a sensor is turned about the tool; about other axes the first three."""
+
+
+def other_readings(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield every other reading of the data, the plainest first."""
+    yield from _turned_forces(rows)
+    yield from _turned_markers(rows)
+    yield from _other_rows(rows)
+    yield from _constants(rows, compliance)
+    yield from _drifts(rows, compliance)
+    yield from _gains(rows, compliance)
+    yield from _lags(rows, compliance)
+    yield from _marker_places(rows, compliance)
+    yield from _any_marker_frame(rows)
+
+
+def _turned_forces(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of forces in other frames, with axes exchanged, reversed or turned."""
+    d, robot, r = rows.problem.d, rows.model.robot, rows.readings
+    for mistake in FORCE_MISTAKES:
+        force, light = mistake.undo(robot, r).force, r.reference_force
+        if light is not None:
+            light = mistake.undo(robot, replace(r, force=light)).force
+        yield OtherReading(mistake.message, rows.blocks(force, light), d, _CLEAR, certain=True)
+    for frame, X in rows.frames.items():
+        for message, A in _turns(f"force_{{axis}} in the {frame} frame", frame != "base"):
+            G = X @ A @ np.swapaxes(X, 1, 2)
+            blocks = rows.turned(G)
+            remedy = f"{message}; check the sensor's frame in the map"
+            yield OtherReading(remedy, blocks, d, _CLEAR, certain=True)
+
+
+def _turned_markers(rows: Rows) -> Iterator[OtherReading]:
+    r, blocks = rows.readings, rows.problem.O
+    for message, A in _turns("marker_displacement_{axis}", False):
+        d = r.marker_displacement @ A.T - r.controller_displacement
+        remedy = f"{message}; check the tracker's frame"
+        yield OtherReading(remedy, blocks, d, _LIKELY, certain=True)
+
+
+def _turns(name: str, any_angle: bool) -> list[tuple[str, FloatArray]]:
+    """Return matrices that undo exchanged, reversed and turned axes, with what was done.
+
+    All 47 ways to read three columns as other axes, with or without their signs, are among them.
+    """
+    whole, found = name.replace("_{axis}", ""), []
+    for axis, letter in enumerate(AXES):
+        A = np.eye(3)
+        A[axis, axis] = -1.0
+        found.append((f"{name.format(axis=letter)} looks reversed", A))
+    for a, b in combinations(range(3), 2):
+        A = np.eye(3)
+        A[[a, b]] = A[[b, a]]
+        pair = name.replace("{axis}", f"{AXES[a]} and {whole.split()[0]}_{AXES[b]}")
+        found.append((f"{pair} look exchanged", A))
+    for axis, letter in enumerate(AXES):
+        for angle in _ANGLES if any_angle and letter == "z" else _ANGLES[:3]:
+            A = Rotation.from_rotvec(np.radians(angle) * np.eye(3)[axis]).as_matrix()
+            by = -angle if abs(angle) < 180 else 180
+            found.append((f"{whole} looks turned by {by} deg about {letter}", A))
+    return found + list(_mixed(whole, [np.eye(3), *(A for _, A in found)]))
+
+
+def _mixed(whole: str, known: Sequence[FloatArray]) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the matrices of axes in other columns, with or without their sign, but those known."""
+    before = {tuple(each.round().ravel()) for each in known if np.allclose(each, each.round())}
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            A = np.diag(signs)[:, order]
+            if tuple(A.ravel()) not in before:
+                each = zip(np.abs(A).argmax(axis=1), A.sum(axis=1), strict=True)
+                read = ", ".join(f"{'-' if sign < 0.0 else ''}{AXES[i]}" for i, sign in each)
+                yield f"x, y, z of {whole} look mixed up: they read as {read}", A
+
+
+def _other_rows(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of forces and markers in another order."""
+    r, d = rows.readings, rows.problem.d
+    for message, order in _orders(r):
+        blocks = rows.blocks(r.force[order], r.reference_force)
+        yield OtherReading((f"forces are {message}"), blocks, d, _CLEAR, certain=True)
+    for shift, which in _SHIFTS:
+        order = np.roll(np.arange(len(r)), shift)
+        moved = r.marker_displacement[order] - r.controller_displacement
+        message = f"marker displacements are those of {which}"
+        yield OtherReading(message, rows.problem.O, moved, _LIKELY, certain=True)
+    message = "marker displacements are deflections already: give what the tracker measured"
+    yield OtherReading(message, rows.problem.O, r.marker_displacement, _LIKELY, certain=True)
+    summed = np.cumsum(r.marker_displacement, axis=0)
+    first = np.searchsorted(np.flatnonzero(_begins(r)), np.arange(len(r)), side="right") - 1
+    start = np.vstack([np.zeros(3), summed])[np.flatnonzero(_begins(r))][first]
+    message = "marker displacements are counted from the load case before, not from the reference"
+    counted = summed - start - r.controller_displacement
+    yield OtherReading(message, rows.problem.O, counted, _LIKELY, certain=True)
+
+
+def _begins(r: Readings) -> BoolArray:
+    """Return whether a reading is the first of its pose, shape (reading,)."""
+    return np.append(True, r.pose[1:] != r.pose[:-1])
+
+
+def _orders(r: Readings) -> Iterator[tuple[str, IndexArray]]:
+    cases, poses = list(dict.fromkeys(r.load_case.tolist())), np.unique(r.pose)
+    width = len(cases)
+    index = np.arange(len(r))
+    for shift, which in _SHIFTS:
+        yield f"those of {which}: shift the column back", np.roll(index, shift)
+    if len(r) != width * len(poses) or width < 2:
+        return
+    table = index.reshape(-1, width)
+    for a, b in combinations(range(width), 2):
+        order = table.copy()
+        order[:, [a, b]] = order[:, [b, a]]
+        yield f"exchanged between load cases {cases[a]} and {cases[b]}", order.ravel()
+    for shift, which in ((-1, "before"), (1, "after")):
+        yield f"those of the load case {which}", np.roll(table, shift, axis=1).ravel()
+        yield f"those of the pose {which}", np.roll(table, shift, axis=0).ravel()
+
+
+def _constants(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings without a constant in the forces: weight in base, bias in the tcp frame."""
+    one = np.ones(len(rows.readings))
+    for frame in ("base", "tcp"):
+        found = _offset(rows, compliance, rows.frames[frame], one)
+        if found is None:
+            continue
+        offset, blocks = found
+        if not np.linalg.norm(offset) > _SMALLEST * median_norm(rows.readings.force):
+            continue
+        kind = "zeroed at the wrong moment? Or, where the tool tilts little, tool weight left in?"
+        if frame == "base":
+            down = float(offset @ np.array(rows.model.robot.gravity)) > 0.0
+            kind = "tool weight left in?" if down else "tool weight subtracted twice?"
+        x, y, z = offset
+        message = (
+            f"the forces seem to contain a constant of ({x:.0f}, {y:.0f}, {z:.0f}) N in the"
+            f" {frame} frame: {kind}"
+        )
+        yield OtherReading(message, blocks, rows.problem.d, _FITTED, estimated=True)
+
+
+def _parts(offset: FloatArray, scale: float = 1.0, digits: int = 0) -> dict[str, str]:
+    return {name: f"{scale * value:.{digits}f}" for name, value in zip(AXES, offset, strict=True)}
+
+
+def _offset(
+    rows: Rows, compliance: FloatArray, X: FloatArray, course: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return a force that is too much in all readings, times a course, and rows without it."""
+    r, offset = rows.readings, np.zeros(3)
+    blocks, c = rows.problem.O, compliance
+    for _ in range(_CONSTANT_ROUNDS):
+        columns = -np.einsum("rikn,n->rik", rows.basis, c) @ X * course[:, None, None]
+        widened = beside(replace(rows.problem, O=blocks), columns).take(rows.kept)
+        x = fitted(widened)
+        offset = offset + x[-3:]
+        if not np.linalg.norm(offset) < 3.0 * np.median(np.linalg.norm(r.force, axis=1)):
+            return None
+        made = np.einsum("rikn,rk->rin", rows.basis, course[:, None] * (X @ offset))
+        blocks = rows.problem.O - made
+        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
+    return offset, blocks
+
+
+def _drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings without what grew, or came at once, in the order of time."""
+    t = np.linspace(0.0, 1.0, len(rows.readings))
+    d, eye = rows.problem.d, np.eye(3)
+    steps = [(part, (t > part).astype(float)) for part in (0.25, 0.33, 0.42, 0.5, 0.58, 0.67, 0.75)]
+    whiles = [
+        (low, ((t > low) & (t < high)).astype(float))
+        for low, high in ((0.25, 0.5), (0.33, 0.67), (0.25, 0.75), (0.5, 0.75))
+    ]
+    for part, course in ((None, t), *steps, *whiles):
+        widened = beside(rows.problem, course[:, None, None] * eye).take(rows.kept)
+        grown = fitted(widened)[-3:]
+        how = ("drift by") if part is None else ("jump half way (station bumped?) by")
+        yield OtherReading(
+            (
+                "marker displacements {how} ({x}, {y}, {z}) mm over the campaign: read a"
+                " fixed target again and again"
+            ).format(how=how, **_parts(grown, 1000.0, 2)),
+            rows.problem.O,
+            d - course[:, None] * grown,
+            _FITTED,
+            estimated=True,
+        )
+    found = _offset(rows, compliance, rows.frames["tcp"], t)
+    if found is not None:
+        yield OtherReading(
+            (
+                "the zero of the force drifts by ({x}, {y}, {z}) N in the tcp frame over the"
+                " campaign: zero the sensor before each pose"
+            ).format(**_parts(found[0])),
+            found[1],
+            d,
+            _FITTED,
+            estimated=True,
+        )
+
+
+def _gains(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings with one axis of force or marker scaled."""
+    for frame, X in rows.frames.items():
+        for axis, letter in enumerate(AXES):
+            found = _force_gain(rows, compliance, X[:, :, axis])
+            if found is None:
+                continue
+            yield OtherReading(
+                (
+                    "force_{axis} in the {frame} frame looks {gain} times too large: check the"
+                    " gain of the sensor's channel"
+                ).format(axis=letter, frame=frame, gain=f"{1.0 / found[0]:.2f}"),
+                found[1],
+                rows.problem.d,
+                _FITTED,
+                estimated=True,
+            )
+    columns = (
+        (f"marker_displacement_{each}", axis) for each, axis in zip(AXES, np.eye(3), strict=True)
+    )
+    for name, kept in (*columns, ("marker displacements", np.ones(3))):
+        seen = rows.readings.marker_displacement * kept
+        widened = beside(rows.problem, -seen[..., None]).take(rows.kept)
+        gain = 1.0 + float(fitted(widened)[-1])
+        if not gain > 0.0:
+            continue
+        yield OtherReading(
+            (
+                "{name} look {gain} times too large (0.039: inches in a column of mm): check the"
+                " tracker's column"
+            ).format(name=name, gain=f"{1.0 / gain:.3g}"),
+            rows.problem.O,
+            rows.problem.d + (gain - 1.0) * seen,
+            _FITTED,
+            certain=not 0.5 < gain < 2.0,
+            louder=1.0 / gain,
+            estimated=True,
+        )
+
+
+def _force_gain(
+    rows: Rows, compliance: FloatArray, x: FloatArray
+) -> tuple[float, FloatArray] | None:
+    """Return the factor that undoes a gain along axes, shape (reading, 3), and rows with it."""
+    along = x[:, :, None] * x[:, None, :]
+    part = np.einsum("rij,rj->ri", along, rows.readings.force)
+    gain, blocks, c = 1.0, rows.problem.O, compliance
+    for _ in range(_ROUNDS):
+        column = np.einsum("rikn,rk,n->ri", rows.basis, part, c)[..., None]
+        widened = beside(replace(rows.problem, O=blocks), column).take(rows.kept)
+        gain += float(fitted(widened)[-1])
+        if not _LEAST_GAIN < gain < 1.0 / _LEAST_GAIN:
+            return None
+        blocks = rows.turned(np.eye(3) + (gain - 1.0) * along)
+        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
+    return gain, blocks
+
+
+def _lags(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings that hold no part of what was read in the load case before."""
+    r, d = rows.readings, rows.problem.d
+    force, marker = (
+        np.where(_begins(r)[:, None], 0.0, values - np.roll(values, 1, axis=0))
+        for values in (r.force, r.marker_displacement)
+    )
+    softer = np.einsum("rikn,rk,n->ri", rows.basis, force, compliance)
+    for name, change, column in (
+        ("forces", force, softer),
+        ("marker displacements", marker, -marker),
+    ):
+        widened = beside(rows.problem, column[..., None]).take(rows.kept)
+        late = float(fitted(widened)[-1])
+        if not 0.0 < late < 2.0:
+            continue
+        message = (
+            f"{name} lag: they seem to hold {late / (1.0 + late):.0%} of the load case before; let"
+            " each press settle, and read all devices at the same time"
+        )
+        if name == "forces":
+            blocks = rows.blocks(r.force + late * change, r.reference_force)
+            yield OtherReading(message, blocks, d, _FITTED, estimated=True)
+        else:
+            yield OtherReading(message, rows.problem.O, d + late * change, _FITTED, estimated=True)
+
+
+def _marker_places(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings with the marker elsewhere on the tool, estimated."""
+    blocks, c = rows.problem.O, compliance
+    place = np.zeros(3)
+    for _ in range(_ROUNDS):
+        widened = beside(replace(rows.problem, O=blocks), np.einsum("rikn,n->rik", rows.lever, c))
+        place = place + fitted(widened.take(rows.kept))[-3:]
+        if not np.linalg.norm(place) < _FARTHEST:
+            return
+        blocks = rows.problem.O + np.einsum("rikn,k->rin", rows.lever, place)
+        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
+    x, y, z = 1e3 * place
+    message = (
+        f"the marker seems to sit ({x:.0f}, {y:.0f}, {z:.0f}) mm in the tcp frame from where it is"
+        " said to be: check its place and unit"
+    )
+    yield OtherReading(message, blocks, rows.problem.d, _FITTED, estimated=True)
+
+
+def _any_marker_frame(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings with the marker in another frame or unit altogether, estimated."""
+    r = rows.readings
+    m = r.marker_displacement
+    columns = -np.einsum("ij,rk->rijk", np.eye(3), m).reshape(len(r), 3, 9)
+    x = fitted(beside(rows.problem, columns).take(rows.kept))[-9:]
+    U, s, Vt = np.linalg.svd(np.eye(3) + x.reshape(3, 3))
+    scale = float(np.median(s))
+    if not s[2] > 0.0:
+        return
+    turn = U @ Vt
+    mirrored = np.linalg.det(turn) < 0.0
+    angle = float(np.degrees(np.arccos(np.clip(0.5 * (np.trace(turn) - 1.0), -1.0, 1.0))))
+    if mirrored:
+        message = "the tracker's frame looks left-handed (mirrored)"
+    elif not 0.5 < scale < 2.0:
+        message = (
+            "marker displacements look {gain} times too large (0.039: inches in a column of mm)"
+        ).format(gain=f"{1.0 / scale:.3g}")
+    else:
+        message = (
+            "marker displacements look turned by {angle} deg: the tracker's frame called base?"
+        ).format(angle=f"{angle:.0f}")
+    B = turn if 0.5 < scale < 2.0 else scale * turn
+    yield OtherReading(
+        (f"{message}; check the registration of the tracker"),
+        rows.problem.O,
+        m @ B.T - r.controller_displacement,
+        _LIKELY,
+        certain=True,
+        louder=1.0 / scale if not 0.5 < scale < 2.0 else 1.0,
+    )
+
 
 _TRIMMED = 0.9
 """Part of the readings, those with the smallest residuals, that rank readings of the data."""

@@ -1,4 +1,3 @@
-from .arm_urdf import urdf_of as urdf_of
 from .catalogue import (
     SCHEMA as SCHEMA,
     entry as entry,
@@ -7,6 +6,7 @@ from .catalogue import (
     names as names,
     read_table as read_table,
     urdf as urdf,
+    urdf_of as urdf_of,
 )
 from .record import (
     CatalogueEntry as CatalogueEntry,

@@ -50,7 +50,7 @@ LINK_BENDING = 9.0e6
 is ``E I / length`` of a 1.15 m iron box of 0.25 m with 10 mm walls (1.1e11 Pa, 9.2e-5 m⁴)."""
 GEAR_GROWTH = 0.25
 """1 - K1/K3 of a stiffening gear: between Harmonic Drive's and Nabtesco's catalogues, see
-`elastocal.sim.presets`."""
+`elastocal.sim.truth`."""
 GEAR_ANGLE = 5.0e-4
 """Twist in rad at which half of that is back. An assumption: 2 kN·m on joint 2 (1100 N at 1.8 m,
 0.7 mrad) then need about a tenth less twist."""

@@ -3,7 +3,7 @@
 A robot is *built* a little otherwise than drawn; it is somewhere between cold and warm; its gears
 stop somewhere in their loops; the disk does not lie flat, and the force wanders on it; a force
 sensor reads more on the way down than up. Sizes are those of the cell file, with their sources in
-`elastocal.sim.presets`; what is random belongs to a seed and a visit, whatever happened before.
+`elastocal.sim.truth`; what is random belongs to a seed and a visit, whatever happened before.
 """
 
 from dataclasses import dataclass, replace
