@@ -184,7 +184,7 @@ class CheckSettings:
     force: bool = False
     """Replace a file that is there by the page."""
     language: Annotated[str, Option(choices="page language")] = "en"
-    """Language of that page, see `elastocal.report.LANGUAGES`."""
+    """Language of that page."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -62,7 +62,8 @@ class CompensateSettings(NewTool, ArmAsBuilt):
     base: str | None = None
     """A program's frame in the model's base, ``"x, y, z, a, b, c"`` with units."""
     start: str | None = None
-    """Posture before the first row, a quantity a joint from base to tip."""
+    """Posture before the first row, a quantity a joint from base to tip, such as
+    ``0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg``."""
     largest: Annotated[
         float,
         Option(

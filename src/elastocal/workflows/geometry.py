@@ -68,7 +68,7 @@ class GeometrySettings:
     force: bool = False
     """Replace a file that this command did not write."""
     language: Annotated[str, Option(choices="page language")] = "en"
-    """Language of the report, see `elastocal.report.LANGUAGES`."""
+    """Language of the report."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

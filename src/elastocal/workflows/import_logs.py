@@ -31,7 +31,7 @@ class ImportLogsSettings:
     """Which logs, what they are, and where the dataset goes."""
 
     logs: Annotated[Sequence[str | PathLike[str]], Option(argument=True)]
-    """Files; folders of ROS 2 bags."""
+    """CSV or text, Excel, MCAP, ROS 1 and 2 bags; one or several."""
     map: Path
     """What their columns are."""
     out: Path | None = None

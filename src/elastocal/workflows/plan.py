@@ -80,7 +80,7 @@ class PlanSettings:
     """Number of poses in free space for `geometry`, after the presses and in the same program;
     none: presses alone."""
     page_language: Annotated[str, Option(choices="page language")] = "en"
-    """Language of ``plan.html``, see `elastocal.report.LANGUAGES`."""
+    """Language of ``plan.html``."""
 
 
 @record()

@@ -80,7 +80,7 @@ class ReportSettings:
     sign: Annotated[Path | None, Option(metavar="KEY")] = None
     """Private key that signs the report; see `elastocal.verdict.make_key`."""
     language: Annotated[str, Option(choices="page language")] = "en"
-    """Language of the report, see `elastocal.report.LANGUAGES`."""
+    """Language of the report."""
     xlsx: bool = False
     """Also write its tables beside it, as a workbook."""
     state: Annotated[

@@ -67,7 +67,8 @@ class SimulateProcessSettings(NewTool):
     direction: Annotated[str, Option(default="lateral")] = process.LATERAL
     """What the deviation of `path` counts along: ``lateral``, ``normal`` or ``"1,0,0"``."""
     start: str | None = None
-    """Posture before the first row of a path of poses, a quantity a joint from base to tip."""
+    """Posture before the first row of a path of poses, a quantity a joint from base to tip, such as
+    ``0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg``."""
     loads: Annotated[
         tuple[float, ...],
         Option(

@@ -56,7 +56,8 @@ class StiffnessSettings(NewTool):
     cell: Path | None = None
     """Cell file, for its margins, tooling and fixtures."""
     start: str | None = None
-    """Posture before the first row, a quantity a joint from base to tip."""
+    """Posture before the first row, a quantity a joint from base to tip, such as
+    ``0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg``."""
     force: bool = False
     """Replace files that are there."""
 

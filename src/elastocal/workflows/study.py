@@ -62,7 +62,14 @@ class StudySettings:
     """Folder of the study; one that is there goes on."""
     samples: Annotated[int, Option(most=1_000_000)] = 200
     """Simulated arms, each calibrated anew."""
-    vary: Annotated[tuple[str, ...], Option(metavar="KEY=A,B")] = (DEFAULT_VARIATION,)
+    vary: Annotated[
+        tuple[str, ...],
+        Option(
+            metavar="KEY=A,B",
+            help="What to vary: poses, search, load_cases, springs, tracker_noise, force_noise or"
+            " truth; repeatable, then every combination. Default: poses=6,10,15,20,31.",
+        ),
+    ] = (DEFAULT_VARIATION,)
     """What to vary, each ``"KEY=A,B"``; see `codec.study.FACTORS`. Every combination is a
     condition; what is not varied is as the cell file has it."""
     target: Annotated[
