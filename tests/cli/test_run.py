@@ -329,7 +329,7 @@ def test_a_device_that_is_not_configured_is_refused_by_name(planned, tmp_path):
     cell = planned.with_text("kuka.yaml", "devices: {arm: simulatd}")
     reason = run(cell, tmp_path / "run").reason
     assert "devices.arm: unknown driver 'simulatd'; did you mean 'simulated'?" in reason
-    assert "(known: simulated, " in reason
+    assert "(allowed: simulated, " in reason
     assert not (tmp_path / "run").exists()
 
 

@@ -39,7 +39,8 @@ def reshaped(folder, change, *changes):
 
 
 def findings(folder):
-    return json.loads((folder / "plan" / "plan.json").read_text())["findings"]
+    found = json.loads((folder / "plan" / "plan.json").read_text())["findings"]
+    return [each["text"] for each in found]
 
 
 def test_an_open_mesh_works_and_says_so(tmp_path):

@@ -192,7 +192,7 @@ def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
     assert model.positions == 180
     assert Robot.from_urdf((tmp_path / "out.urdf").read_text(), measured.robot.tip)
     shown = elastocal("geometry", path, *arguments, "--out", tmp_path / "model.json")
-    assert "chosen" in shown.err
+    assert "taken" in shown.err
     assert "left out as blunders" in shown.err
 
 

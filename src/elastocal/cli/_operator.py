@@ -41,7 +41,7 @@ _LIVE_LINES = 10.0
 def progress_text(step: Progress) -> str:
     """Return a progress report as one line.
 
-    >>> from elastocal.procedure.run import Step
+    >>> from elastocal.procedure.run.steps import Step
     >>> progress_text(Progress(1.0, 3, 31, 2, 1, Step.SETTLE, "north", 1135.2, 4e-5, 754.0))
     'pose 2 (3 of 31)  settle north  1135 N  slip 0.04 mm  13 min left'
     """
