@@ -7,12 +7,12 @@ the source, so that help imports no numerical library.
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,6 @@ class Option:
     """Whether it is given by its place."""
     required: bool = False
     """Whether a command line has to give it, though settings in Python need not."""
-    shown: bool = True
-    """Whether a command line has it at all."""
     metavar: str = ""
     """What help shows for the value."""
     choices: str = ""
@@ -43,7 +41,9 @@ class Option:
     help: str = ""
     """In place of the docstring, where a command line has other words for the same."""
     least: float | None = None
+    """Smallest number that is taken."""
     most: float | None = None
+    """Largest one."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,11 @@ class SettingsField:
     doc: str
     """Its docstring on one line, without markup."""
     option: Option = Option()
+
+    @property
+    def flag(self) -> str:
+        """What a person types before its value."""
+        return self.option.name or f"--{self.name.replace('_', '-')}"
 
 
 REQUIRED, OWN = object(), object()
@@ -84,6 +89,38 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "purpose": ("elasticity", "geometry", "both"),
 }  # fmt: skip
 """What help lists without importing what knows them; tests/contracts/test_commands.py holds it."""
+
+
+ToolFrame = Annotated[
+    str | None,
+    Option("--tool", help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
+]
+Marker = Annotated[
+    tuple[float, float, float] | None,
+    Option(
+        read="point", help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's."
+    ),
+]
+Exclude = Annotated[tuple[str, ...], Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")]
+Statements = Annotated[
+    Mapping[str, str],
+    Option(
+        metavar="KEY=VALUE",
+        read="statements",
+        repeated=True,
+        help="For the certificate, e.g. sensor.serial=FT-7; may be repeated.",
+    ),
+]
+SHARED: dict[str, tuple[str, Option]] = {
+    name: (str(kind), option)
+    for name, (kind, option) in {
+        "ToolFrame": get_args(ToolFrame),
+        "Marker": get_args(Marker),
+        "Exclude": get_args(Exclude),
+        "Statements": get_args(Statements),
+    }.items()
+}
+"""Types of fields that several settings have, by the name that stands at the field."""
 
 
 @cache
@@ -173,12 +210,12 @@ def _own_fields(node: ast.ClassDef) -> Iterator[SettingsField]:
 
 def _option(annotation: ast.expr) -> tuple[str, Option]:
     """Return the type of a field, and what ``Annotated`` says of its option."""
+    if isinstance(annotation, ast.Name) and annotation.id in SHARED:
+        return SHARED[annotation.id]
     if isinstance(annotation, ast.Subscript) and ast.unparse(annotation.value) == "Annotated":
         parts = annotation.slice.elts if isinstance(annotation.slice, ast.Tuple) else []
         kind, notes = parts[0], parts[1:]
         for note in notes:
-            if isinstance(note, ast.Constant):
-                return ast.unparse(kind), Option(help=str(note.value))
             if isinstance(note, ast.Call) and ast.unparse(note.func) == Option.__name__:
                 places = dict(zip(("name",), map(ast.literal_eval, note.args), strict=False))
                 words = {str(word.arg): ast.literal_eval(word.value) for word in note.keywords}

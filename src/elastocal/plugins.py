@@ -177,7 +177,7 @@ def _loaded(kind: str, entry: "EntryPoint") -> Any:
     except _BROKEN as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise PluginError(f"{what} cannot be loaded: {reason}") from error
-    form, wanted = KINDS[kind], _imported(KINDS[kind].expected)
+    form, wanted = KINDS[kind], imported(KINDS[kind].expected)
     if form.is_class:
         fits, words = isinstance(found, type) and wanted in found.__mro__, "a subclass of"
     else:
@@ -187,7 +187,8 @@ def _loaded(kind: str, entry: "EntryPoint") -> Any:
     return found
 
 
-def _imported(place: str) -> Any:
+def imported(place: str) -> Any:
+    """Return what a place ``module:name`` names."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)
 
@@ -227,7 +228,7 @@ class Registry(Mapping[str, _T], Generic[_T]):
         if not isinstance(found, str):
             return found
         try:
-            return cast("_T", _imported(found))
+            return cast("_T", imported(found))
         except ImportError as error:  # of an extra that is not installed
             raise self._error(f"{self.kind} {name!r} cannot be loaded: {error}") from error
 

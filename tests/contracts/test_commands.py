@@ -13,7 +13,7 @@ import pytest
 import typer
 
 from elastocal.cell.examples import EXAMPLES
-from elastocal.cli.commands import _PURPOSES, COMMANDS
+from elastocal.cli.commands import COMMANDS
 from elastocal.cli.generator import _quantity
 from elastocal.cli.main import app, run
 from elastocal.compensation.process import PROCESSES
@@ -156,7 +156,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "posture": (PROGRAMMED, STIFFEST),
         "target": EXPORT_TARGETS,
         "page language": tuple(LANGUAGES),
-        "purpose": _PURPOSES,
+        "purpose": ("elasticity", "geometry", "both"),
     } == CHOICES
 
 
@@ -175,8 +175,10 @@ def test_what_is_read_from_the_source_is_what_the_settings_are(command):
         if each.option.default and not each.option.read:
             assert str(real[each.name].default) == each.option.default
         elif each.option.default:
-            flag = each.option.name or f"--{each.name}"
-            assert _quantity(each.option.read)(each.option.default, flag) == real[each.name].default
+            assert (
+                _quantity(each.option.read)(each.option.default, each.flag)
+                == real[each.name].default
+            )
 
 
 def test_every_option_has_a_sentence():

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 from elastocal.blocks import Block, Paragraph, Table
 from elastocal.errors import IdentificationError
@@ -15,8 +14,10 @@ from elastocal.wording import phrase, phrases
 class Settings:
     """List the springs of a model that yield most."""
 
-    model: Annotated[Path, "Model file from calibrate."]
-    most: Annotated[int, "How many springs are listed."] = 5
+    model: Path
+    """Model file from calibrate."""
+    most: int = 5
+    """How many springs are listed."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """The cell file, validated, and the cell ready to compute with: robot made, files found."""
 
 import contextlib
-import importlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any, TypeVar, get_origin
 import numpy as np
 from pydantic import Field, create_model, field_validator
 
+from elastocal import plugins
 from elastocal.arrays import FloatArray
 from elastocal.cell._quantities import IDENTITY, OptionalName, Pose
 from elastocal.cell.certificate import CertificateEntry
@@ -71,11 +71,11 @@ TOOLING = "tooling"
 
 
 SECTIONS_OF_OTHERS = {
-    "simulation": ("elastocal.sim.truth", "Simulation"),
-    "faults": ("elastocal.sim.truth", "Faults"),
+    "simulation": "elastocal.sim.truth:Simulation",
+    "faults": "elastocal.sim.truth:Faults",
 }
-"""Sections that the packages read that own them, and that nothing here knows: module and name of
-their type. Each can be left out."""
+"""Sections that the packages read that own them, and that nothing here knows: place of their
+type, ``module:name``. Each can be left out."""
 
 
 class CellFile(StrictModel):
@@ -204,14 +204,10 @@ def __getattr__(name: str) -> type[CellFile]:
 @cache
 def cell_file_model() -> type[CellFile]:
     """Return the model of a whole cell file, with the sections of others."""
-    types: dict[str, Any] = {
-        name: getattr(importlib.import_module(module), kind)
-        for name, (module, kind) in SECTIONS_OF_OTHERS.items()
-    }
-    fields: dict[str, Any] = {
-        name: (kind, Field(default_factory=get_origin(kind) or kind))
-        for name, kind in types.items()
-    }
+    fields: dict[str, Any] = {}
+    for name, place in SECTIONS_OF_OTHERS.items():
+        kind = plugins.imported(place)
+        fields[name] = kind, Field(default_factory=get_origin(kind) or kind)
     return create_model(_WHOLE, __base__=CellFile, __module__=__name__, **fields)
 
 

@@ -1,4 +1,4 @@
-"""What each command does with what a person has given: its work, and how the result is shown.
+"""The commands: each calls its work with what a person has given, and shows the result.
 
 The options are those of the settings (`elastocal.cli.generator`); only what belongs to a terminal
 alone stands here.
@@ -6,7 +6,7 @@ alone stands here.
 
 import sys
 import webbrowser
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,7 +16,7 @@ import typer
 from elastocal import workflows
 from elastocal.cli import output, tables
 from elastocal.cli.generator import Command, Given
-from elastocal.options import Option
+from elastocal.options import CHOICES, Option
 from elastocal.wording import mm
 
 if TYPE_CHECKING:
@@ -65,21 +65,27 @@ def command(
     return mark
 
 
-def _say(text: str) -> None:
-    output.console().print(text, soft_wrap=True)
+def _say(*lines: str) -> None:
+    screen = output.console()
+    for line in lines:
+        screen.print(line, soft_wrap=True)
 
 
-def _say_facts(facts: Iterable[tuple[str, str]]) -> None:
-    for label, text in facts:
-        _say(f"{label}: {text}")
-
-
-def _show(given: Given, data: Any, show: "Callable[[Console], None]") -> None:
+def _show(given: Given, data: Callable[[], Any], show: "Callable[[Console], None]") -> None:
     """Print data as JSON where that was asked for, else what a person reads."""
     if given.as_json:
-        output.print_json(data)
+        output.print_json(data())
     else:
         show(output.console())
+
+
+def _show_lines(given: Given, data: object, lines: Iterable[str]) -> None:
+    """Print data as JSON where that was asked for, else lines."""
+    _show(given, lambda: data, lambda _: _say(*lines))
+
+
+def _named(facts: Iterable[tuple[str, str]]) -> Iterator[str]:
+    return (f"{label}: {text}" for label, text in facts)
 
 
 def _worked(work: Callable[..., Any], given: Given, **more: Any) -> Any:
@@ -121,7 +127,7 @@ def _robots(given: Given) -> None:
         else:
             tables.show_robots(screen, rows)
 
-    _show(given, {"robots": rows}, show)
+    _show(given, lambda: {"robots": rows}, show)
 
 
 @dataclass(frozen=True)
@@ -163,7 +169,7 @@ def _new(given: Given) -> None:
 @command("Prepare")
 def _init(given: Given) -> None:
     result = workflows.init(**given.settings)
-    _show(given, result, lambda screen: tables.show_example(screen, result))
+    _show(given, lambda: result, lambda screen: tables.show_example(screen, result))
 
 
 @dataclass(frozen=True)
@@ -185,7 +191,7 @@ def _check(given: Given) -> None:
         if preview is not None:
             screen.print(f"preview: {preview}", soft_wrap=True)
 
-    _show(given, {"file": result.file, "kind": result.kind, **result.holds}, show)
+    _show(given, lambda: {"file": result.file, "kind": result.kind, **result.holds}, show)
 
 
 @command("Prepare")
@@ -196,7 +202,7 @@ def _watch(given: Given) -> None:
     with interruption() as interrupted, DevicesView(output.console()) as view:
         result = workflows.watch(**given.settings, show=view.tell, interrupted=interrupted)
         ended = not interrupted()
-    _show(given, result.figures, lambda _: _say_facts(result.facts()))
+    _show_lines(given, result.figures, _named(result.facts()))
     if ended and result.problem is not None:
         raise DeviceError(result.problem)
 
@@ -227,9 +233,6 @@ def _studio(given: Given) -> None:
     workflows.studio(**given.settings, while_open=show)
 
 
-_PURPOSES = ("elasticity", "geometry", "both")
-
-
 @dataclass(frozen=True)
 class _Plan:
     purpose: Annotated[str, Option("--for", choices="purpose")] = "elasticity"
@@ -247,9 +250,9 @@ def _plan(given: Given) -> None:
 
     asked, here = given.settings, given.here
     purpose, free_poses = here["purpose"], asked.pop("free_poses", None)
-    if purpose not in _PURPOSES:
-        raise typer.BadParameter(f"{purpose!r} is not one of {', '.join(_PURPOSES)}.",
-                                 param_hint="--for")  # fmt: skip
+    if purpose not in CHOICES["purpose"]:
+        known = ", ".join(CHOICES["purpose"])
+        raise typer.BadParameter(f"{purpose!r} is not one of {known}.", param_hint="--for")
     if free_poses is not None and purpose != "both":
         raise PlanningError("--positions is for --for both")
     if purpose == "geometry":
@@ -259,7 +262,7 @@ def _plan(given: Given) -> None:
         chosen = {name: here[name] for name in ("search", "program") if here[name]}
         found = _worked(workflows.plan_positions, given, **chosen)
         out = asked["out"]
-        _show(given, found, lambda screen: tables.show_position_plan(screen, found, out))
+        _show(given, lambda: found, lambda screen: tables.show_position_plan(screen, found, out))
         return
     if here["search"] is not None:
         raise PlanningError("--search is for --for geometry: the cell file names its technique")
@@ -294,7 +297,7 @@ def _show_plan(
         if free is not None:
             tables.show_position_plan(screen, free, out)
 
-    _show(given, figures, show)
+    _show(given, lambda: figures, show)
 
 
 @command("Prepare")
@@ -302,13 +305,13 @@ def _study(given: Given) -> None:
     from elastocal.records import to_data
 
     result, out = _worked(workflows.study, given), given.settings["out"]
-    figures = to_data(result.summary)
-    del figures["schema"]
-    _show(
-        given,
-        {"folder": str(out), "files": result.files, **figures},
-        lambda screen: tables.show_study(screen, result.summary, out, result.files),
-    )
+
+    def data() -> Any:
+        figures = to_data(result.summary)
+        del figures["schema"]
+        return {"folder": str(out), "files": result.files, **figures}
+
+    _show(given, data, lambda screen: tables.show_study(screen, result.summary, out, result.files))
 
 
 @dataclass(frozen=True)
@@ -329,8 +332,11 @@ def _run(given: Given) -> None:
         rehearsed = workflows.dry_run(settings)
         if not given.as_json:
             output.print_lines(rehearsed.pose_lines())
-        figures = tables.dry_figures(rehearsed)
-        _show(given, figures, lambda screen: tables.show_itinerary(screen, rehearsed))
+        _show(
+            given,
+            lambda: tables.dry_figures(rehearsed),
+            lambda screen: tables.show_itinerary(screen, rehearsed),
+        )
         return
     finished = workflows.run(settings)
     if given.as_json and finished.end is RunEnd.DONE:
@@ -349,7 +355,7 @@ def _release(given: Given) -> None:
 
     operator = TerminalOperator(output.console())
     result = workflows.release(**given.settings, operator=operator)
-    _show(given, result.figures, lambda _: _say_facts(result.facts()))
+    _show_lines(given, result.figures, _named(result.facts()))
 
 
 @command("Measure")
@@ -368,7 +374,7 @@ def _simulate(given: Given) -> None:
 @command("Measure")
 def _krc_config(given: Given) -> None:
     result = workflows.krc_config(**given.settings)
-    _show(given, result, lambda _: _say_facts(result.facts()))
+    _show_lines(given, result, _named(result.facts()))
 
 
 @command("Measure")
@@ -377,7 +383,7 @@ def _measure_delay(given: Given) -> None:
 
     operator = TerminalOperator(output.console())
     result = _worked(workflows.measure_delay, given, operator=operator)
-    _show(given, result.measured, lambda _: _say_facts(result.facts()))
+    _show_lines(given, result.measured, _named(result.facts()))
 
 
 @command("Measure")
@@ -390,7 +396,7 @@ def _derive(given: Given) -> None:
         screen.print(f"wrote {folder.dataset} and {folder.summary.name}", soft_wrap=True)
         output.print_remarks(screen, "warning", result.summary.warnings)
 
-    _show(given, result.summary, show)
+    _show(given, lambda: result.summary, show)
 
 
 @dataclass(frozen=True)
@@ -422,23 +428,17 @@ def _import(given: Given) -> None:
         )
         guessed = workflows.guess_map(settings)
 
-        def show(_: "Console") -> None:
-            _say_facts(guessed.facts())
-            _say(f"wrote {here['map']}: look at every line")
-
-        _show(given, {"map": str(here["map"]), "logs": guessed.logs}, show)
+        data = {"map": str(here["map"]), "logs": guessed.logs}
+        wrote = f"wrote {here['map']}: look at every line"
+        _show_lines(given, data, (*_named(guessed.facts()), wrote))
         return
     if here["cell"] is not None:
         raise typer.BadParameter("is for --guess: the map names the cell", param_hint="--cell")
     if here["out"] is None:
         raise typer.BadParameter("is missing: the dataset to write", param_hint="--out")
     result = _worked(workflows.import_logs, given, map=here["map"], out=here["out"])
-
-    def show_result(_: "Console") -> None:
-        _say_facts(result.facts())
-        _say(f"wrote {result.figures.dataset}, look at {result.figures.picture}")
-
-    _show(given, result.figures, show_result)
+    wrote = f"wrote {result.figures.dataset}, look at {result.figures.picture}"
+    _show_lines(given, result.figures, (*_named(result.facts()), wrote))
 
 
 def _ask(question: str) -> str:
@@ -452,28 +452,36 @@ def _tool(given: Given) -> None:
     from elastocal.records import to_data
 
     result = workflows.tool(**given.settings)
-    # What this command always printed: the file without its schema.
-    data = {key: value for key, value in to_data(result).items() if key != "schema"}
+
+    def data() -> Any:
+        # What this command always printed: the file without its schema.
+        return {key: value for key, value in to_data(result).items() if key != "schema"}
+
     _show(given, data, lambda screen: tables.show_tool(screen, result, given.settings["out"]))
 
 
 @command("Identify")
 def _geometry(given: Given) -> None:
-    from elastocal.records import to_data
 
     result, out = _worked(workflows.geometry, given), given.settings["out"]
-    model, found = to_data(result.model), result.accuracy
-    data = {
-        **{key: model[key] for key in ("held_out", "ladder", "parameters", "fixed", "blunders")},
-        **{"axes": to_data(found.axes), "iso_9283": to_data(found.poses)},
-    }
-    _show(given, data, lambda screen: tables.show_geometry(screen, result.model, found, out))
+    model, found = result.model, result.accuracy
+
+    def data() -> Any:
+        kept = ("held_out", "ladder", "parameters", "fixed", "blunders")
+        more = {"axes": found.axes, "iso_9283": found.poses}
+        return {key: getattr(model, key) for key in kept} | more
+
+    _show(given, data, lambda screen: tables.show_geometry(screen, model, found, out))
 
 
 @command("Identify")
 def _calibrate(given: Given) -> None:
     result, out = workflows.calibrate(**given.settings), given.settings["out"]
-    _show(given, result.calibration, lambda screen: tables.show_calibration(screen, result, out))
+    _show(
+        given,
+        lambda: result.calibration,
+        lambda screen: tables.show_calibration(screen, result, out),
+    )
 
 
 @dataclass(frozen=True)
@@ -507,7 +515,7 @@ def _codec(given: Given) -> None:
     result = _worked(workflows.codec, given, options=options, saturation=here["tolerance"])
     _show(
         given,
-        {"folder": str(out), "files": result.files, **to_data(result.summary)},
+        lambda: {"folder": str(out), "files": result.files, **to_data(result.summary)},
         lambda screen: tables.show_codec(screen, result.summary, out, result.files),
     )
 
@@ -551,19 +559,16 @@ def _predict(given: Given) -> None:
     figures, size = result.summary, result.summary.deflection
 
     def show(screen: "Console") -> None:
+        notes = (*figures.notes, *([_NO_MISFIT] if figures.misfit is None else []))
         _say(
             f"{figures.rows} rows: predicted deflection {mm(size.mean)} mean, {mm(size.max)} max;"
-            f" written to {given.settings['out']}"
+            f" written to {given.settings['out']}",
+            f"tool: {figures.tool}",
+            *(f"Note: {note}" for note in notes),
         )
-        _say(f"tool: {figures.tool}")
-        notes = figures.notes
-        if figures.misfit is None:
-            notes = (*notes, _NO_MISFIT)
-        for note in notes:
-            _say(f"Note: {note}")
         output.print_remarks(screen, "warning", [figures.warning] if figures.warning else [])
 
-    _show(given, figures, show)
+    _show(given, lambda: figures, show)
 
 
 _NO_MISFIT = (
@@ -575,7 +580,7 @@ _NO_MISFIT = (
 @command("Use")
 def _compensate(given: Given) -> None:
     result, out = _worked(workflows.compensate, given), given.settings["out"]
-    _show(given, result, lambda screen: tables.show_compensation(screen, result, out))
+    _show(given, lambda: result, lambda screen: tables.show_compensation(screen, result, out))
 
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
@@ -592,7 +597,7 @@ def _live(given: Given) -> None:
             warn=lambda text: output.print_remarks(screen, "warning", [text]),
             interrupted=interrupted,
         )
-    _show(given, result, lambda _: _say_facts(result.facts()))
+    _show_lines(given, result, _named(result.facts()))
     if result.problem is not None:
         raise DeviceError(result.problem)
 
@@ -607,7 +612,7 @@ def _stiffness(given: Given) -> None:
         tables.show_stiffness(screen, result)
         screen.print(f"written to {out}: {', '.join(result.summary.files)}")
 
-    _show(given, to_data(result.summary) | {"folder": str(out)}, show)
+    _show(given, lambda: to_data(result.summary) | {"folder": str(out)}, show)
 
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
@@ -621,7 +626,7 @@ def _simulate_process(given: Given) -> None:
         tables.show_process(screen, result)
         screen.print(f"written to {out}")
 
-    _show(given, to_data(result) | {"folder": str(out)}, show)
+    _show(given, lambda: to_data(result) | {"folder": str(out)}, show)
 
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
@@ -629,13 +634,13 @@ def _export(given: Given) -> None:
     chosen = _only_tool(given)
     result = workflows.export(**given.settings, **chosen)
     with_tool = chosen["tool"] is not None
-    _show(given, result, lambda screen: tables.show_export(screen, result, with_tool))
+    _show(given, lambda: result, lambda screen: tables.show_export(screen, result, with_tool))
 
 
 @command("Judge and hand over")
 def _report(given: Given) -> None:
     result = workflows.report(**given.settings)
-    _show(given, result.figures, lambda screen: tables.show_report(screen, result))
+    _show(given, lambda: result.figures, lambda screen: tables.show_report(screen, result))
 
 
 @command("Judge and hand over")
@@ -650,7 +655,7 @@ def _compare(given: Given) -> None:
         for path in (asked[name] for name in ("out", "figure") if name in asked):
             screen.print(f"written to {path}", soft_wrap=True)
 
-    _show(given, found.summary, show)
+    _show(given, lambda: found.summary, show)
 
 
 @dataclass(frozen=True)
@@ -670,8 +675,8 @@ def _verify(given: Given) -> None:
         from elastocal.verdict import make_key
 
         public = make_key(new_key)
-        written = f"wrote {new_key} (keep it secret) and {public} (give it away)"
-        _show(given, {"private": str(new_key), "public": str(public)}, lambda _: _say(written))
+        wrote = f"wrote {new_key} (keep it secret) and {public} (give it away)"
+        _show_lines(given, {"private": str(new_key), "public": str(public)}, (wrote,))
         return
     found = workflows.verify(target, **given.settings)
 
@@ -681,7 +686,7 @@ def _verify(given: Given) -> None:
             said = " ".join(f"{link.name}: {link.text}".split())
             screen.print(f"{link.state.value:<14} {said}", soft_wrap=True)
 
-    _show(given, {"whole": found.broken is None, "links": found.links}, show)
+    _show(given, lambda: {"whole": found.broken is None, "links": found.links}, show)
     found.require_whole()
 
 
@@ -691,9 +696,4 @@ def _demo(given: Given) -> None:
 
     result = shown(**given.settings)
     data = {"folder": str(given.settings["out"]), "process": result.process}
-
-    def show(_: "Console") -> None:
-        for line in result.closing():
-            _say(line)
-
-    _show(given, data, show)
+    _show(given, lambda: data, lambda _: _say(*result.closing()))

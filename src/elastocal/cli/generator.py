@@ -131,15 +131,12 @@ def _in_order(
     fields: Iterable[SettingsField], here: Iterable[SettingsField]
 ) -> list[SettingsField]:
     """Return fields as help lists them: places, what has to be given, and the rest."""
-    every = [*fields, *here]
-    order = {True: 0, False: 1}
-    every.sort(key=lambda each: (order[_is_argument(each)], order[_is_required(each)]))
-    # What guards files is read last.
-    return sorted(every, key=lambda each: each.name == "force")
 
+    def place(each: SettingsField) -> tuple[bool, bool, bool]:
+        # What guards files is read last.
+        return each.name == "force", not each.option.argument, not _is_required(each)
 
-def _is_argument(each: SettingsField) -> bool:
-    return each.option.argument
+    return sorted((*fields, *here), key=place)
 
 
 def _is_required(each: SettingsField) -> bool:
@@ -165,15 +162,10 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
     required = _is_required(each)
     if not required and not isinstance(default, bool):
         words["show_default"] = default is not None
-    # `typer` takes an option without a value for a value that is not given.
     hint: Any = list[kind] if _is_repeated(each) else kind  # type: ignore[valid-type]
     if default is None and not required:
         hint = hint | None
-    if option.argument:
-        note = typer.Argument(**words)
-    else:
-        flag = option.name or f"--{each.name.replace('_', '-')}"
-        note = typer.Option(flag, **words)
+    note = typer.Argument(**words) if option.argument else typer.Option(each.flag, **words)
     return inspect.Parameter(
         each.name,
         inspect.Parameter.KEYWORD_ONLY,
@@ -185,7 +177,7 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
 def _choice(kind: str, file: bool, help: str) -> dict[str, Any]:
     """Return what shows choices and completes them; the work refuses what is none of them."""
     if kind == "robot":
-        return {"autocompletion": robot_names}
+        return {"autocompletion": _robot_names}
     names = CHOICES[kind]
     shown = f"[{'|'.join(names)}]"
     if file or len(shown) > _NARROW:
@@ -199,7 +191,7 @@ def _choice(kind: str, file: bool, help: str) -> dict[str, Any]:
     return {"metavar": shown, "autocompletion": complete, "help": help}
 
 
-def robot_names(incomplete: str) -> list[str]:
+def _robot_names(incomplete: str) -> list[str]:
     """Return the robots of the catalogue that begin with a text, for a shell."""
     from elastocal.robot import catalogue  # not for help
 
@@ -220,7 +212,7 @@ _TYPES: dict[str, type] = {"Path": Path, "bool": bool, "str": str, "int": int, "
 def _is_shown(each: SettingsField) -> bool:
     """Return whether a person can type what a field holds."""
     typed = not re.search("Callable|Mapping", each.kind) and any(n in each.kind for n in _TYPES)
-    return each.option.shown and (typed or bool(each.option.choices or each.option.read))
+    return typed or bool(each.option.choices or each.option.read)
 
 
 def _is_repeated(each: SettingsField) -> bool:
@@ -233,8 +225,7 @@ def _read(each: SettingsField, given: Any) -> Any:
     if given is None or given == []:
         return None
     if each.option.read:
-        flag = each.option.name or f"--{each.name.replace('_', '-')}"
-        return _READERS.get(each.option.read, _quantity(each.option.read))(given, flag)
+        return _READERS.get(each.option.read, _quantity(each.option.read))(given, each.flag)
     return tuple(given) if isinstance(given, list) else given
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, nearest
-from elastocal.options import Option
+from elastocal.options import Exclude, Marker, Option
 from elastocal.plugins import Registry
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -151,17 +151,9 @@ class FitSettings:
     ] = "0,inf"
     """Lowest and highest compliance in SI units: two numbers, or a text of them; kept as a text,
     since JSON has no infinity."""
-    marker: Annotated[
-        tuple[float, float, float] | None,
-        Option(
-            read="point",
-            help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's.",
-        ),
-    ] = None
+    marker: Marker = None
     """Metrology marker in the tcp frame, in m; none: the dataset's."""
-    exclude: Annotated[
-        tuple[str, ...], Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
-    ] = ()
+    exclude: Exclude = ()
     """Readings left out by name, ``POSE`` or ``POSE:LOAD_CASE``."""
     keep_blunders: bool = False
     """Fit also what cannot be a measurement."""

@@ -27,7 +27,7 @@ from elastocal.identification import (
     summary,
     with_knowledge,
 )
-from elastocal.options import Option
+from elastocal.options import Option, ToolFrame
 from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import brief_repr
@@ -57,10 +57,7 @@ class CalibrateSettings(FitSettings):
     """URDF file or catalogue name; by default the dataset's own."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
-    tool_frame: Annotated[
-        str | None,
-        Option("--tool", help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
-    ] = None
+    tool_frame: ToolFrame = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
     geometry: Path | None = None
     """Model file of `geometry` of the same arm: springs are fitted on the arm as built, with the

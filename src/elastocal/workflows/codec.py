@@ -25,7 +25,7 @@ from elastocal.codec import (
 )
 from elastocal.dataset import content_sha256, read, without
 from elastocal.files import filling
-from elastocal.options import Option
+from elastocal.options import Exclude, Marker, Option, ToolFrame
 from elastocal.parallel import one_blas_thread
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
@@ -56,22 +56,11 @@ class CodecSettings:
     """URDF file or catalogue name; by default the dataset's own."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
-    tool_frame: Annotated[
-        str | None,
-        Option("--tool", help="Tcp behind that link: 'x, y, z, a, b, c' with units (Z-Y'-X'')."),
-    ] = None
+    tool_frame: ToolFrame = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
-    marker: Annotated[
-        tuple[float, float, float] | None,
-        Option(
-            read="point",
-            help="Marker in the tcp frame: 'x, y, z' with units; default: the dataset's.",
-        ),
-    ] = None
+    marker: Marker = None
     """Metrology marker in the tcp frame, in m; none: the dataset's."""
-    exclude: Annotated[
-        tuple[str, ...], Option(help="Leave out POSE or POSE:LOAD_CASE; repeatable.")
-    ] = ()
+    exclude: Exclude = ()
     """Readings to leave out, each ``POSE`` or ``POSE:LOAD_CASE``."""
     options: CodecOptions = field(default_factory=CodecOptions)
     """Number of splits, ratio, seed; whether blunders are set aside and conventions trusted."""

@@ -1,6 +1,5 @@
 """``report``: the document that stays when the engineer has left."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
@@ -10,7 +9,7 @@ from typing import Annotated
 
 from elastocal.errors import FileAccessError
 from elastocal.identification.recertification import Estimate
-from elastocal.options import Option
+from elastocal.options import Option, Statements
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.report import language_of
@@ -83,15 +82,7 @@ class ReportSettings:
     """Language of the report."""
     xlsx: bool = False
     """Also write its tables beside it, as a workbook."""
-    state: Annotated[
-        Mapping[str, str],
-        Option(
-            metavar="KEY=VALUE",
-            read="statements",
-            repeated=True,
-            help="For the certificate, e.g. sensor.serial=FT-7; may be repeated.",
-        ),
-    ] = field(default_factory=dict)
+    state: Statements = field(default_factory=dict)
     """For the certificate, beside what cell file and run state; see
     `elastocal.cell.read_statements`."""
 

@@ -6,7 +6,7 @@ that a person must look at first moves before the operator has agreed.
 
 import contextlib
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from os import PathLike
@@ -17,7 +17,7 @@ from elastocal import procedure, verdict
 from elastocal.cell import Arming, Cell, Devices, LineCounts, certificate_of, load_cell, unstated
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
-from elastocal.options import Option
+from elastocal.options import Option, Statements
 from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.planning.export import pose_lines
 from elastocal.procedure import Event, Journal, LastKnown, RunEnd, RunFolder, RunSummary, Session
@@ -57,15 +57,7 @@ class RunSettings:
     operator: Operator = field(default_factory=Unattended)
     sign: Annotated[Path | None, Option(metavar="KEY")] = None
     """Private key that signs the journal at the end; see `elastocal.verdict.make_key`."""
-    state: Annotated[
-        Mapping[str, str],
-        Option(
-            metavar="KEY=VALUE",
-            read="statements",
-            repeated=True,
-            help="For the certificate, e.g. sensor.serial=FT-7; may be repeated.",
-        ),
-    ] = field(default_factory=dict)
+    state: Statements = field(default_factory=dict)
     """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
     arming: Arming | None = None
     """Of a person who agreed before: the cell file must still be the same, to the byte."""

@@ -29,7 +29,7 @@ from elastocal.errors import CompensationError
 from elastocal.parallel import one_blas_thread
 from elastocal.robot import nearest_rotation
 
-_TURNED = np.radians(15.0)
+_LEAST_SPREAD = np.radians(15.0)
 """Least spread of the postures that tells a weight, in rad."""
 _LEAST_LEVER, _LEVER_RATIO = 0.02, 5.0
 """Distance of a centre of mass from its sensor in m, and how far it may be from the stated one."""
@@ -65,7 +65,7 @@ def tool_doubts(
     found = []
     weight = abs(fit.mass) * float(np.linalg.norm(postures.gravity))
     left = float(np.sqrt(np.mean(np.square(tool_residual(postures, fit)[0]))))
-    if postures.spread < _TURNED:
+    if postures.spread < _LEAST_SPREAD:
         found.append(
             f"gravity turns by {np.degrees(postures.spread):.2g} deg in the sensor over all"
             " postures, too little to tell a weight: turn the tool about two axes"
@@ -412,8 +412,6 @@ _WRONGLY_READ = 1e-3
 """Residual, as a share of the readings' size, below which the stated reading is right."""
 _LIGHT = 0.1
 """Weight, as a share of what is constant, below which a sensor seems to feel no weight turn."""
-_LEAST_SPREAD = np.radians(15.0)
-"""Least spread of the postures for a verdict, in rad."""
 _FARTHEST = 3.0
 """Largest distance of a centre of mass from its sensor that is believed, in m."""
 _CLEAR = 10.0

@@ -10,7 +10,6 @@ none. Sources: ros-industrial/kuka_experimental and kroshu/kuka-external-control
 both messages). Verified against simulators and public layouts, not on hardware.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 from xml.parsers import expat
@@ -364,7 +363,3 @@ def _ipoc(text: str) -> int:
     if not (digits.isascii() and digits.isdigit() and len(digits) <= _MOST_DIGITS):
         raise DeviceError(f"RSI datagram: IPOC is {digits!r:.30}, must be a whole number")
     return int(digits)
-
-
-Answerer = Callable[[RobMessage], SenMessage | None]
-"""Makes the answer to a message; None: there is none."""

@@ -418,13 +418,13 @@ _JOINT_LAYOUT = struct.Struct(">3d4fB")
 _TOOL_LAYOUT = struct.Struct(">BBddfBffB")
 _BOARD_LAYOUT = struct.Struct(">iiBBddbbdd4fB??IB?B")
 _CARTESIAN_LAYOUT = struct.Struct(">12d")
-_STOPPED_BY_SAFETY, _PLAYING = 3, 2
+_PLAYING = 2
 _VOLTS, _CELSIUS = 48.0, 25.0
 
 
 def robot_state(values: Mapping[str, Value]) -> bytes:
     """Return the state of a controller whose RTDE outputs are given, by name."""
-    stopped = values["safety_mode"] == _STOPPED_BY_SAFETY
+    stopped = values["safety_mode"] == _PROTECTIVE_STOP
     running = values["runtime_state"] == _PLAYING
     mode = _MODE_LAYOUT.pack(
         *(_microseconds(values), True, True, True, False, stopped, running, False),
