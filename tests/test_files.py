@@ -52,6 +52,18 @@ def test_an_interruption_leaves_the_old_file_and_nothing_else(tmp_path, reason):
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.txt"]
 
 
+@pytest.mark.parametrize("writer", [replacing, lambda place: filling(place, "last")])
+def test_a_signal_as_soon_as_it_is_made_leaves_nothing(tmp_path, monkeypatch, writer):
+    def interrupted(place):
+        assert place.exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("elastocal.files.show_life", interrupted)
+    with pytest.raises(KeyboardInterrupt), writer(tmp_path / "out"):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_temporary_file_is_beside_its_target_with_its_suffix(tmp_path):
     with replacing(tmp_path / "a.nc") as temporary:
         assert (temporary.parent, temporary.suffix) == (tmp_path, ".nc")

@@ -16,9 +16,9 @@ import glob
 import hashlib
 import json
 import os
+import secrets
 import shutil
 import stat
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,29 +98,18 @@ def replacing(path: Path) -> Iterator[Path]:
         there.
     """
     path, rule = Path(path), current_rule()
-
-    def make() -> str:
-        handle, name = tempfile.mkstemp(path.suffix, _prefix(path), path.parent)
-        os.close(handle)
-        return name
-
     try:
         if path.exists() and not path.is_file():
             raise IsADirectoryError(_NO_FILE)
         if rule is not None:
             rule.require(path)
-        temporary, release = _locked(make)
-    except OSError as error:
-        if isinstance(error, FileAccessError):
-            raise
-        raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
-    try:
-        yield temporary
-        _flush_to_disk(temporary)
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(path)
-        if rule is not None:
-            rule.note_output(path)
+        with _under_way(path, _make_file, path.suffix) as temporary:
+            yield temporary
+            _flush_to_disk(temporary)
+            temporary.chmod(0o666 & ~_umask())
+            temporary.replace(path)
+            if rule is not None:
+                rule.note_output(path)
     except FileAccessError:
         raise  # of another file: it says so itself
     except UnicodeEncodeError as error:
@@ -129,9 +118,6 @@ def replacing(path: Path) -> Iterator[Path]:
         ) from error
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
-        release()
 
 
 def require_place(path: Path) -> None:
@@ -190,26 +176,22 @@ def filling(folder: Path, last: str, force: bool = False) -> Iterator[Path]:
         if rule is not None:
             rule.require(folder / last)
         folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary, release = _locked(
-            lambda: tempfile.mkdtemp(prefix=_prefix(folder), dir=folder.parent)
-        )
     except OSError as error:
         if isinstance(error, FileAccessError):
             raise
         raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
+    temporary = None
     try:
-        yield temporary
-        _move_all(temporary, folder, last)
+        with _under_way(folder, _make_folder) as temporary:
+            yield temporary
+            _move_all(temporary, folder, last)
     except FileAccessError as error:
         # Nobody has asked for the temporary folder, and it is gone when this is read.
         raise FileAccessError(str(error).replace(str(temporary), str(folder))) from error
     except OSError as error:
-        if error.filename is not None and str(temporary) not in str(error.filename):
+        if error.filename is not None and _prefix(folder) not in str(error.filename):
             raise  # of a file elsewhere, which its name says
         raise FileAccessError(f"cannot write {folder}: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        release()
 
 
 def _move_all(source: Path, folder: Path, last: str) -> None:
@@ -241,15 +223,38 @@ def remove_leftovers(output: Path) -> None:
                 place.unlink()
 
 
-def _locked(make: Callable[[], str]) -> tuple[Path, Callable[[], None]]:
-    """Return a new temporary file or folder, and what ends its sign that we live."""
-    while True:
-        place = Path(make())
-        release = show_life(place)
-        # Between the two, another process may have taken it for a leftover.
-        if place.exists():
-            return place, release
-        release()
+@contextlib.contextmanager
+def _under_way(path: Path, make: Callable[[Path], None], suffix: str = "") -> Iterator[Path]:
+    """Yield a new temporary file or folder beside ``path`` that shows that we live.
+
+    Its name is known before it is made, so that it is removed even where a signal arrives then.
+    """
+    made = False
+    while not made:
+        place = path.with_name(f"{_prefix(path)}{secrets.token_urlsafe(6)}{suffix}")
+        with contextlib.ExitStack() as ending:
+            ending.callback(_remove, place)
+            make(place)
+            ending.callback(show_life(place))
+            # Between the two, another process may have taken it for a leftover.
+            made = place.exists()
+            if made:
+                yield place
+
+
+def _make_file(place: Path) -> None:
+    os.close(os.open(place, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600))
+
+
+def _make_folder(place: Path) -> None:
+    place.mkdir(0o700)
+
+
+def _remove(place: Path) -> None:
+    if place.is_dir():
+        shutil.rmtree(place, ignore_errors=True)
+    else:
+        place.unlink(missing_ok=True)
 
 
 def _prefix(path: Path) -> str:
