@@ -37,6 +37,17 @@ def of_command(*arguments: object) -> set[str]:
     )
 
 
+def test_a_researcher_imports_the_core_without_what_programs_for_people_are_made_of():
+    core = ("robot", "elastic", "dataset", "identification", "geometry", "cell", "planning")
+    code = "; ".join(
+        f"import elastocal.{name} as m; [getattr(m, each) for each in dir(m)]"
+        for name in (*core, "codec", "compensation")
+    )
+    people = {"typer", "rich", "jinja2", "matplotlib", "plotly", "websockets", "openpyxl"}
+    others = {f"elastocal.{name}" for name in ("sim", "drivers", "procedure", "workflows", "cli")}
+    assert not imported(code) & (people | others)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder with a dataset, and rows to predict."""

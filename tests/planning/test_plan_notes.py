@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.planning.requirements import unjudged_limits
+from elastocal.planning.plan import unjudged_limits
 from elastocal.robot import Robot
 from support.simulated import example_cell
 from support.urdfs import planar_arm_urdf

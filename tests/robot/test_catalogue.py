@@ -11,7 +11,7 @@ import pytest
 from elastocal.errors import RobotError, SchemaError
 from elastocal.robot import catalogue
 from elastocal.robot.catalogue import CatalogueEntry, catalogue as table
-from elastocal.robot.catalogue.record import LINKS
+from elastocal.robot.catalogue.catalogue import LINKS
 from support.urdfs import colliding_links
 
 ALL = catalogue.names()

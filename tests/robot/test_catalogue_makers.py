@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.robot import catalogue
 from elastocal.robot.catalogue import maker_of
-from elastocal.robot.catalogue.record import LINKS
+from elastocal.robot.catalogue.catalogue import LINKS
 from elastocal.robot.inverse import OpwInverse, inverse_for
 from elastocal.robot.inverse.numerical import NumericalInverse, ParallelInverse
 from support.urdfs import colliding_links

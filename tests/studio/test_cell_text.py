@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from elastocal.errors import SchemaError
-from elastocal.studio.cell_text import appended, with_value, without
+from elastocal.studio.cell_edit import appended, with_value, without
 
 TEXT = """# A cell.
 schema: elastocal.cell/1   # first

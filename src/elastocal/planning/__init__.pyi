@@ -2,6 +2,8 @@ from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
     move_records as move_records,
+    require_loads_possible_anywhere as require_loads_possible_anywhere,
+    require_possible_search as require_possible_search,
     robot_record as robot_record,
 )
 from .plan_result import (
@@ -36,10 +38,6 @@ from .postures import (
 )
 from .production import (
     ProductionRecord as ProductionRecord,
-)
-from .requirements import (
-    require_loads_possible_anywhere as require_loads_possible_anywhere,
-    require_possible_search as require_possible_search,
 )
 from .scene import (
     CollisionScene as CollisionScene,

@@ -134,11 +134,6 @@ from .predict import (
     PredictSettings as PredictSettings,
     predict as predict,
 )
-from .process_trial import (
-    ProcessTrial as ProcessTrial,
-    TrialRuns as TrialRuns,
-    run_loads as run_loads,
-)
 from .release import (
     ReleaseResult as ReleaseResult,
     ReleaseSettings as ReleaseSettings,
@@ -164,8 +159,11 @@ from .simulate import (
     simulate as simulate,
 )
 from .simulate_process import (
+    ProcessTrial as ProcessTrial,
     SimulateProcessResult as SimulateProcessResult,
     SimulateProcessSettings as SimulateProcessSettings,
+    TrialRuns as TrialRuns,
+    run_loads as run_loads,
     simulate_process as simulate_process,
 )
 from .stiffness import (

@@ -1,10 +1,12 @@
 """``run``: Procedure 1 on the devices that a cell names, journaled, derived when it is done.
 
 Nothing moves before cell, plan, folder and devices have been found to fit together, and nothing
-that a person must look at first moves before the operator has agreed.
+that a person must look at first moves before the operator has agreed. A fault is told at once,
+before the arm is brought off the surface.
 """
 
 import contextlib
+import threading
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -14,7 +16,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from elastocal import procedure, verdict
-from elastocal.cell import Arming, Cell, Devices, LineCounts, certificate_of, load_cell, unstated
+from elastocal.cell import (
+    Arming,
+    ArmState,
+    Cell,
+    Devices,
+    LineCounts,
+    certificate_of,
+    load_cell,
+    unstated,
+)
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
 from elastocal.options import Option, Statements
@@ -26,12 +37,35 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.sim import truth_of
-from elastocal.workflows._contact_lines import contact_sentence, tell_at_once
 from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+_CONTACT = {
+    True: "says that it is in contact",
+    False: "says that it is not in contact",
+    None: "does not know whether it is in contact: the force is measured before it moves",
+}
+
+
+def contact_sentence(state: ArmState) -> str:
+    """Return what an arm says of contact."""
+    return f"the arm {_CONTACT[state.in_contact]}"
+
+
+def tell_at_once(operator: Operator, fault: str) -> None:
+    """Let a person read a fault before the arm is brought off the surface, which may take long.
+
+    In a thread of its own: a terminal that takes nothing must not hold the arm up.
+    """
+    lines = [
+        f"fault: {fault}",
+        "the arm now lets go, retracts where it is before a surface, and stops",
+    ]
+    threading.Thread(target=operator.warn, args=(lines,), daemon=True).start()
+
 
 POSES_MEASURED = "poses measured"
 """The stage that a run reports to its progress."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.procedure.run._stability import SlideDetector, SlipReference
+from elastocal.procedure.run.steps import SlideDetector, SlipReference
 
 R = Rotation.from_euler("xyz", [0.4, -1.1, 2.0]).as_matrix()
 """From base to tracker."""

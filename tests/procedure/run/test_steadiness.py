@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.cell import ProcedureSettings
-from elastocal.procedure.run._stability import (
+from elastocal.procedure.run.steps import (
     RecentSamples,
     steadiness,
     why_off,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from elastocal.viewer.solids import Solid, coarsened
+from elastocal.viewer.scene import Solid, coarsened
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ from elastocal.cell import load_cell
 from elastocal.cell.examples import write_example
 from elastocal.report.plots import plan_view
 from elastocal.viewer import Dots, Strokes, Tags
-from elastocal.viewer.scene import Paint
-from elastocal.viewer.solids import rail_solid
+from elastocal.viewer.scene import Paint, rail_solid
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 
 from elastocal.planning import collision_scene
 from elastocal.shapes import Mesh, solid_of
-from elastocal.viewer.solids import fixture_solids, joined, robot_solids, triangles_of
+from elastocal.viewer.scene import fixture_solids, joined, robot_solids, triangles_of
 
 TETRAHEDRON = (
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.planning.surface import sample_uniform
-from elastocal.report.plots._views import flat_map
+from elastocal.report.plots.plan_figure import flat_map
 from support import tooling
 
 

@@ -11,8 +11,13 @@ from elastocal.cell import WallClock
 from elastocal.errors import DeviceError
 from elastocal.sim.arm.statics import EquilibriumError
 from elastocal.sim.wire import LiveCell, Told
-from elastocal.sim.wire._pos_corr import PosCorrLimits, RsiStopError
-from elastocal.sim.wire._rsi_messages import EthernetConfig, RobWriter, SenReader
+from elastocal.sim.wire._rsi_messages import (
+    EthernetConfig,
+    PosCorrLimits,
+    RobWriter,
+    RsiStopError,
+    SenReader,
+)
 from elastocal.sim.wire.rsi import (
     IPOC_START,
     RsiContext,

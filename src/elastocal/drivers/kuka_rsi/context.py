@@ -15,8 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from elastocal.drivers.kuka_rsi._site_xml import attribute, parsed
-from elastocal.drivers.kuka_rsi.ethernet_file import ContextPort, EthernetFile
+from elastocal.drivers.kuka_rsi.ethernet_file import ContextPort, EthernetFile, attribute, parsed
 from elastocal.drivers.kuka_rsi.settings import Bounds
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr

@@ -19,9 +19,13 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
-from elastocal.drivers.kuka_rsi._site_xml import parsed
 from elastocal.drivers.kuka_rsi.context import PRECISION, ContextObject, RsiContext, check_context
-from elastocal.drivers.kuka_rsi.ethernet_file import MODES, EthernetFile, check_ethernet_file
+from elastocal.drivers.kuka_rsi.ethernet_file import (
+    MODES,
+    EthernetFile,
+    check_ethernet_file,
+    parsed,
+)
 from elastocal.drivers.kuka_rsi.force_control import ForceLaw, overshoot
 from elastocal.drivers.kuka_rsi.settings import Bounds, RsiSettings, bounds_of
 from elastocal.errors import DeviceError

@@ -2,7 +2,8 @@
 
 Channels of the controller's own (``DEF_RIst``) are known by their names, all others by the number
 of the input or output of the object that they are wired to in the RSI context; with a point in the
-name they are attributes of one element. Written after kroshu/kuka-external-control-sdk and
+name they are attributes of one element. A site may have changed the XML: it is read with a bound,
+without entities, its attributes by name. Written after kroshu/kuka-external-control-sdk and
 ros-industrial/kuka_experimental; not tried on a controller.
 """
 
@@ -10,10 +11,50 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
-from elastocal.drivers.kuka_rsi._site_xml import attribute, parsed
 from elastocal.drivers.kuka_rsi.settings import CORRECTIONS, HOLD_ON, RsiSettings, require_pair
 from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
+
+_MOST_CHARACTERS = 262_144
+
+
+def parsed(text: str) -> ElementTree.Element:
+    """Return the root of a file, all names without their namespaces.
+
+    Raises
+    ------
+    DeviceError
+        If it is no XML, too long, or has a document type.
+    """
+    if len(text) > _MOST_CHARACTERS:
+        raise DeviceError(
+            f"{len(text)} characters: a file of a controller has at most {_MOST_CHARACTERS}"
+        )
+    if "<!" in text.replace("<!--", ""):
+        raise DeviceError("a document type or entities: a file of a controller has none")
+    try:
+        # RSIVisual begins its files with a byte order mark.
+        root = ElementTree.fromstring(text.removeprefix("\ufeff"))
+    except ElementTree.ParseError as error:
+        raise DeviceError(f"no XML: {error}") from error
+    for each in root.iter():
+        each.tag = each.tag.rpartition("}")[2]
+    return root
+
+
+def attribute(element: ElementTree.Element, name: str) -> str:
+    """Return an attribute that must be there.
+
+    Raises
+    ------
+    DeviceError
+        If it is not.
+    """
+    found = element.get(name)
+    if found is None:
+        raise DeviceError(f"an {element.tag} has no {name}")
+    return found
+
 
 MODES = ("measure", "contact", "compensation")
 _MOST_CHANNELS = 64

@@ -1,16 +1,436 @@
-"""The driver that cell files name ``rtde``: arm and sensor of a Universal Robots controller."""
+"""The driver that cell files name ``rtde``: arm and sensor of a Universal Robots controller.
 
+Each step of the procedure is one of the controller's commands. A slow approach and the load cases
+are force mode: the controller itself stops at the contact force and holds the load. A faster
+approach, which is to end before the surface, is a line that the controller ends at its distance; a
+touch is seen and stopped here. The ramps of `RobotArm.hold` and `RobotArm.release` are made here, a
+new force each cycle. All commands go out from one thread, which no caller waits for.
+"""
+
+import contextlib
+import threading
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from elastocal.cell import LOOPBACK, Cell, DevicePlace, DeviceSet, DeviceSettings, RigContext
+from elastocal.arrays import FloatArray
+from elastocal.cell import (
+    LOOPBACK,
+    Arming,
+    ArmState,
+    Cell,
+    Clock,
+    DevicePlace,
+    DeviceSet,
+    DeviceSettings,
+    Motion,
+    RigContext,
+)
 from elastocal.drivers.rtde._ur_rtde import UrControl, UrReceive, open_control, open_receive
-from elastocal.drivers.rtde.arm import UrArm
-from elastocal.drivers.rtde.line import UrLine, UrSensor, pose_of_T
+from elastocal.drivers.rtde.line import UrLine, UrSample, UrSensor, pose_of_T
 from elastocal.errors import DeviceError
+
+_ZEROED = 0.05
+"""How long after the order the sensor may still show its old zero, in s."""
+_FELT = 0.8
+"""Part of the contact force at which the approach has ended."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Where a guarded move ends."""
+
+    direction: FloatArray
+    distance: float
+    force: float
+    start: UrSample
+
+    def gone(self, now: UrSample) -> float:
+        """Return how far the tool has come, in m."""
+        return float((now.T_base_tcp[:3, 3] - self.start.T_base_tcp[:3, 3]) @ self.direction)
+
+    def felt(self, now: UrSample) -> bool:
+        """Return whether the contact force is there; what came before the new zero is not asked."""
+        fresh = now.time > self.start.time + _ZEROED
+        return fresh and float(-now.force_base @ self.direction) >= _FELT * self.force
+
+
+def unit_vector(direction: FloatArray) -> FloatArray:
+    """Return a direction.
+
+    Raises
+    ------
+    DeviceError
+        If it is no unit vector of three parts.
+    """
+    found = np.asarray(direction, dtype=float)
+    if not (found.shape == (3,) and abs(float(np.linalg.norm(found)) - 1.0) < 1e-6):
+        raise DeviceError(f"rtde: direction {found}: must be a unit vector")
+    return found
+
+
+def frame_along(direction: FloatArray, origin: FloatArray) -> FloatArray:
+    """Return a frame whose z axis is a direction, shape (4, 4)."""
+    side = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    x = np.cross(side, direction)
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([x, np.cross(direction, x), direction])
+    T[:3, 3] = origin
+    return T
+
+
+_SOURCE = "rtde"
+_CYCLE = 0.01
+"""Of the thread, in s of the wall."""
+_TOOL_ACCELERATION = 0.5
+"""In m/s²."""
+_STOP = 2.0
+"""Deceleration of a stop, in rad/s²."""
+_FORCE_MODE_SPEED = 0.008
+"""Fastest approach by force mode, in m/s, whose end we have to see: 0.1 s of ours are 0.8 mm."""
+_IN_FRAME = 2
+"""Type of force mode: the task frame is not changed."""
+_SIDEWAYS, _TURN = 0.01, 0.05
+"""How far other axes may yield in force mode, in m and rad."""
+_PRESS_SPEED = 0.02
+"""Fastest motion along a force that is held, in m/s."""
+_SETTLED = 5
+"""Cycles that a motion must be said to be over: the controller's word comes a cycle late."""
+_STANDING = (Motion.IDLE,)
+_FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
+
+_Step = Callable[[UrSample], Motion | None]
+"""One cycle of a command: None while it goes on, else what the arm does after it."""
+
+
+@dataclass(frozen=True)
+class _Order:
+    """A command on its way to the thread."""
+
+    begin: Callable[[UrSample], _Step]
+    motion: Motion
+
+
+class UrArm:
+    """A `RobotArm` by a controller that runs the program of ``ur-rtde``."""
+
+    def __init__(
+        self,
+        line: UrLine,
+        control: UrControl,
+        clock: Clock,
+        cell: Cell,
+    ) -> None:
+        """Take a controller whose line has a sample.
+
+        Parameters
+        ----------
+        line, control : UrLine, UrControl
+            Both halves of the connection.
+        clock : Clock
+            Of the rig.
+        cell : Cell
+            Of six joints, in the order of the controller.
+        """
+        self._line, self._control, self._clock = line, control, clock
+        motion = cell.file.motion
+        self._cell, self._names = cell, cell.robot.joint_names
+        self._speeds, self._time = cell.axis_speeds / motion.override, motion.acceleration_time
+        self.arming = Arming()
+        """See `elastocal.cell.RealArm`."""
+        self._lock = threading.RLock()
+        self._motion = Motion.DISARMED
+        self._touched: bool | None = None
+        """None: nothing has been felt or left since the connection."""
+        self._forced = False
+        self._fault: str | None = None
+        self._order: _Order | None = None
+        self._step: _Step | None = None
+        self._force_tcp = np.zeros(3)
+        """Force on the robot that is asked for now."""
+        self._halt = False
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._thread.start()
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return self._names
+
+    def state(self) -> ArmState:
+        """Return the newest state; see `RobotArm.state`."""
+        sample = self._line.sample()
+        with self._lock:
+            if self._fault is None and sample.fault is not None:
+                self._fail(sample.fault)
+            return ArmState(
+                time=sample.time,
+                q=sample.q,
+                T_base_tcp=sample.T_base_tcp,
+                motion=self._motion,
+                in_contact=self._touched,
+                fault=self._fault,
+                source=_SOURCE,
+            )
+
+    def enable(self) -> None:
+        """Release the arm; a program that has ended is loaded again, which takes seconds.
+
+        Raises
+        ------
+        DeviceError
+            If it is not armed, the controller is stopped, or the program does not start.
+        """
+        self.arming.require(self._cell)
+        fault = self._line.sample().fault
+        if fault is not None:
+            raise DeviceError(f"{_SOURCE} cannot be enabled: {fault}")
+        if not self._control.isProgramRunning() and not self._control.reuploadScript():
+            raise DeviceError(f"{_SOURCE} cannot be enabled: its program does not start")
+        with self._lock:
+            self._fault = None
+            if self._motion in (Motion.DISARMED, Motion.STOPPED):
+                self._motion = Motion.IDLE
+
+    def disable(self) -> None:
+        """Take the release back."""
+        self.stop()
+        with self._lock:
+            self._motion = Motion.DISARMED
+
+    def stop(self) -> None:
+        """Stop in the next cycle of the thread; always allowed."""
+        with self._lock:
+            if self._motion is not Motion.DISARMED:
+                self._motion = Motion.STOPPED
+            self._order = self._step = None
+            self._halt = True
+
+    def move_joints(self, q: FloatArray, speed: float) -> None:
+        """Start a joint move; see `RobotArm.move_joints`."""
+        if not 0.0 < speed <= 1.0:
+            raise DeviceError(f"{_SOURCE} refuses move_joints: speed {speed:g}: must be in (0, 1]")
+        if self._touched:
+            raise DeviceError(f"{_SOURCE} refuses move_joints: the tool is at the surface, retract")
+
+        def begin(sample: UrSample) -> _Step:
+            way = np.abs(np.asarray(q) - sample.q)
+            # The controller takes the speed of the joint that goes farthest.
+            part = way / max(float(way.max()), 1e-9)
+            leading = float((speed * self._speeds / np.maximum(part, 1e-3)).min())
+            self._control.moveJ([*map(float, q)], leading, leading / self._time, True)
+            return self._arrival()
+
+        self._give("move_joints", _Order(begin, Motion.MOVING), _STANDING)
+
+    def adopt_position(self) -> None:
+        """Do nothing: the controller has no corrections on top of the programmed place."""
+
+    def approach(
+        self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
+    ) -> None:
+        """Start a guarded straight move; see `RobotArm.approach`."""
+        direction = unit_vector(direction_base)
+        if self._touched:
+            raise DeviceError(f"{_SOURCE} refuses approach: in contact, retract first")
+
+        def begin(sample: UrSample) -> _Step:
+            if not np.isfinite(contact_force):
+                return self._line_by(sample, distance * direction, speed)
+            self._control.zeroFtSensor()
+            goal = Guard(direction, distance, contact_force, sample)
+            guarded = self._pressed_way if speed <= _FORCE_MODE_SPEED else self._watched_way
+            return guarded(goal, speed)
+
+        self._give("approach", _Order(begin, Motion.APPROACHING), _STANDING)
+
+    def hold(self, force_tcp: FloatArray, rate: float) -> None:
+        """Start to build up a force and hold it; see `RobotArm.hold`."""
+        wanted = np.asarray(force_tcp, dtype=float)
+        if not (wanted.shape == (3,) and np.isfinite(wanted).all() and wanted[2] < 0.0):
+            raise DeviceError(f"{_SOURCE} refuses hold: force {wanted}: z must be below 0 N")
+        if not self._touched:
+            raise DeviceError(f"{_SOURCE} refuses hold: allowed only in contact")
+        self._give("hold", _Order(self._ramp_to(wanted, rate, None), Motion.HOLDING), _FORCED)
+
+    def release(self, rate: float) -> None:
+        """Start to ramp the force to zero; see `RobotArm.release`."""
+        zero = np.zeros(3)
+        order = _Order(self._ramp_to(zero, rate, Motion.IDLE), Motion.RELEASING)
+        self._give("release", order, _FORCED)
+
+    def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
+        """Start a straight move away from the surface; see `RobotArm.retract`."""
+        way = distance * unit_vector(direction_base)
+
+        def begin(sample: UrSample) -> _Step:
+            self._end_force()
+            arrival = self._line_by(sample, way, speed)
+
+            def step(now: UrSample) -> Motion | None:
+                after = arrival(now)
+                self._touched = self._touched and after is None
+                return after
+
+            return step
+
+        self._give("retract", _Order(begin, Motion.RETRACTING), _FORCED)
+
+    def close(self) -> None:
+        """Stop, and end the program."""
+        self.stop()
+        self._closed.set()
+        self._thread.join(5.0)
+        # A controller that is gone needs neither.
+        with contextlib.suppress(RuntimeError, OSError):
+            self._control.stopScript()
+            self._control.disconnect()
+
+    def _give(self, command: str, order: _Order, states: tuple[Motion, ...]) -> None:
+        with self._lock:
+            if self._motion not in states:
+                allowed = ", ".join(state.value for state in states)
+                raise DeviceError(
+                    f"{_SOURCE} refuses {command}: it is {self._motion.value} (allowed when"
+                    f" {allowed})"
+                )
+            self._order, self._motion = order, order.motion
+
+    # -- the thread ---------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        while not self._closed.wait(_CYCLE):
+            try:
+                self._cycle(self._line.sample())
+            except (DeviceError, RuntimeError, OSError) as error:
+                with self._lock:
+                    self._fail(str(error))
+        if self._halt:
+            self._stop_now()
+
+    def _cycle(self, sample: UrSample) -> None:
+        with self._lock:
+            halt, order, step = self._halt, self._order, self._step
+            self._halt, self._order = False, None
+        if halt:
+            self._stop_now()
+            return
+        if order is not None:
+            step = order.begin(sample)
+        after = None if step is None else step(sample)
+        with self._lock:
+            if self._halt or self._order is not None:
+                return  # what came meanwhile counts
+            self._step = step if after is None else None
+            if after is not None:
+                self._motion = after
+
+    def _stop_now(self) -> None:
+        try:
+            self._end_force()
+            self._control.stopJ(_STOP, True)
+        except (RuntimeError, OSError) as error:
+            with self._lock:
+                self._fail(str(error))
+
+    def _fail(self, fault: str) -> None:
+        self._fault, self._motion, self._step = " ".join(fault.split()), Motion.STOPPED, None
+
+    def _pressed_way(self, goal: Guard, speed: float) -> _Step:
+        """Return an approach in force mode: the controller stops at the force, we at the end."""
+        frame = frame_along(goal.direction, goal.start.T_base_tcp[:3, 3])
+        limits = [_SIDEWAYS, _SIDEWAYS, speed, _TURN, _TURN, _TURN]
+        along = [0.0, 0.0, goal.force, 0.0, 0.0, 0.0]
+        self._press(pose_of_T(frame), [0, 0, 1, 0, 0, 0], along, limits)
+
+        def step(now: UrSample) -> Motion | None:
+            felt = goal.felt(now)
+            if not (felt or goal.gone(now) >= goal.distance):
+                return None
+            self._end_force()
+            self._touched = felt
+            return Motion.IDLE
+
+        return step
+
+    def _watched_way(self, goal: Guard, speed: float) -> _Step:
+        """Return an approach along a line: the controller stops at the end, we at the force."""
+        arrival = self._line_by(goal.start, goal.distance * goal.direction, speed)
+
+        def step(now: UrSample) -> Motion | None:
+            if not goal.felt(now):
+                return arrival(now)
+            self._control.stopJ(_STOP, True)
+            self._touched = True
+            return Motion.IDLE
+
+        return step
+
+    def _arrival(self) -> _Step:
+        still = 0
+
+        def step(_: UrSample) -> Motion | None:
+            nonlocal still
+            running = self._control.getAsyncOperationProgressEx().isAsyncOperationRunning()
+            still = 0 if running else still + 1
+            return Motion.IDLE if still >= _SETTLED else None
+
+        return step
+
+    def _line_by(self, sample: UrSample, way: FloatArray, speed: float) -> _Step:
+        T = sample.T_base_tcp.copy()
+        T[:3, 3] += way
+        self._control.moveL(pose_of_T(T), speed, _TOOL_ACCELERATION, True)
+        return self._arrival()
+
+    def _ramp_to(
+        self, wanted: FloatArray, rate: float, after: Motion | None
+    ) -> Callable[[UrSample], _Step]:
+        """Return what ramps the force; ``after``: what follows at its end, None: it is held."""
+        if not (np.isfinite(rate) and rate > 0.0):
+            raise DeviceError(f"{_SOURCE}: force rate {rate:g} N/s: must be above 0 and finite")
+
+        def begin(sample: UrSample) -> _Step:
+            frame, last = pose_of_T(sample.T_base_tcp), self._clock.now()
+            limits = [_PRESS_SPEED] * 3 + [_TURN] * 3
+
+            def step(_: UrSample) -> Motion | None:
+                nonlocal last
+                now = self._clock.now()
+                gap, most = wanted - self._force_tcp, rate * (now - last)
+                size, last = float(np.linalg.norm(gap)), now
+                if size <= most and after is not None:
+                    self._end_force()
+                    return after
+                if size > 0.0:
+                    self._force_tcp = self._force_tcp + gap * min(1.0, most / size)
+                    # What the robot applies is against what it feels.
+                    applied = [*(-self._force_tcp).tolist(), 0.0, 0.0, 0.0]
+                    self._press(frame, [1, 1, 1, 0, 0, 0], applied, limits)
+                return None
+
+            return step
+
+        return begin
+
+    def _press(
+        self, frame: list[float], selection: list[int], wrench: list[float], limits: list[float]
+    ) -> None:
+        self._forced = True
+        if not self._control.forceMode(frame, selection, wrench, _IN_FRAME, limits):
+            raise DeviceError("the controller refuses force mode")
+
+    def _end_force(self) -> None:
+        self._force_tcp = np.zeros(3)
+        if self._forced:
+            self._forced = False
+            self._control.forceModeStop()
+
 
 _PORT = 30004
 """By which a controller is known, of those that it answers at."""

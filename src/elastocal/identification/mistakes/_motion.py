@@ -17,9 +17,11 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.findings import Finding, Grade, Kind, as_number
-from elastocal.identification.mistakes._common import AXES, MM, median_norm
 from elastocal.robot import Robot, other_joint_readings
 
+AXES = ("x", "y", "z")
+MM = as_number(".2f", 1e3)
+"""Shows a length, in m, in mm."""
 _DEAD = 5e-3
 """Part of the motion below which a controller displacement is none."""
 _CLOSE = 0.01
@@ -352,3 +354,8 @@ def _other_joints(robot: Robot) -> Iterator[tuple[str, JointRead]]:
     )
     for rows, which in ((-1, "before"), (1, "after")):
         yield (f"the joints are those of the row {which}", partial(_rolled, rows))
+
+
+def median_norm(vectors: FloatArray) -> float:
+    """Return the median length of vectors, shape (reading, 3)."""
+    return float(np.median(np.linalg.norm(vectors, axis=1)))

@@ -17,8 +17,7 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, actuated
 from elastocal.findings import Finding, Grade, Kind, as_number
-from elastocal.identification.mistakes._common import AXES, MM, median_norm
-from elastocal.identification.mistakes._motion import contradictions
+from elastocal.identification.mistakes._motion import AXES, MM, contradictions, median_norm
 from elastocal.robot import Robot
 from elastocal.wording import phrase
 

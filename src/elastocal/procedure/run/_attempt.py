@@ -14,7 +14,6 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import ArmState, Motion
 from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import Action, PoseLog, ReadingStatus, Window
-from elastocal.procedure.run._stability import SlideDetector, SlipReference
 from elastocal.procedure.run._supervisor import Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
 from elastocal.procedure.run.leaving import LeavingWatch
@@ -26,6 +25,8 @@ from elastocal.procedure.run.steps import (
     ArmLocation,
     Fault,
     FaultError,
+    SlideDetector,
+    SlipReference,
     Step,
 )
 

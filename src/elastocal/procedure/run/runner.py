@@ -52,16 +52,6 @@ from elastocal.procedure.run._attempt import (
     retract_limit,
     retract_to,
 )
-from elastocal.procedure.run._stability import (
-    LEAST_SAMPLES,
-    RecentSamples,
-    SlideDetector,
-    SlipReference,
-    steadiness,
-    why_off,
-    why_shaking,
-    why_unsteady,
-)
 from elastocal.procedure.run._supervisor import DEVICE_ERRORS, TIME_SLACK, Observers, Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
 from elastocal.procedure.run.leaving import LeavingWatch
@@ -69,6 +59,7 @@ from elastocal.procedure.run.routes import HOME_AT_START, ApproachLine, remainin
 from elastocal.procedure.run.session import RunEnd, Session, SessionHooks, SessionResult
 from elastocal.procedure.run.steps import (
     EXPECTED_ERRORS,
+    LEAST_SAMPLES,
     MAY_TOUCH,
     ON_APPROACH_LINE,
     ArmLocation,
@@ -77,10 +68,17 @@ from elastocal.procedure.run.steps import (
     FaultError,
     FaultScope,
     Progress,
+    RecentSamples,
+    SlideDetector,
+    SlipReference,
     Step,
     StepResult,
     as_fault,
     next_step,
+    steadiness,
+    why_off,
+    why_shaking,
+    why_unsteady,
 )
 
 _AGREES = 0.5

@@ -1,5 +1,6 @@
 from .catalogue import (
     SCHEMA as SCHEMA,
+    CatalogueEntry as CatalogueEntry,
     entry as entry,
     load as load,
     maker_of as maker_of,
@@ -7,7 +8,4 @@ from .catalogue import (
     read_table as read_table,
     urdf as urdf,
     urdf_of as urdf_of,
-)
-from .record import (
-    CatalogueEntry as CatalogueEntry,
 )

@@ -34,13 +34,15 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import LOOPBACK, Motion, RobotArm, WallClock
 from elastocal.errors import DeviceError, ElastocalError
 from elastocal.results import brief_repr
-from elastocal.sim.wire._pos_corr import PosCorr, PosCorrLimits, RsiStopError
 from elastocal.sim.wire._rsi_messages import (
     LARGEST,
     Answer,
     Channel,
     EthernetConfig,
+    PosCorr,
+    PosCorrLimits,
     RobWriter,
+    RsiStopError,
     SenReader,
 )
 from elastocal.sim.wire.live_cell import LiveCell
