@@ -39,8 +39,8 @@ def of_command(*arguments: object) -> set[str]:
 
 def test_a_researcher_imports_the_core_without_what_programs_for_people_are_made_of():
     core = ("robot", "elastic", "dataset", "identification", "geometry", "cell", "planning")
-    code = "; ".join(
-        f"import elastocal.{name} as m; [getattr(m, each) for each in dir(m)]"
+    code = "import importlib\n" + "\n".join(
+        f"m = importlib.import_module('elastocal.{name}'); [getattr(m, each) for each in dir(m)]"
         for name in (*core, "codec", "compensation")
     )
     people = {"typer", "rich", "jinja2", "matplotlib", "plotly", "websockets", "openpyxl"}
