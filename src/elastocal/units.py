@@ -6,7 +6,9 @@ package only ever sees metres, radians, newtons. The table below is the whole li
 
 import math
 import re
+from typing import TypeVar
 
+from elastocal.arrays import FloatArray
 from elastocal.errors import UnitError, nearest
 
 _FACTORS: dict[str, dict[str, float]] = {
@@ -41,6 +43,14 @@ _FACTORS: dict[str, dict[str, float]] = {
     "frequency": {"Hz": 1.0},
     "acceleration": {"m/s2": 1.0, "m/s^2": 1.0, "m/s²": 1.0},
 }
+
+SHOWN = {
+    "mm": 1e3, "µm": 1e6, "mm/s": 1e3, "ms": 1e3, "mrad": 1e3,
+    "deg": 180.0 / math.pi, "°": 180.0 / math.pi,
+}  # fmt: skip
+"""How many of a unit that people read are in one of SI: the only place that says so for what is
+shown."""
+V = TypeVar("V", float, FloatArray)
 
 _LARGEST: dict[str, tuple[float, str]] = {
     "length": (1e3, "1 km"),  # the longest rails and halls are some hundred metres
@@ -91,6 +101,38 @@ def factor(unit: str, dimension: str) -> float:
             f"{nearest(unit, table)}"
         )
     return table[unit]
+
+
+def in_unit(value: V, unit: str) -> V:
+    """Return an SI value, or an array of them, in a unit that people read.
+
+    >>> in_unit(0.0123, "mm"), in_unit(math.pi, "deg")
+    (12.3, 180.0)
+
+    Raises
+    ------
+    KeyError
+        If the unit is none that people read (`SHOWN`).
+    """
+    return value * SHOWN[unit]
+
+
+def quantity(value: float, unit: str, spec: str = "g") -> str:
+    """Return an SI value in a unit that people read, with the unit.
+
+    >>> quantity(0.0123, "mm"), quantity(0.5, "°", ".1f"), quantity(-1e-9, "mm", ".1f")
+    ('12.3 mm', '28.6°', '0.0 mm')
+
+    Raises
+    ------
+    KeyError
+        If the unit is none that people read (`SHOWN`).
+    """
+    number = f"{in_unit(float(value), unit):{spec}}"
+    bare = number.removeprefix("-")
+    # Rounded to nothing, it has no sign.
+    shown = bare if not bare.strip("0.") else number
+    return f"{shown}°" if unit == "°" else f"{shown} {unit}"
 
 
 def parse_quantity(text: object, dimension: str) -> float:

@@ -27,6 +27,7 @@ from elastocal.cell import DeviceReading, read_statements
 from elastocal.cli import output
 from elastocal.errors import ProcedureError, SchemaError
 from elastocal.procedure import Progress
+from elastocal.units import quantity
 from elastocal.workflows import LiveReport, Supervision, WatchResult
 
 REFRESH = 0.1
@@ -51,7 +52,7 @@ def progress_text(step: Progress) -> str:
     again = f" (attempt {step.attempt})" if step.attempt > 1 else ""
     what = f"{step.step.value} {step.load_case or ''}".rstrip()
     return (
-        f"{where}{again}  {what}  {step.force:.0f} N  slip {step.slip * 1e3:.2f} mm"
+        f"{where}{again}  {what}  {step.force:.0f} N  slip {quantity(step.slip, 'mm', '.2f')}"
         f"  {_duration(step.left)} left"
     )
 

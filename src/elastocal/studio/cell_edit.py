@@ -22,6 +22,7 @@ from elastocal.files import replacing, require_file, require_size, sha256
 from elastocal.outputs import OutputRule, ruled
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.units import in_unit
 
 Key = str | int
 """Name of a key, or number of an item."""
@@ -407,9 +408,9 @@ def region_around(cell: Cell, points: FloatArray) -> RegionForm:
 def _with_home(text: str, cell: Cell, home: tuple[float, ...]) -> str:
     joints = zip(cell.robot.joint_names, cell.robot.revolute, home, strict=True)
     for name, turns, value in joints:
-        scale, unit = (np.degrees(1.0), "deg") if turns else (1e3, "mm")
-        quantity = f"{round(scale * value, 2) + 0.0:g} {unit}"
-        text = with_value(text, ("motion", "home", name), quantity)
+        unit = "deg" if turns else "mm"
+        shown = f"{round(in_unit(value, unit), 2) + 0.0:g} {unit}"
+        text = with_value(text, ("motion", "home", name), shown)
     return text
 
 

@@ -27,6 +27,7 @@ from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
 from elastocal.studio.springs import CaseFigure, StiffnessFigure, StudioSprings
+from elastocal.units import in_unit, quantity
 from elastocal.viewer import Scene, cell_scene, packed_places
 from elastocal.wording import millimetres, mm, readable
 
@@ -162,7 +163,7 @@ class CellView:
             ),
             tcp=tuple(T.ravel().tolist()),
             position=f"{millimetres((x, y, z))} mm",
-            orientation=", ".join(f"{np.degrees(angle) + 0.0:.1f}°" for angle in (a, b, c)),
+            orientation=", ".join(quantity(angle, "°", ".1f") for angle in (a, b, c)),
             joints=self._joints(inside),
             checks=(*reaches_off, *checks),
             marker=marker,
@@ -306,7 +307,7 @@ class CellView:
             return "the tool does not point at the tooling"
         point = self.surface.points(np.array([hit[0]]), hit[1][None])
         gap = float((point.position[0] - T[:3, 3]) @ T[:3, 2])
-        tilt = float(np.degrees(np.arccos(np.clip(-point.normal[0] @ T[:3, 2], -1.0, 1.0))))
+        tilt = in_unit(float(np.arccos(np.clip(-point.normal[0] @ T[:3, 2], -1.0, 1.0))), "deg")
         where = f"{mm(abs(gap), 1)} {'off' if gap > 0.0 else 'in'} the tooling"
         where = "on the tooling" if abs(gap) < _TOUCHES else where
         return f"{where}, {tilt:.1f}° from its normal"
@@ -318,12 +319,12 @@ def joint_text(value: float, revolute: bool) -> str:
     >>> joint_text(0.5, True), joint_text(0.25, False)
     ('28.6°', '250.0 mm')
     """
-    return f"{np.degrees(value) + 0.0:.1f}°" if revolute else f"{1e3 * value + 0.0:.1f} mm"
+    return quantity(value, "°", ".1f") if revolute else quantity(value, "mm", ".1f")
 
 
 def _sight_text(margin: float) -> str:
     if margin > 0.0:
-        return f"seen, {np.degrees(margin):.0f}° to spare"
+        return f"seen, {quantity(margin, '°', '.0f')} to spare"
     if margin <= -np.pi:
         return "hidden, or out of range"
-    return f"turned away by {np.degrees(-margin):.0f}°"
+    return f"turned away by {quantity(-margin, '°', '.0f')}"

@@ -12,6 +12,7 @@ from elastocal.identification import CalibratedModel
 from elastocal.planning.surface import arm_reach
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.units import in_unit, quantity
 from elastocal.wording import mm
 
 _WIND_UP = 2e-3
@@ -111,7 +112,7 @@ class StudioSprings:
                 name=name,
                 force=f"{_round(load)} N",
                 size=mm(float(np.linalg.norm(each))),
-                parts=", ".join(f"{1e3 * part + 0.0:.3f}" for part in each),
+                parts=", ".join(f"{in_unit(part, 'mm') + 0.0:.3f}" for part in each),
                 interval=interval,
                 deflection=(float(each[0]), float(each[1]), float(each[2])),
             )
@@ -142,7 +143,8 @@ def default_springs(cell: Cell) -> StudioSprings:
     stiffness = np.where(robot.revolute, torque / _WIND_UP, _DRIVE)
     source = (
         "default springs, not calibrated: one a joint, whose gear winds up"
-        f" {1e3 * _WIND_UP:g} mrad under the torque it may use. Sizes may be wrong by a factor of 3"
+        f" {quantity(_WIND_UP, 'mrad')} under the torque it may use. Sizes may be"
+        " wrong by a factor of 3"
     )
     return StudioSprings(ElasticModel(robot, layout(robot, "actuated")), 1.0 / stiffness, source)
 
@@ -156,7 +158,9 @@ def _stiffness_text(compliance: float) -> str:
 def _interval_text(low: FloatArray, high: FloatArray) -> str:
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         return ""
-    return ", ".join(f"{1e3 * a:.3f} to {1e3 * b:.3f}" for a, b in zip(low, high, strict=True))
+    return ", ".join(
+        f"{in_unit(a, 'mm'):.3f} to {in_unit(b, 'mm'):.3f}" for a, b in zip(low, high, strict=True)
+    )
 
 
 def _round(force: FloatArray) -> str:

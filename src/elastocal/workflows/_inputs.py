@@ -44,7 +44,7 @@ from elastocal.robot import (
     tool_link,
     with_tool,
 )
-from elastocal.units import parse_number, parse_point, parse_quantity
+from elastocal.units import parse_number, parse_point, parse_quantity, quantity
 from elastocal.wording import listed
 
 _LONGEST_TOOL = 10.0
@@ -124,9 +124,9 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
     gap = tcp_gap(model, cell)
     if not of_one_arm(gap, model, cell):
         raise RobotError(
-            f"{file}: the same joints lead {np.degrees(gap.angle):.3g}° and"
-            f" {1e3 * gap.distance:.3g} mm apart in the model and in cell {name}: another tool"
-            " centre point, base or robot"
+            f"{file}: the same joints lead {quantity(gap.angle, '°', '.3g')} and"
+            f" {quantity(gap.distance, 'mm', '.3g')} apart in the model and in cell {name}:"
+            " another tool centre point, base or robot"
         )
 
 
@@ -279,7 +279,7 @@ def parse_posture(robot: Robot, text: str | None) -> FloatArray | None:
 def write_posture(robot: Robot, q: Sequence[float]) -> str:
     """Return a posture as `parse_posture` reads it, to 0.1 deg and 0.1 mm."""
     return ", ".join(
-        f"{np.degrees(value):.1f} deg" if turns else f"{1e3 * value:.1f} mm"
+        quantity(value, "deg", ".1f") if turns else quantity(value, "mm", ".1f")
         for value, turns in zip(q, robot.revolute, strict=True)
     )
 

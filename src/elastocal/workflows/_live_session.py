@@ -39,6 +39,7 @@ from elastocal.compensation.online import (
 )
 from elastocal.errors import CompensationError, DeviceError, present
 from elastocal.identification import CalibratedModel
+from elastocal.units import in_unit, quantity
 from elastocal.workflows._operator_and_devices import ReservedRig, Rig
 
 _LOOK = 0.05
@@ -91,10 +92,10 @@ class LiveReport:
         )
         line = self.line
         times = (line.answer_p50, line.answer_p99, line.answer_longest)
-        shown = " / ".join("-" if each is None else f"{1e3 * each:.2f}" for each in times)
+        shown = " / ".join("-" if each is None else f"{in_unit(each, 'ms'):.2f}" for each in times)
         return (
             f"{self.seconds:.0f} s {self.phase.value}  {self.force:.0f} N"
-            f"  {1e3 * self.correction:.3f} mm  {flags or 'ok'}  answers {shown} ms"
+            f"  {quantity(self.correction, 'mm', '.3f')}  {flags or 'ok'}  answers {shown} ms"
             f"  {line.late} late  {line.lost} lost  {line.jumps} jumps"
             + (f"  log: {self.dropped} dropped" if self.dropped else "")
             + (f"  SENSOR: {self.refusal}" if self.refusal else "")
@@ -267,8 +268,9 @@ class LiveSession:
         cycle, sample = numbers.settings.cycle, numbers.filters.sample
         if sample > cycle or (sample < cycle and abs(sensor.rate * sample - 1.0) > _SAME_RATE):
             raise CompensationError(
-                f"filter.sample is {1e3 * sample:g} ms: must be the cycle of {1e3 * cycle:g} ms or"
-                f" that of the sensor, which sends {sensor.rate:g} a second"
+                f"filter.sample is {quantity(sample, 'ms')}: must be the cycle of"
+                f" {quantity(cycle, 'ms')} or that of the sensor, which sends"
+                f" {sensor.rate:g} a second"
             )
         tare = None
         if self._ready.tares:

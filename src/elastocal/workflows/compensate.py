@@ -31,6 +31,7 @@ from elastocal.records import record
 from elastocal.results import Result
 from elastocal.robot import Robot
 from elastocal.templating import plain
+from elastocal.units import quantity
 from elastocal.workflows._inputs import (
     ArmAsBuilt,
     NewTool,
@@ -242,7 +243,7 @@ def _path_notes(
 
 def _shown(metres: float) -> str:
     """Return a length in mm; how little a solver left is of no use below that."""
-    return f"{1e3 * metres:.3g} mm" if metres >= 1e-8 else "under 0.00001 mm"
+    return quantity(metres, "mm", ".3g") if metres >= 1e-8 else "under 0.00001 mm"
 
 
 def _built(settings: CompensateSettings) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from elastocal.parallel import process_count, process_pool
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
+from elastocal.units import quantity
 from elastocal.workflows._operator_and_devices import Operator, Unattended
 from elastocal.workflows._workflow import Workflow, workflow
 from elastocal.workflows.calibrate import calibrate
@@ -149,10 +150,14 @@ class DemoResult(Result):
         return (
             (
                 "mean deviation on the process path",
-                f"{1e3 * before.mean:.3f} mm before, {1e3 * after.mean:.3f} mm after correction"
+                f"{quantity(before.mean, 'mm', '.3f')} before,"
+                f" {quantity(after.mean, 'mm', '.3f')} after correction"
                 f" (-{100 * share.mean:.1f} %)",
             ),
-            ("largest", f"{1e3 * before.max:.3f} mm, then {1e3 * after.max:.3f} mm"),
+            (
+                "largest",
+                f"{quantity(before.max, 'mm', '.3f')}, then {quantity(after.max, 'mm', '.3f')}",
+            ),
             ("report", str(self.folder / "report.html")),
         )
 

@@ -21,6 +21,7 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
 from elastocal.robot import Robot
+from elastocal.units import quantity
 from elastocal.workflows._inputs import (
     NewTool,
     coverage_notes,
@@ -85,15 +86,18 @@ class ExportResult(Result):
             ("tool", self.tool),
             ("folder", self.folder),
             ("files", ", ".join(self.files)),
-            ("cycle", f"{1e3 * self.cycle:g} ms"),
-            ("delay of the filters", f"{1e3 * self.filter_delay:.3g} ms"),
+            ("cycle", quantity(self.cycle, "ms")),
+            ("delay of the filters", quantity(self.filter_delay, "ms", ".3g")),
             (
                 "on production",
                 "not known: calibrate with --process"
                 if self.on_production is None
                 else f"the model predicts {self.on_production.figures}",
             ),
-            ("largest correction", f"{1e3 * limits.correction:g} mm, {1e3 * limits.rate:g} mm/s"),
+            (
+                "largest correction",
+                f"{quantity(limits.correction, 'mm')}, {quantity(limits.rate, 'mm/s')}",
+            ),
         )
 
 

@@ -28,12 +28,11 @@ from elastocal.report.document import REPORT_TITLE, GeometryFindings, write_geom
 from elastocal.results import Result, brief_repr
 from elastocal.robot import BUILT_MARK
 from elastocal.tables import write_table
-from elastocal.units import parse_point
-from elastocal.wording import counted
+from elastocal.units import in_unit, parse_point
+from elastocal.wording import counted, mm
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
-_MM, _DEGREES = 1e3, float(np.degrees(1.0))
 _PAGE = '<meta name="generator" content="elastocal geometry">'
 """Stands in the report, whatever its language."""
 _TABLE = ("joint", "number", "unit", "nominal", "calibrated", "difference", "low", "high")
@@ -165,14 +164,11 @@ def _check_suffixes(settings: GeometrySettings) -> None:
 
 def _cells(row: LinkNumber) -> tuple[object, ...]:
     """Return a row of the table, in mm and degrees."""
-    scale, unit = (_MM, "mm") if row.unit == "m" else (_DEGREES, "deg")
+    unit = "mm" if row.unit == "m" else "deg"
     values = (row.nominal, row.calibrated, row.calibrated - row.nominal, row.low, row.high)
-    shown = ("" if value is None else round(scale * value, 9) + 0.0 for value in values)
+    shown = ("" if value is None else round(in_unit(value, unit), 9) + 0.0 for value in values)
     return (row.joint, row.number, unit, *shown)
 
 
 def _phrase(mean: float, p95: float, largest: float) -> str:
-    return (
-        f"{_MM * mean:.3f} mm mean, {_MM * p95:.3f} mm at 95 %, {_MM * largest:.3f} mm at most, at"
-        " poses left out"
-    )
+    return f"{mm(mean)} mean, {mm(p95)} at 95 %, {mm(largest)} at most, at poses left out"

@@ -21,6 +21,7 @@ from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record, validate
 from elastocal.results import Result
+from elastocal.units import in_unit, quantity
 from elastocal.workflows._workflow import workflow
 
 _DRIVER = "kuka_rsi"
@@ -60,10 +61,13 @@ class KrcConfigResult(Result):
             ("mode", self.mode),
             ("folder", self.folder or "nothing written"),
             ("files", ", ".join(self.files)),
-            ("largest correction", f"{1e3 * bounds.correction:.1f} mm"),
-            ("POSCORR, POSCORRMON", f"{1e3 * bounds.poscorr:.1f}, {1e3 * bounds.monitor:.1f} mm"),
-            ("fastest correction", f"{1e3 * bounds.speed:g} mm/s"),
-            ("delay to motion", f"{1e3 * self.delay:.1f} ms"),
+            ("largest correction", quantity(bounds.correction, "mm", ".1f")),
+            (
+                "POSCORR, POSCORRMON",
+                f"{in_unit(bounds.poscorr, 'mm'):.1f}, {quantity(bounds.monitor, 'mm', '.1f')}",
+            ),
+            ("fastest correction", quantity(bounds.speed, "mm/s")),
+            ("delay to motion", quantity(self.delay, "ms", ".1f")),
             *(("note", text) for text in self.notes),
         )
 

@@ -21,6 +21,7 @@ from elastocal.procedure.derive import sensor_load
 from elastocal.progress import Progress
 from elastocal.records import record, validate, write_json
 from elastocal.results import Result
+from elastocal.units import in_unit, quantity
 from elastocal.workflows._inputs import (
     NewTool,
     coverage_notes,
@@ -108,8 +109,10 @@ class LiveResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         loop, limits = self.loop, self.limits
-        longest = f"{1e3 * loop.largest_correction:.3f} of {1e3 * limits.correction:g} mm"
-        step = 1e3 * loop.largest_step
+        longest = (
+            f"{in_unit(loop.largest_correction, 'mm'):.3f} of {quantity(limits.correction, 'mm')}"
+        )
+        step = in_unit(loop.largest_step, "mm")
         return (
             ("ended", f"{self.ended}, after {self.seconds:.1f} s"),
             *((("problem", self.problem),) if self.problem else ()),
@@ -163,8 +166,8 @@ def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG
         limits = ready.limits
         raise DeviceError(
             f"nothing was started: {ready.cell.robot.name} would be corrected by up to"
-            f" {1e3 * limits.correction:g} mm at up to {1e3 * limits.rate:g} mm/s; give --arm when"
-            " somebody has looked at the cell"
+            f" {quantity(limits.correction, 'mm')} at up to {quantity(limits.rate, 'mm/s')}; give"
+            " --arm when somebody has looked at the cell"
         )
     started = datetime.now(UTC).isoformat(timespec="seconds")
     with ready.rig.reserved("live", ("arm", "sensor")) as rig:
@@ -253,8 +256,8 @@ def settings_within(file: Path | None, limits: PathLimits, cell: Cell) -> Compen
     ):
         if not ours <= theirs:
             raise CompensationError(
-                f"{file}: {what} is {1e3 * ours:g} mm{'/s' if what.endswith('rate') else ''}: at"
-                f" most {1e3 * theirs:g}, which the cell file allows"
+                f"{file}: {what} is {quantity(ours, 'mm')}{'/s' if what.endswith('rate') else ''}:"
+                f" at most {in_unit(theirs, 'mm'):g}, which the cell file allows"
             )
     if "sensor" not in found.model_fields_set:
         ranges = validate(_range(cell), CompensatorSettings, f"{cell.path}: sensor").sensor

@@ -24,7 +24,7 @@ from elastocal.progress import Progress
 from elastocal.records import write_json
 from elastocal.results import Result
 from elastocal.sim import truth_of
-from elastocal.units import parse_quantity
+from elastocal.units import in_unit, parse_quantity, quantity
 from elastocal.workflows._operator_and_devices import Operator, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
 from elastocal.workflows.krc_config import kuka_settings
@@ -66,11 +66,11 @@ class MeasureDelayResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         found, chirps = self.measured, self.measured.chirps
-        each = ", ".join(f"{1e3 * chirp.delay:.1f}" for chirp in chirps)
+        each = ", ".join(f"{in_unit(chirp.delay, 'ms'):.1f}" for chirp in chirps)
         lag = max(chirp.lag for chirp in chirps)
         return (
-            ("delay to motion", f"{1e3 * found.delay:.1f} ms (x, y, z: {each} ms)"),
-            ("of it lag", f"{1e3 * lag:.1f} ms"),
+            ("delay to motion", f"{quantity(found.delay, 'ms', '.1f')} (x, y, z: {each} ms)"),
+            ("of it lag", quantity(lag, "ms", ".1f")),
             ("gain", ", ".join(f"{chirp.gain:.3f}" for chirp in chirps)),
             ("line", found.link.sentence()),
             ("record", str(self.out)),
@@ -105,7 +105,7 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
     if not 0.0 < amplitude <= _MOST_AMPLITUDE:
         raise DeviceError(
             f"amplitude {settings.amplitude} must be above 0 and at most"
-            f" {1e3 * _MOST_AMPLITUDE:g} mm"
+            f" {quantity(_MOST_AMPLITUDE, 'mm')}"
         )
     if not 2.0 <= settings.seconds <= 60.0:
         raise DeviceError(f"{settings.seconds:g} seconds: must be from 2 to 60")

@@ -22,7 +22,7 @@ from elastocal.progress import Progress
 from elastocal.results import Result
 from elastocal.robot.inverse import inverse_for
 from elastocal.templating import templates
-from elastocal.units import parse_quantity
+from elastocal.units import in_unit, parse_quantity, quantity
 from elastocal.workflows._file_kinds import cell_file
 from elastocal.workflows._inputs import parse_frame
 from elastocal.workflows._workflow import workflow
@@ -151,7 +151,7 @@ def _home(cell: Cell, surface: Surface, mover: Mover) -> FloatArray:
     """Return a posture before the surface that is far from its limits and free of collisions."""
     places = np.concatenate([_places(surface, retreat) for retreat in _RETREATS])
     found = inverse_for(cell.robot).solve_many(places.reshape(-1, 4, 4)).q
-    q = np.degrees(found[np.isfinite(found).all(axis=-1)])
+    q = in_unit(found[np.isfinite(found).all(axis=-1)], "deg")
     q = np.radians(np.round(q, 1))
     if not len(q):
         raise PlanningError("the arm comes to no point before the surface: move it by --place")
@@ -186,7 +186,7 @@ def _before(point: FloatArray, normal: FloatArray, retreat: float, turn: float) 
 def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str:
     """Return the text of the cell file; paths in it are relative to the file."""
     robot = settings.arm
-    shown = zip(robot.joint_names, np.degrees(home) + 0.0, strict=True)
+    shown = zip(robot.joint_names, home, strict=True)
     slow = not np.isfinite(robot.limits.velocity).all()
     effort = np.where(np.isfinite(robot.limits.effort), robot.limits.effort, 100.0)
     torques = zip(robot.joint_names, effort, strict=True)
@@ -212,7 +212,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         low=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in low)),
         high=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in high)),
         flip=flip,
-        floor=f"{1e3 * min(0.0, settings.lowest) - 100.0:.0f} mm",
+        floor=quantity(min(0.0, settings.lowest) - 0.1, "mm", ".0f"),
         side=_quoted(f"{press / 3.0:.2g} N"),
         press=_quoted(settings.press),
         contact=_quoted(f"{min(60.0, max(10.0, 0.2 * press)):.2g} N"),
@@ -220,7 +220,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         disk=_quoted(f"{settings.disk_radius:g} mm"),
         payload=_quoted(f"{2.0 * parse_quantity(settings.tool_mass, 'mass'):g} kg"),
         torques=", ".join(f'{_quoted(name)}: "{value:g} N*m"' for name, value in torques),
-        home=", ".join(f'{_quoted(name)}: "{value:.1f} deg"' for name, value in shown),
+        home=", ".join(f'{_quoted(name)}: "{quantity(q, "deg", ".1f")}"' for name, q in shown),
         speed=", ".join(f'{_quoted(n)}: "90 deg/s"' for n in robot.joint_names) if slow else "",
         poses=settings.poses,
         process="" if process == NONE else _quoted(_relative(process, out)),
@@ -239,15 +239,14 @@ def _shape(tip: FloatArray, radius: float) -> str:
     radius : float
         In mm.
     """
-    length = 1e3 * float(np.linalg.norm(tip))
+    length = in_unit(float(np.linalg.norm(tip)), "mm")
     if length < 1.0:
         return f'{{name: tool, sphere: {{radius: "{radius:.0f} mm"}}}}'
     middle = ", ".join(f'"{420.0 * x:.0f} mm"' for x in tip)
     rod = f'{{radius: "{radius:.0f} mm", length: "{0.8 * length:.0f} mm"}}'
     aside = math.hypot(tip[0], tip[1])
-    a, b = np.degrees(
-        [math.atan2(tip[1], tip[0]) if aside > 1e-6 else 0.0, math.atan2(aside, tip[2])]
-    )
+    a = in_unit(math.atan2(tip[1], tip[0]) if aside > 1e-6 else 0.0, "deg")
+    b = in_unit(math.atan2(aside, tip[2]), "deg")
     turn = "" if b < 0.5 else f', abc: ["{a:.1f} deg", "{b:.1f} deg", "0 deg"]'
     return f"{{name: tool, cylinder: {rod}, pose: {{xyz: [{middle}]{turn}}}}}"
 

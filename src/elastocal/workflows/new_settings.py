@@ -19,7 +19,7 @@ from elastocal.meshes import load_triangles
 from elastocal.options import Option
 from elastocal.planning.surface import arm_reach
 from elastocal.robot import Robot, catalogue, read_urdf, refusals_naming, tool_link, with_tool
-from elastocal.units import parse_point, parse_quantity
+from elastocal.units import in_unit, parse_point, parse_quantity
 from elastocal.workflows._inputs import ROBOT_SUFFIXES, parse_frame
 
 NONE = "none"
@@ -242,7 +242,7 @@ class NewSettings:
     @property
     def extent(self) -> str:
         """Size of the mesh in words."""
-        size = 1e3 * self._metres * np.ptp(self.bounds, axis=0)
+        size = in_unit(self._metres * np.ptp(self.bounds, axis=0), "mm")
         return (
             f"{size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} mm, its numbers taken for {self.unit}"
         )

@@ -14,6 +14,7 @@ from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.units import quantity
 from elastocal.workflows._inputs import ArmAsBuilt, NewTool, coverage_notes
 from elastocal.workflows._workflow import workflow
 
@@ -70,8 +71,8 @@ class PredictResult(Result):
         return (
             ("tool", figures.tool),
             ("rows", str(figures.rows)),
-            ("deflection", f"{1e3 * figures.deflection.mean:.3f} mm mean"),
-            ("largest", f"{1e3 * figures.deflection.max:.3f} mm"),
+            ("deflection", f"{quantity(figures.deflection.mean, 'mm', '.3f')} mean"),
+            ("largest", quantity(figures.deflection.max, "mm", ".3f")),
             *(("note", text) for text in figures.notes),
             *((("warning", text),) if (text := figures.warning) else ()),
         )

@@ -31,6 +31,7 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.sim import truth_of
+from elastocal.units import in_unit, quantity
 from elastocal.wording import mm
 from elastocal.workflows._operator_and_devices import (
     Operator,
@@ -128,7 +129,8 @@ class _Way:
         """Return the way as a phrase."""
         x, y, z = self.direction
         parts = ", then ".join(
-            f"{1e3 * length:g} mm at {1e3 * speed:g} mm/s" for length, speed in self.stages
+            f"{quantity(length, 'mm')} at {quantity(speed, 'mm/s')}"
+            for length, speed in self.stages
         )
         return f"{parts}, along -z of the tool ({x:+.2f}, {y:+.2f}, {z:+.2f} in base)"
 
@@ -226,13 +228,13 @@ def _way(cell: Cell, bench: _Bench, force: FloatArray | None) -> _Way:
 
 def _plan(bench: _Bench, way: _Way, force: FloatArray | None) -> tuple[str, ...]:
     """Return what a person reads before anything moves."""
-    x, y, z = 1e3 * bench.arm.state().T_base_tcp[:3, 3]
+    x, y, z = in_unit(bench.arm.state().T_base_tcp[:3, 3], "mm")
     guarded = f"it stops where the force grows by {_GROWTH:g} N"
     blind = "no force is watched: it goes slowly, in position control"
     return (
         f"the tool stands at {x:.1f}, {y:.1f}, {z:.1f} mm in base",
         _force_sentence(bench, force),
-        f"it is retracted by {1e3 * way.distance:g} mm: {way.sentence()}",
+        f"it is retracted by {quantity(way.distance, 'mm')}: {way.sentence()}",
         blind if force is None else guarded,
     )
 
@@ -248,6 +250,11 @@ def _force_sentence(bench: _Bench, force: FloatArray | None) -> str:
     return f"{size:.0f} N on the tool beyond its weight, {judged} (limit {tolerance:.0f} N)"
 
 
+def _way_from(start: FloatArray, arm: RobotArm) -> str:
+    """Return how far the tool is from where it stood."""
+    return quantity(float(np.linalg.norm(arm.state().T_base_tcp[:3, 3] - start)), "mm", ".1f")
+
+
 def _move(bench: _Bench, way: _Way, interrupted: Callable[[], bool]) -> str:
     """Retract; return what is known of the place then."""
     arm = bench.arm
@@ -259,15 +266,15 @@ def _move(bench: _Bench, way: _Way, interrupted: Callable[[], bool]) -> str:
             leave_surface(
                 (arm, bench.force, bench.clock), length * way.direction, speed, watch, interrupted
             )
-        gone = 1e3 * float(np.linalg.norm(arm.state().T_base_tcp[:3, 3] - start))
-        message = f"retracted by {gone:.1f} mm"
+        gone = _way_from(start, arm)
+        message = f"retracted by {gone}"
         try:
             arm.adopt_position()
         except DeviceError as error:
             message = f"{message}; {error}"
     except FaultError as error:
-        gone = 1e3 * float(np.linalg.norm(arm.state().T_base_tcp[:3, 3] - start))
-        raise ProcedureError(f"{error}. The tool has left by {gone:.1f} mm and stands") from error
+        gone = _way_from(start, arm)
+        raise ProcedureError(f"{error}. The tool has left by {gone} and stands") from error
     finally:
         with contextlib.suppress(DeviceError, OSError):
             arm.disable()

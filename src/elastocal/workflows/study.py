@@ -44,6 +44,7 @@ from elastocal.sim.workcell import (
     ErrorDraws,
     ErrorScales,
 )
+from elastocal.units import quantity
 from elastocal.workflows._workflow import workflow
 
 DEFAULT_VARIATION = "poses=6,10,15,20,31"
@@ -102,7 +103,7 @@ class StudyResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         conditions = tuple(
-            (each.name, f"{1e3 * each.error_mean.median:.4f} mm median mean error")
+            (each.name, f"{quantity(each.error_mean.median, 'mm', '.4f')} median mean error")
             for each in self.summary.conditions
         )
         advice = (("advice", self.summary.advice),) if self.summary.advice else ()

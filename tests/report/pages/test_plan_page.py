@@ -11,7 +11,7 @@ import pytest
 
 from elastocal.errors import FileAccessError, PlanningError, SchemaError
 from elastocal.report import write_plan_page
-from elastocal.viewer import scene, solids
+from elastocal.viewer import scene
 from support import plans
 from support.pages import Page
 
@@ -44,7 +44,7 @@ def test_a_fine_mesh_is_drawn_coarser_and_the_page_says_so(
     tmp_path, cell, plan, pool, moved_onto, monkeypatch, ball
 ):
     monkeypatch.setattr(scene, "MOST_OF_TOOLING", 100)
-    monkeypatch.setattr(solids, "MOST_OF_LINK", 40)
+    monkeypatch.setattr(scene, "MOST_OF_LINK", 40)
     path = write_plan_page(tmp_path / "p.html", cell, ball, *moved_onto(ball, plan, pool))
     text = path.read_text(encoding="utf-8")
     said = re.search(r"The tooling is drawn with (\d+) faces in place of 320\.", text)

@@ -9,6 +9,7 @@ from elastocal.blocks import Stamp
 from elastocal.cell import Equipment, SensorIdentity, TrackerIdentity
 from elastocal.identification import JOINT_REACH, RAIL_REACH, ProductionCoverage
 from elastocal.results import brief_repr
+from elastocal.units import in_unit
 from elastocal.verdict import (
     Evidence,
     Light,
@@ -228,7 +229,9 @@ def _tested_with(evidence: Evidence) -> Phrase | None:
 def _coverage(found: ProductionCoverage | None, red: bool) -> Phrase:
     if found is None:
         return phrase("Not known: the cell file names no production path (process.file).")
-    reach = phrase("{angle}° in each joint but the last", angle=f"{np.degrees(JOINT_REACH):.0f}")
+    reach = phrase(
+        "{angle}° in each joint but the last", angle=f"{in_unit(JOINT_REACH, 'deg'):.0f}"
+    )
     if found.rail is not None:
         reach = phrase("{reach} and {rail} of rail", reach=reach, rail=mm(RAIL_REACH, 0))
     points = counted(found.rows, "point")
@@ -262,7 +265,7 @@ def _bar(evidence: Evidence) -> ToleranceBar | None:
     if unseen is None:
         return None
     longest = 1.08 * max(unseen.max, unseen.p95.high, tolerance or 0.0)
-    end, step = _scale(1e3 * longest, 5)
+    end, step = _scale(in_unit(longest, "mm"), 5)
 
     def at(metres: float) -> float:
         return 1e5 * metres / end
@@ -291,16 +294,16 @@ def _before_after(evidence: Evidence) -> BeforeAfter | None:
     size = np.linalg.norm(readings.deflection, axis=1)
     poses = list(dict.fromkeys(sorted(map(int, readings.pose))))
     place = {pose: number for number, pose in enumerate(poses)}
-    end, step = _scale(1e3 * max(float(size.max()), unseen.max), 4)
+    end, step = _scale(in_unit(max(float(size.max()), unseen.max), "mm"), 4)
     between = _WIDE / max(len(poses), 1)
 
     def dots(pose: IndexArray, values: FloatArray, aside: float) -> str:
         x = (np.array([place[int(each)] for each in pose]) + 0.5 + aside) * between
-        y = _HIGH * (1.0 - 1e3 * values / end)
+        y = _HIGH * (1.0 - in_unit(values, "mm") / end)
         return "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x, y, strict=True))
 
     tolerance = evidence.limits.tolerance
-    level = None if tolerance is None else _HIGH * (1.0 - 1e3 * tolerance / end)
+    level = None if tolerance is None else _HIGH * (1.0 - in_unit(tolerance, "mm") / end)
     every = max(1, -(-len(poses) // 16))
     ticks = np.arange(0.0, end + 0.5 * step, step)
     k = int(unseen.error.argmax())
@@ -313,7 +316,7 @@ def _before_after(evidence: Evidence) -> BeforeAfter | None:
         tuple(Mark(_HIGH * (1.0 - t / end), f"{t:.{_digits(step)}f}") for t in ticks),
         tuple(Mark((place[pose] + 0.5) * between, str(pose)) for pose in poses[::every]),
         Mark(worst, named),
-        _HIGH * (1.0 - 1e3 * unseen.max / end),
+        _HIGH * (1.0 - in_unit(unseen.max, "mm") / end),
         phrase(
             "On average the arm gave way by {before}, and the prediction was wrong by {after}."
             " The arm pressed and was measured; no correction was switched on.",

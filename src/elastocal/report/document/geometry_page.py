@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from elastocal import __version__, blocks
 from elastocal.arrays import FloatArray
 from elastocal.files import write_text
@@ -25,12 +23,12 @@ from elastocal.report.pages import render
 from elastocal.report.plots import MANY_POSITIONS, error_maps, parameter_figure
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
+from elastocal.units import in_unit
 from elastocal.wording import counted, mm, phrase, phrases, point
 
 REPORT_TITLE = "Geometry report"
 """How the title of every such page in English begins."""
 _MOST_ROWS = 200
-_DEGREES = float(np.degrees(1.0))
 _LINKS = phrase(
     "A link goes from its joint's axis to the next by Rz(theta + q) Tz(d) Tx(a) Rx(alpha) (Denavit"
     " and Hartenberg, distal frames). Where both axes are parallel as drawn, Ry(beta) follows and d"
@@ -188,7 +186,10 @@ def _poses_table(poses: Sequence[PoseAccuracy]) -> blocks.Block:
             each.station,
             each.marker,
             each.visits,
-            *(f"{1e3 * v:.3f}" for v in (each.registration, each.chosen, each.repeatability)),
+            *(
+                f"{in_unit(v, 'mm'):.3f}"
+                for v in (each.registration, each.chosen, each.repeatability)
+            ),
         )
         for each in sorted(poses, key=lambda each: -each.repeatability)[:_MOST_ROWS]
     )
@@ -263,7 +264,8 @@ def _links(found: GeometryFindings) -> Iterator[blocks.Block]:
 
 
 def _drawn_unit(row: LinkNumber) -> tuple[float, str, int]:
-    return (1e3, "mm", 3) if row.unit == "m" else (_DEGREES, "°", 4)
+    unit, digits = ("mm", 3) if row.unit == "m" else ("°", 4)
+    return in_unit(1.0, unit), unit, digits
 
 
 def _blunders(found: GeometryFindings) -> Iterator[blocks.Block]:
@@ -275,7 +277,12 @@ def _blunders(found: GeometryFindings) -> Iterator[blocks.Block]:
         return
     named = sorted(blunders, key=lambda each: each.row)
     rows = tuple(
-        (phrase("row {row}", row=each.row), each.station, each.marker, f"{1e3 * each.distance:.2f}")
+        (
+            phrase("row {row}", row=each.row),
+            each.station,
+            each.marker,
+            f"{in_unit(each.distance, 'mm'):.2f}",
+        )
         for each in named[:_MOST_ROWS]
     )
     yield blocks.Paragraph(
@@ -320,5 +327,5 @@ def _frames(found: GeometryFindings) -> Iterator[blocks.Block]:
 
 def _pose(T: FloatArray) -> tuple[str, ...]:
     x, y, z, a, b, c = xyzabc_from_T(T).tolist()
-    lengths = (f"{1e3 * value + 0.0:.3f}" for value in (x, y, z))
-    return (*lengths, *(f"{_DEGREES * value + 0.0:.4f}" for value in (a, b, c)))
+    lengths = (f"{in_unit(value, 'mm') + 0.0:.3f}" for value in (x, y, z))
+    return (*lengths, *(f"{in_unit(value, '°') + 0.0:.4f}" for value in (a, b, c)))

@@ -19,6 +19,7 @@ from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import PlanView, plan_view, weakest_margins
 from elastocal.results import brief_repr
+from elastocal.units import in_unit
 from elastocal.viewer import packed, scene_data
 from elastocal.wording import (
     counted,
@@ -182,7 +183,7 @@ def _covered(production: ProductionRecord) -> tuple[tuple[str, str], ...]:
 def _cells(plan: PlanResult, pose: PoseRecord, worst: str) -> list[str]:
     way = sum(move.duration for move in plan.moves if move.end == pose.id)
     return [
-        *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
+        *(f"{in_unit(value, 'mm') + 0.0:.1f}" for value in pose.tcp_position),
         worst,
         pose.seen_by or phrase("no station"),
         duration(way),

@@ -34,6 +34,7 @@ from elastocal.report.plots._box_plots import (
 )
 from elastocal.report.plots.style import VariantStyle, variant_styles
 from elastocal.results import brief_repr
+from elastocal.units import quantity
 from elastocal.wording import counted, phrase
 
 ERROR_PANELS = {"mean": "Mean error", "max": "Maximum error"}
@@ -225,8 +226,8 @@ def _draw_strip(axes: Axes, verdicts: Verdicts, styles: Sequence[VariantStyle], 
     axes.set_axis_off()
     axes.set_title(
         "Saturation of the mean error: median within"
-        f" {100.0 * verdicts.tolerance.relative:g} % or {1e6 * verdicts.tolerance.floor:g} µm of"
-        " the last (dashed line below)",
+        f" {100.0 * verdicts.tolerance.relative:g} % or"
+        f" {quantity(verdicts.tolerance.floor, 'µm')} of the last (dashed line below)",
         loc="left", fontsize=9.0, pad=4, weight="bold",
     )  # fmt: skip
     for row, (found, variant) in enumerate(zip(verdicts.saturation, styles, strict=True)):

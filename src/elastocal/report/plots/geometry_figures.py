@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from elastocal.arrays import FloatArray
 from elastocal.geometry import GeometryAccuracy, GeometryParameter
 from elastocal.report.plots import style
+from elastocal.units import in_unit
 from elastocal.wording import counted, mm, phrase
 
 _WIDTH = 10.5
@@ -58,7 +59,7 @@ def error_maps(accuracy: GeometryAccuracy, title: str = "") -> Figure:
         Written above with what the errors are of, where no page says it.
     """
     before, after = (
-        1e3 * np.linalg.norm(e, axis=1) for e in (accuracy.registration, accuracy.chosen)
+        in_unit(np.linalg.norm(e, axis=1), "mm") for e in (accuracy.registration, accuracy.chosen)
     )
     both, own = _scale(before), _scale(after)
     across = (_WIDTH - _LEFT - _RIGHT - sum(_GAPS)) / 3.0

@@ -22,6 +22,7 @@ from elastocal.compensation import PathStations, PostureSurvey
 from elastocal.compensation.process import CourseDeviation
 from elastocal.report.plots import style
 from elastocal.results import brief_repr
+from elastocal.units import in_unit
 from elastocal.wording import phrase
 
 _WIDTH, _MAP, _CURVES = 6.6, 2.3, 2.3
@@ -113,8 +114,10 @@ def stiffness_figure(
 ) -> Figure:
     """Return the figure; see `write_stiffness_figure`."""
     along = _along(stations)
-    degrees = [np.degrees(curve.spin) for curve in curves]
-    maps = [("Spin of the tool in °", np.degrees(survey.grid.spins), survey.best_by_spin, degrees)]
+    degrees = [in_unit(curve.spin, "deg") for curve in curves]
+    maps = [
+        ("Spin of the tool in °", in_unit(survey.grid.spins, "deg"), survey.best_by_spin, degrees)
+    ]
     if survey.grid.external.shape[1] == 1 and len(survey.grid.external) > 1:
         held = [curve.rail for curve in curves]
         maps.append(("Rail in m", survey.grid.external[:, 0], survey.best_by_external, held))
@@ -184,7 +187,7 @@ def _draw_curves(axes: Axes, along: FloatArray, curves: Sequence[Curve]) -> None
 
 def _along(stations: PathStations) -> FloatArray:
     """Return the way along the path in mm; a path that stays in one place is counted in rows."""
-    way = 1e3 * stations.arc_length
+    way = in_unit(stations.arc_length, "mm")
     return way if way[-1] > 0.0 else np.arange(len(way), dtype=float)
 
 

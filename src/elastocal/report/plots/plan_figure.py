@@ -24,6 +24,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.planning import PlanResult, PoolData, SpreadRecord, check_pool_of
 from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
+from elastocal.units import in_unit
 from elastocal.wording import phrase, readable
 
 ONE_WAY = np.cos(np.radians(72.0))
@@ -421,8 +422,8 @@ def _draw_candidates(
     size = float(np.clip(12_000.0 / len(place), 0.5, 12.0))
     x, y = place[order].T
     return axes.scatter(
-        x, y, s=size, c=1e3 * distance[order], cmap=f"{style.SEQUENTIAL}_r", vmin=0.0,
-        vmax=1e3 * farthest, linewidths=0, rasterized=len(order) > _MANY,
+        x, y, s=size, c=in_unit(distance[order], "mm"), cmap=f"{style.SEQUENTIAL}_r", vmin=0.0,
+        vmax=in_unit(farthest, "mm"), linewidths=0, rasterized=len(order) > _MANY,
     )  # fmt: skip
 
 

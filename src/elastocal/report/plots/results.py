@@ -26,6 +26,7 @@ from elastocal.report.plots.spring_figures import recertification_figure, spring
 from elastocal.report.plots.style import literal, new_figure, open_frame, variant_styles
 from elastocal.report.plots.timeline_figure import timeline_figure
 from elastocal.results import brief_repr
+from elastocal.units import in_unit
 from elastocal.wording import counted, mm, phrase, springs_and_parameters
 
 _P = ParamSpec("_P")
@@ -169,7 +170,7 @@ def station_figure(stations: Sequence[StationResiduals]) -> Figure:
         for each in stations
     ]
     for each, drawn in zip(stations, variant_styles(names), strict=True):
-        size = 1e6 * np.linalg.norm(each.residual, axis=1)
+        size = in_unit(np.linalg.norm(each.residual, axis=1), "µm")
         axes.vlines(each.poses, 0.0, size, color=drawn.colour, lw=1.0)
         axes.scatter(
             each.poses, size, s=18, c=drawn.colour, marker=drawn.marker, label=literal(drawn.name)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.logs import ImportedLogs, Plateau
 from elastocal.report.plots import style
+from elastocal.units import in_unit
 from elastocal.wording import counted
 
 _MOST = 4000
@@ -96,9 +97,9 @@ def _closely(
     """Draw arm, force and marker about one pose, from its reference."""
     arm, wrench, points = found.streams.arm, found.streams.wrench, found.streams.points
     curves = (
-        ("arm, mm", arm.time, 1e3 * arm.T_base_tcp[:, :3, 3], True),
+        ("arm, mm", arm.time, in_unit(arm.T_base_tcp[:, :3, 3], "mm"), True),
         ("force, N", wrench.time, wrench.force, False),
-        ("marker, mm", points.time, 1e3 * points.position, True),
+        ("marker, mm", points.time, in_unit(points.position, "mm"), True),
     )
     for axes, (name, time, values, as_norm) in zip(panels, curves, strict=True):
         if not len(time):

@@ -12,6 +12,7 @@ from elastocal.findings import group_alike
 from elastocal.procedure.derive import RegistrationSummary, RunSummary, ToolSummary
 from elastocal.report.document.section import Section
 from elastocal.report.plots import StationResiduals, station_figure
+from elastocal.units import in_unit, quantity
 from elastocal.verdict import Evidence
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, point, spans, um
 
@@ -113,7 +114,7 @@ def _surroundings(cell: Cell) -> Iterator[tuple[str, str]]:
 
 
 def _degrees(angle: float) -> str:
-    return f"{np.degrees(angle):.1f}°"
+    return quantity(angle, "°", ".1f")
 
 
 _LIMITS: Mapping[str, tuple[str, Callable[[float], str]]] = {
@@ -130,7 +131,7 @@ _LIMITS: Mapping[str, tuple[str, Callable[[float], str]]] = {
 def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
     file = cell.file
     yield phrase("Contact disk, radius"), mm(file.engagement.disk_radius, 1)
-    yield phrase("Normals within"), f"{np.degrees(file.engagement.normal_tolerance):.1f}°"
+    yield phrase("Normals within"), quantity(file.engagement.normal_tolerance, "°", ".1f")
     yield phrase("Distance to the edge"), mm(file.engagement.edge_margin, 1)
     yield (
         phrase("Friction, safety factor"),
@@ -175,7 +176,7 @@ def _stations(registration: RegistrationSummary) -> Iterator[blocks.Block]:
             spans(each.poses),
             um(each.residual_rms),
             um(each.residual_max),
-            f"{1e3 * each.rotation_sigma:.2f} mrad",
+            quantity(each.rotation_sigma, "mrad", ".2f"),
             um(each.displacement_sigma),
         )
         for each in registration.stations
@@ -309,7 +310,7 @@ def _tool_file(tool: ToolResult | None, cell: Cell | None) -> blocks.Block:
     sensor = None if cell is None else cell.file.sensor
     described = np.eye(3) if sensor is None else sensor.T_flange_sensor[:3, :3]
     R = described.T @ np.array(tool.R_flange_sensor)
-    turned = np.degrees(np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0)))
+    turned = in_unit(np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0)), "deg")
     other = tool.flange if sensor is None else phrase("the cell file's pose of it")
     rows = (
         (phrase("Mass"), f"{tool.mass:.2f} kg"),

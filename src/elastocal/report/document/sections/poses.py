@@ -8,6 +8,7 @@ from elastocal.planning import PlanResult
 from elastocal.report.document.section import PlanScene, Section
 from elastocal.report.pages import expected_table, key_figures
 from elastocal.report.plots import plan_figure, plan_view
+from elastocal.units import in_unit
 from elastocal.verdict import Evidence
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
@@ -61,7 +62,7 @@ def _poses(plan: PlanResult, buttons: bool) -> blocks.Block:
     rows = tuple(
         (
             blocks.PoseButton(pose.id) if buttons else str(pose.id),
-            *(f"{1e3 * value + 0.0:.1f}" for value in pose.tcp_position),
+            *(f"{in_unit(value, 'mm') + 0.0:.1f}" for value in pose.tcp_position),
             pose.seen_by or phrase("no station"),
         )
         for pose in plan.poses

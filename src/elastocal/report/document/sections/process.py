@@ -18,6 +18,7 @@ from elastocal.compensation.process import (
 )
 from elastocal.report.document.section import Section, flattened
 from elastocal.report.plots import course_figure, process_maps
+from elastocal.units import in_unit
 from elastocal.verdict import Evidence, has_own_process
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
@@ -181,7 +182,9 @@ def _means(means: tuple[SeedMeans, ...]) -> blocks.Block:
 
 
 def _change(before: float, after: float) -> Phrase:
-    return phrase("{low} to {high}", low=f"{1e3 * before:.3f}", high=f"{1e3 * after:.3f}")
+    return phrase(
+        "{low} to {high}", low=f"{in_unit(before, 'mm'):.3f}", high=f"{in_unit(after, 'mm'):.3f}"
+    )
 
 
 def _with_interval(figure: SeedMean) -> str:
@@ -264,7 +267,7 @@ def _three(values: DeviationStatistics) -> tuple[float, float, float]:
 
 
 def _mm(values: DeviationStatistics) -> tuple[str, ...]:
-    return tuple(f"{1e3 * value:.3f}" for value in _three(values))
+    return tuple(f"{in_unit(value, 'mm'):.3f}" for value in _three(values))
 
 
 PROCESS = Section(

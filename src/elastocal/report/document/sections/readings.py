@@ -19,6 +19,7 @@ from elastocal.identification import (
 from elastocal.procedure.derive import RunSummary
 from elastocal.report.document.section import Section
 from elastocal.report.plots import displacement_figure, pose_grid
+from elastocal.units import in_unit
 from elastocal.verdict import Evidence
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, sentences
 
@@ -88,7 +89,9 @@ def _lines(lines: tuple[LineCounts, ...]) -> Iterator[blocks.Block]:
             str(each.received),
             *(str(getattr(each, key)) for key, _ in COUNTED),
             "; ".join(each.status) or "ok",
-            "" if each.answer is None else " / ".join(f"{1e3 * t:.2f}" for t in each.answer),
+            ""
+            if each.answer is None
+            else " / ".join(f"{in_unit(t, 'ms'):.2f}" for t in each.answer),
         )
         for each in lines
     )
@@ -181,7 +184,7 @@ def _grid(dataset: Dataset, values: _PoseValues) -> FloatArray:
     """Return values in mm, shape (pose, load_case), NaN where there is none."""
     return np.array(
         [
-            [1e3 * values.get((pose, case), np.nan) for case in dataset.load_cases]
+            [in_unit(values.get((pose, case), np.nan), "mm") for case in dataset.load_cases]
             for pose in dataset.poses
         ]
     )
