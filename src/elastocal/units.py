@@ -6,10 +6,12 @@ package only ever sees metres, radians, newtons. The table below is the whole li
 
 import math
 import re
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from elastocal.arrays import FloatArray
 from elastocal.errors import UnitError, nearest
+
+if TYPE_CHECKING:
+    from elastocal.arrays import FloatArray
 
 _FACTORS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
@@ -50,7 +52,7 @@ SHOWN = {
 }  # fmt: skip
 """How many of a unit that people read are in one of SI: the only place that says so for what is
 shown."""
-V = TypeVar("V", float, FloatArray)
+V = TypeVar("V", float, "FloatArray")
 
 _LARGEST: dict[str, tuple[float, str]] = {
     "length": (1e3, "1 km"),  # the longest rails and halls are some hundred metres
