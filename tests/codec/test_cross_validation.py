@@ -96,7 +96,7 @@ def test_a_broken_beam_is_set_aside_for_all_variants():
     assert found.error_max.max(axis=(0, 1, 3))[-1] < 5e-3
     assert any("pose 4, load case 'east' is set aside" in text for text in found.findings)
     kept = cross_validate(
-        robot(), spoilt, variants, CodecOptions(set_blunders_aside=False, trust_conventions=True)
+        robot(), spoilt, variants, CodecOptions(keep_blunders=True, trust_conventions=True)
     )
     assert kept.error_max.max() > 0.4
 
@@ -120,7 +120,7 @@ def test_forces_turned_round_are_refused_or_fit_nothing(readings):
     turned = replace(readings, force=-readings.force)
     with pytest.raises(ConventionError):
         cross_validate(robot(), turned, [SIX])
-    trusting = CodecOptions(trust_conventions=True, set_blunders_aside=False)
+    trusting = CodecOptions(trust_conventions=True, keep_blunders=True)
     with pytest.raises(CodecError, match="every spring ends at a bound"):
         cross_validate(robot(), turned, [SIX], trusting)
 

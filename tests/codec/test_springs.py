@@ -97,7 +97,7 @@ def test_verification_poses_have_no_part_in_the_choice_of_springs(readings):
     held_out = np.isin(readings.pose, np.array(before.pose_labels)[before.verification[0], 0])
     marker = readings.marker_displacement.copy()
     marker[held_out] += 1e-4 * np.random.default_rng(1).normal(size=(held_out.sum(), 3))
-    options = replace(FEW, set_blunders_aside=False, trust_conventions=True)
+    options = replace(FEW, keep_blunders=True, trust_conventions=True)
     spoilt = replace(readings, marker_displacement=marker)
     after = cross_validate(robot(), spoilt, [Variant()], options)
     assert after.split_layouts[0][0] == before.split_layouts[0][0]

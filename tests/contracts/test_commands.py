@@ -14,7 +14,7 @@ import typer
 
 from elastocal.cell.examples import EXAMPLES
 from elastocal.cli.commands import COMMANDS
-from elastocal.cli.generator import _quantity
+from elastocal.cli.generator import _read
 from elastocal.cli.main import app, run
 from elastocal.compensation.process import PROCESSES
 from elastocal.compensation.programs.languages import PROGRAM_WRITERS
@@ -50,6 +50,14 @@ class TestEveryCommand:
         text = elastocal("--help").out
         above = text[: text.index(f"│ {command} ")]
         assert f"╭─ {COMMANDS[command].group} ─" in above
+
+    def test_help_prints_every_word_of_its_options(self, command, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "1000")
+        shown = elastocal(command, "--help").out
+        for each in COMMANDS[command].fields():
+            assert (each.option.help or each.doc).partition("\n")[0] in shown
+            if each.option.default and not each.option.required:
+                assert f"[default: {each.option.default}]" in shown
 
     @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="/dev/full is Linux's")
     def test_begins_nothing_where_its_output_is_full(self, command, monkeypatch, capfd, tmp_path):
@@ -175,10 +183,10 @@ def test_what_is_read_from_the_source_is_what_the_settings_are(command):
         if each.option.default and not each.option.read:
             assert str(real[each.name].default) == each.option.default
         elif each.option.default:
-            assert (
-                _quantity(each.option.read)(each.option.default, each.flag)
-                == real[each.name].default
-            )
+            field = real[each.name]
+            made = field.default_factory is not dataclasses.MISSING
+            default = field.default_factory() if made else field.default
+            assert _read(each, each.option.default) == default
 
 
 def test_every_option_has_a_sentence():

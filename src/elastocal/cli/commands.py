@@ -484,35 +484,11 @@ def _calibrate(given: Given) -> None:
     )
 
 
-@dataclass(frozen=True)
-class _Codec:
-    keep_blunders: bool = False
-    """Use also what cannot be a measurement."""
-    trust_conventions: bool = False
-    """Use data that fit far better with a sign read otherwise."""
-    splits: Annotated[int | None, Option(most=100_000)] = None
-    """Verification sets; default: as many as poses."""
-    poses: Annotated[int, Option(most=1_000_000)] = 100
-    """Most poses; of a larger dataset as many are drawn by the seed."""
-    ratio: Annotated[str, Option(metavar="A/B", read="ratio")] = "70/30"
-    """Training to verification poses."""
-    seed: Annotated[int, Option(least=0)] = 0
-    """Seed of searches and intervals."""
-    tolerance: Annotated[str, Option(metavar="PART,LENGTH", read="tolerance")] = "5 %, 5 um"
-    """Errors this near to the last count as saturated: the larger of a part of it and a length."""
-
-
-@command("Identify", more=_Codec, hidden=("options", "saturation"))
+@command("Identify")
 def _codec(given: Given) -> None:
-    from elastocal.codec import CodecOptions
     from elastocal.records import to_data
 
-    here, out = given.here, given.settings["out"]
-    options = CodecOptions(
-        *(here["splits"], here["ratio"], here["seed"], not here["keep_blunders"]),
-        *(here["trust_conventions"], here["poses"]),
-    )
-    result = _worked(workflows.codec, given, options=options, saturation=here["tolerance"])
+    result, out = _worked(workflows.codec, given), given.settings["out"]
     _show(
         given,
         lambda: {"folder": str(out), "files": result.files, **to_data(result.summary)},

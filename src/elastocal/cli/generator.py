@@ -154,6 +154,8 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
         words["metavar"] = option.metavar
     if option.choices:
         words |= _choice(option.choices, option.file, help)
+    # A bracket without the backslash would be a mark-up of rich's, and would not be printed.
+    words["help"] = words["help"].replace("[", "\\[")
     if kind in (int, float):
         words |= {"min": option.least, "max": option.most}
     default: Any = each.default

@@ -7,7 +7,7 @@ layouts differ in their numbers of springs.
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -322,6 +322,11 @@ def _arrays_of(data: CodecData) -> LabelledArrays:
     return LabelledArrays(variables, _attributes(data))
 
 
+def _read_options(stated: Mapping[str, Any]) -> CodecOptions:
+    own = {name: value for name, value in stated.items() if name != "set_blunders_aside"}
+    return CodecOptions(**(_ALL_POSES | own), keep_blunders=not stated["set_blunders_aside"])
+
+
 def _attributes(data: CodecData) -> dict[str, str]:
     options = {name: getattr(data.options, name) for name in _OPTIONS}
     splits = data.options.splits
@@ -362,7 +367,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
         pose_labels=tuple(labels),
         compliance=tuple(found[f"compliance_{k}"].values for k in numbers),
         load_cases=tuple(_said(found, "load_cases")),
-        options=CodecOptions(**(_ALL_POSES | _said(found, "options"))),
+        options=_read_options(_said(found, "options")),
         robot=str(found.attributes["robot_name"]),
         provenance=str(found.attributes["provenance"]),
         findings=tuple(map(Finding.read, _said(found, "findings"))),

@@ -6,6 +6,7 @@ set aside first, for all variants alike.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +26,7 @@ from elastocal.identification import (
     same_configuration,
     screen,
 )
+from elastocal.options import Option
 from elastocal.planning.search import Candidates, Cover
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -33,24 +35,30 @@ _RATIO = 70.0 / 30.0
 """Training to verification poses, the paper's ``r``."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CodecOptions:
     """Choices about the splits, and about the readings that are split."""
 
-    splits: int | None = None
-    """Number ``N_cv`` of verification sets; None: as many as there are poses."""
-    ratio: float = _RATIO
+    splits: Annotated[int | None, Option(most=100_000)] = None
+    """Number ``N_cv`` of verification sets; default: as many as poses."""
+    ratio: Annotated[float, Option(metavar="A/B", read="ratio", default="70/30")] = _RATIO
     """Training to verification poses, ``r``."""
-    seed: int = 0
-    """Seed of the techniques that draw."""
-    set_blunders_aside: bool = True
-    """Leave out readings that cannot be measurements of this robot."""
+    seed: Annotated[int, Option(least=0)] = 0
+    """Seed of the techniques that draw, and of the intervals."""
+    keep_blunders: bool = False
+    """Use also readings that cannot be measurements of this robot."""
     trust_conventions: bool = False
-    """Go on with data that fit far better with a sign or frame read otherwise."""
-    poses: int = 100
-    """Most poses; of a larger dataset as many are drawn. Work and memory grow with their cube."""
+    """Use also data that fit far better with a sign or frame read otherwise."""
+    poses: Annotated[int, Option(most=1_000_000)] = 100
+    """Most poses; of a larger dataset as many are drawn by the seed."""
+
+    @property
+    def set_blunders_aside(self) -> bool:
+        """Whether readings that cannot be measurements of this robot are left out."""
+        return not self.keep_blunders
 
     def __post_init__(self) -> None:
+        # Work and memory grow with the cube of their number; too few tell nothing.
         if not self.poses >= MINIMUM_BLOCKS:
             raise CodecError(f"{self.poses} poses: at least {MINIMUM_BLOCKS} are needed")
         if not 0.0 < self.ratio < np.inf:

@@ -1,6 +1,6 @@
 """``codec``: were there enough poses, and which technique is better (paper Algorithm 1)."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
@@ -35,7 +35,7 @@ from elastocal.workflows._workflow import workflow
 
 @brief_repr
 @dataclass(frozen=True)
-class CodecSettings:
+class CodecSettings(CodecOptions):
     """The readings that are cross-validated, what is compared, and where the files go."""
 
     data: Annotated[str | PathLike[str], Option(argument=True)]
@@ -62,10 +62,11 @@ class CodecSettings:
     """Metrology marker in the tcp frame, in m; none: the dataset's."""
     exclude: Exclude = ()
     """Readings to leave out, each ``POSE`` or ``POSE:LOAD_CASE``."""
-    options: CodecOptions = field(default_factory=CodecOptions)
-    """Number of splits, ratio, seed; whether blunders are set aside and conventions trusted."""
-    saturation: Tolerance = field(default_factory=Tolerance)
-    """Distance from the last error that counts as saturated."""
+    saturation: Annotated[
+        Tolerance,
+        Option("--tolerance", metavar="PART,LENGTH", read="tolerance", default="5 %, 5 um"),
+    ] = field(default_factory=Tolerance)
+    """Errors this near to the last count as saturated: the larger of a part of it and a length."""
     indices: bool = False
     """Correlate observability indices and covering radius with accuracy."""
     per_axis: bool = False
@@ -74,6 +75,13 @@ class CodecSettings:
     """Processes; by default all cores for long work."""
     force: bool = False
     """Replace the files of a codec that is there."""
+
+    @property
+    def chosen(self) -> CodecOptions:
+        """Choices about the splits, which the codec keeps."""
+        return CodecOptions(
+            **{each.name: getattr(self, each.name) for each in fields(CodecOptions)}
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,7 +143,7 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
             arm,
             readings,
             variants,
-            settings.options,
+            settings.chosen,
             marker_offset=marker,
             provenance=f"{path}; {measured.provenance}" if measured.provenance else str(path),
             jobs=settings.jobs,
