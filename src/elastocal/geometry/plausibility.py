@@ -37,7 +37,7 @@ LENGTHS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}
 _ANGLES = {"deg": float(np.radians(1.0)), "rad": 1.0}
 _FACTORS = (0.5, 2.0, 0.75, 1.35)
 """What a joint is multiplied by in looking for its scale; the best is then refined."""
-_ZEROS = tuple(np.radians([-135, -90, -45, 45, 90, 135, 180]).tolist())
+_ZEROS = tuple(np.radians([-135, -90, -45, -10, 10, 45, 90, 135, 180]).tolist())
 """What is added to a joint in looking for its zero."""
 _WHOLE = 6.0
 """A zero within so many degrees of a quarter turn is taken for it."""
@@ -77,14 +77,12 @@ def undone_joints(robot: Robot, data: Positions, score: Score) -> Iterator[Undon
     yield from _swapped_joints(robot, data)
     for search in (_scaled_joint, _shifted_zero):
         yield search(robot, data, score)
-    yield from _late_rows(robot, data)
 
 
 def undone_markers(robot: Robot, data: Positions) -> Iterator[Undone]:
     """Yield positions with each mistake of trackers, tools and the choice of the robot undone."""
     yield from _trackers(robot, data)
     yield from _markers(robot, data)
-    yield from _changes(robot, data)
     yield from _other_robots(robot, data)
 
 
@@ -220,6 +218,10 @@ def _trackers(robot: Robot, data: Positions) -> Iterator[Undone]:
             markers = data.markers * np.where(own, factor, 1.0)
             message = f"{name} {unit_mistake(factor, LENGTHS)}"
             yield Undone(message, robot, replace(data, markers=markers))
+
+
+def _late_markers(robot: Robot, data: Positions) -> Iterator[Undone]:
+    """Undo single columns of markers that are some rows late."""
     for number, axis in enumerate(AXES):
         for lag in _LAGS:
             markers = data.markers.copy()
@@ -308,6 +310,8 @@ _LARGEST = {
 links of a bad arm; in rad and m."""
 _NOT_DRAWN = 4e-3
 """Median error of an arm as drawn, over its length, that none has: twice what is left of one."""
+_NAMED_FROM = 7
+"""Positions from which on a mistake is told from others by the arm as drawn."""
 _TRIED = 6
 """Mistakes whose undoing is fitted, the likeliest by the arm as drawn first."""
 _TIE = 1.5
@@ -371,6 +375,8 @@ def position_mistake(robot: Robot, data: Positions) -> str | None:
     """Return why an arm as drawn does not carry its marker to some positions; None: it does.
 
     For a few positions, none of which can be left out: mistakes are judged by the arm as drawn.
+    Each position is a mean of joints and markers at one time, so that no row is late, and whoever
+    asks finds stations that moved.
 
     Parameters
     ----------
@@ -391,7 +397,10 @@ def position_mistake(robot: Robot, data: Positions) -> str | None:
     found = sorted(((missed(each), each.mistake) for each in every), key=lambda pair: pair[0])
     best = found[0][0]
     named = [text for left, text in found if left <= _TIE * best][:2]
-    if best <= max(_FAR_BETTER * stated, min(_NOT_DRAWN * arm_length(robot), 0.5 * stated)):
+    # Of fewer positions many mistakes explain every one.
+    if len(data) >= _NAMED_FROM and best <= max(
+        _FAR_BETTER * stated, min(_NOT_DRAWN * arm_length(robot), 0.5 * stated)
+    ):
         return f"{', or '.join(named)}; {why}, with that undone {1e3 * best:.2g} mm"
     return f"{why}: is the log of another run, of another arm, or its time mistaken?"
 
@@ -517,8 +526,10 @@ def _explanations(problem: GeometryProblem, limit: float) -> list[tuple[str, flo
         return _in_any_frame(each.robot, each.data)
 
     robot, data = problem.robot, problem.data
-    likely = sorted(undone_joints(robot, data, joints), key=joints)[:_TRIED]
-    every = [*likely, *undone_markers(robot, data)]
+    of_joints = [*undone_joints(robot, data, joints), *_late_rows(robot, data)]
+    likely = sorted(of_joints, key=joints)[:_TRIED]
+    of_markers = [*undone_markers(robot, data), *_late_markers(robot, data), *_changes(robot, data)]
+    every = [*likely, *of_markers]
     distances = [_as_drawn(each.robot, each.data) for each in every]
     found: list[tuple[str, float]] = []
     nearest = np.inf

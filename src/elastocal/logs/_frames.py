@@ -4,7 +4,7 @@ The tool frame that a controller states must be that of its joints. The weight o
 the sensor as the arm turns it: it tells how the sensor is turned on the flange.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -37,6 +37,8 @@ _LEAST_TURN = np.radians(3.0)
 """A sensor turned by less is mounted as people mount them."""
 _MOST_LEFT = 0.2
 """Part of the change that another turn may leave and still be believed."""
+_BETTER, _TELLS = 0.5, 0.02
+"""How much less one sense of the forces must leave than the other, and what that one leaves."""
 _LEAST_SPREAD = 0.05
 """Second spread of the directions of gravity in the sensor, against which a turn is told."""
 
@@ -168,23 +170,31 @@ def sensor_doubts(poses: Sequence[PoseReadings], loads: FloatArray, site: Site) 
         What the map says.
     """
     along = float(np.median(loads[:, 2])) if len(loads) else 0.0
-    sense, found = 1.0, []
-    if along > 0.0 and along > _PULL * float(np.linalg.norm(loads, axis=1).mean()):
-        sense = -1.0
-        found.append(
-            f"the loads pull at the tool ({along:+.0f} N along z of the tcp; a press is negative):"
-            " does the sensor show the force on the tooling (acts_on: environment), does z of the"
-            " tcp point into the tool?"
-        )
-    return (*found, *_turned_sensor(poses, sense, site))
+    left, turned = _turned_sensor(poses, 1.0, site)
+    if not (along > 0.0 and along > _PULL * float(np.linalg.norm(loads, axis=1).mean())):
+        return turned
+    left_reversed, turned_reversed = _turned_sensor(poses, -1.0, site)
+    if left < min(_MOST_LEFT, _BETTER * left_reversed) and left_reversed > _TELLS:
+        return turned  # an upside-down sensor: forces of the other sense would fit no tool
+    return (
+        f"the loads pull at the tool ({along:+.0f} N along z of the tcp; a press is negative):"
+        " does the sensor show the force on the tooling (acts_on: environment), does z of the"
+        " tcp point into the tool?",
+        *turned_reversed,
+    )
 
 
-def _turned_sensor(poses: Sequence[PoseReadings], sense: float, site: Site) -> Iterator[str]:
-    """Yield how the sensor seems to be turned; nothing where weight and poses do not tell it."""
+def _turned_sensor(
+    poses: Sequence[PoseReadings], sense: float, site: Site
+) -> tuple[float, tuple[str, ...]]:
+    """Return what part of the weight's change another turn leaves, and how the sensor is turned.
+
+    The part is infinite where weight and poses do not tell it.
+    """
     at_rest = [each.reference.tool for each in poses if each.reference is not None]
     tools = [tool for tool in at_rest if tool is not None]
     if len(tools) < _LEAST_POSES:
-        return
+        return np.inf, ()
     load = site.sensor
     R_base_sensor = np.stack([t.T_base_tcp[:3, :3] @ load.T_tcp_sensor[:3, :3] for t in tools])
     gravity = np.einsum("nji,j->ni", R_base_sensor, load.gravity)
@@ -193,13 +203,12 @@ def _turned_sensor(poses: Sequence[PoseReadings], sense: float, site: Site) -> I
     spread = np.linalg.svd(gravity / np.linalg.norm(load.gravity), compute_uv=False)
     size = float(np.sqrt((force**2).sum(axis=1).mean()))
     if size < _LEAST_WEIGHT or spread[1] < _LEAST_SPREAD * np.sqrt(len(tools)):
-        return
+        return np.inf, ()
     Q = nearest_rotation(force.T @ gravity)
     mass = float((force * (gravity @ Q.T)).sum() / (gravity**2).sum())
-    left = float(np.sqrt(((force - mass * gravity @ Q.T) ** 2).sum(axis=1).mean()))
+    left = float(np.sqrt(((force - mass * gravity @ Q.T) ** 2).sum(axis=1).mean())) / size
     turn = float(Rotation.from_matrix(Q).magnitude())
-    if left < _MOST_LEFT * size and turn > _LEAST_TURN:
-        yield _turned(site, Q, mass)
+    return left, (_turned(site, Q, mass),) if left < _MOST_LEFT and turn > _LEAST_TURN else ()
 
 
 def _turned(site: Site, Q: FloatArray, mass: float) -> str:

@@ -59,6 +59,8 @@ _LEAST_STRETCHES = 5
 """Stretches from which on a drift is estimated."""
 _HOUR, _DAY = 3600.0, 86400.0
 """In s."""
+_OTHER_UNIT = 200.0
+"""How much longer than another a log is whose time is in another unit."""
 _LONGEST = 1_000_000
 """Samples of the longest activity; longer recordings are looked at in larger steps."""
 
@@ -148,9 +150,23 @@ def align(
                     f"{log.entry.log}: it has no time, and {reference.entry.log} no handshake"
                 )
             if log.clock not in fits:
-                fits[log.clock] = fit_clock(log, reference, lever)
+                fits[log.clock] = _fit_or_unit(log, reference, lever)
             aligned.append(log.at(fits[log.clock].shifted(log.time)))
     return tuple(aligned), tuple(fits.values())
+
+
+def _fit_or_unit(log: LogStreams, reference: LogStreams, lever: FloatArray) -> ClockFit:
+    """Return the fit of a clock; refuse one that cannot be told by the unit that may be why."""
+    try:
+        return fit_clock(log, reference, lever)
+    except LogError as error:
+        ours, theirs = float(np.ptp(log.time)), float(np.ptp(reference.time))
+        if min(ours, theirs) > max(ours, theirs) / _OTHER_UNIT:
+            raise
+        raise LogError(
+            f"{log.entry.log} lasts {ours:.3g} s, {reference.entry.log} {theirs:.3g} s: is the"
+            f" time of one in another unit than the map says ({error})"
+        ) from error
 
 
 def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> ClockFit:

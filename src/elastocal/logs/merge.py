@@ -61,10 +61,13 @@ from elastocal.procedure.record import (
 from elastocal.procedure.registration import Registration, register
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
-from elastocal.wording import counted
+from elastocal.robot import Robot
+from elastocal.wording import counted, listed
 
 _STILL = 0.25
 """Part of a log in which a column must stand still to be named."""
+_MOVES = np.radians(2.0)
+"""Range of a joint that moves."""
 _GAP, _USUAL = 5.0, 10.0
 """Shortest interruption in s, and over the intervals between nearly all samples."""
 _POOR_CORRELATION, _MOST_APART = 0.85, 0.75
@@ -104,21 +107,60 @@ def stream_doubts(
             yield from _other_clock(log, reference, lever)
 
 
-def still_columns(logs: Sequence[LogStreams]) -> Iterator[str]:
-    """Yield columns of forces and markers that stand still while the others change."""
+def still_columns(logs: Sequence[LogStreams], robot: Robot) -> Iterator[str]:
+    """Yield columns of forces, markers and joints that stand still while the others change."""
     for log in logs:
+        if log.arm is not None:
+            yield from _still_joints(log, log.arm, robot)
         if log.wrench is not None and log.entry.force is not None:
             yield from _still_columns(log, log.entry.force.columns, log.wrench.force)
         if log.points is not None and len(log.entry.markers) == 1:
             yield from _still_columns(log, log.entry.markers[0].columns, log.points.position)
 
 
+def _still_joints(log: LogStreams, arm: ArmStream, robot: Robot) -> Iterator[str]:
+    """Yield joints that hold the same number while each other one moves, and moved before or after.
+
+    A rail may stand for many poses, and so may a joint that no plan moves.
+    """
+    turning = np.flatnonzero(robot.revolute).tolist()
+    if not turning or not len(arm.q):
+        return
+    runs = {joint: _longest_run(arm.q[:, joint]) for joint in turning}
+    for joint, run in runs.items():
+        others = [other for other in turning if other != joint]
+        rest = np.delete(arm.q[:, joint], np.r_[run])
+        if (
+            _STILL * len(arm.q) <= run.stop - run.start < len(arm.q)
+            and np.ptp(rest) > _MOVES
+            and (np.ptp(arm.q[run][:, others], axis=0) > _MOVES).all()
+        ):
+            yield (
+                f"{log.entry.log}: {robot.joint_names[joint]} holds the same number in"
+                f" {run.stop - run.start} of {len(arm.q)} rows while the other joints move: is its"
+                " column dead?"
+            )
+
+
+def _longest_run(values: FloatArray) -> slice:
+    """Return the most rows, one after the other, that hold the same number."""
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]])
+    longest = int(np.argmax(np.diff(ends)))
+    return slice(int(ends[longest]), int(ends[longest + 1]))
+
+
 def _still_columns(log: LogStreams, names: Sequence[str], values: FloatArray) -> Iterator[str]:
     """Yield columns that hold the same number in many rows one after the other."""
+    same = _longest_run(np.cumsum((np.diff(values, axis=0, prepend=values[:1]) != 0).any(axis=1)))
+    if same.stop - same.start >= _STILL * len(values):
+        yield (
+            f"{log.entry.log}: columns {listed([repr(name) for name in names])} hold the same"
+            f" numbers in {same.stop - same.start} of {len(values)} rows: did the device stop, or"
+            " lose what it follows?"
+        )
+        return
     for name, column in zip(names, values.T, strict=True):
-        ends = np.concatenate([[0], np.flatnonzero(np.diff(column) != 0.0) + 1, [len(column)]])
-        longest = int(np.argmax(np.diff(ends)))
-        run = slice(ends[longest], ends[longest + 1])
+        run = _longest_run(column)
         count = run.stop - run.start
         if count >= _STILL * len(column) and np.ptp(values[run], axis=0).any():
             yield (
@@ -207,10 +249,13 @@ def sensor_contradictions(postures: StaticPostures, site: Site) -> Iterator[str]
     """
     fit = fit_tool(postures, site.T_flange_sensor[:3, :3])
     left, change = fit.force_scatter, _change(postures)
-    if not change > _WEIGHS:
+    turning = float((postures.gravity_flange - postures.gravity_flange.mean(axis=0)).std())
+    # In another unit the weight may hardly change.
+    if not max(change, site.sensor.mass * turning) > _WEIGHS:
         return
     try:
-        refuse_other_readings(postures, site.T_flange_sensor[:3, :3], _LEVER)
+        if change > _WEIGHS:
+            refuse_other_readings(postures, site.T_flange_sensor[:3, :3], _LEVER)
     except CompensationError as error:
         if not str(error).startswith(SENSOR_TURNED):
             yield str(error)
@@ -327,7 +372,11 @@ def import_streams(
     progress("logs", 0, 4)
     logs = read_streams_of(log_map, files, site.robot)
     progress("clocks", 1, 4)
-    logs, clocks = align(logs, site.marker)
+    still = tuple(still_columns(logs, site.robot))
+    try:
+        logs, clocks = align(logs, site.marker)
+    except LogError as error:
+        raise LogError(f"{still[0]} ({error})") if still else error from error
     streams = _merged(logs, site)
     progress("plateaus", 2, 4)
     by_word = next((log for log in logs if log.arm is not None and log.handshake), None)
@@ -335,7 +384,6 @@ def import_streams(
     poses = [each.pose for each in standing.bare]
     postures = postures_at_rest(standing.readings, poses, site)
     # What is named first explains what comes after: joints that are mistaken turn the weight, too.
-    still = tuple(still_columns(logs))
     astray = () if still else tuple(marker_contradictions(standing.readings, poses, site))
     judged = None if still or astray else postures
     sensor = () if judged is None else tuple(sensor_contradictions(judged, site))
