@@ -60,10 +60,10 @@ WALKS = {
         tool_alarms,
     ),
     "import": Walk(
-        (Recording(), Recording(1)),
+        (Recording(), Recording(1), Recording(2, other=True)),
         LOG_MISTAKES,
         log_outcome,
-        [Recording(100 + n) for n in range(50)],
+        [Recording(100 + n, other=n % 2 == 1) for n in range(80)],
         log_alarms,
     ),
 }

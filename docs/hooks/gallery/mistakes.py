@@ -13,7 +13,7 @@ HARMFUL = 0.05
 _INPUTS = {
     "calibrate": ("predictions", "campaigns"),
     "tool": ("what is taken off", "tables"),
-    "import": ("readings", "recordings"),
+    "import": ("predictions", "recordings"),
 }
 """What mistakes change, and what they are made in."""
 

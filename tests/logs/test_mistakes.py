@@ -1,0 +1,109 @@
+"""Mistakes in logs and their maps are found and named; sound logs pass in silence."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from elastocal.cell import SensorLoad
+from elastocal.compensation.conditioning import static_postures
+from elastocal.logs._frames import sensor_doubts
+from elastocal.logs.merge import sensor_contradictions
+from support.by_day import some_by_day
+from support.mistake_table import rates, tabulate
+from support.walk_mistakes import WALKS, require_same, require_whole
+
+WALK = WALKS["import"]
+WARNED = (
+    "A4 frozen from half way on, no pose",
+    "force in kgf for N",
+    "moments in N m for N mm",
+    "force_z dead",
+    "force_x reversed",
+    "one clock, 2 s apart",
+    "marker frozen from half way on",
+    "tracker left-handed",
+    "a lost part of the tracker",
+)
+REFUSED = (
+    "time of the tracker in ms for s",
+    "A1, A2 exchanged",
+    "A6 frozen from half way on",
+    "force x, y exchanged",
+    "sensor's frame called base",
+)
+MASS, DOWN = 38.0, np.array([0.0, 0.0, -9.80665])
+
+
+@pytest.mark.parametrize("name", some_by_day((*WARNED, *REFUSED), every=6))
+def test_a_mistake_in_logs_is_named_as_the_documentation_shows(name):
+    found = require_same("import", 0, name)
+    assert found.named, found.said
+    assert found.refused is (name in REFUSED)
+
+
+def test_a_gap_in_the_sensors_log_does_not_mislead_its_clock():
+    found = require_same("import", 0, "a lost part of the sensor")
+    assert found.named, found.said
+    assert not found.refused
+
+
+def _turns(most: float) -> np.ndarray:
+    tilts = Rotation.from_euler("x", [180.0], degrees=True)
+    some = Rotation.from_rotvec(np.random.default_rng(4).uniform(-most, most, (8, 3)))
+    return (some * tilts).as_matrix()
+
+
+def _site(mass: float) -> Any:
+    load = SensorLoad(mass, np.zeros(3), T_tcp_sensor=np.eye(4), gravity=DOWN)
+    return SimpleNamespace(sensor=load, T_flange_sensor=np.eye(4))
+
+
+def test_a_light_tool_tells_forces_in_kgf():
+    """The weight changes by less than 5 N from pose to pose, as it would of a tool of 4 kg."""
+    R = _turns(0.2)
+    force = MASS / 9.80665 * (DOWN @ R)
+    postures = static_postures(R, force, np.zeros_like(force), DOWN)
+    assert any("forces in kgf?" in text for text in sensor_contradictions(postures, _site(MASS)))
+    assert not [*sensor_contradictions(postures, _site(MASS / 9.80665))]
+
+
+def test_a_sensor_upside_down_is_not_said_to_show_the_force_on_the_tooling():
+    R = _turns(0.6)
+    upside_down = np.diag([1.0, -1.0, -1.0])
+
+    def doubts(turn: np.ndarray) -> str:
+        pulls = np.tile([0.0, 0.0, -1000.0], (8, 1)) @ turn
+        return " ".join(sensor_doubts(_unloaded(R, MASS * DOWN @ R @ turn), pulls, _site(MASS)))
+
+    assert "acts_on" not in doubts(upside_down)
+    assert "turns in the sensor as in one whose abc" in doubts(upside_down)
+    assert "acts_on: environment" in doubts(-np.eye(3))
+    assert "turns in the sensor" not in doubts(-np.eye(3))
+    assert not doubts(np.eye(3))
+
+
+def _unloaded(R: np.ndarray, force: np.ndarray) -> Any:
+    """Return poses that hold what is asked for: the unloaded reading of each."""
+    T = np.tile(np.eye(4), (len(R), 1, 1))
+    T[:, :3, :3] = R
+    tools = (
+        SimpleNamespace(T_base_tcp=own, force=SimpleNamespace(value=value))
+        for own, value in zip(T, force, strict=True)
+    )
+    return [SimpleNamespace(reference=SimpleNamespace(tool=tool)) for tool in tools]
+
+
+def test_the_documentation_shows_every_mistake_in_logs():
+    require_whole("import", found=0.95, named=0.85, most_alarms=0.01)
+
+
+@pytest.mark.slow
+def test_mistakes_in_logs_are_found_and_most_of_them_named():
+    made = [(sound, mistake) for sound in WALK.made_in for mistake in WALK.mistakes]
+    found, named = rates(tabulate(WALK.outcome(*each) for each in made))
+    assert found >= 0.95
+    assert named >= 0.85
+    assert not any(WALK.alarms(sound) for sound in WALK.sound)
