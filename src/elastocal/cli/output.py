@@ -10,6 +10,7 @@ Rich is imported when something is printed: help does without most of it.
 import json
 import re
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from elastocal.blocks import Block, Cell, Table
 
 
+_HEAD, _NAME = 12, 18
+"""Characters that a line of a heading, and the name of a row, are given at least."""
 _STYLES = ("bold", "dim", "red", "yellow", "green")
 _FIRST, _END = 0xE000, "\ue0ff"
 """Letters for private use: a style begins with that of its number, and all end with the same."""
@@ -130,6 +133,7 @@ def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
             screen.print()
         before = block
         if isinstance(block, Table):
+            screen.print(bold(block.caption), soft_wrap=True)
             screen.print(table_of(block))
         for line in _lines(block):
             screen.print(line, soft_wrap=True)
@@ -160,11 +164,19 @@ def table_of(block: "Table") -> "RichTable":
     for number, head in enumerate(block.heads):
         # A number that is cut would be another number.
         is_text = number < block.texts or _are_words(block, number)
+        longest = max((len(_text(row[number])) for row in block.rows), default=0)
         # A unit stands below what it is of.
+        lines = [
+            line
+            for part in head.split(", ")
+            for line in textwrap.wrap(part, max(longest, _HEAD), break_long_words=False)
+        ]
         table.add_column(
-            head.replace(", ", "\n"),
+            "\n".join(lines),
             justify="left" if is_text else "right",
             no_wrap=not is_text,
+            # Beside wide numbers a name would shrink to nothing.
+            min_width=min(longest, _NAME) if number == 0 else None,
             overflow="fold" if is_text or number == last else "crop",
         )
     for row in block.rows:
@@ -172,16 +184,19 @@ def table_of(block: "Table") -> "RichTable":
     return table
 
 
+def _text(cell: "Cell") -> str:
+    return str(getattr(cell, "text", getattr(cell, "pose", cell)))
+
+
 def _are_words(block: "Table", column: int) -> bool:
     """Return whether no cell of a column has a figure at its head."""
-    texts = [str(getattr(row[column], "text", row[column])) for row in block.rows]
+    texts = [_text(row[column]) for row in block.rows]
     return not any(text[:1].isdigit() or text[:1] in "(-+" for text in texts if text)
 
 
 def _cell(value: "Cell") -> str:
     grade = {"good": green, "fair": yellow, "poor": red}.get(getattr(value, "grade", ""))
-    text = str(getattr(value, "text", getattr(value, "pose", value)))
-    return grade(text) if grade else text
+    return grade(_text(value)) if grade else _text(value)
 
 
 @contextmanager

@@ -3,18 +3,15 @@
 A plan's poses and their checks, the steps of a run.
 """
 
-import math
-
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.cli.output import bold, dim, green, print_remarks, visible, yellow
-from elastocal.planning import PlanResult, ProductionRecord, SpreadRecord
+from elastocal.cli.output import bold, dim, green, print_blocks, print_remarks, visible, yellow
+from elastocal.planning import PlanResult, show_plan as shown_plan
 from elastocal.procedure import RunSummary
 from elastocal.records import record
 from elastocal.robot import catalogue
-from elastocal.wording import um
 from elastocal.workflows import DryRunResult, InitResult, PlanFigures, RunResult
 
 _LOST_SHOWN = 5
@@ -34,17 +31,8 @@ def show_example(console: Console, result: InitResult) -> None:
 
 def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     """Print the plan for a person."""
-    search, pool = plan.search, plan.pool
-    console.print(
-        f"{bold(f'{len(plan.poses)} poses')} by {search.name} from {pool.valid} candidates"
-        f" ({pool.sampled} points tried); covering radius"
-        f" {1e3 * search.covering_radius:.1f} mm; about {_minutes(plan.total_time)}"
-        f" ({_minutes(plan.travel_time)} on the way)"
-    )
-    console.print(_spread_table(plan))
-    console.print(_check_table(plan))
+    print_blocks(console, shown_plan(plan))
     if plan.production is not None:
-        console.print(_expected_table(plan, plan.production))
         for name, text in plan.production.facts():
             console.print(f"{name}: {text}", soft_wrap=True)
     if figures.stations:
@@ -55,74 +43,6 @@ def show_plan(console: Console, plan: PlanResult, figures: PlanFigures) -> None:
     console.print(f"robot program: {program}", soft_wrap=True)
     written = f"written to {figures.folder}: {', '.join(figures.files)}"
     console.print(written if figures.files else "Nothing was written.", soft_wrap=True)
-
-
-def _spread_table(plan: PlanResult) -> Table:
-    table = Table(title="How the poses lie in the pool", title_justify="left")
-    table.add_column("technique")
-    for title in ("covering radius", "to the edge, mean", "to the next pose, mean", "O1"):
-        table.add_column(title, justify="right")
-    rows = [(plan.search.name, plan.search.spread)]
-    if plan.comparison:
-        rows.append((f"{plan.comparison.name} (not used)", plan.comparison.spread))
-    for name, spread in rows:
-        table.add_row(name, *_lengths(spread), f"{spread.o1:.4g}")
-    return table
-
-
-def _lengths(spread: SpreadRecord) -> list[str]:
-    values = (spread.covering_radius, spread.boundary_distance, spread.nearest_neighbour)
-    return ["none" if value is None else f"{1e3 * value:.1f} mm" for value in values]
-
-
-def _expected_table(plan: PlanResult, production: ProductionRecord) -> Table:
-    """Return the error to expect on production from some numbers of poses, and what they take."""
-    table = Table(title="Error to expect on production", title_justify="left")
-    for title in ("poses", "from noise", "with the model's own", "in the cell"):
-        table.add_column(title, justify="right")
-    for each in production.some_expected():
-        mark = " <- plan" if each.poses == production.poses else ""
-        table.add_row(
-            f"{each.poses}{mark}",
-            um(each.noise),
-            "not known" if production.floor is None else um(each.error),
-            f"{plan.time_of(each.poses) / 60.0:.0f} min",
-        )
-    return table
-
-
-def _check_table(plan: PlanResult) -> Table:
-    """Return what each check refused, and how near the chosen poses come to it."""
-    table = Table(title="Checks", title_justify="left")
-    table.add_column("check")
-    for title in ("points refused", "smallest margin of a pose", "at pose"):
-        table.add_column(title, justify="right")
-    for check in plan.pool.checks:
-        margins = {
-            pose.id: pose.margins[check.name] for pose in plan.poses if check.name in pose.margins
-        }
-        worst = min(margins, key=lambda pose: margins[pose], default=None)
-        mark = " <- most" if check.name == plan.pool.bottleneck else ""
-        table.add_row(
-            check.name,
-            f"{check.refused}{mark}",
-            "" if worst is None else _with_unit(margins[worst], check.unit),
-            "" if worst is None else str(worst),
-        )
-    return table
-
-
-def _with_unit(margin: float, unit: str | None) -> str:
-    if unit == "m":
-        return f"{1e3 * margin:.1f} mm"
-    if unit == "rad":
-        return f"{math.degrees(margin):.1f} deg"
-    return f"{margin:.3f}" if unit in (None, "1") else f"{margin:.1f} {unit}"
-
-
-def _minutes(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
 
 
 @record()

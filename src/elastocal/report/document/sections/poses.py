@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from functools import partial
 
 from elastocal import blocks
-from elastocal.planning import PlanResult
+from elastocal.planning import PlanResult, expected, key_figures, spreads
 from elastocal.report.document.section import PlanScene, Section
-from elastocal.report.pages import expected_table, key_figures
 from elastocal.report.plots import plan_figure, plan_view
 from elastocal.units import in_unit
 from elastocal.verdict import Evidence
@@ -20,10 +19,9 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
         yield blocks.Paragraph(text)
         return
     yield blocks.Facts(key_figures(plan))
-    yield _spreads(plan)
+    yield spreads(plan)
     if plan.production is not None:
-        expected = expected_table(plan, plan.production)
-        yield blocks.Table(expected.caption, expected.heads, expected.rows)
+        yield expected(plan, plan.production)
     pictures = tuple(_pictures(evidence, plan))
     yield from pictures or (
         blocks.Paragraph(phrase("Without cell, mesh and pool there is no picture.")),
@@ -72,35 +70,6 @@ def _poses(plan: PlanResult, buttons: bool) -> blocks.Block:
     table = blocks.Table(caption, heads, rows, name="pose-table")
     return blocks.Details(
         phrase("The {poses} in visiting order", poses=counted(len(plan.poses), "pose")), (table,)
-    )
-
-
-def _spreads(plan: PlanResult) -> blocks.Block:
-    search, other = plan.search, plan.comparison
-    rows = [(search.name, search.spread)] + ([(other.name, other.spread)] if other else [])
-    return blocks.Table(
-        phrase("How the poses lie in the pool"),
-        phrases(
-            "Technique",
-            "Covering radius",
-            "To the edge, mean",
-            "To the next pose, mean",
-            "Observability O1 (more is better)",
-        ),
-        tuple(
-            (
-                name if name == search.name else phrase("{name} (not used)", name=name),
-                mm(spread.covering_radius, 1),
-                phrase("no edge")
-                if spread.boundary_distance is None
-                else mm(spread.boundary_distance, 1),
-                phrase("one pose")
-                if spread.nearest_neighbour is None
-                else mm(spread.nearest_neighbour, 1),
-                f"{spread.o1:.4f}",
-            )
-            for name, spread in rows
-        ),
     )
 
 
