@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from elastocal.blocks import Block, Cell, Table
 
 
-_HEAD, _NAME = 12, 18
+_HEAD, _NAME = 14, 18
 """Characters that a line of a heading, and the name of a row, are given at least."""
 _STYLES = ("bold", "dim", "red", "yellow", "green")
 _FIRST, _END = 0xE000, "\ue0ff"
