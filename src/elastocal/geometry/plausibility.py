@@ -311,7 +311,8 @@ links of a bad arm; in rad and m."""
 _NOT_DRAWN = 4e-3
 """Median error of an arm as drawn, over its length, that none has: twice what is left of one."""
 _NAMED_FROM = 7
-"""Positions from which on a mistake is told from others by the arm as drawn."""
+"""Positions from which on a mistake is told from others by the arm as drawn: many mistakes explain
+fewer."""
 _TRIED = 6
 """Mistakes whose undoing is fitted, the likeliest by the arm as drawn first."""
 _TIE = 1.5
@@ -393,16 +394,16 @@ def position_mistake(robot: Robot, data: Positions) -> str | None:
     if not stated > _NOT_DRAWN * arm_length(robot):
         return None
     why = f"the marker is {1e3 * stated:.3g} mm (median) from where the arm carries it"
+    unnamed = f"{why}: is the log of another run, of another arm, or its time mistaken?"
+    if len(data) < _NAMED_FROM:
+        return unnamed
     every = [*undone_joints(robot, data, missed), *undone_markers(robot, data)]
     found = sorted(((missed(each), each.mistake) for each in every), key=lambda pair: pair[0])
     best = found[0][0]
     named = [text for left, text in found if left <= _TIE * best][:2]
-    # Of fewer positions many mistakes explain every one.
-    if len(data) >= _NAMED_FROM and best <= max(
-        _FAR_BETTER * stated, min(_NOT_DRAWN * arm_length(robot), 0.5 * stated)
-    ):
+    if best <= max(_FAR_BETTER * stated, min(_NOT_DRAWN * arm_length(robot), 0.5 * stated)):
         return f"{', or '.join(named)}; {why}, with that undone {1e3 * best:.2g} mm"
-    return f"{why}: is the log of another run, of another arm, or its time mistaken?"
+    return unnamed
 
 
 def arm_length(robot: Robot) -> float:

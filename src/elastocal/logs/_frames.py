@@ -4,16 +4,14 @@ The tool frame that a controller states must be that of its joints. The weight o
 the sensor as the arm turns it: it tells how the sensor is turned on the flange.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation.conditioning import StaticPostures
 from elastocal.errors import LogError, present
 from elastocal.logs.map import LogEntry, MarkerColumns, Site, ToolPose, Vector
 from elastocal.logs.table import LogTable
-from elastocal.procedure import PoseReadings
 from elastocal.robot import Robot, nearest_rotation, xyzabc_from_T
 from elastocal.units import factor, largest
 
@@ -29,8 +27,6 @@ _UNIT_NORM = 1e-2
 """Distance of a quaternion's norm from 1: four columns of few digits are nearer."""
 _PULL = 0.5
 """Part of a load along z of the tcp from which on it is a press, or a pull."""
-_LEAST_POSES = 4
-"""Two differences tell a turn, a third checks it."""
 _LEAST_WEIGHT = 5.0
 """Change of the unloaded force between poses, RMS in N, from which on it tells something."""
 _LEAST_TURN = np.radians(3.0)
@@ -153,7 +149,9 @@ def _rotations(pose: ToolPose, stated: FloatArray, R_joints: FloatArray) -> Floa
     return np.asarray(Rotation.from_quat(stated).as_matrix())
 
 
-def sensor_doubts(poses: Sequence[PoseReadings], loads: FloatArray, site: Site) -> tuple[str, ...]:
+def sensor_doubts(
+    postures: StaticPostures | None, loads: FloatArray, site: Site
+) -> tuple[str, ...]:
     """Return why the sensor cannot be as the map says, by the sense of the loads and the weight.
 
     Unloaded, its force is a constant and the weight of the tool. Without the means over the poses,
@@ -162,18 +160,18 @@ def sensor_doubts(poses: Sequence[PoseReadings], loads: FloatArray, site: Site) 
 
     Parameters
     ----------
-    poses : sequence of PoseReadings
-        Readings of each pose.
+    postures : StaticPostures, optional
+        At which nothing presses.
     loads : ndarray, shape (load, 3)
         Force on the robot in the tcp, as the map has it, in N.
     site : Site
         What the map says.
     """
     along = float(np.median(loads[:, 2])) if len(loads) else 0.0
-    left, turned = _turned_sensor(poses, 1.0, site)
+    left, turned = _turned_sensor(postures, 1.0, site)
     if not (along > 0.0 and along > _PULL * float(np.linalg.norm(loads, axis=1).mean())):
         return turned
-    left_reversed, turned_reversed = _turned_sensor(poses, -1.0, site)
+    left_reversed, turned_reversed = _turned_sensor(postures, -1.0, site)
     if left < min(_MOST_LEFT, _BETTER * left_reversed) and left_reversed > _TELLS:
         return turned  # an upside-down sensor: forces of the other sense would fit no tool
     return (
@@ -185,24 +183,20 @@ def sensor_doubts(poses: Sequence[PoseReadings], loads: FloatArray, site: Site) 
 
 
 def _turned_sensor(
-    poses: Sequence[PoseReadings], sense: float, site: Site
+    postures: StaticPostures | None, sense: float, site: Site
 ) -> tuple[float, tuple[str, ...]]:
     """Return what part of the weight's change another turn leaves, and how the sensor is turned.
 
     The part is infinite where weight and poses do not tell it.
     """
-    at_rest = [each.reference.tool for each in poses if each.reference is not None]
-    tools = [tool for tool in at_rest if tool is not None]
-    if len(tools) < _LEAST_POSES:
+    if postures is None:
         return np.inf, ()
-    load = site.sensor
-    R_base_sensor = np.stack([t.T_base_tcp[:3, :3] @ load.T_tcp_sensor[:3, :3] for t in tools])
-    gravity = np.einsum("nji,j->ni", R_base_sensor, load.gravity)
-    force = sense * np.stack([tool.force.value for tool in tools])
+    gravity = postures.gravity_flange @ site.T_flange_sensor[:3, :3]
+    force = sense * postures.force
     gravity, force = gravity - gravity.mean(axis=0), force - force.mean(axis=0)
-    spread = np.linalg.svd(gravity / np.linalg.norm(load.gravity), compute_uv=False)
+    spread = np.linalg.svd(gravity / np.linalg.norm(postures.gravity), compute_uv=False)
     size = float(np.sqrt((force**2).sum(axis=1).mean()))
-    if size < _LEAST_WEIGHT or spread[1] < _LEAST_SPREAD * np.sqrt(len(tools)):
+    if size < _LEAST_WEIGHT or spread[1] < _LEAST_SPREAD * np.sqrt(len(postures)):
         return np.inf, ()
     Q = nearest_rotation(force.T @ gravity)
     mass = float((force * (gravity @ Q.T)).sum() / (gravity**2).sum())

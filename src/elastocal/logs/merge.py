@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -64,6 +65,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.wording import counted, listed
 
+_T = TypeVar("_T")
 _STILL = 0.25
 """Part of a log in which a column must stand still to be named."""
 _MOVES = np.radians(2.0)
@@ -291,29 +293,44 @@ def sensor_misfit(postures: StaticPostures, site: Site) -> str | None:
 
 
 def marker_contradictions(
-    readings: Sequence[Reading], poses: Sequence[int], site: Site
+    streams: Streams, spans: Sequence[tuple[float, float]], site: Site
 ) -> Iterator[str]:
-    """Yield why the marker does not go where the arm carries it; see `postures_at_rest`."""
-    seen = [(r.tool.q, r.marker.value, r.window.station) for r in _first_of_poses(readings, poses)
-            if r.tool is not None and r.marker is not None]  # fmt: skip
+    """Yield why the marker does not go where the arm carries it, at the first span of each pose."""
+    firsts = _first_of_poses(spans, number_poses(spans, streams))
+    seen = [each for span in firsts if (each := _place(streams, span)) is not None]
     if len(seen) < _LEAST_POSES:
         return
     q, markers, stations = zip(*seen, strict=True)
     data = replace(
         Positions.unloaded(np.stack(q), Payload()),
         markers=np.stack(markers)[:, None],
-        station=np.array([each or "" for each in stations]),
+        station=np.array(stations),
     )
     mistake = position_mistake(site.robot, data)
     if mistake is not None:
         yield mistake
 
 
-def _first_of_poses(readings: Sequence[Reading], poses: Sequence[int]) -> list[Reading]:
-    firsts: dict[int, Reading] = {}
-    for pose, reading in zip(poses, readings, strict=True):
+def _place(
+    streams: Streams, span: tuple[float, float]
+) -> tuple[FloatArray, FloatArray, str] | None:
+    """Return mean joints and marker over a span, and the station; None where one is missing."""
+    near = span[0] - SAME_TIME, span[1] + SAME_TIME
+    arm = stream_rows(streams.arm, slice(*np.searchsorted(streams.arm.time, near)))
+    points = stream_rows(streams.points, slice(*np.searchsorted(streams.points.time, near)))
+    seen = np.isfinite(points.position).all(axis=1)
+    stations = Counter(points.station[seen].tolist()).most_common(1)
+    if not len(arm.time) or not stations:
+        return None
+    own = seen & (points.station == stations[0][0])
+    return arm.q.mean(axis=0), points.position[own].mean(axis=0), stations[0][0]
+
+
+def _first_of_poses(each_of: Sequence[_T], poses: Sequence[int]) -> list[_T]:
+    firsts: dict[int, _T] = {}
+    for pose, each in zip(poses, each_of, strict=True):
         if pose >= 0:
-            firsts.setdefault(pose, reading)
+            firsts.setdefault(pose, each)
     return list(firsts.values())
 
 
@@ -383,13 +400,19 @@ def import_streams(
     standing = _standing(streams, site, by_word)
     poses = [each.pose for each in standing.bare]
     postures = postures_at_rest(standing.readings, poses, site)
+    # The sensor's clock is told by the weight, which joints turn: not asked about the marker.
+    alone = replace(streams, wrench=stream_rows(streams.wrench, slice(0)))
+    spans = [(each.start, each.end) for each in standing.bare]
+    if by_word is None:
+        spans = [averaged_part(*each) for each in standing_spans(alone, site.marker)]
     # What is named first explains what comes after: joints that are mistaken turn the weight, too.
-    astray = () if still else tuple(marker_contradictions(standing.readings, poses, site))
+    astray = () if still else tuple(marker_contradictions(streams, spans, site))
     judged = None if still or astray else postures
     sensor = () if judged is None else tuple(sensor_contradictions(judged, site))
     doubts = (*still, *astray, *sensor, *stream_doubts(logs, clocks, site.marker))
     try:
-        found = _imported(streams, standing, log_map, site, files, not (still or sensor), progress)
+        judge = not (still or sensor)
+        found = _imported(streams, standing, log_map, site, files, postures, judge, progress)
     except LogError as error:
         why = next(iter(doubts), None if judged is None else sensor_misfit(judged, site))
         if why is None:
@@ -404,6 +427,7 @@ def _imported(
     log_map: LogMap,
     site: Site,
     files: Sequence[Path],
+    judged: StaticPostures | None,
     judge_sensor: bool,
     progress: Progress,
 ) -> ImportedLogs:
@@ -420,7 +444,7 @@ def _imported(
     dataset = _dataset(poses, rows, log_map, site, registration, files)
     progress("readings", 4, 4)
     loads = np.array([each.force_tcp for each in plateaus if each.pose >= 0 and each.load])
-    doubts = sensor_doubts(poses, loads.reshape(-1, 3), site) if judge_sensor else ()
+    doubts = sensor_doubts(judged, loads.reshape(-1, 3), site) if judge_sensor else ()
     warnings = (*doubts, *_warnings(plateaus, rows, registration, log_map))
     return ImportedLogs(dataset, streams, tuple(plateaus), (), registration, warnings)
 

@@ -70,20 +70,20 @@ def standing_spans(streams: Streams, lever: FloatArray) -> list[tuple[float, flo
     Parameters
     ----------
     streams : Streams
-        By one clock.
+        By one clock. Those without a sample are not asked, but for the arm.
     lever : ndarray, shape (3,)
         Roughly the marker in the tcp frame, in m.
     """
     arm, wrench, points = streams.arm, streams.wrench, streams.points
-    start = max(arm.time[0], wrench.time[0])
-    grid = np.arange(start, min(arm.time[-1], wrench.time[-1]), _STEP)
-    if len(points.time):
-        grid = grid[(grid >= points.time[0]) & (grid <= points.time[-1])]
+    known = [each.time for each in (arm, wrench, points) if len(each.time)]
+    start, end = max(time[0] for time in known), min(time[-1] for time in known)
+    grid = np.arange(start, end, _STEP)
     marker = arm.T_base_tcp[:, :3, 3] + arm.T_base_tcp[:, :3, :3] @ lever
     good = wrench.ok
     force = wrench.force[good]
     still = _still(grid, arm.time, marker, _STILL_ARM)
-    still &= _still(grid, wrench.time[good], force, _STILL_FORCE * largest_load(force))
+    if len(wrench.time):
+        still &= _still(grid, wrench.time[good], force, _STILL_FORCE * largest_load(force))
     seen = np.isfinite(points.position).all(axis=1)
     if len(points.time):
         still &= _still(grid, points.time[seen], points.position[seen], _STILL_MARKER)
