@@ -1,5 +1,6 @@
 """Mistakes in logs and their maps are found and named; sound logs pass in silence."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,8 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.cell import SensorLoad
 from elastocal.compensation.conditioning import static_postures
+from elastocal.geometry import Payload, Positions, position_mistake
 from elastocal.logs._frames import sensor_doubts
 from elastocal.logs.merge import sensor_contradictions
+from elastocal.robot import catalogue
 from support.by_day import some_by_day
 from support.mistake_table import rates, tabulate
 from support.walk_mistakes import WALKS, require_same, require_whole
@@ -32,7 +35,8 @@ REFUSED = (
     "A1, A2 exchanged",
     "A6 frozen from half way on",
     "force x, y exchanged",
-    "sensor's frame called base",
+    "A4 reversed, no pose",
+    "zero of A3 10 deg off, no pose",
 )
 MASS, DOWN = 38.0, np.array([0.0, 0.0, -9.80665])
 
@@ -76,7 +80,9 @@ def test_a_sensor_upside_down_is_not_said_to_show_the_force_on_the_tooling():
 
     def doubts(turn: np.ndarray) -> str:
         pulls = np.tile([0.0, 0.0, -1000.0], (8, 1)) @ turn
-        return " ".join(sensor_doubts(_unloaded(R, MASS * DOWN @ R @ turn), pulls, _site(MASS)))
+        force = MASS * DOWN @ R @ turn
+        postures = static_postures(R, force, np.zeros_like(force), DOWN)
+        return " ".join(sensor_doubts(postures, pulls, _site(MASS)))
 
     assert "acts_on" not in doubts(upside_down)
     assert "turns in the sensor as in one whose abc" in doubts(upside_down)
@@ -85,19 +91,17 @@ def test_a_sensor_upside_down_is_not_said_to_show_the_force_on_the_tooling():
     assert not doubts(np.eye(3))
 
 
-def _unloaded(R: np.ndarray, force: np.ndarray) -> Any:
-    """Return poses that hold what is asked for: the unloaded reading of each."""
-    T = np.tile(np.eye(4), (len(R), 1, 1))
-    T[:, :3, :3] = R
-    tools = (
-        SimpleNamespace(T_base_tcp=own, force=SimpleNamespace(value=value))
-        for own, value in zip(T, force, strict=True)
-    )
-    return [SimpleNamespace(reference=SimpleNamespace(tool=tool)) for tool in tools]
+@pytest.mark.slow
+def test_a_mistake_is_not_named_by_a_few_positions_that_any_would_explain():
+    robot, rng = catalogue.load("UR10e"), np.random.default_rng(2)
+    q = rng.uniform(-1.5, 1.5, (6, 6))
+    markers = robot.forward(q)[:, None, :3, 3] * [1.0, 1.0, -1.0]
+    data = replace(Positions.unloaded(q, Payload()), markers=markers)
+    assert "carries it: is the log of another run" in str(position_mistake(robot, data))
 
 
 def test_the_documentation_shows_every_mistake_in_logs():
-    require_whole("import", found=0.95, named=0.85, most_alarms=0.01)
+    require_whole("import", found=1.0, named=0.9, most_alarms=0.01)
 
 
 @pytest.mark.slow
@@ -105,5 +109,5 @@ def test_mistakes_in_logs_are_found_and_most_of_them_named():
     made = [(sound, mistake) for sound in WALK.made_in for mistake in WALK.mistakes]
     found, named = rates(tabulate(WALK.outcome(*each) for each in made))
     assert found >= 0.95
-    assert named >= 0.85
+    assert named >= 0.9
     assert not any(WALK.alarms(sound) for sound in WALK.sound)

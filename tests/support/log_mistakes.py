@@ -88,7 +88,19 @@ class Recording:
             force_time=rows.force_time + rng.uniform(-5.0, 5.0),
             point_time=rows.point_time * (1.0 + rng.normal(0.0, 3e-5)) + rng.uniform(-5.0, 5.0),
         )
+        if self.seed % 5 == 0:  # few digits
+            rows = replace(rows, force=np.round(rows.force), position=np.round(rows.position, 5))
+        if self.seed % 7 == 0:  # all stands for a while, and goes on
+            rows = _paused(rows, 120.0)
         return Logs(rows, cell)
+
+
+def _paused(rows: Rows, pause: float) -> Rows:
+    """Return rows of a run that was interrupted in the middle; nobody recorded the pause."""
+    half = float(np.median(rows.arm_time) - rows.arm_time[0])
+    times = {name: getattr(rows, name) for name in ("arm_time", "force_time", "point_time")}
+    late = {name: time + pause * (time - time[0] > half) for name, time in times.items()}
+    return replace(rows, **late)
 
 
 def _other_run() -> Path:

@@ -63,7 +63,7 @@ WALKS = {
         (Recording(), Recording(1), Recording(2, other=True)),
         LOG_MISTAKES,
         log_outcome,
-        [Recording(100 + n, other=n % 2 == 1) for n in range(80)],
+        [Recording(100 + n, other=n % 2 == 1) for n in range(100)],
         log_alarms,
     ),
 }
