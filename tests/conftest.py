@@ -1,5 +1,6 @@
 """Parts of the suite that can be run alone: units, whole commands and pages, the browser."""
 
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -51,11 +52,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if not item.path.is_relative_to(TESTS):
             continue
-        place = item.path.relative_to(TESTS)
-        if place.name in BROWSER or "browser" in item.fixturenames or "in_a_browser" in item.name:
+        named = item.path.name in BROWSER or "in_a_browser" in item.name
+        if named or "browser" in item.fixturenames:
             item.add_marker("browser")
-        elif any(place.is_relative_to(part) for part in END_TO_END):
+        elif _is_end_to_end(item.path):
             item.add_marker("end_to_end")
+
+
+@cache
+def _is_end_to_end(path: Path) -> bool:
+    place = path.relative_to(TESTS)
+    return any(place.is_relative_to(part) for part in END_TO_END)
 
 
 @pytest.hookimpl(wrapper=True)

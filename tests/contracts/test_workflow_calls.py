@@ -105,7 +105,7 @@ def test_paths_given_as_texts_are_read_and_written(tmp_path_factory):
     figure = str(out / "compared.svg")
     ec.compare(model, new=again, rows=rows, out=str(out / "compared.json"), figure=figure)
     ec.export(model, out=str(out / "c"))
-    ec.stiffness(model, path=rows, out=str(out / "s"), spins=4, external_positions=3, stations=5)
+    ec.stiffness(model, path=rows, out=str(out / "s"), spins=2, external_positions=2, stations=2)
     assert {each.name for each in out.iterdir()} == {
         *("again.json", "predicted.csv", "tool.json", "corrected.csv", "compared.json"),
         *("compared.svg", "c", "s"),

@@ -15,10 +15,12 @@ from support.by_day import some_by_day
 from support.kept import kept
 
 CORPUS = json.loads((Path(__file__).parent / "corpus.json").read_text(encoding="utf-8"))
-PARTS = 4
-"""Tests that share the cases, so that several processes can."""
+REPORTS = ("report ", '["report"')
+PARTS = 10
+"""Tests that share the cases: the first runs by day, the others at night."""
 CASES = 2_000
 NIGHTLY = 100_000
+NIGHTLY_PARTS = 8
 NIGHT = 3_600.0
 """In s, of each part of the nightly cases."""
 TODAY = datetime.datetime.now(tz=datetime.UTC).date().toordinal()
@@ -43,8 +45,14 @@ def test_every_command_reads_the_files_as_they_are(seeds):
     assert [v for v in run_cases(cases, seeds) if v.word != "ok" or v.code] == []
 
 
-def test_what_fell_once_does_not_fall_again(seeds):
-    assert fallen(run_cases([Case(**entry) for entry in CORPUS], seeds)) == []
+@pytest.mark.parametrize(
+    "report", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["quick", "reports"]
+)
+def test_what_fell_once_does_not_fall_again(seeds, report):
+    # Those of whole reports take as long as all others; reports are among the new cases, too.
+    entries = [each for each in CORPUS if each["command"].startswith(REPORTS) == report]
+    assert entries
+    assert fallen(run_cases([Case(**entry) for entry in entries], seeds)) == []
 
 
 @pytest.mark.parametrize("part", some_by_day(range(PARTS), PARTS))
@@ -53,9 +61,9 @@ def test_no_case_of_two_thousand_falls(seeds, part):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(2 * PARTS))
+@pytest.mark.parametrize("part", range(NIGHTLY_PARTS))
 def test_none_of_a_hundred_thousand_new_cases_falls(seeds, part):
-    cases = drawn_cases(NIGHTLY // (2 * PARTS), TODAY * 100 + part)
+    cases = drawn_cases(NIGHTLY // NIGHTLY_PARTS, TODAY * 100 + part)
     assert fallen(run_cases(cases, seeds, NIGHT)) == []
 
 
