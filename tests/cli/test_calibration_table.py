@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from elastocal.cli.output import bold, console, table_of, visible
+from elastocal.blocks import Table
+from elastocal.cli.output import bold, console, print_blocks, table_of, visible
 from elastocal.identification import show_calibration, spring_table
 from elastocal.identification.figures import SpringSummary
 from support.summaries import made_up_summary
@@ -92,3 +93,14 @@ def test_parameters_are_counted_beside_springs_where_they_differ():
         (found, ": 9 springs with 11 parameters, "),
     ):
         assert said in next(iter(show_calibration(summary))).text
+
+
+def test_headings_are_folded_until_no_number_is_cut():
+    heads = ("Technique", *(f"a long heading of column {k}, mean" for k in range(4)))
+    block = Table("Wide", heads, (("cover (not used)", *(["1234.5 mm"] * 4)),))
+    screen = console(stderr=False, file=io.StringIO(), width=80)
+    print_blocks(screen, [block])
+    lines = screen.file.getvalue().splitlines()
+    assert lines[0].strip() == "Wide"
+    assert lines[-1].split() == ["cover", "(not", "used)", *(["1234.5", "mm"] * 4)]
+    assert max(map(len, lines)) <= 80

@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from elastocal.blocks import Block, Cell, Table
 
 
-_HEAD, _NAME = 14, 18
-"""Characters that a line of a heading, and the name of a row, are given at least."""
+_HEADS = (80, 18, 14, 10)
+"""Characters that a line of a heading may have: the first with which a table fits."""
+_NAME = 18
+"""Characters that the name of a row is given at least."""
 _STYLES = ("bold", "dim", "red", "yellow", "green")
 _FIRST, _END = 0xE000, "\ue0ff"
 """Letters for private use: a style begins with that of its number, and all end with the same."""
@@ -134,7 +136,7 @@ def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
         before = block
         if isinstance(block, Table):
             screen.print(bold(block.caption), soft_wrap=True)
-            screen.print(table_of(block))
+            screen.print(table_of(block, screen.width))
         for line in _lines(block):
             screen.print(line, soft_wrap=True)
 
@@ -155,33 +157,50 @@ def _lines(block: "Block") -> list[str]:
     return []
 
 
-def table_of(block: "Table") -> "RichTable":
-    """Return a table for a terminal: numbers whole, words folded where the terminal is narrow."""
+def table_of(block: "Table", width: int = 80) -> "RichTable":
+    """Return a table for a terminal: numbers whole, words folded where the terminal is narrow.
+
+    Parameters
+    ----------
+    block : Table
+        The table.
+    width : int, optional
+        Columns of the terminal. Headings are folded until the table fits, as far as that helps.
+    """
     from rich.table import Table as RichTable
 
     table = RichTable(box=None, pad_edge=False)
     last = len(block.heads) - 1
-    for number, head in enumerate(block.heads):
+    longest = [
+        max((len(_text(row[number])) for row in block.rows), default=0)
+        for number in range(last + 1)
+    ]
+    for widest in _HEADS:
+        heads = [_folded(head, max(longest[k], widest)) for k, head in enumerate(block.heads)]
+        needed = sum(max(longest[k], *map(len, lines)) + 2 for k, lines in enumerate(heads)) - 2
+        if needed <= width:
+            break
+    for number, lines in enumerate(heads):
         # A number that is cut would be another number.
         is_text = number < block.texts or _are_words(block, number)
-        longest = max((len(_text(row[number])) for row in block.rows), default=0)
-        # A unit stands below what it is of.
-        lines = [
-            line
-            for part in head.split(", ")
-            for line in textwrap.wrap(part, max(longest, _HEAD), break_long_words=False)
-        ]
         table.add_column(
             "\n".join(lines),
             justify="left" if is_text else "right",
             no_wrap=not is_text,
             # Beside wide numbers a name would shrink to nothing.
-            min_width=min(longest, _NAME) if number == 0 else None,
+            min_width=min(longest[0], _NAME) if number == 0 else None,
             overflow="fold" if is_text or number == last else "crop",
         )
     for row in block.rows:
         table.add_row(*map(_cell, row))
     return table
+
+
+def _folded(head: str, width: int) -> list[str]:
+    """Return the lines of a heading; a unit stands below what it is of."""
+    parts = head.split(", ")
+    found = [line for part in parts for line in textwrap.wrap(part, width, break_long_words=False)]
+    return found or [""]
 
 
 def _text(cell: "Cell") -> str:
