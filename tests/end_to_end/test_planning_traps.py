@@ -151,6 +151,7 @@ def test_loads_beyond_the_torques_name_the_torque(tmp_path):
         ('fz: "1100 N"', 'fz: "20 kN"'),
         ('force_range: ["2500 N", "2500 N", "6250 N"]', 'force_range: ["9 kN", "9 kN", "30 kN"]'),
         ('["400 N*m", "400 N*m", "400 N*m"]', '["9 kN*m", "9 kN*m", "9 kN*m"]'),
+        ("pool: 100", "pool: 31"),
     )
     assert "refused by" in reason
     assert "torque" in reason
@@ -239,7 +240,8 @@ def test_a_home_in_collision_is_refused_before_the_long_work_and_names_the_bodie
 
 def test_a_tool_longer_than_its_stem_is_refused_by_collision(tmp_path):
     deep = ('pose: {xyz: ["0 mm", "0 mm", "190 mm"]}', 'pose: {xyz: ["0 mm", "0 mm", "350 mm"]}')
-    assert "collision" in refusal(tmp_path, deep)
+    few = ("pool: 100", "pool: 31")
+    assert "collision" in refusal(tmp_path, deep, few)
 
 
 def test_what_the_catalogue_assumes_is_said(tmp_path):

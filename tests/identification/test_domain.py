@@ -16,17 +16,22 @@ from support.cells import Cell, linear_truth, robot, unseen
 from support.problems import campaign
 from support.recertified import calibrated
 
-ARM, DOMAIN = robot(), calibrated(linear_truth(), 0).domain
+ARM = robot()
 Q, FORCE = campaign().joint_position, campaign().force
 
 
+def domain():
+    """Return that of a calibration, which `calibrated` remembers."""
+    return calibrated(linear_truth(), 0).domain
+
+
 def rows(q=Q, force=FORCE, moment=None) -> CoveredRows:
-    return covered_rows(ARM, CalibratedLoads.of_domain(ARM, DOMAIN), q, force, moment)
+    return covered_rows(ARM, CalibratedLoads.of_domain(ARM, domain()), q, force, moment)
 
 
 def test_a_calibration_covers_its_own_readings():
     assert rows().covered.all()
-    assert len(DOMAIN.joint_position) == 31
+    assert len(domain().joint_position) == 31
 
 
 def test_other_poses_over_the_same_region_are_covered_under_the_same_forces():
@@ -72,8 +77,8 @@ def test_a_model_file_holds_its_domain_and_one_without_it_is_read():
     record = CalibrateResult.of(calibrated(linear_truth(), 0))
     data = to_data(record)
     read = from_data(CalibrateResult, data, "model.json").domain
-    np.testing.assert_array_equal(read.joint_position, DOMAIN.joint_position)
-    np.testing.assert_array_equal(read.torque_high, DOMAIN.torque_high)
+    np.testing.assert_array_equal(read.joint_position, domain().joint_position)
+    np.testing.assert_array_equal(read.torque_high, domain().torque_high)
     older = {key: value for key, value in data.items() if key != "domain"}
     assert from_data(CalibrateResult, older, "model.json").calibrated.domain is None
 
@@ -105,7 +110,7 @@ def test_a_domain_of_another_robot_is_refused():
 
 def test_the_domain_is_that_of_the_readings_in_the_fit():
     measured = Cell(linear_truth(), seed=0).readings()
-    assert len(DOMAIN.force) == len(measured)
+    assert len(domain().force) == len(measured)
     np.testing.assert_allclose(
-        DOMAIN.joint_position[DOMAIN.reading_pose], measured.joint_position, atol=5e-3
+        domain().joint_position[domain().reading_pose], measured.joint_position, atol=5e-3
     )
