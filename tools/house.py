@@ -382,13 +382,17 @@ def _fields(node: ast.ClassDef) -> set[str]:
     }
 
 
-def functions(module: Module) -> Iterator[tuple[str, int]]:
-    """Yield each function with its lines of code, signature and docstring not among them."""
+def functions(module: Module, beyond: int = 0) -> Iterator[tuple[str, int]]:
+    """Yield each function with its lines of code, signature and docstring not among them.
+
+    Those whose bodies have ``beyond`` lines at most, of whatever kind, are left out uncounted.
+    """
     for node in ast.walk(module.tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first = node.body[0].lineno
             lines = range(first, (node.end_lineno or first) + 1)
-            yield f"{module.name}.{node.name}", sum(line in module.code for line in lines)
+            if len(lines) > beyond:
+                yield f"{module.name}.{node.name}", sum(line in module.code for line in lines)
 
 
 def defined_names(module: Module) -> set[str]:
