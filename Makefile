@@ -14,7 +14,8 @@ export PYTHONDONTWRITEBYTECODE :=
 # Processes share the processors; threads of each of them would wait for one another.
 tests units end-to-end browser slow: export OMP_NUM_THREADS := 1
 # As many tests run as there are processors: a test that starts more processes only imports more.
-# What the number of processes must not change is tested with numbers that are given. At night pools start as they do for users.
+# What the number of processes must not change is tested with numbers that are given. At night, pools
+# start as they do for users.
 tests units end-to-end browser: export LOKY_MAX_CPU_COUNT := 1
 
 .PHONY: demo test checks lint tests units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
