@@ -132,7 +132,7 @@ class DemoSettings:
     force: bool = False
     """Remove an earlier demo from the folder first."""
     display: MakeDisplay | None = None
-    """None: progress only."""
+    """What shows the demo; without it only progress is shown."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

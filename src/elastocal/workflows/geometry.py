@@ -63,7 +63,7 @@ class GeometrySettings:
     draws: Annotated[int, Option(least=40, most=100_000)] = 200
     """Draws of the bootstrap over blocks of poses."""
     seed: Annotated[int, Option(least=0)] = 0
-    """Of these draws."""
+    """Seed of the draws of the bootstrap."""
     force: bool = False
     """Replace a file that this command did not write."""
     language: Annotated[str, Option(choices="page language")] = "en"

@@ -46,7 +46,7 @@ class MeasureDelaySettings:
     out: Annotated[str | PathLike[str], Option(metavar="RECORD.json")]
     """Commissioning record, ``.json``."""
     amplitude: str = "0.5 mm"
-    """Of the movement, about where the tool stands."""
+    """Amplitude of the movement about where the tool stands, with its unit."""
     seconds: float = 6.0
     """Duration of each of the three movements, in s."""
     confirmed: Annotated[bool, Option("--yes")] = False

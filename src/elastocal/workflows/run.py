@@ -94,7 +94,7 @@ class RunSettings:
     state: Statements = field(default_factory=dict)
     """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
     arming: Arming | None = None
-    """Of a person who agreed before: the cell file must still be the same, to the byte."""
+    """Arming by a person who agreed before: the cell file must still be the same, to the byte."""
 
 
 @brief_repr
