@@ -56,7 +56,7 @@ def test_without_a_comparison_the_default_stands_alone(data, tmp_path):
     result = elastocal("codec", data, "--out", tmp_path / "c", "--splits", "3")
     assert result.code == 0, result.err
     assert result.out == ""
-    for text in ("9 poses, 3 splits", "default", "training poses", "codec.nc"):
+    for text in ("9 poses, 3 splits", "default", "Training poses", "codec.nc"):
         assert text in result.err
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from elastocal.codec import PairedDifference, Verdicts, cross_validate, judge, make_variants
+from elastocal.codec import Verdicts, cross_validate, judge, make_variants
+from elastocal.codec.pairs import PairedDifference
 from support.cells import Cell, linear_truth, rich_truth, robot
 from support.cli import elastocal
 from support.shared import FANUC, needs_shared

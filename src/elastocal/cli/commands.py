@@ -302,6 +302,7 @@ def _show_plan(
 
 @command("Prepare")
 def _study(given: Given) -> None:
+    from elastocal.codec.study import show_study
     from elastocal.records import to_data
 
     result, out = _worked(workflows.study, given), given.settings["out"]
@@ -311,7 +312,11 @@ def _study(given: Given) -> None:
         del figures["schema"]
         return {"folder": str(out), "files": result.files, **figures}
 
-    _show(given, data, lambda screen: tables.show_study(screen, result.summary, out, result.files))
+    def show(screen: "Console") -> None:
+        output.print_blocks(screen, show_study(result.summary))
+        output.print_folder(screen, result.files, out)
+
+    _show(given, data, show)
 
 
 @dataclass(frozen=True)
@@ -486,13 +491,14 @@ def _calibrate(given: Given) -> None:
 
 @command("Identify")
 def _codec(given: Given) -> None:
+    from elastocal.cli.story import print_codec
     from elastocal.records import to_data
 
     result, out = _worked(workflows.codec, given), given.settings["out"]
     _show(
         given,
         lambda: {"folder": str(out), "files": result.files, **to_data(result.summary)},
-        lambda screen: tables.show_codec(screen, result.summary, out, result.files),
+        lambda screen: print_codec(screen, result, out),
     )
 
 
@@ -621,17 +627,23 @@ def _report(given: Given) -> None:
 
 @command("Judge and hand over")
 def _compare(given: Given) -> None:
+    from elastocal.identification.recertification import show_comparison
+
     asked = given.settings
     found = workflows.compare(**asked)
+    summary = found.summary
 
     def show(screen: "Console") -> None:
-        unseen = "limit" in asked and "rows" not in asked
-        hint = workflows.measured_rows(found.summary.new_provenance) if unseen else None
-        tables.show_comparison(screen, found, hint)
+        output.print_blocks(screen, show_comparison(summary, found.rows or found.calibrated))
+        if "limit" in asked and "rows" not in asked:
+            path = workflows.measured_rows(summary.new_provenance)
+            eg = path and f", e.g. {path}, which the new model states it was calibrated on"
+            screen.print(f"give the rows that matter with --rows{eg or ''}", soft_wrap=True)
+        output.print_remarks(screen, "note", summary.notes)
         for path in (asked[name] for name in ("out", "figure") if name in asked):
             screen.print(f"written to {path}", soft_wrap=True)
 
-    _show(given, lambda: found.summary, show)
+    _show(given, lambda: summary, show)
 
 
 @dataclass(frozen=True)

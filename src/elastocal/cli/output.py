@@ -117,6 +117,11 @@ def print_remarks(screen: "Console", label: str, texts: Iterable[str]) -> None:
         screen.print(f"{yellow(f'{label}:')} {text}", soft_wrap=True)
 
 
+def print_folder(screen: "Console", names: Iterable[str], folder: object) -> None:
+    """Print which files were written into a folder."""
+    screen.print(f"\n{', '.join(names)} written to {bold(folder)}", soft_wrap=True)
+
+
 def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
     """Print blocks; pictures, scenes and what may be opened are left to pages.
 
@@ -146,6 +151,8 @@ def _lines(block: "Block") -> list[str]:
     from elastocal import blocks
 
     match block:
+        case blocks.Paragraph(text, "sentence"):
+            return [bold(text)]
         case blocks.Paragraph(text) | blocks.Verbatim(text):
             return [text]
         case blocks.Heading(text):

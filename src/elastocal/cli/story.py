@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from elastocal.progress import Progress
     from elastocal.results import Result
-    from elastocal.workflows import Chapter, DemoResult
+    from elastocal.workflows import Chapter, CodecResult, DemoResult
 
 _WIDTH = 100
 """Columns of the log."""
@@ -81,10 +81,6 @@ def _print(console: "Console", chapter: "Chapter", result: Any, out: Path) -> No
         figures = workflows.plan_figures(result, out / "plan", "calib")
         tables.show_plan(console, result, figures)
 
-    def show_codec() -> None:
-        folder = Path(chapter.words[-1])
-        tables.show_codec(console, result.summary, folder, result.files)
-
     def show_process() -> None:
         tables.show_process(console, result)
         console.print(f"written to {out / 'process'}")
@@ -95,13 +91,22 @@ def _print(console: "Console", chapter: "Chapter", result: Any, out: Path) -> No
         "run": lambda: tables.show_run(console, result),
         "calibrate": lambda: tables.show_calibration(console, result, out / "model.json"),
         "tool": lambda: tables.show_tool(console, result, out / "tool.json"),
-        "codec": show_codec,
+        "codec": lambda: print_codec(console, result, Path(chapter.words[-1])),
         "simulate-process": show_process,
         "compensate": lambda: tables.show_compensation(console, result, out / "corrected.csv"),
         "export": lambda: tables.show_export(console, result, with_tool=True),
         "report": lambda: tables.show_report(console, result),
     }
     shown[chapter.words[0]]()
+
+
+def print_codec(console: "Console", result: "CodecResult", out: Path) -> None:
+    """Print the verdicts of a codec."""
+    from elastocal.codec import show_codec
+
+    output.print_blocks(console, show_codec(result.summary))
+    output.print_remarks(console, "note", result.summary.findings)
+    output.print_folder(console, result.files, out)
 
 
 @contextmanager

@@ -18,12 +18,17 @@ from .indices import (
     IndexValues as IndexValues,
     write_index_table as write_index_table,
 )
-from .pairs import (
-    PairedDifference as PairedDifference,
-)
 from .saturation import (
     Saturation as Saturation,
     Tolerance as Tolerance,
+)
+from .show import (
+    comparison_sentences as comparison_sentences,
+    enough_sentence as enough_sentence,
+    error_table as error_table,
+    saturation_table as saturation_table,
+    show_codec as show_codec,
+    split_facts as split_facts,
 )
 from .splits import (
     CodecOptions as CodecOptions,

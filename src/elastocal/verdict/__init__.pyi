@@ -6,7 +6,6 @@ from .chain import (
     LinkState as LinkState,
 )
 from .evidence import (
-    CodecEvidence as CodecEvidence,
     Evidence as Evidence,
     ModelEvidence as ModelEvidence,
 )

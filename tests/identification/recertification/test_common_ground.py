@@ -48,7 +48,7 @@ def test_springs_of_campaigns_at_other_poses_are_not_held_against_one_another():
     assert not found.springs_judged
     assert found.moved == ()
     assert not any(each.moved for each in found.springs)
-    assert "springs are not held against one another" in found.unmoved_sentence
+    assert "Springs are not held against one another" in found.moved_sentence
 
 
 def test_springs_of_campaigns_under_other_forces_are_not_held_against_one_another():

@@ -97,8 +97,8 @@ def test_numbers_are_told_with_unit_and_count(shown):
 def test_verdicts_and_medians_stand_in_words(text, known):
     for sentence in known.verdicts.sentences:
         assert sentence in text
-    median = 1e3 * np.median(known.data.errors("bearing", "max"), axis=0)[-1]
-    assert f"<td>{median:.4f}</td>" in text
+    median = 1e6 * np.median(known.data.errors("bearing", "max"), axis=0)[-1]
+    assert f" / {median:.1f}</td>" in text
     assert text.count('<tr><th scope="row">') == known.data.n_train[-1]
 
 

@@ -14,14 +14,13 @@ from elastocal.errors import CodecError
 from elastocal.report.plots import (
     codec_chart,
     compliance_chart,
-    error_boxes,
     index_chart,
     style,
     variant_styles,
 )
 from elastocal.report.plots._box_plots import PALE
 from elastocal.report.plots.analysis_charts import spring_boxes
-from elastocal.report.plots.codec_chart import saturation_words
+from elastocal.report.plots.codec_chart import error_boxes, saturation_words
 from elastocal.report.plots.style import tint
 from support.codecs import judged, renamed, without_errors
 

@@ -2,11 +2,6 @@ from .calibration import (
     show_calibration as show_calibration,
     show_report as show_report,
 )
-from .comparisons import (
-    show_codec as show_codec,
-    show_comparison as show_comparison,
-    show_study as show_study,
-)
 from .compensation import (
     show_compensation as show_compensation,
     show_export as show_export,

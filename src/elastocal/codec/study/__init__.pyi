@@ -33,11 +33,10 @@ from .sampling import (
     check_samples as check_samples,
     run_study as run_study,
 )
+from .show import show_study as show_study
 from .summary import (
     STUDY_SCHEMA as STUDY_SCHEMA,
-    Share as Share,
     StudySummary as StudySummary,
-    micrometres as micrometres,
     read_study as read_study,
     study_summary as study_summary,
     write_study as write_study,

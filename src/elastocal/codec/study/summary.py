@@ -14,6 +14,7 @@ from elastocal.identification import CONFIDENCE
 from elastocal.records import read_json, record, write_json
 from elastocal.results import brief_repr
 from elastocal.tables import write_table
+from elastocal.units import in_unit
 
 STUDY_SCHEMA = "elastocal.study/1"
 _SUMMARY, _TABLE, _COMPLIANCES = "study.json", "study.csv", "compliance.csv"
@@ -301,5 +302,5 @@ def advice(conditions: Sequence[ConditionSummary], target: float | None) -> str:
 
 def micrometres(length: float) -> str:
     """Return a length in m in µm, without more digits than it deserves."""
-    value = 1e6 * length
+    value = in_unit(length, "µm")
     return f"{value:.0f}" if value >= 99.95 else f"{value:.3g}"

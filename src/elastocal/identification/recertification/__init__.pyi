@@ -17,3 +17,4 @@ from .result import (
     SpringChange as SpringChange,
     Verdict as Verdict,
 )
+from .show import show_comparison as show_comparison

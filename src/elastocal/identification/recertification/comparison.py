@@ -418,15 +418,12 @@ def _judge(
         Rows that both campaigns cover, where that is known.
     """
     if limit is None:
-        return None, "no limit was given, so nothing was judged"
+        return None, "no limit was given"
     if deflection is None and ground is not None and ground.rows:
-        return None, (
-            f"not judged: none of {counted(ground.rows, 'row')} lies where both campaigns measured"
-        )
+        return None, f"none of {counted(ground.rows, 'row')} lies where both campaigns measured"
     if deflection is None:
         return None, (
-            "not judged: a limit is held against the poses and forces that matter, and no rows were"
-            " given"
+            "a limit is held against the poses and forces that matter, and no rows were given"
         )
     largest, allowed = deflection.largest, f"the limit of {1e3 * limit:g} mm"
     where = ""

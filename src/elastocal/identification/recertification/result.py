@@ -9,6 +9,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification.spring_sums import Term
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.wording import Phrase, phrase
 
 SCHEMA = "elastocal.comparison/1"
 LEAST_COVERED = 0.75
@@ -111,13 +112,15 @@ class CommonGround:
         return (self.rows or 0) - (self.rows_covered or 0)
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Phrase:
         """Why springs are not judged."""
-        return (
-            "springs are not held against one another: the campaigns were made at other poses or"
-            f" loads ({self.old_covered:.0%} of the old readings lie where the new campaign"
-            f" measured, {self.new_covered:.0%} of the new ones where the old one did), and what"
-            " springs cannot express would look like a change"
+        return phrase(
+            "Springs are not held against one another: the campaigns were made at other poses or"
+            " loads ({old} of the old readings lie where the new campaign measured, {new} of the"
+            " new ones where the old one did), and what springs cannot express would look like a"
+            " change.",
+            old=f"{self.old_covered:.0%}",
+            new=f"{self.new_covered:.0%}",
         )
 
 
@@ -214,22 +217,28 @@ class CompareSummary:
         return not self.only_old and not self.only_new
 
     @property
-    def verb(self) -> str:
-        """The word for springs that changed: those of different models only *differ*."""
-        return "moved" if self.same_springs else "differ"
+    def moved_sentence(self) -> Phrase:
+        """Which springs changed, the most certain first; or why none is said to have.
 
-    @property
-    def unmoved_sentence(self) -> str:
-        """The sentence where no spring changed; empty where one did."""
-        count = len(self.springs)
-        if not count:
-            return "no spring is determined by both calibrations"
+        Springs of different models only *differ*.
+        """
+        if not self.springs:
+            return phrase("No spring is determined by both calibrations.")
         if self.ground is not None and not self.springs_judged:
             return self.ground.sentence
         if self.moved:
-            return ""
-        return (
-            f"none of {count} compared springs and sums of springs {self.verb} beyond its interval"
+            return phrase(
+                "Moved beyond their intervals: {names}."
+                if self.same_springs
+                else "Differ beyond their intervals: {names}.",
+                names=", ".join(each.label for each in self.moved_springs),
+            )
+        return phrase(
+            "None of {count} compared springs and sums of springs moved beyond its interval."
+            if self.same_springs
+            else "None of {count} compared springs and sums of springs differs beyond its"
+            " interval.",
+            count=len(self.springs),
         )
 
     @property
@@ -299,17 +308,6 @@ class RowComparison:
         size, low, high = (tuple(each.tolist()) for each in (self.size, self.low, self.high))
         return DeflectionChange(len(self.q), self.mean, self.largest, where, size, low, high)
 
-    def sentence(self, rows: str = "rows") -> str:
-        """Return the change in words, a line each: before, change, where it is largest."""
-        place = ", ".join(f"{1e3 * x:.0f}" for x in self.tcp_position[self.where])
-        before = 1e3 * np.linalg.norm(self.old, axis=1)
-        return (
-            f"predicted deflection over {len(self.q)} {rows}: {before.mean():.3f} mm mean,"
-            f" {before.max():.3f} mm max by the old model\n"
-            f"   change: {_in_mm(self.mean)} mean, {_in_mm(self.largest)} max\n"
-            f"   largest at {rows[:-1]} {self.number[self.where] + 1}, tcp at ({place}) mm in base"
-        )
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompareResult(Result):
@@ -327,7 +325,7 @@ class CompareResult(Result):
         found = self.summary
         return (
             ("robot", found.robot),
-            ("moved", ", ".join(found.moved) or found.unmoved_sentence or "none"),
+            ("springs", found.moved_sentence),
             ("verdict", "none" if found.verdict is None else found.verdict.value),
             ("reason", found.reason),
         )
@@ -336,8 +334,3 @@ class CompareResult(Result):
 def _triple(vector: FloatArray) -> _Triple:
     x, y, z = vector.tolist()
     return x, y, z
-
-
-def _in_mm(estimate: Estimate) -> str:
-    low, high = 1e3 * estimate.low, 1e3 * estimate.high
-    return f"{1e3 * estimate.value:.3f} mm ({low:.3f} to {high:.3f}, 95 %)"

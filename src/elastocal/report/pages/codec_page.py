@@ -14,20 +14,21 @@ from elastocal.codec import (
     Correlation,
     SpringObservability,
     Verdicts,
+    codec_summary,
+    error_table,
+    split_facts,
 )
 from elastocal.files import write_text
 from elastocal.findings import group_alike
 from elastocal.parallel import map_in_processes, process_count
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import (
-    ERROR_PANELS,
     INDEX_NAMES,
     KIND_TITLES,
     check_indices,
     codec_chart,
     compliance_chart,
     compliance_views,
-    error_boxes,
     error_views,
     headline,
     how_to_read,
@@ -153,7 +154,7 @@ def write_codec_page(
         interactive=True,
         data={"variants": variants, "charts": charts},
         provenance=data.provenance,
-        figures=_key_figures(data),
+        figures=split_facts(data),
         springs=verdicts.springs,
         saturations=verdicts.sentences[:first],
         pairs=verdicts.sentences[first:],
@@ -161,40 +162,14 @@ def write_codec_page(
         findings=group_alike(data.findings),
         how=how_to_read(data),
         last=data.n_train[-1],
-        names=names,
         compliances=bool(seen),
         kinds=tuple(KIND_TITLES.values()),
         indices=_index_rows(names, correlations) if correlations else (),
-        rows=_median_rows(data),
+        errors=error_table(codec_summary(data, verdicts).variants),
         footer=f"Made by elastocal {data.versions.get('elastocal', '')}".strip() + ".",
     )
     write_text(path, page)
     return Path(path)
-
-
-def _key_figures(data: CodecData) -> list[tuple[str, str]]:
-    """Return the figures at the head of the page, as name and value."""
-    sets, size = data.verification.shape
-    return [
-        ("Poses", str(len(data.contact))),
-        ("Splits", str(sets)),
-        ("Held-out poses in each", str(size)),
-        ("Training poses", f"1 to {data.n_train[-1]}"),
-        ("Verified under load cases", ", ".join(data.load_cases)),
-    ]
-
-
-def _median_rows(data: CodecData) -> list[tuple[int, list[str]]]:
-    """Return the medians of the error norms, a row for each number of training poses."""
-    columns = [
-        dict(zip(boxes.n.tolist(), boxes.median.tolist(), strict=True))
-        for pair in zip(*(error_boxes(data, which, "norm") for which in ERROR_PANELS), strict=True)
-        for boxes in pair
-    ]
-    return [
-        (n, [f"{column[n]:.4f}" if n in column else "none" for column in columns])
-        for n in data.n_train.tolist()
-    ]
 
 
 def _index_rows(

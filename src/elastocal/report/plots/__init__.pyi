@@ -7,10 +7,8 @@ from .analysis_charts import (
     index_chart as index_chart,
 )
 from .codec_chart import (
-    ERROR_PANELS as ERROR_PANELS,
     ErrorCurve as ErrorCurve,
     codec_chart as codec_chart,
-    error_boxes as error_boxes,
     error_curves as error_curves,
     headline as headline,
     how_to_read as how_to_read,

@@ -320,9 +320,10 @@ def _found(found: CompareSummary) -> str:
     springs = f"{verb.capitalize()}: {names}." if names else f"No compared spring {verb}."
     if not found.springs_judged:
         springs = "Springs are not judged: the campaigns were made at other poses or loads."
-    verdict = "" if found.verdict is None else f" {found.verdict.value.capitalize()}:"
-    judged = "" if found.limit is None else f" {found.reason.partition(';')[0]}."
-    return f"{springs}{verdict}{judged}"
+    if found.limit is None:
+        return springs
+    verdict = "Not judged" if found.verdict is None else found.verdict.value.capitalize()
+    return f"{springs} {verdict}: {found.reason.partition(';')[0]}."
 
 
 def _short(name: str) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from functools import partial
 
 from elastocal import blocks
-from elastocal.elastic import unit_of
 from elastocal.identification import (
     CalibrationSummary,
     show_budget,
@@ -13,16 +12,11 @@ from elastocal.identification import (
     spring_summaries,
     spring_table,
 )
-from elastocal.identification.recertification import (
-    CompareSummary,
-    DeflectionChange,
-    Estimate,
-    Verdict,
-)
+from elastocal.identification.recertification import show_comparison
 from elastocal.report.document.section import Section
 from elastocal.report.plots import recertification_figure, spring_bars, spring_figure
 from elastocal.verdict import Evidence, ModelEvidence
-from elastocal.wording import Phrase, mm, phrase, phrases, sentences
+from elastocal.wording import mm, phrase
 
 
 def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -107,14 +101,6 @@ COMPLIANCES = Section(
 )
 
 
-_WORDS = {
-    Verdict.PASS: phrase("Passed:"),
-    Verdict.FAIL: phrase("Failed:"),
-    Verdict.UNDECIDED: phrase("Not decided:"),
-    None: phrase("Not judged:"),
-}
-
-
 def _recertification(evidence: Evidence) -> Iterator[blocks.Block]:
     found = evidence.recertification
     if found is None:
@@ -125,18 +111,13 @@ def _recertification(evidence: Evidence) -> Iterator[blocks.Block]:
             )
         )
         return
-    yield blocks.Paragraph(
-        sentences([_WORDS[found.verdict], f"{found.reason}.", _moved_springs(found)]), "sentence"
-    )
-    if found.deflection is not None:
-        yield _deflections(found.deflection, found.limit)
-    yield _change_table(found)
+    yield from show_comparison(found)
     yield blocks.Picture(
         partial(recertification_figure, found),
         phrase(
             "Springs of both calibrations with their intervals, and the change of deflection."
             " {moved}",
-            moved=_moved_springs(found),
+            moved=found.moved_sentence,
         ),
         phrase(
             "Round: the earlier calibration; diamonds: this one. What lies outside the grey band"
@@ -146,54 +127,6 @@ def _recertification(evidence: Evidence) -> Iterator[blocks.Block]:
     # The origin of the readings is a path; where a folder lies is no part of a report.
     origin = f" ({found.old_provenance})"
     yield blocks.Bullets(tuple(note.replace(origin, "") for note in found.notes))
-
-
-def _moved_springs(found: CompareSummary) -> Phrase:
-    names = ", ".join(found.moved)
-    if not found.springs_judged and found.ground is not None:
-        return phrase("{sentence}", sentence=f"{found.ground.sentence.capitalize()}.")
-    if not names:
-        return phrase("No compared spring moved beyond its interval.")
-    return phrase("Moved beyond their intervals: {names}.", names=names)
-
-
-def _deflections(change: DeflectionChange, limit: float | None) -> blocks.Block:
-    return blocks.Facts(
-        (
-            (phrase("Poses and forces compared"), change.rows),
-            (phrase("Change, mean"), _span(change.mean)),
-            (phrase("Change, largest"), _span(change.largest)),
-            (phrase("Limit"), phrase("none given") if limit is None else mm(limit)),
-        )
-    )
-
-
-def _change_table(found: CompareSummary) -> blocks.Block:
-    rows = tuple(
-        (
-            each.name,
-            phrase("moved") if each.moved else "",
-            f"{unit.factor * each.old.value:.4f}",
-            f"{unit.factor * each.new.value:.4f}",
-            f"{unit.factor * each.difference.value:+.4f}",
-            phrase(
-                "{low} to {high}",
-                low=f"{unit.factor * each.together.low:+.3f}",
-                high=f"{unit.factor * each.together.high:+.3f}",
-            ),
-            unit.shown,
-        )
-        for each, unit in ((each, unit_of(each.unit)) for each in found.springs)
-    )
-    first, *others = phrases("Spring or sum", "Old", "New", "Change", "95 %, all at once", "Unit")
-    caption = phrase("Springs and sums that both calibrations determine")
-    return blocks.Table(caption, (first, "", *others), rows, texts=2)
-
-
-def _span(found: Estimate) -> Phrase:
-    return phrase(
-        "{value} ({low} to {high})", value=mm(found.value), low=mm(found.low), high=mm(found.high)
-    )
 
 
 RECERTIFICATION = Section(
