@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elastocal.elastic import KINDS, ElasticModel, bearing
+from elastocal.elastic import KINDS, ElasticModel, bearing, layout
 from elastocal.errors import ElastocalError, PluginError, SchemaError
 from elastocal.identification import LOSSES, CalibratedModel, Observability, read_model, write_model
 from elastocal.planning.search import CRITERIA, TECHNIQUES
@@ -108,6 +108,14 @@ def test_a_key_that_a_spring_of_a_plug_in_does_not_have_is_refused_by_its_place(
         read_model(file)
 
 
+def test_a_spring_file_gives_settings_of_a_spring_of_a_plug_in(examples, tmp_path):
+    file = tmp_path / "springs.yaml"
+    entry = "{joint: joint_2, axis: x, kind: softening, settings: {opening: 250.0}}"
+    file.write_text(f"schema: elastocal.springs/1\nsprings: [{entry}]")
+    (spring,) = layout(robot(), str(file))
+    assert spring == KINDS["softening"]("joint_2.softening-x", "joint_2", (1.0, 0, 0), opening=250)
+
+
 def test_a_technique_of_a_plug_in_works_in_other_processes(examples):
     """They know it by its name, as those of a study do."""
     assert "exchange-t" in TECHNIQUES
@@ -154,6 +162,35 @@ class TestAPlugInThatCannotBeUsed:
         offered(tmp_path / "b", monkeypatch, "THING = len", "elastocal.springs")
         with pytest.raises(PluginError, match="odd_module:THING is not a subclass of Spring"):
             KINDS["odd"]
+
+    def test_a_class_that_is_not_finished_names_what_is_missing(self, tmp_path, monkeypatch):
+        source = "from elastocal.elastic import OneAxisSpring as THING"
+        offered(tmp_path, monkeypatch, source, "elastocal.springs")
+        with pytest.raises(
+            PluginError, match=r"does not define angles, kind, parameters, tangents$"
+        ):
+            KINDS["odd"]
+
+    @pytest.mark.parametrize(
+        ("at", "reason"),
+        [
+            (
+                "at = classmethod(lambda cls: cls)",
+                "kind of spring 'odd' of odd-things 1.0 cannot be used: TypeError: .*argument",
+            ),
+            (
+                "def at(place): pass",
+                "spring 'joint_2.odd-axial': kind of spring 'odd' makes a NoneType of it",
+            ),
+        ],
+    )
+    def test_a_spring_that_cannot_be_made_is_named(self, tmp_path, monkeypatch, at, reason):
+        source = f"import elastocal.elastic as e\nclass THING(e.Gear):\n    {at}"
+        offered(tmp_path, monkeypatch, source, "elastocal.springs")
+        file = tmp_path / "springs.yaml"
+        file.write_text("schema: elastocal.springs/1\nsprings: [{joint: joint_2, kind: odd}]")
+        with pytest.raises(ElastocalError, match=reason):
+            layout(robot(), str(file))
 
     def test_two_of_one_name_are_refused_with_both_distributions(self, tmp_path, monkeypatch):
         for name in ("first", "second"):

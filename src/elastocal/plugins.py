@@ -175,8 +175,7 @@ def _loaded(kind: str, entry: "EntryPoint") -> Any:
     try:
         found = entry.load()
     except _BROKEN as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise PluginError(f"{what} cannot be loaded: {reason}") from error
+        raise PluginError(f"{what} cannot be loaded: {_reason(error)}") from error
     form, wanted = KINDS[kind], imported(KINDS[kind].expected)
     if form.is_class:
         fits, words = isinstance(found, type) and wanted in found.__mro__, "a subclass of"
@@ -184,7 +183,41 @@ def _loaded(kind: str, entry: "EntryPoint") -> Any:
         fits, words = isinstance(found, wanted), "a"
     if not fits:
         raise PluginError(f"{what}: {entry.value} is not {words} {wanted.__name__}")
+    missing = sorted(getattr(found, "__abstractmethods__", ()))
+    if form.is_class and missing:
+        raise PluginError(f"{what}: {entry.value} does not define {', '.join(missing)}")
     return found
+
+
+def used(kind: str, name: str, make: Callable[[], _T]) -> _T:
+    """Return what a plug-in makes; where it fails, the message names its distribution.
+
+    Parameters
+    ----------
+    kind, name : str
+        As for `load`; what elastocal itself has may be named as well, and fails as it is.
+    make : callable
+        Calls the plug-in.
+
+    Raises
+    ------
+    PluginError
+        With what the plug-in raised.
+    """
+    found = entries(kind).get(name)
+    if not found:
+        return make()
+    try:
+        return make()
+    except ElastocalError:
+        raise
+    except _BROKEN as error:
+        what = f"{kind} {name!r} of {source_of(found[0])}"
+        raise PluginError(f"{what} cannot be used: {_reason(error)}") from error
+
+
+def _reason(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def imported(place: str) -> Any:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib
+import inspect
 import json
 import os
 import subprocess
@@ -14,14 +15,21 @@ import typer
 
 from elastocal.cell.examples import EXAMPLES
 from elastocal.cli.commands import COMMANDS
-from elastocal.cli.generator import _read
+from elastocal.cli.generator import _parameter, _read
 from elastocal.cli.main import app, run
 from elastocal.compensation.process import PROCESSES
 from elastocal.compensation.programs.languages import PROGRAM_WRITERS
 from elastocal.elastic import LAYOUTS
 from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
-from elastocal.options import CHOICES, OWN, REQUIRED, settings_fields
+from elastocal.options import (
+    CHOICES,
+    OWN,
+    REQUIRED,
+    Option,
+    SettingsField,
+    settings_fields,
+)
 from elastocal.planning.search import TECHNIQUES
 from elastocal.report.language import LANGUAGES
 from elastocal.robot import catalogue
@@ -73,6 +81,14 @@ class TestEveryCommand:
             message = "elastocal: cannot write output: No space left on device\n"
             assert capfd.readouterr().err == message
         assert not list(tmp_path.iterdir())
+
+    def test_settings_take_what_typer_hands_over_for_what_is_not_given(self, command):
+        made = COMMANDS[command]
+        parameters = inspect.signature(made.callback()).parameters
+        for each in made.fields():
+            default = parameters[each.name].default
+            if default is not inspect.Parameter.empty:
+                assert _read(each, default) in (None, each.default)
 
     def test_prints_json(self, command):
         assert ["--json"] in options_of(command).values()
@@ -245,3 +261,12 @@ class TestCompletion:
         )
         assert done.returncode == 0, done.stderr
         assert f"_ELASTOCAL_COMPLETE=complete_{shell}" in Path(tmp_path, file).read_text()
+
+
+def test_a_default_of_what_is_read_from_a_text_is_that_of_the_settings():
+    """It is a number already, and a text would be read again."""
+    read = SettingsField("height", "float", 0.02, "Height.", Option(read="length"))
+    parameter = _parameter(read)
+    assert parameter.default is None
+    assert _read(read, parameter.default) is None
+    assert _read(read, "30 mm") == pytest.approx(0.03)

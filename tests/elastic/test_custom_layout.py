@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -195,3 +197,23 @@ def test_a_missing_file_is_refused_by_its_path(tmp_path):
 def test_a_stiffness_that_no_arm_has_is_refused(read, text, message):
     with pytest.raises(SchemaError, match=message):
         read(f'springs: [{{joint: joint_6, axis: x, stiffness: "{text}", uncertainty: "20 %"}}]')
+
+
+class TestSettingsOfAKind:
+    def test_they_are_fields_of_the_kind(self, read):
+        (gear,) = read("springs: [{joint: joint_2, kind: gear, settings: {knees: [100, 300]}}]")
+        assert gear == replace(Gear.at(gear.axes[0]), knees=(100.0, 300.0))
+
+    @pytest.mark.parametrize(
+        ("entry", "error", "reason"),
+        [
+            ("kind: gear, settings: {knee: [100]}", SchemaError, "joint_2.gear-axial.*knee"),
+            ("kind: gear, settings: {knees: soft}", SchemaError, "knees"),
+            ("kind: gear, settings: {axis: [0, 0, 1]}", SpringError, "axis is no setting of the"),
+            ("kind: gear, settings: {kind: tensor}", SpringError, "kind is no setting of the kind"),
+            ("settings: {knees: [100]}", SchemaError, "settings are for a kind of spring that has"),
+        ],
+    )
+    def test_others_are_refused(self, read, entry, error, reason):
+        with pytest.raises(error, match=reason):
+            read(f"springs: [{{joint: joint_2, {entry}}}]")

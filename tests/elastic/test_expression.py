@@ -4,14 +4,14 @@ import pytest
 from elastocal.compensation.kernel import Call
 from elastocal.compensation.kernel._statics import written
 from elastocal.compensation.kernel.program import Program, Value
-from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
-from elastocal.elastic.springs.expression import atan2
+from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum, atan2
 
 X, Y = Input("x"), Input("y")
 
 
 def law(x, y):
-    return (2.0 * x - y / 4.0 + 1.0) * -x + (3.0 - atan2(x * y, x)) + (0.5 + atan2(1.0, y))
+    whole = (2.0 * x - y / 4.0 + 1.0) * -x + (3.0 - atan2(x * y, x)) + (0.5 + atan2(1.0, y))
+    return whole / (x * x + 2.0) - 3.0 / (y - 1.0)
 
 
 def evaluated(formula: Expression, values: dict[str, float]) -> float:
@@ -26,6 +26,8 @@ def evaluated(formula: Expression, values: dict[str, float]) -> float:
             return float(np.prod([evaluated(factor, values) for factor in factors]))
         case Function("atan2", (y, x)):
             return float(np.arctan2(evaluated(y, values), evaluated(x, values)))
+        case Function("quotient", (over, under)):
+            return evaluated(over, values) / evaluated(under, values)
     raise AssertionError(formula)
 
 

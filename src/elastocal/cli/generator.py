@@ -159,7 +159,9 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
     if kind in (int, float):
         words |= {"min": option.least, "max": option.most}
     default: Any = each.default
-    if default in (REQUIRED, OWN) or option.required or isinstance(default, tuple):
+    # What is read from a text is no default of a text: the settings have it.
+    by_settings = bool(option.read) or isinstance(default, tuple)
+    if default in (REQUIRED, OWN) or option.required or by_settings:
         default = None
     required = _is_required(each)
     if not required and not isinstance(default, bool):

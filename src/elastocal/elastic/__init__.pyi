@@ -30,6 +30,7 @@ from .springs import (
     SpringAxis as SpringAxis,
     SpringLoad as SpringLoad,
     Unit as Unit,
+    atan2 as atan2,
     require_possible as require_possible,
     unit_of as unit_of,
 )

@@ -12,6 +12,7 @@ changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
       - {joint: joint_a2, stiffness: "1.2 MN*m/rad", uncertainty: "20 %"}   # of a data sheet
       - {joint: joint_a1, bounds: ["0.5 MN*m/rad", "5 MN*m/rad"]}
       - {joint: joint_a4, kind: gear, K1: "0.3 MN*m/rad", uncertainty: "30 %"}
+      - {joint: joint_a5, kind: gear, settings: {knees: [100, 300, 900]}}   # fields of the kind
 
 Where the virtual springs of a joint sit: its Hartenberg-Denavit origin (paper Eq. 2).
 
@@ -36,7 +37,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from elastocal.arrays import FloatArray
 from elastocal.elastic.known import Knowledge, KnownSpring
@@ -51,6 +52,7 @@ from elastocal.elastic.springs import (
     as_axis,
     axial,
     coordinate_axis,
+    spring_at,
 )
 from elastocal.errors import SpringError
 from elastocal.plugins import Registry
@@ -439,6 +441,14 @@ class SpringEntry(Knowledge):
     frame: Literal["proximal", "distal"] = "proximal"
     offset: tuple[_Length, _Length, _Length] = (0.0, 0.0, 0.0)
     name: str | None = None
+    settings: dict[str, Any] = Field(default={})
+    """Fields of the kind in SI units, other than those that say where the spring is."""
+
+    @model_validator(mode="after")
+    def _require_a_kind_with_settings(self) -> "SpringEntry":
+        if self.settings and self.kind in (None, *_MOTIONS):
+            raise ValueError("settings are for a kind of spring that has some: name it by kind")
+        return self
 
 
 class SpringFile(StrictModel):
@@ -474,14 +484,16 @@ def _spring(entry: SpringEntry, joints: dict[str, ChainJoint]) -> Spring:
     if entry.kind == "gear" and entry.axis == "axial" and not joint.revolute:
         raise SpringError(f"spring at joint {joint.name!r}: a gear turns, and this joint slides")
     axis, distal = _axis(entry, joint), entry.frame == "distal"
-    # A name tells what distinguishes a spring, e.g. x, distal-x, linear-z.
+    # The name says what distinguishes a spring, e.g. x, distal-x, linear-z.
     parts = [] if entry.kind in (None, *_MOTIONS) else [str(entry.kind)]
     parts += [] if revolute == usual else ["torsion" if revolute else "linear"]
     parts += ["distal"] if distal else []
     parts += [entry.axis if isinstance(entry.axis, str) else _direction(axis)]
     name = entry.name or f"{joint.name}.{'-'.join(parts)}"
-    kind = KINDS.get(entry.kind or DEFAULT_KIND, Hinge)
-    return kind.at(SpringAxis(name, joint.name, axis, revolute, distal, entry.offset))
+    place = SpringAxis(name, joint.name, axis, revolute, distal, entry.offset)
+    if entry.kind in (None, *_MOTIONS):
+        return Hinge.at(place)
+    return spring_at(str(entry.kind), place, entry.settings)
 
 
 def _axis(entry: SpringEntry, joint: ChainJoint) -> tuple[float, float, float]:

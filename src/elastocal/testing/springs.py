@@ -14,6 +14,10 @@ class SpringSuite:
 
     def test_its_class_is_found_by_the_word_that_files_have_for_it(self, spring: Spring) -> None:
         word = to_data(spring).get("kind", "hinge")
+        assert word in KINDS, (
+            f"no package has the entry point {word!r} in elastocal.springs: is yours installed, and"
+            " is that the word of its field kind?"
+        )
         assert KINDS[word] is type(spring)
 
     def test_parameters_have_names_units_scales_and_bounds(self, spring: Spring) -> None:

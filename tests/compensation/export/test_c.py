@@ -5,15 +5,18 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
 
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Reading, Status, design
+from elastocal.elastic import OneAxisSpring, Parameter, Unit, unit_of
 from elastocal.elastic.layouts import SpringEntry, custom
 from elastocal.elastic.springs.hinge import axial
 from elastocal.errors import CompensationError
+from elastocal.records import record
 from elastocal.robot import Robot
 from support import compensated, exported
 from support.exported import SANITIZED, build, needs_gcc, written
@@ -61,6 +64,36 @@ def soft_everywhere(robot):
         )
     )
     return (*(axial(joint) for joint in robot.chain.joints), *custom(robot, entries))
+
+
+@record()
+class Sinking(OneAxisSpring):
+    """A spring ``theta = c t (1 / (1 + u) + 1 / (1 + u))``, ``u = t^2 / T^2``, made to divide."""
+
+    kind: Literal["sinking"] = "sinking"
+    units: ClassVar[tuple[Unit, ...]] = (unit_of("rad/(N*m)"),)
+
+    @property
+    def parameters(self):
+        return (Parameter(self.name, self.joint, self.units[0], 1e-6),)
+
+    def angles(self, load):
+        (t,) = load.torque
+        return ((t * (1.0 / (1.0 + t * t / 1e6)) + 1e6 * t / (1e6 + t * t),),)
+
+    def tangents(self, load):
+        (t,) = load.torque
+        slope = (1.0 - t * t / 1e6) / (1.0 + t * t / 1e6) ** 2
+        return (((2.0 * slope,),),)
+
+
+def test_a_law_that_divides_by_the_load(tmp_path):
+    robot = Robot.from_urdf(ARMS["on a rail"], "tcp")
+    joints = robot.chain.joints[1:4]
+    springs = tuple(Sinking(f"{each.name}.axial", each.name, axial(each).axis) for each in joints)
+    calibrated = compensated.calibrated(robot, springs)
+    executable = build(written(tmp_path, design(calibrated)), "-O1", *SANITIZED)
+    assert_deflections_agree(executable, calibrated, 500)
 
 
 at_many_states = pytest.mark.parametrize(

@@ -69,6 +69,7 @@ _FUNCTIONS = {
     "fabs": "fabs({})",
     "min": "({0} < {1}) ? {0} : {1}",
     "max": "({0} < {1}) ? {1} : {0}",
+    "quotient": "{} / {}",
 }
 """As C for what statements call: comparisons compile to one instruction, without a branch."""
 _RAW = "N, N m; raw, as the sensor gives them | sensor"

@@ -16,7 +16,11 @@ from elastocal.compensation.kernel.program import (
 )
 from elastocal.results import brief_repr
 
-_ORDERED = {"min": "{0} if {0} < {1} else {1}", "max": "{1} if {0} < {1} else {0}"}
+_WRITTEN_OUT = {
+    "min": "{0} if {0} < {1} else {1}",
+    "max": "{1} if {0} < {1} else {0}",
+    "quotient": "{0} / {1}",
+}
 """Python's own functions take thrice the time."""
 
 _MATH = ("sin", "cos", "atan2", "fabs")
@@ -101,8 +105,8 @@ def python_text(routine: Routine, joints: int, loaded: bool) -> str:
                 lines.append(f"    {variables.write(statement.name)} = {text}")
             case Call(name, function, arguments):
                 texts = [value_text(argument, naming) for argument in arguments]
-                ordered = _ORDERED.get(function)
-                text = ordered.format(*texts) if ordered else f"{function}({', '.join(texts)})"
+                form = _WRITTEN_OUT.get(function)
+                text = form.format(*texts) if form else f"{function}({', '.join(texts)})"
                 variables.free(statement)
                 lines.append(f"    {variables.write(name)} = {text}")
     lines.append(f"    return ({' '.join(value_text(v, naming) + ',' for v in routine.outputs)})")

@@ -79,7 +79,7 @@ class Call:
 
     name: str
     function: str
-    """``atan2``, ``fabs``, ``min`` or ``max``."""
+    """``atan2``, ``quotient``, ``fabs``, ``min`` or ``max``."""
     arguments: tuple[Value, ...]
 
 

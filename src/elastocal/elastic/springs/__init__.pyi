@@ -5,6 +5,7 @@ from .expression import (
     Number as Number,
     Product as Product,
     Sum as Sum,
+    atan2 as atan2,
 )
 from .gear import (
     Gear as Gear,
@@ -18,6 +19,7 @@ from .kinds import (
     KINDS as KINDS,
     AnySpring as AnySpring,
     check_springs as check_springs,
+    spring_at as spring_at,
     unit_of as unit_of,
 )
 from .spring import (

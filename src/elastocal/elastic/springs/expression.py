@@ -36,8 +36,13 @@ class Expression:
     def __rmul__(self, other: float) -> "Expression":
         return Product((Number(other), self))
 
-    def __truediv__(self, other: float) -> "Expression":
+    def __truediv__(self, other: "Expression | float") -> "Expression":
+        if isinstance(other, Expression):
+            return Function("quotient", (self, other))
         return Product((self, Number(1.0 / other)))
+
+    def __rtruediv__(self, other: float) -> "Expression":
+        return Function("quotient", (Number(other), self))
 
     def __neg__(self) -> "Expression":
         return Product((Number(-1.0), self))
@@ -76,7 +81,7 @@ class Product(Expression):
 @brief_repr
 @dataclass(frozen=True)
 class Function(Expression):
-    """A function, by the name that it has in Python's `math`."""
+    """A function: ``atan2``, or ``quotient`` of two formulas."""
 
     name: str
     arguments: tuple[Expression, ...]

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from functools import reduce
+from functools import partial, reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -10,10 +10,11 @@ from pydantic import Discriminator, PlainValidator, Tag, TypeAdapter
 
 from elastocal.elastic.springs.gear import Gear
 from elastocal.elastic.springs.hinge import Hinge
-from elastocal.elastic.springs.spring import Spring, Unit
+from elastocal.elastic.springs.spring import Spring, SpringAxis, Unit
 from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SpringError
-from elastocal.plugins import Registry
+from elastocal.plugins import Registry, used
+from elastocal.records import from_data, to_data
 
 DEFAULT_KIND = "hinge"
 """Kind of a spring whose kind a file does not name."""
@@ -55,6 +56,39 @@ def unit_of(si: str) -> Unit:
     """Return the unit that files state so; one that no kind has is shown as it is."""
     known = (unit for kind in KINDS.values() for unit in kind.units if unit.si == si)
     return next(known, Unit(si, si))
+
+
+def spring_at(word: str, place: SpringAxis, settings: Mapping[str, Any]) -> Spring:
+    """Return a spring of a kind at a place.
+
+    Parameters
+    ----------
+    word : str
+        The word of files for the kind.
+    place : SpringAxis
+        Where it is.
+    settings : mapping
+        Fields of the kind that are not its default, other than those that say where it is.
+
+    Raises
+    ------
+    PluginError
+        If a kind of another package makes no spring.
+    SpringError
+        If what it makes is no spring, or a setting says where the spring is.
+    SchemaError
+        If the kind has no such field, or it takes another value.
+    """
+    kind, what = KINDS[word], f"spring {place.name!r}"
+    where = sorted((kind.places | {"kind"}) & set(settings))
+    if where:
+        raise SpringError(f"{what}: {where[0]} is no setting of the kind: it stands beside them")
+    spring = used("kind of spring", word, partial(kind.at, place))
+    if not isinstance(spring, Spring):
+        raise SpringError(f"{what}: kind of spring {word!r} makes a {type(spring).__name__} of it")
+    if not settings:
+        return spring
+    return from_data(kind, to_data(spring) | dict(settings), what)
 
 
 def check_springs(springs: Sequence[Spring], joint_names: Sequence[str]) -> None:
