@@ -18,7 +18,7 @@ from elastocal.identification import LOSSES, CalibratedModel, Observability, rea
 from elastocal.planning.search import CRITERIA, TECHNIQUES
 from elastocal.plugins import KINDS as KINDS_OF_PLUGINS, Registry
 from elastocal.report.language import language_of
-from support import plugged
+from support import plugged, shown
 from support.cells import robot
 from support.cli import elastocal
 from support.pools import choice
@@ -236,6 +236,25 @@ class TestACommandOfAPlugIn:
         assert f"{last} 0.200" in " ".join(shown.err.replace("│", " ").split())
         printed = json.loads(elastocal("softest", tmp_path / "model.json", "--json").out)
         assert next(iter(printed["springs"])) == last
+
+    def test_its_result_is_a_page_in_another_language(self, tmp_path):
+        language_of.cache_clear()
+        model_with_a_spring_of_another_package(tmp_path / "model.json")
+        page, words = tmp_path / "softest.html", ("--page", tmp_path / "softest.html")
+        asked = ("softest", tmp_path / "model.json", "--most", 2, *words, "--page-language", "de")
+        try:
+            for _ in range(2):  # a page of this command may be replaced by one
+                assert elastocal(*asked).code == 0
+        finally:
+            language_of.cache_clear()
+        text = page.read_text("utf-8")
+        assert 'lang="de"' in text
+        assert "geben am meisten nach" in text
+        assert shown.Cells(text).rows[1][0].startswith("joint_")
+        page.write_text("somebody's", "utf-8")
+        refused = elastocal(*asked)
+        assert refused.reason.endswith("no former output of this command; name another file")
+        assert page.read_text("utf-8") == "somebody's"
 
     def test_what_it_refuses_is_one_line(self, tmp_path):
         refused = elastocal("softest", tmp_path / "model.json", "--most", 0)

@@ -14,8 +14,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elastocal.compensation.process import SeedMean
-from elastocal.report.document.sections.process import PAPER, PublishedCase
+from elastocal.compensation.process import PAPER, PublishedCase, SeedMean
 
 if TYPE_CHECKING:
     from mkdocs.structure.pages import Page

@@ -5,7 +5,7 @@ and a notebook show any of them. Texts are phrases, so that every reader's langu
 figures are drawn where they are shown.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -49,6 +49,11 @@ class Graded:
 
 Cell = str | int | Stamp | Code | PoseButton | Graded
 Row = tuple[Cell, ...]
+
+
+def cell_text(cell: Cell) -> str:
+    """Return the text of a cell as every shell shows it."""
+    return str(getattr(cell, "text", getattr(cell, "pose", cell)))
 
 
 class Block:
@@ -131,3 +136,12 @@ class Details(Block):
     summary: str
     blocks: tuple[Block, ...]
     kind: str = ""
+
+
+def every_table(shown: Iterable[Block]) -> Iterator[Table]:
+    """Yield the tables of blocks, those that a reader may open as well."""
+    for block in shown:
+        if isinstance(block, Table):
+            yield block
+        elif isinstance(block, Details):
+            yield from every_table(block.blocks)

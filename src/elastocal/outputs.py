@@ -39,6 +39,8 @@ class OutputRule:
 
     force: bool = False
     """Replace what somebody else wrote, too."""
+    has_force: bool = True
+    """Whether a person can ask for that."""
     marks: tuple[str, ...] = ()
     """Texts by one of which a former output of this command is known."""
     folder: Path | None = None
@@ -86,9 +88,9 @@ class OutputRule:
         inside = any(_same(above, self.folder) for above in path.parents)
         if not self.force and not inside and path.is_file() and not self._is_ours(path):
             known = ", and no former output of this command" if self.marks else ""
+            or_force = ", or give --force to replace it" if self.has_force else ""
             raise FileAccessError(
-                f"cannot write {path}: it is there already{known}; name another file, or give"
-                " --force to replace it"
+                f"cannot write {path}: it is there already{known}; name another file{or_force}"
             )
 
     def _is_ours(self, path: Path) -> bool:

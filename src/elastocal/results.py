@@ -3,7 +3,7 @@
 import dataclasses
 import html
 import importlib
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from typing import Any, TypeVar
 
 from elastocal.findings import group_alike
@@ -12,8 +12,8 @@ MOST_LINES = 20
 """Longest representation in a console."""
 MOST_CHARACTERS = 1500
 """Longest representation in a console."""
-_REMARKS = ("warning", "finding")
-"""Labels of facts of which there may be hundreds of one kind."""
+REMARKS = ("warning", "finding", "note")
+"""Labels of facts of which there may be hundreds of one kind, and which are to be noticed."""
 _LONGEST = 60
 _LONGEST_LINE = 200
 _LEFT = "style='text-align:left'"
@@ -36,6 +36,11 @@ class Result:
             (each.name.replace("_", " "), brief(getattr(self, each.name)))
             for each in dataclasses.fields(self)  # type: ignore[arg-type]
         )
+
+    def show(self) -> Iterable[Any]:
+        """Return what a person sees of the result, as `elastocal.blocks`: by default its facts."""
+        # Blocks stand above results in the layers.
+        return (importlib.import_module("elastocal.blocks").Facts(tuple(self._shown())),)
 
     def pictured(self) -> object:
         """Return what a picture is drawn of: the result itself, or data that it holds."""
@@ -65,7 +70,7 @@ class Result:
         """Return the facts; warnings of one kind are one, where the first of all stands."""
         facts, shown = self.facts(), list[tuple[str, str]]()
         for label, text in facts:
-            if label not in _REMARKS:
+            if label not in REMARKS:
                 shown.append((label, text))
             elif (label, text) == next(fact for fact in facts if fact[0] == label):
                 alike = (each for name, each in facts if name == label)
@@ -73,13 +78,32 @@ class Result:
         return shown
 
     def _repr_html_(self) -> str:
-        """Return the facts as a table, for notebooks."""
-        rows = "".join(
-            f"<tr><th scope='row' {_LEFT}>{html.escape(label)}</th>"
-            f"<td {_LEFT}>{html.escape(text)}</td></tr>"
-            for label, text in self._shown()
+        """Return the facts as a table, and the tables below it, for notebooks."""
+        blocks = importlib.import_module("elastocal.blocks")
+        shown = "".join(
+            _html_table(
+                each.caption,
+                _html_row(each.heads, each.texts, "th"),
+                (_html_row(map(blocks.cell_text, row), each.texts) for row in each.rows),
+            )
+            for each in blocks.every_table(self.show())
         )
-        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
+        facts = (_html_row(pair, 2) for pair in self._shown())
+        return _html_table(type(self).__name__, "", facts) + shown
+
+
+def _html_table(caption: str, head: str, rows: Iterable[str]) -> str:
+    return f"<table><caption>{html.escape(caption)}</caption>{head}{''.join(rows)}</table>"
+
+
+def _html_row(cells: Iterable[str], texts: int, tag: str = "td") -> str:
+    """Return a row whose first cell names it; so many of its cells stand to the left."""
+    made = []
+    for number, cell in enumerate(cells):
+        kind, scope = (tag, "") if number else ("th", " scope='row'" if tag == "td" else "")
+        side = f" {_LEFT}" if number < texts else ""
+        made.append(f"<{kind}{scope}{side}>{html.escape(cell)}</{kind}>")
+    return f"<tr>{''.join(made)}</tr>"
 
 
 def brief_repr(cls: type[T]) -> type[T]:

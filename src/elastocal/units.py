@@ -47,7 +47,7 @@ _FACTORS: dict[str, dict[str, float]] = {
 }
 
 SHOWN = {
-    "mm": 1e3, "µm": 1e6, "mm/s": 1e3, "ms": 1e3, "mrad": 1e3,
+    "mm": 1e3, "µm": 1e6, "mm/s": 1e3, "ms": 1e3, "mrad": 1e3, "N/mm": 1e-3, "N/µm": 1e-6,
     "deg": 180.0 / math.pi, "°": 180.0 / math.pi,
 }  # fmt: skip
 """How many of a unit that people read are in one of SI: the only place that says so for what is

@@ -7,8 +7,9 @@ import pytest
 
 from elastocal.blocks import Table
 from elastocal.cli.output import bold, console, print_blocks, table_of, visible
-from elastocal.identification import show_calibration, spring_table
+from elastocal.identification import spring_table
 from elastocal.identification.figures import SpringSummary
+from elastocal.identification.show import show_calibration
 from support.summaries import made_up_summary
 
 NAME = "joint_2.axial with a long name, slip 3"

@@ -50,10 +50,10 @@ def test_it_says_what_was_left_and_what_was_assumed(folder):
     assert result.out == ""
     words = " ".join(result.err.split())
     for text in (
-        "12 rows corrected",
+        "rows: 12; all figures are predicted",
         "deviation as programmed:",
-        "left by one first-order step:",
-        "left by this correction:",
+        "a first-order step would leave:",
+        "the correction leaves:",
         "posture nearest to those that were calibrated",
     ):
         assert text in words

@@ -23,7 +23,7 @@ def test_people_are_told_counts_and_places_on_standard_error(tmp_path):
     run = record_run(tmp_path / "run")
     said = elastocal("derive", run.path)
     assert said.out == ""
-    assert "6 poses, readings: 30 ok" in said.err
+    assert "6 poses\nreadings: 30 ok" in said.err
     assert "summary.json" in said.err
 
 
@@ -40,7 +40,7 @@ def test_a_journal_that_was_cut_shrinks_no_run_silently(tmp_path, torn, place):
     journal.write_bytes(b"".join(lines[: -3 if torn else -2]) + lines[-3][:torn])
     left = 6 - (3 if torn else 2)
     told = elastocal("derive", run.path).err
-    assert f"{left} of 6 planned poses, readings: " in told
+    assert f"{left} of 6 planned poses\nreadings: " in told
     assert f"it does not name {6 - left} of 6 recordings (pose_000{left}_1.mcap the first)" in told
     found = json.loads((run.path / "summary.json").read_text())["warnings"]
     warnings = [each["text"] for each in found]

@@ -2,17 +2,30 @@
 
 import re
 
+import openpyxl
 import pytest
 from matplotlib.figure import Figure
 
 from elastocal import workflows
+from elastocal.blocks import cell_text, every_table
 from elastocal.codec.study import study_summary
 from elastocal.compensation.process import read_process
 from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
+from elastocal.report.document import write_workbook
+from elastocal.report.document.section import Content
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
 from elastocal.robot import catalogue
-from support import foreign_logs, kuka_bench, live_bench, measured_arms, plans, reported, studies
+from support import (
+    foreign_logs,
+    kuka_bench,
+    live_bench,
+    measured_arms,
+    plans,
+    reported,
+    shown,
+    studies,
+)
 
 CLASSES = {
     name: getattr(workflows, name)
@@ -111,7 +124,30 @@ def test_it_is_short_in_a_console(results, name):
 def test_it_is_a_table_in_a_notebook(results, name):
     html = results[name]._repr_html_()
     assert html.startswith(f"<table><caption>{name}</caption><tr>")
-    assert html.count("<tr>") == len(results[name].facts())
+    assert html[: html.index("</table>")].count("<tr>") == len(results[name].facts())
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_shell_shows_the_same_cells(results, name, tmp_path):
+    blocks = tuple(results[name].show())
+    lines, page = shown.printed(blocks), shown.Cells(Content(blocks).html).rows
+    notebook = shown.Cells(results[name]._repr_html_()).rows
+    book = openpyxl.load_workbook(write_workbook(tmp_path / "a.xlsx", [(name, blocks)]))
+    kept = [row for sheet in book for row in sheet.iter_rows(values_only=True)]
+    for table in every_table(blocks):
+        for row in table.rows:
+            cells = [cell_text(cell) for cell in row]
+            assert [word for cell in cells for word in cell.split()] in lines
+            assert cells in page
+            assert cells in notebook
+            assert any(
+                [as_kept(cell) for cell in cells] == list(each[: len(cells)]) for each in kept
+            ), cells
+
+
+def as_kept(cell):
+    """Return what a workbook has for a cell: figures as numbers."""
+    return float(cell) if re.fullmatch(r"[+-]?\d+(\.\d+)?", cell) else cell or None
 
 
 @pytest.mark.parametrize("name", CLASSES)

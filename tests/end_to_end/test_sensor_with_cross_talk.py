@@ -7,8 +7,8 @@ import pytest
 
 from elastocal import workflows
 from elastocal.cell import SensorLoad
-from elastocal.compensation.conditioning import TOOL_UNKNOWNS, read_sensor_load
-from elastocal.compensation.conditioning.tool_fit import rotation_off
+from elastocal.compensation.conditioning import read_sensor_load
+from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS, rotation_off
 from elastocal.compensation.online import Compensator, Reading
 from support.compensated import arm, settings
 from support.static_postures import PlantedTool, posture_table, turned

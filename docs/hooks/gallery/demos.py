@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from process_tables import DEMOS, TRUTHS
 
-from elastocal.report.document.sections.process import PAPER
+from elastocal.compensation.process import PAPER
 from elastocal.report.plots import new_figure, style, write_figure
 from gallery.process_figures import ProcessFigures, quoted
 

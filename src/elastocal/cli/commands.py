@@ -6,7 +6,7 @@ alone stands here.
 
 import sys
 import webbrowser
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elastocal import workflows
-from elastocal.cli import output, tables
+from elastocal.cli import output
 from elastocal.cli.generator import Command, Given
 from elastocal.options import CHOICES, Option
-from elastocal.wording import mm
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from elastocal.blocks import Block
 
 COMMANDS: dict[str, Command] = {}
 """By the name that people type, in the order of help."""
@@ -71,21 +70,31 @@ def _say(*lines: str) -> None:
         screen.print(line, soft_wrap=True)
 
 
-def _show(given: Given, data: Callable[[], Any], show: "Callable[[Console], None]") -> None:
-    """Print data as JSON where that was asked for, else what a person reads."""
+def _show(given: Given, data: object, shown: "Iterable[Block]", *lines: str) -> None:
+    """Print data as JSON where that was asked for, else blocks, and where they were written."""
     if given.as_json:
-        output.print_json(data())
-    else:
-        show(output.console())
+        output.print_json(data)
+        return
+    screen = output.console()
+    output.print_blocks(screen, shown)
+    for path in (given.settings.get(name) for name in ("out", "figure")):
+        if path is not None and not given.settings.get("dry_run"):
+            screen.print(f"written to {output.bold(path)}", soft_wrap=True)
+    for line in lines:
+        screen.print(line, soft_wrap=True)
 
 
-def _show_lines(given: Given, data: object, lines: Iterable[str]) -> None:
-    """Print data as JSON where that was asked for, else lines."""
-    _show(given, lambda: data, lambda _: _say(*lines))
+def _as_file(result: object) -> dict[str, Any]:
+    """Return what a file of a result holds, without its schema: figures of a JSON object."""
+    return {key: value for key, value in _figures(result).items() if key != "schema"}
 
 
-def _named(facts: Iterable[tuple[str, str]]) -> Iterator[str]:
-    return (f"{label}: {text}" for label, text in facts)
+def _figures(result: object) -> dict[str, Any]:
+    """Return the figures of a result as a JSON object has them."""
+    from elastocal.records import to_data  # not for help
+
+    found: dict[str, Any] = to_data(result)
+    return found
 
 
 def _worked(work: Callable[..., Any], given: Given, **more: Any) -> Any:
@@ -118,16 +127,9 @@ def _robots(given: Given) -> None:
         else:
             typer.echo(text, nl=False)
         return
-    chosen = [catalogue.entry(name).name] if name else list(catalogue.names())
-    rows = [tables.robot_facts(robot) for robot in chosen]
-
-    def show(screen: "Console") -> None:
-        if name:
-            tables.show_robot(screen, rows[0])
-        else:
-            tables.show_robots(screen, rows)
-
-    _show(given, lambda: {"robots": rows}, show)
+    robots = [catalogue.robot_facts(each) for each in ([name] if name else catalogue.names())]
+    shown = catalogue.show_robot(robots[0]) if name else catalogue.show_robots(robots)
+    _show(given, {"robots": robots}, shown)
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ def _new(given: Given) -> None:
 @command("Prepare")
 def _init(given: Given) -> None:
     result = workflows.init(**given.settings)
-    _show(given, lambda: result, lambda screen: tables.show_example(screen, result))
+    _show(given, result, result.show(), f"edit it, then `elastocal check {result.cell}`")
 
 
 @dataclass(frozen=True)
@@ -184,14 +186,11 @@ def _check(given: Given) -> None:
     if preview is not None and given.here["browser"]:
         webbrowser.open(preview.resolve().as_uri())
 
-    def show(screen: "Console") -> None:
-        screen.print(f"{output.green('ok')} {result.file} is a {result.kind}")
-        for name, text in result.lines():
-            screen.print(f"   {name}: {text}", soft_wrap=True)
-        if preview is not None:
-            screen.print(f"preview: {preview}", soft_wrap=True)
-
-    _show(given, lambda: {"file": result.file, "kind": result.kind, **result.holds}, show)
+    data = {"file": result.file, "kind": result.kind, **result.holds}
+    if not given.as_json:
+        _say(f"{output.green('ok')} {result.file} is a {result.kind}")
+    lines = () if preview is None else (f"preview: {preview}",)
+    _show(given, data, result.show(), *lines)
 
 
 @command("Prepare")
@@ -202,7 +201,7 @@ def _watch(given: Given) -> None:
     with interruption() as interrupted, DevicesView(output.console()) as view:
         result = workflows.watch(**given.settings, show=view.tell, interrupted=interrupted)
         ended = not interrupted()
-    _show_lines(given, result.figures, _named(result.facts()))
+    _show(given, result.figures, result.show())
     if ended and result.problem is not None:
         raise DeviceError(result.problem)
 
@@ -261,8 +260,7 @@ def _plan(given: Given) -> None:
         asked.pop("page_language")
         chosen = {name: here[name] for name in ("search", "program") if here[name]}
         found = _worked(workflows.plan_positions, given, **chosen)
-        out = asked["out"]
-        _show(given, lambda: found, lambda screen: tables.show_position_plan(screen, found, out))
+        _show(given, found, found.show(), _FILL_IN)
         return
     if here["search"] is not None:
         raise PlanningError("--search is for --for geometry: the cell file names its technique")
@@ -292,31 +290,21 @@ def _show_plan(
         if not given.as_json:
             output.print_lines(pose_lines(found))
 
-    def show(screen: "Console") -> None:
-        tables.show_plan(screen, found, figures)
-        if free is not None:
-            tables.show_position_plan(screen, free, out)
+    program = getattr(figures.program, "values", {}).get("reason", figures.program)
+    shown = (*found.show(), *(free.show() if free is not None else ()))
+    files = f"files: {', '.join(figures.files)}" if figures.files else "Nothing was written."
+    lines = (f"robot program: {program}", files)
+    _show(given, figures, shown, *lines, *((_FILL_IN,) if free is not None else ()))
 
-    _show(given, lambda: figures, show)
+
+_FILL_IN = "fill the markers into the table of positions, then `elastocal geometry`"
 
 
 @command("Prepare")
 def _study(given: Given) -> None:
-    from elastocal.codec.study import show_study
-    from elastocal.records import to_data
-
     result, out = _worked(workflows.study, given), given.settings["out"]
-
-    def data() -> Any:
-        figures = to_data(result.summary)
-        del figures["schema"]
-        return {"folder": str(out), "files": result.files, **figures}
-
-    def show(screen: "Console") -> None:
-        output.print_blocks(screen, show_study(result.summary))
-        output.print_folder(screen, result.files, out)
-
-    _show(given, data, show)
+    data = {"folder": str(out), "files": result.files, **_as_file(result.summary)}
+    _show(given, data, result.show(), f"files: {', '.join(result.files)}")
 
 
 @dataclass(frozen=True)
@@ -337,17 +325,14 @@ def _run(given: Given) -> None:
         rehearsed = workflows.dry_run(settings)
         if not given.as_json:
             output.print_lines(rehearsed.pose_lines())
-        _show(
-            given,
-            lambda: tables.dry_figures(rehearsed),
-            lambda screen: tables.show_itinerary(screen, rehearsed),
-        )
+        _show(given, rehearsed.figures, rehearsed.show(), "Nothing was moved.")
         return
     finished = workflows.run(settings)
+    # Of a run that is not done people are told why, whatever a program asked for.
     if given.as_json and finished.end is RunEnd.DONE:
         output.print_json(finished.figures)
     else:
-        tables.show_run(output.console(), finished)
+        output.print_blocks(output.console(), finished.show())
     if finished.problem is not None:
         raise finished.problem
     if finished.end is RunEnd.INTERRUPTED:
@@ -360,7 +345,7 @@ def _release(given: Given) -> None:
 
     operator = TerminalOperator(output.console())
     result = workflows.release(**given.settings, operator=operator)
-    _show_lines(given, result.figures, _named(result.facts()))
+    _show(given, result.figures, result.show())
 
 
 @command("Measure")
@@ -379,7 +364,7 @@ def _simulate(given: Given) -> None:
 @command("Measure")
 def _krc_config(given: Given) -> None:
     result = workflows.krc_config(**given.settings)
-    _show_lines(given, result, _named(result.facts()))
+    _show(given, result, result.show())
 
 
 @command("Measure")
@@ -388,20 +373,14 @@ def _measure_delay(given: Given) -> None:
 
     operator = TerminalOperator(output.console())
     result = _worked(workflows.measure_delay, given, operator=operator)
-    _show_lines(given, result.measured, _named(result.facts()))
+    _show(given, result.measured, result.show())
 
 
 @command("Measure")
 def _derive(given: Given) -> None:
     result = workflows.derive(**given.settings)
-
-    def show(screen: "Console") -> None:
-        folder = result.folder
-        screen.print(f"{result.poses()}, readings: {result.counts()}")
-        screen.print(f"wrote {folder.dataset} and {folder.summary.name}", soft_wrap=True)
-        output.print_remarks(screen, "warning", result.summary.warnings)
-
-    _show(given, lambda: result.summary, show)
+    written = f"written to {result.folder.dataset} and {result.folder.summary.name}"
+    _show(given, result.summary, result.show(), written)
 
 
 @dataclass(frozen=True)
@@ -434,8 +413,7 @@ def _import(given: Given) -> None:
         guessed = workflows.guess_map(settings)
 
         data = {"map": str(here["map"]), "logs": guessed.logs}
-        wrote = f"wrote {here['map']}: look at every line"
-        _show_lines(given, data, (*_named(guessed.facts()), wrote))
+        _show(given, data, guessed.show(), f"wrote {here['map']}: look at every line")
         return
     if here["cell"] is not None:
         raise typer.BadParameter("is for --guess: the map names the cell", param_hint="--cell")
@@ -443,7 +421,7 @@ def _import(given: Given) -> None:
         raise typer.BadParameter("is missing: the dataset to write", param_hint="--out")
     result = _worked(workflows.import_logs, given, map=here["map"], out=here["out"])
     wrote = f"wrote {result.figures.dataset}, look at {result.figures.picture}"
-    _show_lines(given, result.figures, (*_named(result.facts()), wrote))
+    _show(given, result.figures, result.show(), wrote)
 
 
 def _ask(question: str) -> str:
@@ -454,52 +432,30 @@ def _ask(question: str) -> str:
 
 @command("Identify")
 def _tool(given: Given) -> None:
-    from elastocal.records import to_data
-
     result = workflows.tool(**given.settings)
-
-    def data() -> Any:
-        # What this command always printed: the file without its schema.
-        return {key: value for key, value in to_data(result).items() if key != "schema"}
-
-    _show(given, data, lambda screen: tables.show_tool(screen, result, given.settings["out"]))
+    _show(given, _as_file(result), result.show())
 
 
 @command("Identify")
 def _geometry(given: Given) -> None:
-
-    result, out = _worked(workflows.geometry, given), given.settings["out"]
-    model, found = result.model, result.accuracy
-
-    def data() -> Any:
-        kept = ("held_out", "ladder", "parameters", "fixed", "blunders")
-        more = {"axes": found.axes, "iso_9283": found.poses}
-        return {key: getattr(model, key) for key in kept} | more
-
-    _show(given, data, lambda screen: tables.show_geometry(screen, model, found, out))
+    result = _worked(workflows.geometry, given)
+    kept = ("held_out", "ladder", "parameters", "fixed", "blunders")
+    figures = {key: getattr(result.model, key) for key in kept}
+    more = {"axes": result.accuracy.axes, "iso_9283": result.accuracy.poses}
+    _show(given, figures | more, result.show())
 
 
 @command("Identify")
 def _calibrate(given: Given) -> None:
-    result, out = workflows.calibrate(**given.settings), given.settings["out"]
-    _show(
-        given,
-        lambda: result.calibration,
-        lambda screen: tables.show_calibration(screen, result, out),
-    )
+    result = workflows.calibrate(**given.settings)
+    _show(given, result.calibration, result.show())
 
 
 @command("Identify")
 def _codec(given: Given) -> None:
-    from elastocal.cli.story import print_codec
-    from elastocal.records import to_data
-
     result, out = _worked(workflows.codec, given), given.settings["out"]
-    _show(
-        given,
-        lambda: {"folder": str(out), "files": result.files, **to_data(result.summary)},
-        lambda screen: print_codec(screen, result, out),
-    )
+    data = {"folder": str(out), "files": result.files, **_figures(result.summary)}
+    _show(given, data, result.show(), f"files: {', '.join(result.files)}")
 
 
 @dataclass(frozen=True)
@@ -538,31 +494,13 @@ def _only_tool(given: Given) -> dict[str, Any]:
 @command("Use")
 def _predict(given: Given) -> None:
     result = workflows.predict(**given.settings)
-    figures, size = result.summary, result.summary.deflection
-
-    def show(screen: "Console") -> None:
-        notes = (*figures.notes, *([_NO_MISFIT] if figures.misfit is None else []))
-        _say(
-            f"{figures.rows} rows: predicted deflection {mm(size.mean)} mean, {mm(size.max)} max;"
-            f" written to {given.settings['out']}",
-            f"tool: {figures.tool}",
-            *(f"Note: {note}" for note in notes),
-        )
-        output.print_remarks(screen, "warning", [figures.warning] if figures.warning else [])
-
-    _show(given, lambda: figures, show)
-
-
-_NO_MISFIT = (
-    "the model does not know its errors at left-out poses, so that there are no intervals of what"
-    " would be measured; calibrate again to have them"
-)
+    _show(given, result.summary, result.show())
 
 
 @command("Use")
 def _compensate(given: Given) -> None:
-    result, out = _worked(workflows.compensate, given), given.settings["out"]
-    _show(given, lambda: result, lambda screen: tables.show_compensation(screen, result, out))
+    result = _worked(workflows.compensate, given)
+    _show(given, result, result.show())
 
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
@@ -579,71 +517,48 @@ def _live(given: Given) -> None:
             warn=lambda text: output.print_remarks(screen, "warning", [text]),
             interrupted=interrupted,
         )
-    _show_lines(given, result, _named(result.facts()))
+    _show(given, result, result.show())
     if result.problem is not None:
         raise DeviceError(result.problem)
 
 
 @command("Use")
 def _stiffness(given: Given) -> None:
-    from elastocal.records import to_data
-
-    result, out = _worked(workflows.stiffness, given), given.settings["out"]
-
-    def show(screen: "Console") -> None:
-        tables.show_stiffness(screen, result)
-        screen.print(f"written to {out}: {', '.join(result.summary.files)}")
-
-    _show(given, lambda: to_data(result.summary) | {"folder": str(out)}, show)
+    result = _worked(workflows.stiffness, given)
+    data = _figures(result.summary) | {"folder": str(given.settings["out"])}
+    _show(given, data, result.show(), f"files: {', '.join(result.summary.files)}")
 
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
 def _simulate_process(given: Given) -> None:
-    from elastocal.records import to_data
-
-    (files, frame), out = _tools(given), given.settings["out"]
+    files, frame = _tools(given)
     result = _worked(workflows.simulate_process, given, tools=files, tool_frame=frame)
-
-    def show(screen: "Console") -> None:
-        tables.show_process(screen, result)
-        screen.print(f"written to {out}")
-
-    _show(given, lambda: to_data(result) | {"folder": str(out)}, show)
+    data = _figures(result) | {"folder": str(given.settings["out"])}
+    _show(given, data, result.show())
 
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
 def _export(given: Given) -> None:
-    chosen = _only_tool(given)
-    result = workflows.export(**given.settings, **chosen)
-    with_tool = chosen["tool"] is not None
-    _show(given, lambda: result, lambda screen: tables.show_export(screen, result, with_tool))
+    result = workflows.export(**given.settings, **_only_tool(given))
+    _show(given, result, result.show())
 
 
 @command("Judge and hand over")
 def _report(given: Given) -> None:
     result = workflows.report(**given.settings)
-    _show(given, lambda: result.figures, lambda screen: tables.show_report(screen, result))
+    others = (path for path in (result.figures.pdf, result.figures.xlsx) if path)
+    _show(given, result.figures, result.show(), *(f"written to {path}" for path in others))
 
 
 @command("Judge and hand over")
 def _compare(given: Given) -> None:
-    from elastocal.identification.recertification import show_comparison
-
-    asked = given.settings
-    found = workflows.compare(**asked)
-    summary = found.summary
-
-    def show(screen: "Console") -> None:
-        output.print_blocks(screen, show_comparison(summary, found.rows or found.calibrated))
-        if "limit" in asked and "rows" not in asked:
-            path = workflows.measured_rows(summary.new_provenance)
-            eg = path and f", e.g. {path}, which the new model states it was calibrated on"
-            screen.print(f"give the rows that matter with --rows{eg or ''}", soft_wrap=True)
-        output.print_remarks(screen, "note", summary.notes)
-        for path in (asked[name] for name in ("out", "figure") if name in asked):
-            screen.print(f"written to {path}", soft_wrap=True)
-
-    _show(given, lambda: summary, show)
+    asked, lines = given.settings, list[str]()
+    result = workflows.compare(**asked)
+    if "limit" in asked and "rows" not in asked:
+        path = workflows.measured_rows(result.summary.new_provenance)
+        known = path and f", e.g. {path}, which the new model states it was calibrated on"
+        lines.append(f"give the rows that matter with --rows{known or ''}")
+    _show(given, result.summary, result.show(), *lines)
 
 
 @dataclass(frozen=True)
@@ -664,17 +579,10 @@ def _verify(given: Given) -> None:
 
         public = make_key(new_key)
         wrote = f"wrote {new_key} (keep it secret) and {public} (give it away)"
-        _show_lines(given, {"private": str(new_key), "public": str(public)}, (wrote,))
+        _show(given, {"private": str(new_key), "public": str(public)}, (), wrote)
         return
     found = workflows.verify(target, **given.settings)
-
-    def show(screen: "Console") -> None:
-        for link in found.links:
-            # A line each: the words of a forged report must not look like a link of their own.
-            said = " ".join(f"{link.name}: {link.text}".split())
-            screen.print(f"{link.state.value:<14} {said}", soft_wrap=True)
-
-    _show(given, lambda: {"whole": found.broken is None, "links": found.links}, show)
+    _show(given, {"whole": found.broken is None, "links": found.links}, found.show())
     found.require_whole()
 
 
@@ -684,4 +592,7 @@ def _demo(given: Given) -> None:
 
     result = shown(**given.settings)
     data = {"folder": str(given.settings["out"]), "process": result.process}
-    _show(given, lambda: data, lambda _: _say(*result.closing()))
+    if given.as_json:
+        output.print_json(data)
+    else:
+        _say(*result.closing())

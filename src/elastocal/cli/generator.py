@@ -6,16 +6,28 @@ the command by the names of the fields, and what is not given is left to the set
 
 import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from elastocal import plugins
 from elastocal.cli import output
-from elastocal.options import CHOICES, OWN, REQUIRED, SettingsField, settings_fields, summary_of
+from elastocal.options import (
+    CHOICES,
+    OWN,
+    REQUIRED,
+    Option,
+    SettingsField,
+    settings_fields,
+    summary_of,
+)
+
+if TYPE_CHECKING:
+    from elastocal.blocks import Block
 
 _NARROW = 20
 """Characters that help shows of what an option takes, where a terminal has 80 columns."""
@@ -101,14 +113,49 @@ def plugged(name: str) -> Command:
     found: plugins.Command[Any] = plugins.load("command", name)
 
     def run(given: Given) -> None:
-        result = found.run(found.settings(**given.settings))
-        if given.as_json:
-            output.print_json(result)
-        else:
-            output.print_blocks(output.console(), found.show(result))
+        with _page_of(given, name) as write:
+            result = found.run(found.settings(**given.settings))
+            if given.as_json:
+                output.print_json(result)
+            else:
+                output.print_blocks(output.console(), found.show(result))
+            write(found.show(result))
 
     settings = found.settings
-    return _Plugged(OTHERS, settings.__module__, settings.__name__, settings.__name__, run)
+    return _Plugged(OTHERS, settings.__module__, settings.__name__, settings.__name__, run, _Page)
+
+
+@dataclass(frozen=True)
+class _Page:
+    page: Path | None = None
+    """Write a page (.html) that shows the result."""
+    page_language: Annotated[str, Option(choices="page language")] = "en"
+    """Language of that page."""
+
+
+@contextmanager
+def _page_of(given: Given, name: str) -> Iterator[Callable[[Iterable["Block"]], None]]:
+    """Yield what writes the page that was asked for, in a place where nothing else is replaced."""
+    path, code = given.here["page"], given.here["page_language"]
+    if path is None:
+        yield lambda _: None
+        return
+    from elastocal.files import require_place
+    from elastocal.outputs import OutputRule, ruled
+    from elastocal.report import language_of
+    from elastocal.report.document import write_page
+
+    language, maker = language_of(code), f"elastocal {name}"
+    require_place(path)
+    inputs = [each for each in given.settings.values() if isinstance(each, Path)]
+    with ruled(OutputRule(marks=(f'content="{maker}"',), has_force=False), inputs, [path]):
+        yield lambda shown: _written(
+            write_page(path, name, [("result", name, shown)], language, maker=maker)
+        )
+
+
+def _written(path: Path) -> None:
+    output.console().print(f"written to {output.bold(path)}", soft_wrap=True)
 
 
 class _Plugged(Command):

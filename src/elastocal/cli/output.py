@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from elastocal.errors import FileAccessError
 from elastocal.findings import group_alike
 from elastocal.progress import Progress
+from elastocal.results import REMARKS, Result
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -117,11 +118,6 @@ def print_remarks(screen: "Console", label: str, texts: Iterable[str]) -> None:
         screen.print(f"{yellow(f'{label}:')} {text}", soft_wrap=True)
 
 
-def print_folder(screen: "Console", names: Iterable[str], folder: object) -> None:
-    """Print which files were written into a folder."""
-    screen.print(f"\n{', '.join(names)} written to {bold(folder)}", soft_wrap=True)
-
-
 def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
     """Print blocks; pictures, scenes and what may be opened are left to pages.
 
@@ -132,10 +128,12 @@ def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
     shown : iterable of Block
         In the order in which they are read.
     """
-    from elastocal.blocks import Table
+    from elastocal.blocks import Bullets, Facts, Table
 
     before: Block | None = None
     for block in shown:
+        if block == Facts(()) or block == Bullets(()):
+            continue
         if isinstance(before, Table) or (before and isinstance(block, Table)):
             screen.print()
         before = block
@@ -144,6 +142,13 @@ def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
             screen.print(table_of(block, screen.width))
         for line in _lines(block):
             screen.print(line, soft_wrap=True)
+
+
+def print_result(screen: "Console", result: Result, out: object = None) -> None:
+    """Print what a person sees of a result, and where it was written."""
+    print_blocks(screen, result.show())
+    if out is not None:
+        screen.print(f"written to {bold(out)}", soft_wrap=True)
 
 
 def _lines(block: "Block") -> list[str]:
@@ -160,7 +165,10 @@ def _lines(block: "Block") -> list[str]:
         case blocks.Bullets(items):
             return [f"   {item}" for item in items]
         case blocks.Facts(pairs):
-            return [f"{name}: {value}" for name, value in pairs]
+            return [
+                f"{yellow(f'{name}:') if name in REMARKS else f'{name}:'} {value}"
+                for name, value in pairs
+            ]
     return []
 
 
@@ -176,10 +184,12 @@ def table_of(block: "Table", width: int = 80) -> "RichTable":
     """
     from rich.table import Table as RichTable
 
+    from elastocal.blocks import cell_text
+
     table = RichTable(box=None, pad_edge=False)
     last = len(block.heads) - 1
     longest = [
-        max((len(_text(row[number])) for row in block.rows), default=0)
+        max((len(cell_text(row[number])) for row in block.rows), default=0)
         for number in range(last + 1)
     ]
     for widest in _HEADS:
@@ -210,19 +220,19 @@ def _folded(head: str, width: int) -> list[str]:
     return found or [""]
 
 
-def _text(cell: "Cell") -> str:
-    return str(getattr(cell, "text", getattr(cell, "pose", cell)))
-
-
 def _are_words(block: "Table", column: int) -> bool:
     """Return whether no cell of a column has a figure at its head."""
-    texts = [_text(row[column]) for row in block.rows]
+    from elastocal.blocks import cell_text
+
+    texts = [cell_text(row[column]) for row in block.rows]
     return not any(text[:1].isdigit() or text[:1] in "(-+" for text in texts if text)
 
 
 def _cell(value: "Cell") -> str:
+    from elastocal.blocks import cell_text
+
     grade = {"good": green, "fair": yellow, "poor": red}.get(getattr(value, "grade", ""))
-    return grade(_text(value)) if grade else _text(value)
+    return grade(cell_text(value)) if grade else cell_text(value)
 
 
 @contextmanager

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from elastocal import workflows
-from elastocal.cli import output, tables
+from elastocal.cli import output
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from elastocal.progress import Progress
     from elastocal.results import Result
-    from elastocal.workflows import Chapter, CodecResult, DemoResult
+    from elastocal.workflows import Chapter, DemoResult
 
 _WIDTH = 100
 """Columns of the log."""
@@ -66,47 +66,14 @@ class _Display:
     def text(self, chapter: "Chapter", result: "Result") -> str:
         """Return what a chapter's command prints."""
         printed = io.StringIO()
-        _print(_log_console(printed), chapter, result, self._out)
+        words = chapter.words
+        out = words[words.index("--out") + 1] if "--out" in words else None
+        output.print_result(_log_console(printed), result, out)
         return printed.getvalue()
 
 
 def _log_console(file: TextIO) -> "Console":
     return output.console(file=file, stderr=False, width=_WIDTH, force_terminal=False)
-
-
-def _print(console: "Console", chapter: "Chapter", result: Any, out: Path) -> None:
-    """Print a result as its command does."""
-
-    def show_plan() -> None:
-        figures = workflows.plan_figures(result, out / "plan", "calib")
-        tables.show_plan(console, result, figures)
-
-    def show_process() -> None:
-        tables.show_process(console, result)
-        console.print(f"written to {out / 'process'}")
-
-    shown: dict[str, Callable[[], None]] = {
-        "init": lambda: tables.show_example(console, result),
-        "plan": show_plan,
-        "run": lambda: tables.show_run(console, result),
-        "calibrate": lambda: tables.show_calibration(console, result, out / "model.json"),
-        "tool": lambda: tables.show_tool(console, result, out / "tool.json"),
-        "codec": lambda: print_codec(console, result, Path(chapter.words[-1])),
-        "simulate-process": show_process,
-        "compensate": lambda: tables.show_compensation(console, result, out / "corrected.csv"),
-        "export": lambda: tables.show_export(console, result, with_tool=True),
-        "report": lambda: tables.show_report(console, result),
-    }
-    shown[chapter.words[0]]()
-
-
-def print_codec(console: "Console", result: "CodecResult", out: Path) -> None:
-    """Print the verdicts of a codec."""
-    from elastocal.codec import show_codec
-
-    output.print_blocks(console, show_codec(result.summary))
-    output.print_remarks(console, "note", result.summary.findings)
-    output.print_folder(console, result.files, out)
 
 
 @contextmanager

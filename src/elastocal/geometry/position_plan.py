@@ -9,12 +9,14 @@ confidence ellipsoid (D. Daney et al., IJRR 24, 2005), `cover` spreads the marke
 """
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.blocks import Block
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import PlanningError, present
 from elastocal.findings import Finding, Kind
@@ -108,6 +110,12 @@ class PositionPlan:
     expected: tuple[PosesNeeded, ...]
     """What a quarter, half and all of the poses give, taken in the order of the search."""
     findings: tuple[Finding, ...]
+
+    def show(self) -> Iterator[Block]:
+        """Yield where positions are to be measured, and what they will tell."""
+        from elastocal.geometry.show import show_position_plan
+
+        return show_position_plan(self)
 
     @property
     def travel_time(self) -> float:

@@ -3,12 +3,14 @@
 How far off the arm was and is; is the model better than simpler ones; which errors are known.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from elastocal.blocks import Block, Facts, Row, Table
+from elastocal.blocks import Block, Facts, Paragraph, Row, Table
 from elastocal.geometry.accuracy import GeometryAccuracy, PoseAccuracy
 from elastocal.geometry.model import GeometryModel
-from elastocal.wording import mm, phrase, phrases
+from elastocal.geometry.position_plan import PositionPlan
+from elastocal.wording import counted, duration, listed, mm, phrase, phrases, point
 
 _AXES = dict(
     zip(
@@ -17,6 +19,8 @@ _AXES = dict(
         strict=True,
     )
 )
+_MOST_ROWS = 12
+"""Rows with blunders that are named."""
 _SHOWN = {
     "m": (1e3, "mm", 3),
     "rad": (1e3, "mrad", 3),
@@ -43,6 +47,58 @@ def show_geometry(model: GeometryModel, accuracy: GeometryAccuracy) -> Iterator[
         yield arm_error_table(model)
     if accuracy.poses:
         yield repeatability_facts(accuracy.poses)
+    facts = [("warning", str(each)) for each in model.findings]
+    if model.blunders:
+        rows = listed(tuple(map(str, model.blunders)), _MOST_ROWS)
+        facts.append(
+            (phrase("left out as blunders"), phrase("rows {rows}, counted from 0", rows=rows))
+        )
+    if model.T_tcp_built is not None:
+        off = point(model.T_tcp_built[:3, 3].tolist(), digits=3)
+        facts.append((phrase("tcp"), phrase("{off} mm from where it is described", off=off)))
+    facts.append((phrase("errors not told apart from others"), str(len(model.fixed))))
+    yield Facts(tuple(facts))
+
+
+def show_position_plan(plan: PositionPlan) -> Iterator[Block]:
+    """Yield where positions are to be measured, and what they will tell.
+
+    Parameters
+    ----------
+    plan : PositionPlan
+        The plan.
+    """
+    seen = Counter(pose.station for pose in plan.poses)
+    yield Paragraph(
+        phrase(
+            "{poses} in free space ({technique}) of {pool} that can be measured, for {errors}"
+            " errors of the arm: {stations}; {time} on the way",
+            poses=counted(len(plan.poses), "pose"),
+            technique=plan.technique,
+            pool=plan.pool,
+            errors=plan.errors,
+            stations=", ".join(
+                phrase("{poses} by {station}", poses=counted(number, "pose"), station=name)
+                for name, number in seen.items()
+            ),
+            time=duration(plan.travel_time),
+        )
+    )
+    yield Table(
+        phrase("Error of a predicted position"),
+        phrases("Poses", "In standard deviations of a measured coordinate"),
+        tuple((each.poses, f"{each.amplification:.2f}") for each in plan.expected),
+    )
+    refused = ", ".join(f"{name} {number}" for name, number in plan.refused.items())
+    yield Facts(
+        (
+            *(("warning", str(each)) for each in plan.findings),
+            (
+                "postures",
+                phrase("{drawn} drawn; refused by {refused}", drawn=plan.drawn, refused=refused),
+            ),
+        )
+    )
 
 
 def axis_table(accuracy: GeometryAccuracy) -> Table:

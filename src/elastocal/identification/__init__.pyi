@@ -114,7 +114,6 @@ from .rungs import (
 )
 from .show import (
     show_budget as show_budget,
-    show_calibration as show_calibration,
     show_ladder as show_ladder,
     show_unseen as show_unseen,
     spring_table as spring_table,

@@ -1,5 +1,6 @@
 """Model file ``*.json``: a calibrated model with draws, observability, provenance and figures."""
 
+from collections.abc import Iterable
 from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
@@ -7,9 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.blocks import Block, Facts
 from elastocal.elastic import KINDS, AnySpring, ElasticModel, require_possible
 from elastocal.errors import SchemaError, nearest
 from elastocal.files import sha256
+from elastocal.findings import group_alike
 from elastocal.identification.calibrated import CalibratedModel, ToolChange
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
@@ -63,6 +66,15 @@ class CalibrateResult(Result):
     needs: dict[str, str] = field(default_factory=dict)
     """Distributions that its springs are of, beside elastocal, with the versions that made it; what
     reads it asks for them first (`elastocal.plugins.require_distributions`)."""
+
+    def show(self) -> Iterable[Block]:
+        """Return what a person asks of a calibration; of a model made otherwise, its facts."""
+        from elastocal.identification.show import show_calibration
+
+        if self.calibration is None:
+            return super().show()
+        warnings = (("warning", text) for text in group_alike(self.calibration.warnings))
+        return (*show_calibration(self.calibration), Facts(tuple(warnings)))
 
     def __post_init__(self) -> None:
         """Refuse parts that contradict one another.

@@ -49,6 +49,5 @@ from .search_pool import SearchPool as SearchPool
 from .show import (
     expected as expected,
     key_figures as key_figures,
-    show_plan as show_plan,
     spreads as spreads,
 )

@@ -5,6 +5,7 @@ SI; joint positions are in rad (m for prismatic joints) in the order of ``robot.
 """
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import field, fields
 from itertools import pairwise
@@ -14,10 +15,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
+from elastocal.blocks import Block, Facts
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.files import sha256, write_json
-from elastocal.findings import Finding
+from elastocal.findings import Finding, group_alike
 from elastocal.planning.production import ProductionRecord
 from elastocal.records import read_json, record, to_data
 from elastocal.results import Result, brief_repr
@@ -236,6 +238,17 @@ class PlanResult(Result):
             *(() if self.production is None else self.production.facts()),
             ("estimated time", f"{self.total_time / 60.0:.0f} min"),
         )
+
+    def show(self) -> Iterator[Block]:
+        """Yield its key figures, how its poses lie, what they promise, the checks, the notes."""
+        from elastocal.planning.show import show_plan
+
+        yield from show_plan(self)
+        covered = () if self.production is None else self.production.facts()
+        seen = Counter(sorted(pose.seen_by for pose in self.poses if pose.seen_by is not None))
+        stations = ", ".join(f"{name} {count}" for name, count in seen.items())
+        notes = (("note", text) for text in group_alike(self.findings))
+        yield Facts((*covered, *((("marker seen by", stations),) if seen else ()), *notes))
 
     @property
     def travel_time(self) -> float:

@@ -4,13 +4,14 @@ The kind of a file is found by its suffix and the schema that it states; a new k
 of `elastocal.workflows._file_kinds`, and its entry in a table here.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
 from elastocal import planning, verdict, workflows
+from elastocal.blocks import Block, Facts
 from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, VERDICTS
 from elastocal.codec.study import DESIGN, PARTS
@@ -200,6 +201,10 @@ class CheckResult(Result):
         """Return what a person wants to know first."""
         held = ((name, brief(text)) for name, text in self.lines())
         return (("file", self.file), ("kind", self.kind), *held)
+
+    def show(self) -> Iterator[Block]:
+        """Yield all that the file holds."""
+        yield Facts(self.lines())
 
     def lines(self) -> tuple[tuple[str, str], ...]:
         """Return all that the file holds for a person: pairs of a label and its text."""

@@ -1,10 +1,12 @@
 """``codec``: were there enough poses, and which technique is better (paper Algorithm 1)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
+from elastocal.blocks import Block, Facts
 from elastocal.codec import (
     VERDICTS,
     CodecAnalysis,
@@ -19,12 +21,14 @@ from elastocal.codec import (
     judge,
     make_variants,
     read_comparisons,
+    show_codec,
     write_codec,
     write_codec_summary,
     write_index_table,
 )
 from elastocal.dataset import content_sha256, read, without
 from elastocal.files import filling
+from elastocal.findings import group_alike
 from elastocal.options import Exclude, Marker, Option, ToolFrame
 from elastocal.parallel import one_blas_thread
 from elastocal.progress import Progress
@@ -103,6 +107,11 @@ class CodecResult(Result):
         found = self.summary
         verdicts = tuple(("verdict", sentence) for sentence in found.sentences)
         return (("robot", found.robot), ("splits", found.settings.sentence), *verdicts)
+
+    def show(self) -> Iterator[Block]:
+        """Yield the splits, the springs, some errors, and the verdicts in words."""
+        yield from show_codec(self.summary)
+        yield Facts(tuple(("note", each) for each in group_alike(self.summary.findings)))
 
     def plot(self) -> Any:
         """Return the chart of errors over training poses, as a Matplotlib figure."""

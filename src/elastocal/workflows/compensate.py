@@ -121,6 +121,7 @@ class CompensateResult(Result, CorrectionFigures):
             ),
             ("posture jumps", f"{self.posture_jumps}{first}"),
             ("rows where the force pulls", str(self.pulled)),
+            *((("program", ", ".join(self.program)),) if self.program else ()),
             *(("note", text) for text in self.notes),
         )
 
@@ -242,8 +243,8 @@ def _path_notes(
 
 
 def _shown(metres: float) -> str:
-    """Return a length in mm; how little a solver left is of no use below that."""
-    return quantity(metres, "mm", ".3g") if metres >= 1e-8 else "under 0.00001 mm"
+    """Return a length in mm; what no tracker sees is not told apart from nothing."""
+    return "below 0.001 mm" if 0.0 < metres < 1e-6 else quantity(metres, "mm", ".3g")
 
 
 def _built(settings: CompensateSettings) -> tuple[str, ...]:

@@ -57,6 +57,12 @@ class ExportSettings(NewTool):
     """Replace files that are there."""
 
 
+_NO_TOOL = (
+    "no tool file: wrenches are taken as at the tool centre point, in its axes, bias and tool"
+    " weight removed"
+)
+
+
 @record()
 class ExportResult(Result):
     """The C files that were written, and the key figures of their compensator."""
@@ -98,6 +104,7 @@ class ExportResult(Result):
                 "largest correction",
                 f"{quantity(limits.correction, 'mm')}, {quantity(limits.rate, 'mm/s')}",
             ),
+            *(("note", text) for text in self.notes),
         )
 
 
@@ -148,6 +155,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         notes=(
             *(coverage_notes(calibrated) if calibrated.tool is not None else ()),
             *(on_production.warnings if on_production else ()),
+            *((_NO_TOOL,) if settings.tool is None else ()),
         ),
         on_production=on_production,
     )

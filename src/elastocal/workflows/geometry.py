@@ -1,5 +1,6 @@
 """``geometry``: from absolute positions of markers to the geometry of the arm."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from elastocal.blocks import Block
 from elastocal.errors import FileAccessError
 from elastocal.files import write_text
 from elastocal.geometry import (
@@ -19,6 +21,7 @@ from elastocal.geometry import (
     link_table,
     plausible_ladder,
     read_positions,
+    show_geometry,
 )
 from elastocal.options import Option
 from elastocal.progress import Progress
@@ -91,6 +94,10 @@ class GeometryResult(Result):
             ("errors of the arm", f"{known} known of {len(model.parameters)} fitted"),
             *(("warning", each) for each in model.findings),
         )
+
+    def show(self) -> Iterator[Block]:
+        """Yield the tables that a person asks of a calibrated geometry, and its warnings."""
+        return show_geometry(self.model, self.accuracy)
 
     def plot(self) -> Any:
         """Return maps of the errors before and after, as a Matplotlib figure."""

@@ -18,6 +18,11 @@ from elastocal.units import quantity
 from elastocal.workflows._inputs import ArmAsBuilt, NewTool, coverage_notes
 from elastocal.workflows._workflow import workflow
 
+_NO_MISFIT = (
+    "the model does not know its errors at left-out poses, so that there are no intervals of what"
+    " would be measured; calibrate again to have them"
+)
+
 
 @dataclass(frozen=True)
 class PredictSettings(NewTool, ArmAsBuilt):
@@ -74,6 +79,7 @@ class PredictResult(Result):
             ("deflection", f"{quantity(figures.deflection.mean, 'mm', '.3f')} mean"),
             ("largest", quantity(figures.deflection.max, "mm", ".3f")),
             *(("note", text) for text in figures.notes),
+            *((("note", _NO_MISFIT),) if figures.misfit is None else ()),
             *((("warning", text),) if (text := figures.warning) else ()),
         )
 

@@ -1,5 +1,6 @@
 """``report``: the document that stays when the engineer has left."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
@@ -7,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
+from elastocal.blocks import Block, Bullets, Facts
 from elastocal.errors import FileAccessError
 from elastocal.identification.recertification import Estimate
 from elastocal.options import Option, Statements
@@ -17,9 +19,10 @@ from elastocal.report.document import (
     WrittenReport,
     find_browser,
     require_excel,
+    section_blocks,
     write_pdf,
     write_report,
-    write_tables,
+    write_workbook,
 )
 from elastocal.results import Result, brief_repr
 from elastocal.verdict import (
@@ -134,6 +137,12 @@ class ReportResult(Result):
             ("written to", self.files),
         )
 
+    def show(self) -> Iterator[Block]:
+        """Yield the verdict and its reasons."""
+        verdict, *reasons, _ = self.facts()
+        yield Facts((verdict,))
+        yield Bullets(tuple(reason for _, reason in reasons))
+
     @property
     def light(self) -> str:
         """The colour of the light as it follows the verdict's word; empty without one."""
@@ -197,7 +206,7 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
             write_pdf(page, paper, browser)
             progress("report", 3, steps)
         if tables is not None:
-            write_tables(tables, evidence, language)
+            write_workbook(tables, section_blocks(evidence), language)
 
     signer = public_key(key) if key else ""
     written = write_report(out, evidence, signed, language, signer, write_beside)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from elastocal import procedure, verdict
+from elastocal.blocks import Block, Facts, Paragraph
 from elastocal.cell import (
     Arming,
     ArmState,
@@ -28,6 +29,7 @@ from elastocal.cell import (
 )
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
+from elastocal.findings import group_alike
 from elastocal.options import Option, Statements
 from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.planning.export import pose_lines
@@ -129,6 +131,10 @@ class RunFigures:
         return ", ".join(f"{count} {status}" for status, count in self.readings.items())
 
 
+_LOST_SHOWN = 5
+"""Readings that are not ok of which the reason is shown."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class RunResult(Result):
     """How a stretch of a run ended, and what its streams say when it was the last one."""
@@ -152,6 +158,41 @@ class RunResult(Result):
             *(("warning", text) for text in found.warnings),
         )
 
+    def show(self) -> Iterator[Block]:
+        """Yield how it ended in a sentence, what is to be noticed, and what comes next."""
+        found = self.figures
+        counts = found.counts() or "no readings"
+        derived = "" if found.dataset else ", not derived"
+        yield Paragraph(
+            f"{found.state}: {found.committed} of {found.poses} poses committed"
+            f" ({counts}{derived}), {found.seconds / 60.0:.1f} min,"
+            f" failed attempts: {found.failed_attempts}; the arm is {found.arm}"
+        )
+        if found.message:
+            yield Paragraph(found.message)
+        yield Facts(
+            (
+                *(("line", each.sentence()) for each in found.lines),
+                *(("warning", text) for text in group_alike(found.warnings)),
+                *self._lost(),
+            )
+        )
+        if found.dataset:
+            yield Paragraph(
+                f"wrote {found.dataset} and summary.json:"
+                f" `elastocal calibrate {found.dataset} --out model.json`"
+            )
+
+    def _lost(self) -> Iterator[tuple[str, str]]:
+        """Yield the first readings that are not ok, with why."""
+        lost = () if self.summary is None else self.summary.readings.not_ok
+        for each in lost[:_LOST_SHOWN]:
+            where = f"pose {each.pose}, {each.load_case}"
+            yield "reading", f"{where}: {each.status.value}, {each.note}"
+        if len(lost) > _LOST_SHOWN:
+            more = len(lost) - _LOST_SHOWN
+            yield "readings that are not ok", f"{more} more in summary.json, readings.not_ok"
+
     def pictured(self) -> object:
         """Return what was derived: the picture shows how well the stations are registered."""
         return self if self.summary is None else self.summary
@@ -174,6 +215,16 @@ class DryRunResult(Result):
         """How long it would take, in s."""
         return float(sum(step.seconds for step in self.steps))
 
+    @property
+    def figures(self) -> dict[str, object]:
+        """The figures of ``run --dry-run --json``."""
+        kept = ("poses", "load_cases", "force_limit", "seconds", "warnings")
+        steps = [
+            {**vars(each), "step": each.step.value, "seconds": round(each.seconds, 3)}
+            for each in self.steps
+        ]
+        return {name: getattr(self, name) for name in kept} | {"steps": steps}
+
     def pose_lines(self) -> Iterator[str]:
         """Yield a line a pose: id, begin and time in s, station, joints in contact."""
         seconds: defaultdict[int, float] = defaultdict(float)
@@ -185,7 +236,7 @@ class DryRunResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         return (
-            ("steps", str(len(self.steps))),
+            ("steps", f"{len(self.steps)}, of which none was made"),
             ("poses", str(self.poses)),
             ("load cases", ", ".join(self.load_cases)),
             ("force limit", f"{self.force_limit:.6g} N"),

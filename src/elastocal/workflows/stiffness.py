@@ -1,6 +1,7 @@
 """``stiffness``: which posture is stiffest along a path (paper section 4.3.1)."""
 
 import itertools
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
@@ -12,6 +13,7 @@ import numpy as np
 
 from elastocal import compensation
 from elastocal.arrays import FloatArray
+from elastocal.blocks import Block, Facts, Table
 from elastocal.cell import load_cell
 from elastocal.compensation import PathPostures, PathStations, PostureChoice, PostureSurvey
 from elastocal.errors import PathError
@@ -24,7 +26,8 @@ from elastocal.report import Curve, drawn, stiffness_figure, write_stiffness_fig
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for, posture_jumps
-from elastocal.units import parse_number
+from elastocal.units import in_unit, parse_number, quantity
+from elastocal.wording import phrase, phrases
 from elastocal.workflows._inputs import NewTool, coverage_notes, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 
@@ -99,6 +102,17 @@ class ChosenStiffness:
     posture_jumps: int
     """Stations at which a joint turns by more than 90 deg from the one before."""
 
+    def cells(self, rail: tuple[ExternalAxis, ...]) -> tuple[str, ...]:
+        """Return softest, mean, spin and position of the external axis as a table shows them."""
+        if not self.stations:
+            return (phrase("none"),) * (3 + len(rail))
+        various = phrase("various")
+        return (
+            *(f"{in_unit(value, 'N/µm'):.3g}" for value in (self.softest, self.mean)),
+            various if self.spin is None else quantity(self.spin, "deg", ".0f"),
+            *(various if self.stand is None else f"{self.stand:.3g} {each.unit}" for each in rail),
+        )
+
 
 @brief_repr
 @record("elastocal.stiffness/1")
@@ -139,9 +153,37 @@ class StiffnessResult(Result):
             ("stiffness along", self.along),
             ("postures", f"{counts.allowed} of {counts.tried} are allowed"),
             *(
-                (each.name, f"{1e-6 * each.softest:.3g} N/µm where softest")
+                (each.name, f"{quantity(each.softest, 'N/µm', '.3g')} where softest")
                 for each in self.summary.choices
             ),
+        )
+
+    def show(self) -> Iterator[Block]:
+        """Yield the choices as a table, and what else a person asks."""
+        counts, rail = self.summary.postures, self.summary.external_axes[:1]
+        # Of several external axes the figure shows the first; choice.csv has all.
+        yield Table(
+            phrase("Stiffness along {direction} in N/µm", direction=self.along),
+            (
+                *phrases("Posture", "Softest", "Mean", "Spin"),
+                *(axis.name for axis in rail),
+                phrase("Stations"),
+            ),
+            tuple((each.name, *each.cells(rail), each.stations) for each in self.summary.choices),
+        )
+        refused = ", ".join(
+            f"{number} by {what}" for what, number in counts.refused.items() if number
+        )
+        yield Facts(
+            (
+                (
+                    "postures",
+                    f"{counts.allowed} of {counts.tried} postures are allowed"
+                    + (f"; refused: {refused}" if refused else ""),
+                ),
+                ("tool", self.summary.tool),
+                *(("note", text) for text in self.notes),
+            )
         )
 
     def plot(self) -> Any:

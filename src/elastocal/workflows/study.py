@@ -5,7 +5,7 @@ Its samples have the simulator's truth on one side, the estimator on the other.
 
 import importlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.blocks import Block
 from elastocal.cell import CONDITIONING, DEFAULT_POSES, LIGHT_CONTACT, Cell, fingerprint, load_cell
 from elastocal.codec import ALL_LOADS, study as studies, training_cases
 from elastocal.codec.study import (
@@ -25,6 +26,7 @@ from elastocal.codec.study import (
     SampleResult,
     StudyDesign,
     StudySummary,
+    show_study,
 )
 from elastocal.dataset import Readings
 from elastocal.elastic import LAYOUTS, ElasticModel, layout
@@ -108,6 +110,10 @@ class StudyResult(Result):
         )
         advice = (("advice", self.summary.advice),) if self.summary.advice else ()
         return (("study", self.summary.sentence), *conditions, *advice)
+
+    def show(self) -> Iterator[Block]:
+        """Yield the arms of the study, a row for each condition, and the advice."""
+        return show_study(self.summary)
 
     def plot(self) -> Any:
         """Return the box plots of all conditions, as a Matplotlib figure."""

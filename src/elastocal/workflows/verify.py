@@ -1,12 +1,14 @@
 """``verify``: is a run, or a report, what it was when it was made; who vouches for it."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
+from elastocal.blocks import Block, Facts
 from elastocal.errors import ElastocalError, FileAccessError, VerificationError
 from elastocal.options import Option
 from elastocal.procedure import JOURNAL
@@ -64,6 +66,16 @@ class VerifyResult(Result):
         """Return what a person wants to know first."""
         return tuple((link.name, f"{link.state.value}: {link.text}") for link in self.links)
 
+    def show(self) -> Iterator[Block]:
+        """Yield a line a link, its state first."""
+        # One line each: the words of a forged report must not look like a link of their own.
+        yield Facts(
+            tuple(
+                (f"{link.state.value:<14} {_on_one_line(link.name)}", _on_one_line(link.text))
+                for link in self.links
+            )
+        )
+
     def require_whole(self) -> None:
         """Refuse what is broken.
 
@@ -74,6 +86,10 @@ class VerifyResult(Result):
         """
         if self.broken is not None:
             raise VerificationError(f"{self.file}: {self.broken.text}")
+
+
+def _on_one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 @workflow(VerifySettings)

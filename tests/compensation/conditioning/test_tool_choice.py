@@ -7,13 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.compensation.conditioning import (
-    TOOL_UNKNOWNS,
     ToolModel,
     choose_tool,
     refuse_mistakes,
 )
 from elastocal.compensation.conditioning.tool_choice import blunders
-from elastocal.compensation.conditioning.tool_fit import fit_tool, rotation_off
+from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS, fit_tool, rotation_off
 from elastocal.errors import CompensationError
 from support.static_postures import PlantedTool, turned
 

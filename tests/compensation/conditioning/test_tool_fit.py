@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.compensation.conditioning import TOOL_UNKNOWNS, ToolModel, static_postures
+from elastocal.compensation.conditioning import ToolModel, static_postures
 from elastocal.compensation.conditioning.tool_fit import (
+    TOOL_UNKNOWNS,
     fit_tool,
     tool_derivatives,
     tool_residual,

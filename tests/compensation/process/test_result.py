@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from elastocal.compensation.process import DeviationStatistics, compare_deviations, pooled
+from elastocal.compensation.process import compare_deviations, pooled
+from elastocal.compensation.process.statistics import DeviationStatistics
 
 
 def test_figures_are_those_of_absolute_deviations():

@@ -7,7 +7,7 @@ import pytest
 from openpyxl import load_workbook
 
 from elastocal.report import language_of
-from elastocal.report.document import write_tables
+from elastocal.report.document import section_blocks, write_workbook
 from elastocal.report.document.certificate import _scale, certificate_of_evidence
 from elastocal.report.document.page import SECTIONS
 from elastocal.verdict import Evidence, judge_evidence, state_uncertainty
@@ -106,7 +106,7 @@ def book(parts, tmp_path_factory):
     poses = (replace(plan.poses[0], seen_by="=1+1"), *plan.poses[1:])
     spoilt = replace(parts, plan=replace(plan, poses=poses))
     path = tmp_path_factory.mktemp("xlsx") / "t.xlsx"
-    return load_workbook(write_tables(path, spoilt, language_of("de")))
+    return load_workbook(write_workbook(path, section_blocks(spoilt), language_of("de")))
 
 
 def test_every_section_with_tables_has_a_sheet_of_its_title(book):

@@ -9,12 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.cell import Limits
+from elastocal.compensation.process import PAPER
 from elastocal.identification import CalibrationSummary, describe
 from elastocal.procedure import Event, RunSummary
 from elastocal.procedure.derive.derivation import MOVED
 from elastocal.records import from_data, to_data
 from elastocal.report.document.page import SECTIONS
-from elastocal.report.document.sections import PAPER
 from elastocal.report.document.sections.cell import _LIMITS, _tool_file
 from elastocal.verdict import Link, LinkState
 from elastocal.verdict.chain import ChainFiles, verify_chain

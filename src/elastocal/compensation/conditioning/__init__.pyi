@@ -29,7 +29,6 @@ from .tool_choice import (
     choose_tool as choose_tool,
 )
 from .tool_fit import (
-    TOOL_UNKNOWNS as TOOL_UNKNOWNS,
     ToolModel as ToolModel,
     fit_tool as fit_tool,
 )

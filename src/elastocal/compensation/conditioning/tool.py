@@ -1,11 +1,13 @@
 """The tool on a force sensor: what a raw wrench is corrected by, and its file ``*.json``."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.blocks import Block
 from elastocal.cell import SensorLoad, weight_response
 from elastocal.compensation.conditioning.tool_choice import PostureSetAside, ToolChoice, ToolRung
 from elastocal.compensation.conditioning.tool_fit import TOOL_UNKNOWNS
@@ -118,6 +120,12 @@ class ToolResult(Result):
             *(("note", text) for text in self.notes),
             ("source", self.source),
         )
+
+    def show(self) -> Iterator[Block]:
+        """Yield the unknowns with their intervals, the models that were tried, and the notes."""
+        from elastocal.compensation.conditioning.show import show_tool
+
+        return show_tool(self)
 
 
 @brief_repr

@@ -41,9 +41,15 @@ from .result import (
     read_table as read_table,
     write_process as write_process,
 )
+from .show import (
+    PAPER as PAPER,
+    PublishedCase as PublishedCase,
+    budget_table as budget_table,
+    show_deviations as show_deviations,
+    show_notes as show_notes,
+)
 from .statistics import (
     DeviationComparison as DeviationComparison,
-    DeviationStatistics as DeviationStatistics,
     LoadLines as LoadLines,
     PostureGain as PostureGain,
     SeedMean as SeedMean,

@@ -11,7 +11,7 @@ Its folder has, lengths in m and reductions as shares of 1 where no unit is name
 ==================  ==============================================================
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.blocks import Block
 from elastocal.compensation.process.loop import CourseRun
 from elastocal.compensation.process.statistics import (
     DeviationComparison,
@@ -111,6 +112,12 @@ class SimulateProcessResult(Result):
             *((f"{line.name}, 3-D", line.sentence) for line in self.spatial[-1:]),
             *(("note", text) for text in self.notes),
         )
+
+    def show(self) -> Iterator[Block]:
+        """Yield the table beside the paper's, the error budget, and what a person must know."""
+        from elastocal.compensation.process.show import show_process
+
+        return show_process(self)
 
 
 @brief_repr

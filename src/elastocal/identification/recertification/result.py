@@ -1,11 +1,14 @@
 """The result of a recertification: the file ``elastocal.comparison/1``, and the rows behind it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.blocks import Block, Facts
+from elastocal.findings import group_alike
 from elastocal.identification.spring_sums import Term
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
@@ -329,6 +332,13 @@ class CompareResult(Result):
             ("verdict", "none" if found.verdict is None else found.verdict.value),
             ("reason", found.reason),
         )
+
+    def show(self) -> Iterator[Block]:
+        """Yield the springs that moved, the change over the rows, the verdict, and the notes."""
+        from elastocal.identification.recertification.show import show_comparison
+
+        yield from show_comparison(self.summary, self.rows or self.calibrated)
+        yield Facts(tuple(("note", text) for text in group_alike(self.summary.notes)))
 
 
 def _triple(vector: FloatArray) -> _Triple:

@@ -10,6 +10,8 @@ from .geometry_page import (
 )
 from .page import (
     WrittenReport as WrittenReport,
+    section_blocks as section_blocks,
     write_report as write_report,
 )
-from .workbook import require_excel as require_excel, write_tables as write_tables
+from .sections_page import write_page as write_page
+from .workbook import require_excel as require_excel, write_workbook as write_workbook

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from elastocal import __version__, blocks
+from elastocal import blocks
 from elastocal.arrays import FloatArray
-from elastocal.files import write_text
 from elastocal.geometry import (
     GeometryAccuracy,
     GeometryModel,
@@ -18,8 +17,8 @@ from elastocal.geometry import (
     repeatability_facts,
     rung_table,
 )
+from elastocal.report.document.sections_page import write_page
 from elastocal.report.language import ENGLISH, Language
-from elastocal.report.pages import render
 from elastocal.report.plots import MANY_POSITIONS, error_maps, parameter_figure
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
@@ -67,7 +66,7 @@ def write_geometry_page(path: Path, found: GeometryFindings, language: Language 
     """
     model = found.model
     sections = [
-        (identifier, title, tuple(show(found)))
+        (identifier, title, show(found))
         for identifier, title, show in (
             ("result", phrase("Before and after"), _result),
             ("maps", phrase("Where in the workspace"), _maps),
@@ -78,24 +77,19 @@ def write_geometry_page(path: Path, found: GeometryFindings, language: Language 
             ("frames", phrase("Stations, markers, provenance"), _frames),
         )
     ]
-    page = render(
-        "geometry.html",
+    return write_page(
+        path,
+        phrase("Geometry report: {robot}", robot=model.robot.name),
+        sections,
         language,
-        title=phrase("Geometry report: {robot}", robot=model.robot.name),
-        subtitle=phrase(
+        phrase(
             "{positions} of markers, {provenance}. Errors are those at poses that were left out of"
             " the fit.",
             positions=counted(model.positions, "position"),
             provenance=model.provenance,
         ),
-        styles=("page.css",),
-        scripts=(),
-        data={},
-        sections=sections,
-        version=__version__,
+        "elastocal geometry",
     )
-    write_text(path, page)
-    return Path(path)
 
 
 def _result(found: GeometryFindings) -> Iterator[blocks.Block]:

@@ -1,12 +1,13 @@
 """The whole document: a certificate on one sheet, contents, and an appendix of sections."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from markupsafe import Markup
 
 from elastocal import __version__
+from elastocal.blocks import Block
 from elastocal.files import replacing
 from elastocal.report.document import sections as exported
 from elastocal.report.document.certificate import certificate_of_evidence
@@ -29,6 +30,11 @@ SECTIONS: tuple[Section, ...] = tuple(
     sorted((each for each in _EXPORTED if isinstance(each, Section)), key=lambda each: each.place)
 )
 """Every section that `elastocal.report.document.sections` exports, in order."""
+
+
+def section_blocks(evidence: Evidence) -> Iterator[tuple[str, tuple[Block, ...]]]:
+    """Yield the title of every section and what it shows."""
+    return ((section.title, section.body(evidence).blocks) for section in SECTIONS)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The tables of a report as a workbook for Excel: a sheet a section, figures as numbers."""
+"""Tables and key figures as a workbook for Excel: figures as numbers."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -16,9 +16,7 @@ from elastocal.blocks import (
 )
 from elastocal.errors import ReportError
 from elastocal.files import replacing
-from elastocal.report.document.page import SECTIONS
-from elastocal.report.language import Language
-from elastocal.verdict import Evidence
+from elastocal.report.language import ENGLISH, Language
 
 _NUMBER = re.compile(r"[+-]?\d+(\.\d+)?")
 _FORBIDDEN = re.compile(r"[\[\]:*?/\\]")
@@ -41,8 +39,10 @@ def require_excel() -> None:
         raise ReportError("--xlsx needs openpyxl: pip install 'elastocal[logs]'") from error
 
 
-def write_tables(path: Path, evidence: Evidence, language: Language) -> Path:
-    """Write the tables and key figures of every section, atomically; return the path.
+def write_workbook(
+    path: Path, sheets: Iterable[tuple[str, Iterable[Block]]], language: Language = ENGLISH
+) -> Path:
+    """Write the tables and key figures among blocks, atomically; return the path.
 
     A text is never a formula, whatever it begins with: it is stored as a text.
 
@@ -50,8 +50,8 @@ def write_tables(path: Path, evidence: Evidence, language: Language) -> Path:
     ----------
     path : Path
         A file ``.xlsx``.
-    evidence : Evidence
-        Whatever is there.
+    sheets : iterable of (str, iterable of Block)
+        The title of each, and what it shows; a sheet without tables and key figures is left out.
     language : Language
         Of captions and heads.
 
@@ -66,11 +66,11 @@ def write_tables(path: Path, evidence: Evidence, language: Language) -> Path:
     from openpyxl.utils import get_column_letter
 
     book = Workbook(write_only=True)
-    for section in SECTIONS:
-        rows = list(_rows(section.body(evidence).blocks, language))
+    for name, blocks in sheets:
+        rows = list(_rows(blocks, language))
         if not rows:
             continue
-        title = _FORBIDDEN.sub(" ", language.say(section.title))[:_LONGEST_NAME]
+        title = _FORBIDDEN.sub(" ", language.say(name))[:_LONGEST_NAME]
         sheet = book.create_sheet(title.strip())
         for column, width in enumerate(_widths(rows), start=1):
             sheet.column_dimensions[get_column_letter(column)].width = width

@@ -9,3 +9,8 @@ from .catalogue import (
     urdf as urdf,
     urdf_of as urdf_of,
 )
+from .show import (
+    robot_facts as robot_facts,
+    show_robot as show_robot,
+    show_robots as show_robots,
+)

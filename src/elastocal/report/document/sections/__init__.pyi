@@ -7,6 +7,6 @@ from .judgement import (
     UNCERTAINTY as UNCERTAINTY,
 )
 from .poses import POSES as POSES
-from .process import PAPER as PAPER, PROCESS as PROCESS, PublishedCase as PublishedCase
+from .process import PROCESS as PROCESS
 from .provenance import PROVENANCE as PROVENANCE
 from .readings import READINGS as READINGS

@@ -1,5 +1,0 @@
-"""Print typed results for people: one file a subject."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
