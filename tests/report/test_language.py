@@ -125,7 +125,8 @@ def all_phrases():
 @pytest.mark.parametrize("code", CATALOGUES)
 class TestEveryCatalogue:
     def test_it_has_every_phrase(self, code):
-        assert sorted(all_phrases() - CATALOGUES[code].keys()) == []
+        missing = sorted(all_phrases() - CATALOGUES[code].keys())
+        assert not missing, f"not in words/{code}.json:\n" + "\n".join(missing)
 
     def test_it_has_no_phrase_that_nobody_says(self, code):
         assert sorted(CATALOGUES[code].keys() - all_phrases()) == []
