@@ -105,3 +105,19 @@ def test_headings_are_folded_until_no_number_is_cut():
     assert lines[0].strip() == "Wide"
     assert lines[-1].split() == ["cover", "(not", "used)", *(["1234.5", "mm"] * 4)]
     assert max(map(len, lines)) <= 80
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_a_table_that_is_too_wide_is_shown_in_parts_without_cutting_a_number(width):
+    heads = ("Training poses", *(f"variant {number}" for number in range(8)))
+    rows = tuple((n, *(f"{1000 * k + n}.5 / {6000 + n}.7" for k in range(8))) for n in (1, 2))
+    screen = console(stderr=False, file=io.StringIO(), width=width)
+    print_blocks(screen, [Table("Errors", heads, rows, texts=0)])
+    printed = screen.file.getvalue()
+    assert max(map(len, printed.splitlines())) <= width
+    words = printed.split()
+    for row in rows:
+        assert row[0] in map(int, filter(str.isdigit, words))
+        for cell in row[1:]:
+            assert cell in printed
+    assert printed.count("Errors") == 1

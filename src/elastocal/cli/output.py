@@ -13,6 +13,7 @@ import sys
 import textwrap
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -139,7 +140,10 @@ def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
         before = block
         if isinstance(block, Table):
             screen.print(bold(block.caption), soft_wrap=True)
-            screen.print(table_of(block, screen.width))
+            for number, part in enumerate(_parts(block, screen.width)):
+                if number:
+                    screen.print()
+                screen.print(table_of(part, screen.width))
         for line in _lines(block):
             screen.print(line, soft_wrap=True)
 
@@ -170,6 +174,39 @@ def _lines(block: "Block") -> list[str]:
                 for name, value in pairs
             ]
     return []
+
+
+def _parts(block: "Table", width: int) -> "Iterator[Table]":
+    """Yield a table in as many as it takes for all numbers to be seen, each with the first column.
+
+    A number that is cut would be another number.
+    """
+    least = [_least(block, number) for number in range(len(block.heads))]
+    groups, room = [[0]], width - least[0]
+    for number, needed in enumerate(least[1:], start=1):
+        room -= needed + 2
+        if room < 0 and len(groups[-1]) > 1:
+            groups.append([0])
+            room = width - least[0] - needed - 2
+        groups[-1].append(number)
+    for group in groups:
+        yield replace(
+            block,
+            heads=tuple(block.heads[k] for k in group),
+            rows=tuple(tuple(row[k] for k in group) for row in block.rows),
+            texts=sum(k < block.texts for k in group),
+        )
+
+
+def _least(block: "Table", column: int) -> int:
+    """Return the width below which a column cannot be read."""
+    from elastocal.blocks import cell_text
+
+    longest = max((len(cell_text(row[column])) for row in block.rows), default=0)
+    head = max(map(len, block.heads[column].split()), default=0)
+    if column < block.texts or _are_words(block, column):
+        longest = min(longest, _HEADS[-1] if column else _NAME)
+    return max(longest, head)
 
 
 def table_of(block: "Table", width: int = 80) -> "RichTable":

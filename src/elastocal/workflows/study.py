@@ -26,6 +26,7 @@ from elastocal.codec.study import (
     SampleResult,
     StudyDesign,
     StudySummary,
+    micrometres,
     show_study,
 )
 from elastocal.dataset import Readings
@@ -46,7 +47,6 @@ from elastocal.sim.workcell import (
     ErrorDraws,
     ErrorScales,
 )
-from elastocal.units import quantity
 from elastocal.workflows._workflow import workflow
 
 DEFAULT_VARIATION = "poses=6,10,15,20,31"
@@ -105,7 +105,7 @@ class StudyResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""
         conditions = tuple(
-            (each.name, f"{quantity(each.error_mean.median, 'mm', '.4f')} median mean error")
+            (each.name, f"{micrometres(each.error_mean.median)} µm median mean error")
             for each in self.summary.conditions
         )
         advice = (("advice", self.summary.advice),) if self.summary.advice else ()

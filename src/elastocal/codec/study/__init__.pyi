@@ -37,6 +37,7 @@ from .show import show_study as show_study
 from .summary import (
     STUDY_SCHEMA as STUDY_SCHEMA,
     StudySummary as StudySummary,
+    micrometres as micrometres,
     read_study as read_study,
     study_summary as study_summary,
     write_study as write_study,

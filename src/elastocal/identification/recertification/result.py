@@ -12,7 +12,7 @@ from elastocal.findings import group_alike
 from elastocal.identification.spring_sums import Term
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.wording import Phrase, phrase
+from elastocal.wording import Phrase, phrase, sentences
 
 SCHEMA = "elastocal.comparison/1"
 LEAST_COVERED = 0.75
@@ -28,6 +28,14 @@ class Verdict(StrEnum):
     """The lower end is beyond the limit."""
     UNDECIDED = "undecided"
     """The limit lies within the interval."""
+
+
+_WORDS = {
+    Verdict.PASS: phrase("Passed:"),
+    Verdict.FAIL: phrase("Failed:"),
+    Verdict.UNDECIDED: phrase("Not decided:"),
+    None: phrase("Not judged:"),
+}
 
 
 @record()
@@ -220,6 +228,11 @@ class CompareSummary:
         return not self.only_old and not self.only_new
 
     @property
+    def verdict_sentence(self) -> Phrase:
+        """The verdict and why; behind a semicolon, what would decide one that is open."""
+        return sentences([_WORDS[self.verdict], f"{self.reason}."])
+
+    @property
     def moved_sentence(self) -> Phrase:
         """Which springs changed, the most certain first; or why none is said to have.
 
@@ -329,8 +342,7 @@ class CompareResult(Result):
         return (
             ("robot", found.robot),
             ("springs", found.moved_sentence),
-            ("verdict", "none" if found.verdict is None else found.verdict.value),
-            ("reason", found.reason),
+            ("verdict", found.verdict_sentence),
         )
 
     def show(self) -> Iterator[Block]:

@@ -14,18 +14,11 @@ from elastocal.identification.recertification.result import (
     Estimate,
     RowComparison,
     SpringChange,
-    Verdict,
 )
 from elastocal.wording import Phrase, mm, phrase, phrases, point, sentences
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
 """The unit of most springs stands in the heads; other springs name their own."""
-_WORDS = {
-    Verdict.PASS: phrase("Passed:"),
-    Verdict.FAIL: phrase("Failed:"),
-    Verdict.UNDECIDED: phrase("Not decided:"),
-    None: phrase("Not judged:"),
-}
 
 
 def show_comparison(found: CompareSummary, rows: RowComparison | None = None) -> Iterator[Block]:
@@ -38,8 +31,7 @@ def show_comparison(found: CompareSummary, rows: RowComparison | None = None) ->
     rows : RowComparison, optional
         The rows behind its change: they say how far the arm was deflected before.
     """
-    said = [_WORDS[found.verdict], f"{found.reason}.", found.moved_sentence]
-    yield Paragraph(sentences(said), "sentence")
+    yield Paragraph(sentences([found.verdict_sentence, found.moved_sentence]), "sentence")
     yield Facts(tuple(_deflections(found, rows)))
     if found.springs:
         yield from _changes(found)

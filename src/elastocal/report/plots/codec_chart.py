@@ -20,6 +20,7 @@ from elastocal.codec.study import (
     StudyDesign,
     StudySummary,
     condition_name,
+    micrometres,
     value_text,
 )
 from elastocal.report.plots import style
@@ -284,7 +285,7 @@ def write_study_figures(
     """
     title = f"{record.cell}: error at unseen poses of {record.samples} simulated arms"
     description = "; ".join(
-        f"{each.name}: median mean error {_MM * each.error_mean.median:.4f} mm"
+        f"{each.name}: median mean error {micrometres(each.error_mean.median)} µm"
         for each in record.conditions
     )
     places = [Path(folder) / name for name in _STUDY_FIGURES]

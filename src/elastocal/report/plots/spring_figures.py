@@ -161,8 +161,7 @@ def write_recertification_figure(path: Path, found: CompareSummary) -> Path:
     FileAccessError
         If the suffix is another or the file cannot be written.
     """
-    moved = ", ".join(found.moved) or ("none" if found.springs_judged else "not judged")
-    description = f"Springs that moved: {moved}. {found.reason}."
+    description = f"{found.moved_sentence} {found.verdict_sentence}"
     return style.write_figure(
         path, lambda: recertification_figure(found), _title(found), description
     )
@@ -320,10 +319,8 @@ def _found(found: CompareSummary) -> str:
     springs = f"{verb.capitalize()}: {names}." if names else f"No compared spring {verb}."
     if not found.springs_judged:
         springs = "Springs are not judged: the campaigns were made at other poses or loads."
-    if found.limit is None:
-        return springs
-    verdict = "Not judged" if found.verdict is None else found.verdict.value.capitalize()
-    return f"{springs} {verdict}: {found.reason.partition(';')[0]}."
+    judged = found.verdict_sentence.removesuffix(".").partition(";")[0]
+    return springs if found.limit is None else f"{springs} {judged}."
 
 
 def _short(name: str) -> str:
