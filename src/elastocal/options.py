@@ -33,7 +33,8 @@ class Option:
     """Whether a file may be given in place of a choice."""
     read: str = ""
     """How a text becomes the value: ``point``, ``direction``, ``numbers``, ``statements``, ``list``
-    (with commas) or a dimension, ``length`` or ``speed``, of a quantity above zero."""
+    (with commas), ``ratio``, ``tolerance``, or a dimension, such as ``length``, of a quantity above
+    zero. Without the option the default of the settings counts, which ``default`` shows in help."""
     repeated: bool = False
     """Whether it may be given several times."""
     default: str = ""

@@ -117,6 +117,8 @@ def brief_repr(cls: type[T]) -> type[T]:
     >>> Way("a", tuple(range(99)))
     Way(name='a', stops=99 entries)
     """
+    if issubclass(cls, Result):
+        raise TypeError(f"{cls.__name__} is a Result: it shows its facts, in a console as well")
 
     def show(self: Any) -> str:
         values = {

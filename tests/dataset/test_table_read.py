@@ -113,6 +113,7 @@ def test_a_pose_measured_twice_is_refused_with_both_rows(tmp_path):
         (row("1_5"), "row 3: pose is '1_5': it must be an integer"),
         (row("A"), "row 3: pose is 'A': it must be an integer"),
         (row("1.5"), "row 3: pose is '1.5': it must be an integer"),
+        (row("9" * 19), f"row 3: pose is '{'9' * 19}': it must lie within ±1e+15"),
         (row(2, case=" "), "row 3: load_case is empty: it must be a name"),
         (
             row(2, status="okay"),

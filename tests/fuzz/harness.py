@@ -159,8 +159,8 @@ _ABSURD = (
 
 def _absurd_command(rng: random.Random) -> str:
     """Return the words of a command with one or two absurd options or arguments, as JSON."""
-    name = rng.choice([*list(_PLAIN)] + 12 * [each for each in _PLAIN if each not in _SLOW])
-    words = _PLAIN[name].split()
+    name = rng.choice([*list(PLAIN)] + 12 * [each for each in PLAIN if each not in _SLOW])
+    words = PLAIN[name].split()
     command = _commands().get_command(None, name)
     options = [
         each for each in command.params if each.param_type_name == "option" and each.name != "help"
@@ -190,7 +190,7 @@ _SLOW = (
     "derive",
 )
 """Commands that take a second or more: drawn seldom."""
-_PLAIN = {
+PLAIN = {
     "robots": "robots",
     "init": "init {o}",
     "check": "check {s}/tool.json",
@@ -214,6 +214,7 @@ _PLAIN = {
     "krc-config": "krc-config {s}/kuka.yaml --out {o}",
     "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
     "release": "release {s}/cell.yaml",
+    "watch": "watch {s}/cell.yaml --for 0.5s",
     "live": "live {s}/kuka.yaml --model {s}/model.json --duration 1",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
     "studio": "studio {s}/cell.yaml --no-browser",

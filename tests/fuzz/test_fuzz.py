@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from elastocal.cli.commands import COMMANDS
 from fuzz import harness
-from fuzz.harness import Case, drawn_cases, run_cases
+from fuzz.harness import PLAIN, Case, drawn_cases, run_cases
 from fuzz.seeds import KINDS, make_seeds
 from support.by_day import some_by_day
 from support.kept import kept
@@ -106,3 +107,8 @@ def test_the_harness_sees_noise_before_a_line():
     assert judged(1, f"Error: no\n         at line 3 in model.cpp\n{line}", 0.0, 0.0) == "noise"
     assert judged(1, f"{line}more\n", 0.0, 0.0) == "lines"
     assert judged(3, "", 0.0, 0.0) == "code"
+
+
+def test_absurd_options_are_added_to_every_command_that_leaves_the_seeds_alone():
+    writes_into_the_seeds = {"derive"}
+    assert PLAIN.keys() == COMMANDS.keys() - {"demo"} - writes_into_the_seeds

@@ -85,7 +85,7 @@ def test_a_seal_that_is_no_hash_is_refused(tmp_path, stated):
     path.write_text(
         f'{{"schema": "elastocal.sealed/1", "compliance": [], "content_sha256": {stated}}}'
     )
-    with pytest.raises(SchemaError, match="was changed after it was written"):
+    with pytest.raises(SchemaError, match=r"was changed after it was written|half of a letter"):
         read_json(path, Sealed)
 
 
@@ -144,3 +144,13 @@ def peak(path, data):
     *told, most = done.stdout.splitlines()
     unit = 1 if sys.platform == "darwin" else 1024
     return int(most) * unit, " ".join(told)
+
+
+@pytest.mark.parametrize("text", [r'["\ud800"]', r'{"a\uDFFF": 1}', r'{"a": [["x\udc00y"]]}'])
+def test_half_of_a_letter_is_refused(text):
+    with pytest.raises(SchemaError, match=r"^it holds '.*', half of a letter$"):
+        parse_json(text, "it")
+
+
+def test_two_halves_of_one_letter_are_whole():
+    assert parse_json(r'["\ud83d\ude00"]', "it") == ["\U0001f600"]

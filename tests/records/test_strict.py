@@ -213,3 +213,11 @@ def test_aliases_are_read(tmp_path):
     path = tmp_path / "cell.yaml"
     path.write_text(f"schema: {SCHEMA}\nrobot: &r arm\nstations: [{{name: *r}}]\n")
     assert read_yaml(path, Cell, SCHEMA).stations[0].name == "arm"
+
+
+@pytest.mark.parametrize("written", [r"\ud800", r"\U0000dfff"])
+def test_half_of_a_letter_is_refused(tmp_path, written):
+    path = tmp_path / "cell.yaml"
+    path.write_text(f'schema: elastocal.cell/1\nrobot: "{written}"\n')
+    with pytest.raises(SchemaError, match=r"cell\.yaml: it holds .*, half of a letter$"):
+        read_yaml(path, Cell, "elastocal.cell/1")

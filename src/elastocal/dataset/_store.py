@@ -61,6 +61,8 @@ from elastocal.units import factor, parse_number, split_column
 
 _JOINT_HINT = "a joint column is written name[rad], name[deg], name[m] or name[mm]"
 _VARIABLE_OF = {column: variable for variable in VECTORS for column in variable.columns}
+_MOST_COUNTED = 10**15
+"""Largest label of a pose, and place in the order of the readings."""
 _ATTRIBUTE = re.compile(r"#\s*(\w+)\s*:\s*(.*)")
 
 
@@ -500,9 +502,14 @@ def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
 def _integer(name: str, cell: str, line: int) -> int:
     try:
         parse_number(cell)
-        return int(cell)
+        number = int(cell)
     except ValueError as error:
         raise DatasetError(f"row {line}: {name} is {cell!r}: it must be an integer") from error
+    if not -_MOST_COUNTED <= number <= _MOST_COUNTED:
+        raise DatasetError(
+            f"row {line}: {name} is {cell!r}: it must lie within ±{_MOST_COUNTED:.0e}"
+        )
+    return number
 
 
 def _numbers(table: TableText, columns: Sequence[Column]) -> FloatArray:

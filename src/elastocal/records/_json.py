@@ -5,6 +5,7 @@ what one has checked is not what the other shows.
 """
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from elastocal.errors import SchemaError
 from elastocal.files import Limit
 
 MOST_VALUES = Limit("ELASTOCAL_MAX_JSON_VALUES", 2_000_000, "values")
+_HALF = re.compile(r"\\[uU](?:0000)?[dD][89a-fA-F]")
+"""An escape that may stand for half of a letter, in JSON and in YAML."""
 _MOST_NESTING = Limit("ELASTOCAL_MAX_NESTING", 64, "levels")
 SEAL = "content_sha256"
 """Key or attribute by which a file states the hash of all else that it says."""
@@ -58,6 +61,7 @@ def parse_json(
     except (ValueError, RecursionError) as error:
         raise SchemaError(f"{what} is not valid JSON: {parser_reason(error)}") from error
     require_shallow(data, what)
+    require_whole_letters(whole, data, what)
     return data
 
 
@@ -110,6 +114,39 @@ def require_shallow(data: Any, what: str) -> None:
             for inner in (node.values() if isinstance(node, dict) else node)
             if isinstance(inner, dict | list)
         ]
+
+
+def require_whole_letters(text: str, data: Any, what: str) -> None:
+    r"""Refuse halves of letters, such as ``"\ud800"``: no file or terminal takes them.
+
+    Parameters
+    ----------
+    text : str
+        The file.
+    data : object
+        What was read of it.
+    what : str
+        The file, for the message.
+
+    Raises
+    ------
+    SchemaError
+        With the first.
+    """
+    # Only escapes make them: the text itself is UTF-8.
+    waiting = [data] if _HALF.search(text) else []
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, str) and not each.isascii() and any(map(_is_half, each)):
+            raise SchemaError(f"{what} holds {each!a:.60}, half of a letter")
+        if isinstance(each, dict):
+            waiting += [*each.keys(), *each.values()]
+        elif isinstance(each, list):
+            waiting += each
+
+
+def _is_half(letter: str) -> bool:
+    return "\ud800" <= letter <= "\udfff"
 
 
 def parser_reason(error: Exception) -> str:

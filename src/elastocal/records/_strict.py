@@ -19,7 +19,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, fie
 from elastocal.errors import SchemaError
 from elastocal.files import Limit, read_text
 from elastocal.records._codec import from_data
-from elastocal.records._json import parser_reason, require_shallow
+from elastocal.records._json import parser_reason, require_shallow, require_whole_letters
 
 
 class StrictModel(BaseModel):
@@ -145,6 +145,7 @@ def parse_yaml(text: str, path: Path) -> Any:
         # The loader is PyYAML's safe one with duplicate keys refused.
         data = yaml.load(text, _UniqueKeyLoader)
         require_shallow(data, "it")
+        require_whole_letters(text, data, "it")
     except SchemaError as error:
         raise SchemaError(f"{path}: {error}") from error
     except (*_PARSER_ERRORS, yaml.YAMLError) as error:

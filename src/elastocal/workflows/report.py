@@ -174,9 +174,10 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
         If a part that was named cannot be used, or the key.
     """
     out = Path(settings.out)
+    _require_page(out)
     paper = out.with_suffix(".pdf") if settings.pdf else None
     tables = out.with_suffix(".xlsx") if settings.xlsx else None
-    _check_places(out, (paper, tables), settings.force)
+    _require_free((out, paper, tables), settings.force)
     language = language_of(settings.language)
     if tables is not None:
         require_excel()
@@ -234,13 +235,16 @@ def _figures(
     )
 
 
-def _check_places(out: Path, beside: tuple[Path | None, ...], force: bool) -> None:
-    """Refuse places for a report before the work, so that none is done in vain."""
+def _require_page(out: Path) -> None:
+    """Refuse a place for a report before the work, so that none is done in vain."""
     if out.suffix.lower() not in (".html", ".htm"):
         # Any other name could be that of a model.
         raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")
     if not out.parent.is_dir():
         raise FileAccessError(f"cannot write {out}: there is no folder {out.parent}")
-    for path in (out, *beside):
+
+
+def _require_free(places: tuple[Path | None, ...], force: bool) -> None:
+    for path in places:
         if path is not None and path.exists() and not force:
             raise FileAccessError(f"{path} is there already: name another file, or give --force")
