@@ -1,12 +1,13 @@
 """The figures of a codec: on paper, and on one HTML page to explore (paper Fig. 7, 9, 10)."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from elastocal.blocks import Block, Bullets, Details, Table
 from elastocal.codec import (
     INDICES,
     CodecAnalysis,
@@ -40,6 +41,8 @@ from elastocal.report.plots import (
 KINDS = (".svg", ".png")
 """In which kinds every figure is written."""
 PAGE = "codec.html"
+_MOST_PAIRS = 3
+"""Pairs of variants that stand on the page unfolded."""
 _MANY = 30
 """Springs above which drawing takes longer than processes take to start."""
 
@@ -145,7 +148,6 @@ def write_codec_page(
         {"name": variant.name, "colour": variant.colour, "fill": variant.fill}
         for variant in variant_styles(names)
     ]
-    first = len(verdicts.saturation)
     page = render(
         "codec.html",
         title=f"Codec: {data.robot or 'robot'}",
@@ -155,16 +157,12 @@ def write_codec_page(
         data={"variants": variants, "charts": charts},
         provenance=data.provenance,
         figures=split_facts(data),
-        springs=verdicts.springs,
-        saturations=verdicts.sentences[:first],
-        pairs=verdicts.sentences[first:],
-        pair_count=len(verdicts.pairs),
+        verdicts=tuple(_verdicts(verdicts)),
         findings=group_alike(data.findings),
         how=how_to_read(data),
         last=data.n_train[-1],
         compliances=bool(seen),
-        kinds=tuple(KIND_TITLES.values()),
-        indices=_index_rows(names, correlations) if correlations else (),
+        indices=_index_table(names, correlations) if correlations else None,
         errors=error_table(codec_summary(data, verdicts).variants),
         footer=f"Made by elastocal {data.versions.get('elastocal', '')}".strip() + ".",
     )
@@ -172,16 +170,26 @@ def write_codec_page(
     return Path(path)
 
 
-def _index_rows(
-    names: Sequence[str], correlations: Sequence[Correlation]
-) -> list[tuple[str, str, list[str]]]:
-    """Return variant, index and rank correlations of each kind with the mean error."""
+def _verdicts(found: Verdicts) -> Iterator[Block]:
+    """Yield the springs, the verdicts on variants, and those on pairs, folded if they are many."""
+    first = len(found.saturation)
+    pairs = Bullets(found.sentences[first:], "verdicts")
+    many = len(found.pairs) > _MOST_PAIRS
+    yield Bullets(found.springs, "verdicts")
+    yield Bullets(found.sentences[:first], "verdicts")
+    yield Details(f"{len(found.pairs)} pairs of variants", (pairs,)) if many else pairs
+
+
+def _index_table(names: Sequence[str], correlations: Sequence[Correlation]) -> Table:
+    """Return the rank correlations of each kind with the mean error, a row for each index."""
     of = {(e.variant, e.index, e.kind): e for e in correlations if e.error == "mean"}
-    return [
-        (name, INDEX_NAMES[index].title, [_correlation(of[name, index, k]) for k in KIND_TITLES])
+    rows = tuple(
+        (name, INDEX_NAMES[index].title, *(_correlation(of[name, index, k]) for k in KIND_TITLES))
         for name in names
         for index in INDICES
-    ]
+    )
+    heads = ("Variant", "Index", *KIND_TITLES.values())
+    return Table("Rank correlations with the accuracy", heads, rows, texts=2)
 
 
 def _correlation(found: Correlation) -> str:
