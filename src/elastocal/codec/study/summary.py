@@ -14,7 +14,7 @@ from elastocal.identification import CONFIDENCE
 from elastocal.records import read_json, record, write_json
 from elastocal.results import brief_repr
 from elastocal.tables import write_table
-from elastocal.units import in_unit
+from elastocal.units import in_unit, quantity
 
 STUDY_SCHEMA = "elastocal.study/1"
 _SUMMARY, _TABLE, _COMPLIANCES = "study.json", "study.csv", "compliance.csv"
@@ -279,7 +279,7 @@ def advice(conditions: Sequence[ConditionSummary], target: float | None) -> str:
     """
     if target is None:
         return ""
-    wanted = f"a mean error of {1e3 * target:.4g} mm at unseen poses"
+    wanted = f"a mean error of {quantity(target, 'mm', '.4g')} at unseen poses"
     good = [c for c in conditions if c.mean_reaches and c.mean_reaches.low >= _RELIABLE]
     if good:
         best = min(good, key=lambda c: (c.factors.poses, -c.mean_reaches.low))  # type: ignore[union-attr]

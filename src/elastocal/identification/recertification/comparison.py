@@ -75,7 +75,8 @@ from elastocal.identification.recertification.result import (
 from elastocal.identification.uncertainty import CONFIDENCE, interval
 from elastocal.records import read_json
 from elastocal.robot import Robot
-from elastocal.wording import counted
+from elastocal.units import in_unit, quantity
+from elastocal.wording import counted, mm
 
 _SHIFTS = 10
 """Number of draws of the new model that each draw of the old one is paired with."""
@@ -425,13 +426,13 @@ def _judge(
         return None, (
             "a limit is held against the poses and forces that matter, and no rows were given"
         )
-    largest, allowed = deflection.largest, f"the limit of {1e3 * limit:g} mm"
+    largest, allowed = deflection.largest, f"the limit of {quantity(limit, 'mm')}"
     where = ""
     if ground is not None and ground.left_out:
         where = f" over the {ground.rows_covered} of {ground.rows} rows that both campaigns cover"
     found = (
-        f"the largest change{where} is {_mm(largest.value)}"
-        f" ({1e3 * largest.low:.3f} to {_mm(largest.high)}, 95 %)"
+        f"the largest change{where} is {mm(largest.value)}"
+        f" ({in_unit(largest.low, 'mm'):.3f} to {mm(largest.high)}, 95 %)"
     )
     if largest.high <= limit:
         return Verdict.PASS, f"{found}, all of it within {allowed}"
@@ -454,19 +455,15 @@ def _what_decides(deflection: RowComparison, limit: float) -> str:
     share = float(deflection.old_share[row])
     spare = (abs(limit - largest.value) / half) ** 2 - share
     times = math.inf if not spare > 0.0 else (1.0 - share) / spare
-    limits = f"limits of {_mm(largest.high)} and more would pass"
+    limits = f"limits of {mm(largest.high)} and more would pass"
     if largest.low > 0.0:
-        limits += f", limits below {_mm(largest.low)} fail"
+        limits += f", limits below {mm(largest.low)} fail"
     if not times <= _MOST:
         return f"more poses in the new calibration alone will hardly decide it; {limits}"
     return (
         f"about {max(math.ceil(10.0 * times) / 10.0, 1.1):.1f} times as many poses in the new"
         f" calibration would decide it, if the estimate stays; {limits}"
     )
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.3f} mm"
 
 
 def _notes_on(
@@ -536,8 +533,8 @@ def _load_note(old: float | None, new: float | None) -> str | None:
     if not abs(np.log(new / old)) > np.log(_LIKE):
         return None
     return (
-        f"the arm was deflected by {1e3 * old:.3f} mm on average in the old calibration and by"
-        f" {1e3 * new:.3f} mm in the new one: with other forces gears that stiffen under load look"
+        f"the arm was deflected by {mm(old)} on average in the old calibration and by"
+        f" {mm(new)} in the new one: with other forces gears that stiffen under load look"
         " like a change"
     )
 
