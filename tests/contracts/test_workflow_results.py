@@ -1,19 +1,18 @@
 """Every result of a workflow: short in a console, a table in a notebook, a picture or a reason."""
 
+import importlib.util
 import re
+import sys
+from pathlib import Path
 
-import openpyxl
 import pytest
 from matplotlib.figure import Figure
 
 from elastocal import workflows
-from elastocal.blocks import cell_text, every_table
 from elastocal.codec.study import study_summary
 from elastocal.compensation.process import read_process
 from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
-from elastocal.report.document import write_workbook
-from elastocal.report.document.section import Content
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
 from elastocal.robot import catalogue
 from support import (
@@ -129,25 +128,32 @@ def test_it_is_a_table_in_a_notebook(results, name):
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_every_shell_shows_the_same_cells(results, name, tmp_path):
-    blocks = tuple(results[name].show())
-    lines, page = shown.printed(blocks), shown.Cells(Content(blocks).html).rows
-    notebook = shown.Cells(results[name]._repr_html_()).rows
-    book = openpyxl.load_workbook(write_workbook(tmp_path / "a.xlsx", [(name, blocks)]))
-    kept = [row for sheet in book for row in sheet.iter_rows(values_only=True)]
-    for table in every_table(blocks):
-        for row in table.rows:
-            cells = [cell_text(cell) for cell in row]
-            assert [word for cell in cells for word in cell.split()] in lines
-            assert cells in page
-            assert cells in notebook
-            assert any(
-                [as_kept(cell) for cell in cells] == list(each[: len(cells)]) for each in kept
-            ), cells
+    shown.assert_one_telling(results[name], tmp_path)
 
 
-def as_kept(cell):
-    """Return what a workbook has for a cell: figures as numbers."""
-    return float(cell) if re.fullmatch(r"[+-]?\d+(\.\d+)?", cell) else cell or None
+@pytest.mark.slow
+def test_every_shell_shows_the_same_cells_of_a_foreign_campaign(tmp_path):
+    place = Path(__file__).parents[2] / "benchmarks" / "first_use.py"
+    spec = importlib.util.spec_from_file_location("first_use", place)
+    first_use = importlib.util.module_from_spec(spec)
+    sys.modules["first_use"] = first_use
+    spec.loader.exec_module(first_use)
+    arm = next(iter(first_use.ARMS))
+    first_use.write_campaign(arm, tmp_path, masses=True)
+    steps = [each.command for each in first_use.first_use(arm, tmp_path)]
+    assert steps[-1] == "verify"
+    data, model = tmp_path / "data.nc", tmp_path / "model.json"
+    other = workflows.calibrate(data, springs="actuated", out=tmp_path / "other.json")
+    results = (
+        workflows.check(tmp_path / "cell.yaml"),
+        workflows.calibrate(data),
+        other,
+        workflows.compare(model, new=tmp_path / "other.json"),
+        workflows.codec(data, out=tmp_path / "codec2", splits=2),
+        workflows.verify(tmp_path / "report.html"),
+    )
+    tables = sum(shown.assert_one_telling(each, tmp_path) for each in results)
+    assert tables > 6
 
 
 @pytest.mark.parametrize("name", CLASSES)
