@@ -127,9 +127,9 @@ def _robots(given: Given) -> None:
         else:
             typer.echo(text, nl=False)
         return
-    robots = [catalogue.robot_facts(each) for each in ([name] if name else catalogue.names())]
-    shown = catalogue.show_robot(robots[0]) if name else catalogue.show_robots(robots)
-    _show(given, {"robots": robots}, shown)
+    names = [name] if name else catalogue.names()
+    shown = catalogue.show_robot(name) if name else catalogue.show_robots(names)
+    _show(given, {"robots": [catalogue.robot_figures(each) for each in names]}, shown)
 
 
 @dataclass(frozen=True)

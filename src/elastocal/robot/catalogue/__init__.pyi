@@ -10,7 +10,7 @@ from .catalogue import (
     urdf_of as urdf_of,
 )
 from .show import (
-    robot_facts as robot_facts,
+    robot_figures as robot_figures,
     show_robot as show_robot,
     show_robots as show_robots,
 )

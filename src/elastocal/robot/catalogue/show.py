@@ -1,43 +1,18 @@
 """Show the robots of the catalogue as blocks: what is known of each, and from which source."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from elastocal.blocks import Block, Cell, Facts, Graded, Paragraph, Table
-from elastocal.records import record
 from elastocal.robot.catalogue.catalogue import entry, load
+from elastocal.robot.robot import Robot
 from elastocal.units import quantity
 from elastocal.wording import phrase, phrases
 
 
-@record()
-class JointFacts:
-    """A joint in SI units; an unknown number is None."""
-
-    name: str
-    lower: float | None
-    upper: float | None
-    velocity: float | None
-    effort: float | None
-
-
-@record()
-class RobotFacts:
-    """What the catalogue knows of a robot."""
-
-    name: str
-    reach: float
-    """In m."""
-    joints: tuple[JointFacts, ...]
-    sources: dict[str, str]
-    """By the field that they are of."""
-    assumptions: dict[str, str]
-    """Reasons for what has no source, by the field."""
-
-
-def robot_facts(name: str) -> RobotFacts:
-    """Return what the catalogue knows of a robot.
+def robot_figures(name: str) -> dict[str, object]:
+    """Return what the catalogue knows of a robot as a JSON object has it; None: not known.
 
     Raises
     ------
@@ -45,21 +20,25 @@ def robot_facts(name: str) -> RobotFacts:
         If it has none of that name.
     """
     robot, known = load(name), entry(name)
-    limits = robot.limits
-    ranges = zip(limits.lower, limits.upper, limits.velocity, limits.effort, strict=True)
-    joints = tuple(
-        JointFacts(joint, *(float(value) if np.isfinite(value) else None for value in values))
-        for joint, values in zip(robot.joint_names, ranges, strict=True)
-    )
-    assumed = {each.field: each.reason for each in robot.assumptions}
-    return RobotFacts(known.name, known.reach, joints, dict(known.sources), assumed)
+    return {
+        "name": known.name,
+        "reach": known.reach,
+        "joints": [
+            {"name": joint} | dict(zip(_LIMITS, limits, strict=True))
+            for joint, limits in _limits(robot)
+        ],
+        "sources": dict(known.sources),
+        "assumptions": {each.field: each.reason for each in robot.assumptions},
+    }
 
 
-def show_robots(robots: Sequence[RobotFacts]) -> Iterator[Block]:
+def show_robots(names: Iterable[str]) -> Iterator[Block]:
     """Yield a row a robot, and what the words in it mean."""
     heads = phrases("Robot", "Reach", "Limits", "Speeds", "Torques", "Masses")
+    entries = map(entry, names)
     rows = tuple(
-        (each.name, f"{each.reach:.3f} m" if each.reach else "-", *_marks(each)) for each in robots
+        (each.name, f"{each.reach:.3f} m" if each.reach else "-", *_marks(load(each.name)))
+        for each in entries
     )
     yield Table(phrase("Robots of the catalogue"), heads, rows)
     yield Paragraph(
@@ -70,36 +49,46 @@ def show_robots(robots: Sequence[RobotFacts]) -> Iterator[Block]:
     )
 
 
-def show_robot(robot: RobotFacts) -> Iterator[Block]:
+def show_robot(name: str) -> Iterator[Block]:
     """Yield the joints of a robot and the source of each number."""
+    robot, known = load(name), entry(name)
     rows = tuple(
         (
-            each.name,
-            *(_quantity(value, "°") for value in (each.lower, each.upper)),
-            "-" if each.velocity is None else f"{_quantity(each.velocity, '°')}/s",
-            "-" if each.effort is None else f"{each.effort:.0f} N·m",
+            joint,
+            *(_quantity(value, "°") for value in (lower, upper)),
+            "-" if velocity is None else f"{_quantity(velocity, '°')}/s",
+            "-" if effort is None else f"{effort:.0f} N·m",
         )
-        for each in robot.joints
+        for joint, (lower, upper, velocity, effort) in _limits(robot)
     )
-    yield Table(robot.name, phrases("Joint", "From", "To", "Speed", "Torque"), rows)
+    yield Table(known.name, phrases("Joint", "From", "To", "Speed", "Torque"), rows)
     yield Facts(
         (
-            *((f"source of {field}", text) for field, text in robot.sources.items()),
-            *((f"assumed {field}", text) for field, text in robot.assumptions.items()),
+            *((f"source of {field}", text) for field, text in known.sources.items()),
+            *((f"assumed {each.field}", each.reason) for each in robot.assumptions),
         )
     )
 
 
-def _marks(robot: RobotFacts) -> tuple[Cell, ...]:
+_LIMITS = ("lower", "upper", "velocity", "effort")
+
+
+def _limits(robot: Robot) -> Iterator[tuple[str, tuple[float | None, ...]]]:
+    """Yield the name of each joint and its limits in SI units; None: not known."""
+    rows = zip(*(getattr(robot.limits, key) for key in _LIMITS), strict=True)
+    for name, row in zip(robot.joint_names, rows, strict=True):
+        yield name, tuple(float(value) if np.isfinite(value) else None for value in row)
+
+
+def _marks(robot: Robot) -> tuple[Cell, ...]:
+    """Return whether limits, speeds, torques and masses have a source."""
     fields = (("position", "lower"), ("velocity", "velocity"), ("effort", "effort"))
+    assumed = {each.field for each in robot.assumptions}
     marks = (
-        _mark(
-            field in robot.assumptions,
-            all(getattr(joint, key) is not None for joint in robot.joints),
-        )
+        _mark(field in assumed, bool(np.isfinite(getattr(robot.limits, key)).all()))
         for field, key in fields
     )
-    return (*marks, _mark("inertia" in robot.assumptions, True))
+    return (*marks, _mark("inertia" in assumed, True))
 
 
 def _mark(assumed: bool, known: bool) -> Cell:
