@@ -24,7 +24,7 @@ from elastocal.identification import (
     observability,
     solve,
 )
-from elastocal.identification.observability import FaintParameter, find_faint
+from elastocal.identification.observability import FaintParameter, find_faint, left_open
 from elastocal.identification.solve import Factored
 from elastocal.robot import Robot
 from support.problems import campaign, elastic, made_up
@@ -311,3 +311,41 @@ def test_a_marker_on_the_axis_of_the_last_joint_never_shows_its_spring():
     offset = model.robot.forward(q)[:3, :3].T @ to_axis
     assert np.linalg.norm(offset) > 0.01
     assert attainable_rank(model, offset) == 5
+
+
+class TestDirectionsThatBoundsLeaveOpen:
+    FREE, AT_BOUND = 1.0, 0.0
+
+    def open_directions(self, rows, at_lower):
+        """Return the rank that is left of a null space, given by rows, with springs at bounds."""
+        below = np.where(at_lower, self.AT_BOUND, self.FREE)
+        found = left_open(np.array(rows, dtype=float), below, np.full(len(rows), self.FREE))
+        return found.shape[1]
+
+    def test_without_a_spring_at_a_bound_all_are(self):
+        assert self.open_directions(np.eye(3), [False] * 3) == 3
+
+    def test_a_spring_that_may_move_inward_holds_none(self):
+        assert self.open_directions(np.eye(3), [True, False, False]) == 3
+
+    def test_two_springs_that_drive_one_another_outward_hold_their_direction(self):
+        assert self.open_directions([[1, 0], [-1, 0], [0, 1]], [True, True, False]) == 1
+
+    def test_three_springs_hold_a_plane(self):
+        corners = [[1, 0, 0], [-0.5, 0.9, 0], [-0.5, -0.9, 0], [0, 0, 1]]
+        assert self.open_directions(corners, [True, True, True, False]) == 1
+        assert self.open_directions(corners, [True, True, False, False]) == 3
+
+    @pytest.mark.parametrize("seed", [*range(40), 2458, 2512, 2930, 6676, 6913])
+    def test_rows_that_nearly_depend_on_one_another_have_an_answer(self, seed):
+        """Linear programmes of the last five ended without one: `calibrate` in a traceback."""
+        rng = np.random.default_rng(seed)
+        n = rng.integers(6, 44)
+        k = rng.integers(1, min(14, n))
+        null_space = np.linalg.qr(rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-14, 0, n))[0]
+        null_space = null_space[:, :k] * (rng.random((n, k)) > 0.5)
+        null_space = null_space + 10.0 ** rng.uniform(-16, -6) * rng.normal(size=null_space.shape)
+        room = (rng.random((2, n)) > 0.4).astype(float)
+        found = left_open(null_space, *room)
+        assert np.isfinite(found).all()
+        assert 0 <= found.shape[1] <= k
