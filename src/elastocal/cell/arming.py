@@ -21,7 +21,8 @@ class Arming:
     """What a person has agreed to."""
 
     cell_sha256: str = ""
-    """Of the cell file that the person was shown; see `Cell.sha256`. Empty: nobody has agreed."""
+    """SHA-256 of the cell file that the person was shown; see `Cell.sha256`. Empty: nobody has
+    agreed."""
     real: bool = False
     """Whether an arm that is not simulated may move."""
 

@@ -242,7 +242,7 @@ class Cell:
     process: ProductionPath | None = None
     """Poses and forces of the production process."""
     sha256: str = ""
-    """Of the text of the file, as it was read."""
+    """SHA-256 of the text of the file, as it was read."""
 
     def __repr__(self) -> str:
         return "\n  ".join([f"Cell {self.name!r} of {self.path}", *self.file.summary()])

@@ -59,7 +59,7 @@ class CertificateEntry(StrictModel):
     """What the first page of a report says of a calibration beside its result."""
 
     number: Name | None = None
-    """Of the certificate."""
+    """Number of the certificate."""
     robot: Equipment = Equipment()
     """Type by default the name of the robot's model."""
     controller: Equipment = Equipment()

@@ -34,7 +34,7 @@ class LineCounts:
     """Times that the device's count has jumped: it was started anew."""
     malformed: int = 0
     foreign: int = 0
-    """Of others than the device; they are not read."""
+    """Messages of others than the device; they are not read."""
     saturated: int = 0
     """Samples beyond a range; cycles in which the controller clamped a correction."""
     breaks: int = 0

@@ -58,7 +58,7 @@ class PathLimits:
     rate: float
     """Fastest change of it, in m/s."""
     cycle: float
-    """Of the controller, in s."""
+    """Cycle of the controller, in s."""
     frame: str
     """Axes that it takes corrections in: ``base`` or ``tcp``."""
 
@@ -86,7 +86,7 @@ class CycleStatistics:
     controller_delay: int | None
     """Most cycles without an answer that the controller has reported; none: it does not say."""
     answer_p50: float | None
-    """Of the times of answers, in s; none before the first."""
+    """Median of the times of answers, in s; none before the first."""
     answer_p99: float | None
     answer_p999: float | None
     answer_longest: float | None

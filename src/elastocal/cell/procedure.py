@@ -293,8 +293,8 @@ class ProcedureSettings(StrictModel):
     approach_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.25)] = 0.02
     """Between approach pose and near contact, and back, in m/s."""
     contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.02)] = 0.005
-    """Of the guarded approach from near contact to the surface, in m/s: how fast `elastocal run`
-    touches. ``motion.contact_speed`` is another: the KRL program's limit on the whole straight
+    """Speed of the guarded approach from near contact to the surface, in m/s: how fast `elastocal
+    run` touches. ``motion.contact_speed`` is another: the KRL program's limit on the whole straight
     way."""
     contact_force: PositiveForce = 60.0
     """Force at which the guarded approach stops, in N."""

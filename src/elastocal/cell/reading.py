@@ -41,7 +41,7 @@ class DeviceReading:
     """Headings of `cells`."""
 
     kind: str
-    """Of `elastocal.cell.KINDS`."""
+    """One of `elastocal.cell.KINDS`."""
     device: str
     """With its address."""
     heard: bool
@@ -64,9 +64,9 @@ class DeviceReading:
     drift: float | None = None
     """How much faster its clock runs than the PC's, without dimension; None: too early to tell."""
     position: Three | None = None
-    """Of the tool in base, or of the marker in the station's frame, in m."""
+    """Position of the tool in base, or of the marker in the station's frame, in m."""
     turn: Three | None = None
-    """Of the tool in base: a, b, c (Z-Y'-X''), in rad."""
+    """Orientation of the tool in base: a, b, c (Z-Y'-X''), in rad."""
     force: Three | None = None
     """Raw, in the sensor's frame, in N."""
     moment: Three | None = None

@@ -203,16 +203,17 @@ class RigContext:
 
     clock: Clock
     seed: int
-    """Of simulated devices."""
+    """Seed of simulated devices."""
     start: float
     """What the clock showed when the rig was made, in s: later than all of a run that goes on."""
     feed: WrenchFeed | None
-    """Of another driver of the rig; None where none has one."""
+    """Wrench feed of another driver of the rig; None where none has one."""
     ports: Mapping[LocalPort, socket.socket] = field(default_factory=dict)
     """Ports that are bound already, as `DeviceSettings.own_ports` names them."""
 
     arming: Arming = Arming()  # noqa: RUF009 - frozen
-    """Of an arm that moves as soon as its path is corrected, see `elastocal.cell.PathDriver`."""
+    """Arming of an arm that moves as soon as its path is corrected, see
+    `elastocal.cell.PathDriver`."""
     watches: bool = False
     """Whether somebody only looks (`elastocal watch`): a driver then commands no arm, waits for
     nobody, and goes on to listen whatever it hears."""
@@ -242,7 +243,7 @@ class DeviceSet:
     sensor: ForceSensor | None = None
     metrology: Metrology | None = None
     feed: WrenchFeed | None = None
-    """Of a sensor that can be read beside `ForceSensor.read`."""
+    """Wrench feed of a sensor that can be read beside `ForceSensor.read`."""
     clock: Clock | None = None
     """Takes the place of the rig's; only where one driver makes everything."""
     close: Callable[[], None] = close_nothing

@@ -59,7 +59,8 @@ class _LearningCurve:
     chosen: tuple[IndexArray, ...]
     """Numbers of the training poses, in the order of choice."""
     compliance: FloatArray
-    """Of the springs that the file carries, shape (n_train, spring), in rad/(N·m) or m/N."""
+    """Compliances of the springs that the file carries, shape (n_train, spring), in rad/(N·m) or
+    m/N."""
     error_mean: FloatArray
     """Mean absolute residual at the verification poses, shape (n_train, 4), in m; see `AXES`."""
     error_max: FloatArray

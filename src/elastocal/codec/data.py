@@ -49,7 +49,7 @@ ARRAYS = "codec.nc"
 """Name of the file in a codec's folder."""
 _OPTIONS = ("ratio", "seed", "set_blunders_aside", "trust_conventions", "poses")
 _ALL_POSES = {"poses": sys.maxsize}
-"""Of a file that does not say: elastocal 0.1.0 drew none."""
+"""Poses drawn of a file that does not say: elastocal 0.1.0 drew none."""
 
 
 @brief_repr

@@ -108,7 +108,7 @@ class Knowledge(StrictModel):
     uncertainty: Annotated[float, BeforeValidator(_parse_share)] | None = None
     """Standard deviation of that, or of each of the next three, as a percentage."""
     K1: _Written | None = None
-    """Of a gear up to ``T1``; without torque where that is not given."""
+    """Stiffness of a gear up to ``T1``; without torque where that is not given."""
     K2: _Written | None = None
     """From ``T1`` to ``T2``."""
     K3: _Written | None = None

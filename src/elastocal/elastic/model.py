@@ -266,9 +266,9 @@ class ElasticModel:
     robot: Robot
     springs: tuple[Spring, ...]
     parameters: tuple[Parameter, ...] = field(init=False, repr=False)
-    """Of all springs, in the order of every compliance vector."""
+    """Parameters of all springs, in the order of every compliance vector."""
     friction: FrictionElements = field(init=False, repr=False)
-    """Of all springs."""
+    """Friction elements of all springs."""
     _chain: ChainModel = field(init=False, repr=False)
     _columns: IndexArray = field(init=False, repr=False)
     _groups: tuple[AlikeSprings, ...] = field(init=False, repr=False)

@@ -28,7 +28,7 @@ class ErrorFigures:
     bias: float
     """Mean with its sign."""
     mean: float
-    """Of their sizes."""
+    """Mean of their sizes."""
     rms: float
     p95: float
     max: float
@@ -49,7 +49,7 @@ class AxisErrors:
     axis: str
     """``x``, ``y``, ``z`` or ``norm``."""
     registration: ErrorFigures
-    """Of the nominal arm, its frames and markers fitted."""
+    """Errors of the nominal arm, its frames and markers fitted."""
     chosen: ErrorFigures
 
 
@@ -98,7 +98,7 @@ class GeometryAccuracy:
     registration: FloatArray
     """Measured minus expected of the nominal arm, in base, shape (position, 3), in m."""
     chosen: FloatArray
-    """Of the calibrated arm, likewise."""
+    """Errors of the calibrated arm, likewise."""
     axes: tuple[AxisErrors, ...]
     poses: tuple[PoseAccuracy, ...]
     """Poses that were visited at least twice; empty where there are none."""

@@ -26,9 +26,9 @@ from elastocal.records import record
 from elastocal.robot import Robot, inverse_transform, xyzabc_from_T
 
 LINK_NUMBERS = ("theta", "d", "a", "alpha", "beta")
-"""Of a link; angles in rad, lengths in m."""
+"""Numbers of a link; angles in rad, lengths in m."""
 TOOL_NUMBERS = ("x", "y", "z", "rz", "ry", "rx")
-"""Of the tool behind the last joint: lengths in m, then turns in rad, ``Rz Ry Rx``."""
+"""Numbers of the tool behind the last joint: lengths in m, then turns in rad, ``Rz Ry Rx``."""
 _PARALLEL = np.radians(5.0)
 """Smaller angles between axes as drawn count as none: the common normal jumps there."""
 _NOTHING = 2e-6
@@ -59,9 +59,9 @@ class _Way:
 
     parallel: bool
     sense: float = 1.0
-    """Of the common normal: that in which ``a`` is above zero."""
+    """Sense of the common normal: that in which ``a`` is above zero."""
     d: float = 0.0
-    """Of parallel axes."""
+    """Offset of parallel axes."""
 
 
 def link_table(problem: GeometryProblem, found: GeometryLadder) -> tuple[LinkNumber, ...]:

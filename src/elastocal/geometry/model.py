@@ -55,7 +55,7 @@ class HeldOutFigures:
     """Errors at poses that were left out of the fit."""
 
     registration: DistanceFigures
-    """Of the nominal arm, its frames and markers fitted."""
+    """Errors of the nominal arm, its frames and markers fitted."""
     chosen: DistanceFigures
 
 

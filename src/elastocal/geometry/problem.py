@@ -20,12 +20,13 @@ _SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3, "complianc
 _OF_ANY_JOINT = ("offset", "scale", "compliance")
 """Errors of motion that linear axes have too."""
 _GEAR_SIZE = 2e-4
-"""Of an error of a gear once or twice a turn, in rad."""
+"""Expected size of an error of a gear once or twice a turn, in rad."""
 _MOST_NUMBERS = Limit("ELASTOCAL_MAX_FIT_MB", 150, "MB of derivatives")
 """Thirty thousand positions of two stations and three markers on six axes; a fit takes some times
 as much."""
 _FRAME_SIZE = 1e-2
-"""Of what frames and markers are off by after the first registration, in m and rad."""
+"""Expected size of what frames and markers are off by after the first registration, in m and
+rad."""
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ class ErrorBudget:
     total: ErrorPart
     """Error of the model at left-out poses."""
     noise: ErrorPart
-    """Of the instruments, in a reading."""
+    """Noise of the instruments, in a reading."""
     fit: ErrorPart
     """What another choice of poses would change."""
     rest: ErrorPart

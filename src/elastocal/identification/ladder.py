@@ -67,7 +67,7 @@ class Climbed:
     high: float = 0.0
     """Upper end, in m."""
     standard_error: float = 0.0
-    """Of the difference, in m."""
+    """Standard error of the difference, in m."""
     chosen: bool = False
     counted: BoolArray | None = None
     """Pose blocks whose score decides, shape (block,); none: all. See `poses_in_company`."""

@@ -109,9 +109,9 @@ class Coverage:
     """Measured coverage of both intervals of a prediction."""
 
     measurement: IntervalCoverage
-    """Of the interval of a measurement: x, y and z of each reading at left-out poses."""
+    """Coverage of the interval of a measurement: x, y and z of each reading at left-out poses."""
     fit: IntervalCoverage
-    """Of the interval of the fit, which is one of the true deflection."""
+    """Coverage of the interval of the fit, which is one of the true deflection."""
 
 
 def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArray) -> Coverage:

@@ -93,7 +93,7 @@ class ClockFit:
     drift_sigma: float | None
     """None where no drift was estimated."""
     correlation: float
-    """Of the activities; 1 for the handshake."""
+    """Correlation of the activities; 1 for the handshake."""
     first: float
     """Its first time, by its own clock, in s."""
 

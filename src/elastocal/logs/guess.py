@@ -48,7 +48,7 @@ _SURELY_NEWTONS = 20.0
 _LARGEST_FORCE = 100e3
 """No press is larger, in N: what is has been counted, not converted."""
 _LONGEST_LEVER = 5.0
-"""Of a force about its sensor, in m: a moment beyond is in N mm."""
+"""Longest lever of a force about its sensor, in m: a moment beyond is in N mm."""
 
 
 @brief_repr
@@ -57,7 +57,7 @@ class GuessedColumns:
     """What some columns of a log were taken for, and why."""
 
     key: str
-    """Of the map."""
+    """Key of the map."""
     columns: tuple[str, ...]
     unit: str | None
     """``?`` where a person must say; None for dates and words."""

@@ -70,7 +70,7 @@ class TimeColumn(StrictModel):
 
     column: _ColumnName
     unit: str | None = None
-    """Of plain numbers: s, ms; left out for dates and times of day."""
+    """Unit of plain numbers: s, ms; left out for dates and times of day."""
 
     @model_validator(mode="after")
     def _known_unit(self) -> "TimeColumn":
@@ -156,7 +156,7 @@ class LogEntry(StrictModel):
     log: str
     """Name of the file, or a pattern such as ``tracker_*.txt``; several are joined in time."""
     topic: str | None = None
-    """Of a recording, or sheet of a workbook."""
+    """Topic of a recording, or sheet of a workbook."""
     clock: str = ""
     """Logs with the same word share a clock; by default each file has its own."""
     time: TimeColumn | None = None

@@ -54,7 +54,7 @@ class Plateau:
     """A stretch of time in which everything stood."""
 
     start: float
-    """Of what is averaged, in s by the clock of the joints."""
+    """Start of what is averaged, in s by the clock of the joints."""
     end: float
     pose: int
     """Number of the pose, from 0 in order of time; -1 of none."""

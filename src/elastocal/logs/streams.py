@@ -40,7 +40,7 @@ class LogStreams:
     clock: str
     entry: LogEntry
     time: FloatArray
-    """Of each row, shape (row,), in s of the log's clock; the row's number without one."""
+    """Time of each row, shape (row,), in s of the log's clock; the row's number without one."""
     handshake: tuple[str, ...] | None
     """Word of each row, empty between readings."""
     arm: ArmStream | None

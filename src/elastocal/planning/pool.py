@@ -361,7 +361,7 @@ class PostureSolver:
     """
 
     inverse: InverseKinematics
-    """Of the robot with its tool."""
+    """Inverse kinematics of the robot with its tool."""
     checks: Checks
     """What a posture has to pass."""
     approach: float

@@ -51,7 +51,7 @@ _DIMENSIONS = {
     ("cylinder", "radius"): "length",
     ("cylinder", "length"): "length",
 }
-"""Of those whose size is bounded: limits of joints often hold 1e16 for "none"."""
+"""Attributes of those whose size is bounded: limits of joints often hold 1e16 for "none"."""
 _AXIS_LENGTHS = (1e-6, 1e6)
 """Lengths of a joint's axis: its square must neither vanish nor overflow when it is normed."""
 _MOVABLE = ("revolute", "continuous", "prismatic")

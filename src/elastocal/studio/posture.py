@@ -68,7 +68,7 @@ class SightFigure:
 
     station: str
     position: tuple[float, float, float]
-    """Of the station in base, in m."""
+    """Position of the station in base, in m."""
     text: str
     sees: bool
 

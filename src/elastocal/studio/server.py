@@ -27,7 +27,7 @@ from elastocal.errors import DeviceError, ElastocalError, SchemaError
 from elastocal.records import parse_json
 
 MOST_BYTES = 1_000_000
-"""Of a message to the server."""
+"""Largest size of a message to the server."""
 _CONNECTIONS = 32
 """Answered at a time; for more, those that have not shown the token yet are hung up."""
 _HANGING_UP = 1.0

@@ -130,7 +130,7 @@ class Evidence:
     pool: PoolData | None = None
     journal: tuple[Entry, ...] | None = None
     logs: tuple[Path, ...] = ()
-    """Of imported readings: their map, then the logs; none of those of a run."""
+    """Files of imported readings: their map, then the logs; none of those of a run."""
     dataset: Dataset | None = None
     summary: RunSummary | None = None
     """The summary of the run."""

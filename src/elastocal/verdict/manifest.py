@@ -33,7 +33,7 @@ EMPTY_MANIFEST = f"{_OPENED}{_CLOSED}"
 _FIRST = "elastocal.manifest/1"
 """The schema of manifests that did not state the hash of their own content."""
 _MOST_VALUES = Limit("ELASTOCAL_MAX_MANIFEST_VALUES", 20_000, "values")
-"""Of six thousand files; a report shows some dozens."""
+"""Values of six thousand files; a report shows some dozens."""
 
 
 @record()
@@ -72,7 +72,7 @@ class FoundManifest:
 
     manifest: Manifest
     page_sha256: str
-    """Of all bytes before and behind the manifest, as `Manifest.page_sha256`."""
+    """SHA-256 of all bytes before and behind the manifest, as `Manifest.page_sha256`."""
     signed_sha256: str
     """What a signature must be of: the hash of the manifest without the signature."""
 

@@ -46,7 +46,8 @@ class Signature:
     key: str
     """The public key, 64 hexadecimal digits."""
     signature: str = ""
-    """Of the other entries as JSON, keys sorted and without spaces; 128 hexadecimal digits."""
+    """Signature of the other entries as JSON, keys sorted and without spaces; 128 hexadecimal
+    digits."""
 
     @property
     def signed(self) -> bytes:

@@ -18,7 +18,7 @@ from elastocal.verdict.evidence import Evidence
 from elastocal.wording import Phrase, counted, phrase
 
 COVERAGE_FACTOR = 2.0
-"""Of the uncertainties that the instruments' certificates state."""
+"""Coverage factor of the uncertainties that the instruments' certificates state."""
 _COVERED = 0.9545
 """Probability that k = 2 covers of a normal distribution."""
 
@@ -43,7 +43,7 @@ class UncertaintyStatement:
 
     sources: tuple[UncertaintySource, ...]
     degrees_of_freedom: int
-    """Of the type A evaluation: poses that were left out, less one."""
+    """Degrees of freedom of the type A evaluation: poses that were left out, less one."""
 
     @property
     def standard(self) -> float:

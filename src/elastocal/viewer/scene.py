@@ -281,7 +281,7 @@ class Tags:
     colour: str
     hints: tuple[str, ...]
     normals: FloatArray | None = None
-    """Of poses: out of the surface, shape (tag, 3); a tag on the far side is drawn pale."""
+    """Normals of poses: out of the surface, shape (tag, 3); a tag on the far side is drawn pale."""
 
 
 @brief_repr

@@ -53,9 +53,9 @@ _STOPPING = 0.2
 _SLACK = 2.0
 """Beyond the time that a fade takes, in s, after which a controller that is silent is left."""
 _PRIORITY = 40
-"""Of the loop's thread under SCHED_FIFO: below the kernel's own at 50."""
+"""Priority of the loop's thread under SCHED_FIFO: below the kernel's own at 50."""
 _LISTENING = 30
-"""Of the threads that hear the sensor."""
+"""Priority of the threads that hear the sensor."""
 _SWITCH = 1e-4
 """Time after which another thread of Python lets the loop's pass, in s; 5 ms by default."""
 _LOADED = 20.0

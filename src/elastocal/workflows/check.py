@@ -159,7 +159,7 @@ _UNITS = {
 """SI units of the numbers that files hold, by the key of `CheckResult.holds`."""
 
 _FEW_POSES, _FEW_CANDIDATES = 6, 150
-"""Of a preview: seconds, not minutes."""
+"""Poses and candidates of a preview: seconds, not minutes."""
 _PLAN_PAGE = '<meta name="generator" content="elastocal plan">'
 """Stands in the page of a plan, whatever its language."""
 _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (

@@ -16,7 +16,7 @@ from elastocal.results import Result
 from elastocal.workflows._workflow import workflow
 
 _SEED = 0
-"""Of the forces of production."""
+"""Seed of the forces of production."""
 
 
 @dataclass(frozen=True)

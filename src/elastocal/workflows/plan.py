@@ -97,7 +97,7 @@ class PlanTimes:
 
     travel: float
     total: float
-    """Of the presses, their ways included."""
+    """Time of the presses, their ways included."""
     positions: float | None = None
     """On the ways through the poses in free space; none where there are none."""
 

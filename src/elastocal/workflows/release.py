@@ -75,7 +75,7 @@ class ReleaseFigures:
     distance: float
     """By which the tool was, or would be, retracted."""
     direction: tuple[float, ...]
-    """Of the way, base."""
+    """Direction of the way, base."""
     force_before: float | None
     """Force on the tool beyond its weight; None where none can be trusted."""
     force_after: float | None

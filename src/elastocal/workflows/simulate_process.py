@@ -351,7 +351,7 @@ class SimulateProcessSettings(NewTool):
         float | None,
         Option(read="speed", help="Of --path, '0.1 m/s'; default: its column time[s]."),
     ] = None
-    """Of the tool along `path`, in m/s; by default its column ``time[s]`` says it."""
+    """Speed of the tool along `path`, in m/s; by default its column ``time[s]`` says it."""
     direction: Annotated[str, Option(default="lateral")] = process.LATERAL
     """What the deviation of `path` counts along: ``lateral``, ``normal`` or ``"1,0,0"``."""
     start: str | None = None

@@ -84,7 +84,7 @@ class _PostureSource:
     lever: float = _LEVER
     """The sensor's moment range over its force range, in m."""
     mass: float | None = None
-    """Of the tool by another source than the postures, in kg."""
+    """Mass of the tool by another source than the postures, in kg."""
 
 
 @workflow(ToolSettings, marks=("elastocal.tool/",))

@@ -58,7 +58,8 @@ class ToolResult(Result):
     ladder: tuple[ToolRung, ...] = ()
     """Models that were tried, with what they leave of postures that they had not seen."""
     drift: tuple[float, ...] | None = None
-    """Of the biases from first to last posture, shape (6,), in N and N·m; none: there is none."""
+    """Drift of the biases from first to last posture, shape (6,), in N and N·m; none: there is
+    none."""
     serial_correlation: float | None = None
     set_aside: tuple[PostureSetAside, ...] = ()
     notes: tuple[str, ...] = ()

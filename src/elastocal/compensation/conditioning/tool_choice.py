@@ -38,7 +38,7 @@ _LEAST = 7
 """Postures, from which on there is something to choose or to set aside."""
 _TRIALS = 150
 _SMALL = 1e-9
-"""Of the readings' size: rounding, which is no noise."""
+"""Part of the readings' size: rounding, which is no noise."""
 _CHANCE = 1e-4
 """Probability, over all components, below which a posture's reading is no chance."""
 _MOST_ASIDE = 0.2
@@ -100,7 +100,7 @@ class ToolChoice:
     set_aside: tuple[PostureSetAside, ...]
     ladder: tuple[ToolRung, ...]
     serial_correlation: float
-    """Of neighbouring postures' residuals; NaN with too few postures."""
+    """Correlation of neighbouring postures' residuals; NaN with too few postures."""
     notes: tuple[str, ...]
 
 

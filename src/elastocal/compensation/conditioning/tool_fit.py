@@ -266,7 +266,7 @@ class _WeighedFit:
     """As in `tool_wrenches`; the rotation is 0, about ``R``."""
     R: FloatArray
     weights: FloatArray
-    """Of a force and of a moment component, shape (2,)."""
+    """Weights of a force and of a moment component, shape (2,)."""
 
     def left(self) -> FloatArray:
         """Return what is left of forces and moments, shape (posture, 6)."""

@@ -28,7 +28,7 @@ class LoadedAxis:
     revolute: bool
     direction: Vector
     torque: Value
-    """Of the load about the axis, or force along it."""
+    """Torque of the load about the axis, or force along it."""
     weight: Value
     """Torque of the arm's own weight, likewise; zero where no law asks for it."""
 

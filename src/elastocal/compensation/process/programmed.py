@@ -46,9 +46,9 @@ class PathTiming:
     """How a path file becomes courses in time."""
 
     speed: float | None = None
-    """Of the tool along the path, in m/s; None: the file's column ``time[s]`` says it."""
+    """Speed of the tool along the path, in m/s; None: the file's column ``time[s]`` says it."""
     cycle: float = 0.004
-    """Of the compensator, in s; the time between rows is a multiple of it."""
+    """Cycle of the compensator, in s; the time between rows is a multiple of it."""
     start: FloatArray | None = None
     """Posture before the first row of a path of poses, shape (joint,), in rad or m."""
 

@@ -14,7 +14,7 @@ from elastocal.records import record
 from elastocal.results import brief_repr
 
 _TAIL = 0.975
-"""Of a two-sided interval of 95 %."""
+"""Quantile at the upper end of a two-sided interval of 95 %."""
 
 
 @record()
@@ -140,7 +140,7 @@ class PostureGain:
     softest_programmed: float
     """The same in the programmed posture."""
     lines: tuple[DeviationComparison, ...]
-    """Of the programmed posture, one a seed, as those of the table."""
+    """Deviations of the programmed posture, one a seed, as those of the table."""
     spatial: tuple[DeviationComparison, ...]
     """The same of the 3-D deviation."""
 

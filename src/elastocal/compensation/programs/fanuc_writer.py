@@ -29,7 +29,7 @@ from elastocal.robot.inverse import arm_axes
 
 _TP_WORDS = "ABORT CALL END GOTO IF JMP LBL OFF ON PAUSE RUN SELECT SKIP WAIT"
 _LONGEST_COMMENT = 16
-"""Of a position, in characters."""
+"""Longest comment of a position, in characters."""
 _ATTRIBUTES = """OWNER		= MNEDITOR;
 COMMENT		= "elastocal";
 PROG_SIZE	= 0;

@@ -38,7 +38,7 @@ class PathProgram:
     writer: ProgramWriter
     name: str
     speed: float = LIN_SPEED
-    """Of the tool along the path, in m/s."""
+    """Speed of the tool along the path, in m/s."""
     _moves: list[StraightMove] = field(default_factory=list)
 
     def __post_init__(self) -> None:

@@ -148,7 +148,7 @@ class ProgramWriter(ABC):
     title: ClassVar[str]
     """As a person does."""
     suffixes: ClassVar[tuple[str, ...]]
-    """Of the files of a program, the main one first."""
+    """Suffixes of the files of a program, the main one first."""
     longest_name: ClassVar[int]
     reserved: ClassVar[frozenset[str]]
     """Words in capitals that cannot name a program."""
@@ -157,7 +157,7 @@ class ProgramWriter(ABC):
     comment: ClassVar[str]
     """What stands before each line of a comment."""
     width: ClassVar[int]
-    """Of a comment, in characters."""
+    """Width of a comment, in characters."""
     words: ClassVar[ProgramWords]
     axis_names: ClassVar[tuple[str, str]]
     """Beginnings of the names of the arm's and of the external axes."""

@@ -113,7 +113,7 @@ class EmsconSettings(DeviceSettings):
     """Keys beside ``driver: emscon``."""
 
     address: str = LOOPBACK
-    """Of the controller of the only station."""
+    """Address of the controller of the only station."""
     port: _Port = _PORT
     stations: dict[Name, EmsconStation] = Field(default_factory=dict)
     """A controller for each station of the cell, where there are several."""
@@ -122,7 +122,7 @@ class EmsconSettings(DeviceSettings):
     reflector: str | None = None
     """Name of the corner cube as the tracker knows it; by default the one that is set."""
     point: Point = (0.0, 0.0, 0.0)
-    """Of a 6D probe: the point that counts, in the probe's own frame, in m."""
+    """Point of a 6D probe: the point that counts, in the probe's own frame, in m."""
     rate: SampleRate = 100.0
     """Points a second."""
     initialize: bool = True

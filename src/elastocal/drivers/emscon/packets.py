@@ -124,7 +124,7 @@ class MeasuredPoints:
     """Points of a continuous measurement."""
 
     status: int
-    """Of the packet."""
+    """Status of the packet."""
     temperature: float
     """In °C."""
     pressure: float
@@ -140,9 +140,9 @@ class MeasuredPoints:
     sigma: FloatArray
     """Shape (point, 3), in m; NaN where the mode states none."""
     quaternion: FloatArray | None
-    """Of a 6D probe, scalar first, shape (point, 4)."""
+    """Orientations of a 6D probe, scalar first, shape (point, 4)."""
     rotation_status: IndexArray | None
-    """Of a 6D probe, bits, shape (point,)."""
+    """Rotation status of a 6D probe, bits, shape (point,)."""
 
 
 Packet = Answer | Complaint | StatusChange | MeasuredPoints

@@ -49,7 +49,7 @@ class DelayEstimate:
 
     @property
     def delay(self) -> float:
-        """Of slow movements, in s."""
+        """Delay of slow movements, in s."""
         return self.dead_time + self.lag
 
 
@@ -69,11 +69,11 @@ class CommissioningRecord:
     delay: float
     """From command to motion, the largest of the chirps, in s."""
     amplitude: float
-    """Of the chirps, in m."""
+    """Amplitude of the chirps, in m."""
     chirps: tuple[DelayEstimate, ...]
     """One along each axis of base."""
     link: LinkStatistics
-    """Of the line meanwhile."""
+    """Statistics of the line meanwhile."""
 
     def __post_init__(self) -> None:
         # The gain of force control follows from it: of a delay below 0 the arm would push harder.

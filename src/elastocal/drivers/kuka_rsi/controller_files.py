@@ -77,7 +77,7 @@ class DrawnObject:
 
     @property
     def height(self) -> float:
-        """Of the box."""
+        """Height of the box."""
         longest = max(sum(p.way == way for p in self.ports) for way in ("In", "Out"))
         return max(self._list_height + 0.61, 0.475 + _PORT_STEP * (longest - 1))
 
@@ -111,12 +111,12 @@ class Drawing:
 
     @property
     def width(self) -> str:
-        """Of the page."""
+        """Width of the page."""
         return f"{max(box.left for box in self.boxes) + _WIDTH + _EDGE:g}"
 
     @property
     def height(self) -> str:
-        """Of the page."""
+        """Height of the page."""
         return f"{max(box.top + box.height for box in self.boxes) + _EDGE:g}"
 
     @classmethod
@@ -175,7 +175,7 @@ PROGRAMS = {"measure": "elcal_meas", "contact": "elcal_run", "compensation": "el
 """Name of program, RSI context and ETHERNET file of each mode."""
 SHEET = "SIGN-OFF.md"
 LONGEST_NAME = 24
-"""Of a file on the controller, with its suffix; not verified on one."""
+"""Longest name of a file on the controller, with its suffix; not verified on one."""
 FORMS = {"rsi": ("rsi", "rsi.xml", "rsi.diagram"), "rsix": ("rsix",)}
 """Suffixes of the files that make one RSI context, by the setting ``rsi_context``."""
 

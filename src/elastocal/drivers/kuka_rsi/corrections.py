@@ -292,8 +292,8 @@ class PathCorrections:
     cycle: float
     sentype: str = "elastocal"
     timeout: int = 10
-    """Of the controller's ETHERNET object: whoever was silent for more cycles may have stopped, and
-    begin anew without correction."""
+    """Timeout of the controller's ETHERNET object: whoever was silent for more cycles may have
+    stopped, and begin anew without correction."""
     delay: float = LATE_DELAY
     """From a correction to its motion, at most, in s."""
     clamped: int = 0

@@ -69,7 +69,7 @@ class ContextPort:
     """Input or output of an object of the RSI context."""
 
     kind: str
-    """Of the object: ``POSCORR``."""
+    """Kind of the object: ``POSCORR``."""
     port: str
     variable: int | None = None
     """Index of the KRL variable that the object reads or writes; such an object is for it alone."""
@@ -89,10 +89,10 @@ class EthernetChannel:
     kind: str
     """``BOOL``, ``LONG`` or ``DOUBLE``."""
     number: int
-    """Of the output (received) or input (sent) of the ETHERNET object, from 1."""
+    """Number of the output (received) or input (sent) of the ETHERNET object, from 1."""
     wired_to: ContextPort
     hold_on: int | None = None
-    """Of a received channel."""
+    """HoldOn of a received channel."""
 
 
 @brief_repr
@@ -102,7 +102,7 @@ class EthernetFile:
 
     mode: str
     address: str
-    """Of the PC."""
+    """Address of the PC."""
     port: int
     sentype: str
     own: tuple[str, ...]

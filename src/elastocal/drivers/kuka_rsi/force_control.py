@@ -45,11 +45,11 @@ class ForceLaw:
     gain: float
     """In m/s per N."""
     delay: float
-    """Of the whole loop, in s."""
+    """Delay of the whole loop, in s."""
     largest_speed: float
     """In m/s."""
     stiffness: float
-    """Of the stiffest contact that is expected, in N/m."""
+    """Stiffness of the stiffest contact that is expected, in N/m."""
 
     @classmethod
     def design(

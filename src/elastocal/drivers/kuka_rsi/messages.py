@@ -115,7 +115,7 @@ class MoveTarget:
     """Axis positions of a ``PTP``."""
 
     number: int
-    """Of the command."""
+    """Number of the command."""
     axes: Six = NO_CORRECTION
     """A1 to A6, in deg."""
     external: Six = NO_CORRECTION

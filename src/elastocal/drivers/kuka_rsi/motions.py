@@ -165,7 +165,7 @@ class ContactGuard:
 
     reader: ForceReader
     direction: FloatArray | None
-    """Of the move, base, shape (3,); None: a force in any direction ends it."""
+    """Direction of the move, base, shape (3,); None: a force in any direction ends it."""
     contact_force: float
     """In N; infinite: never."""
     force_limit: float

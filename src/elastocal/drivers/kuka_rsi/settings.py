@@ -122,11 +122,11 @@ class RsiSettings(DeviceSettings):
     correction_speed: Annotated[PositiveSpeed, Field(le=FASTEST)] = 0.05
     """Fastest correction, in m/s."""
     acceleration: Annotated[float, Field(gt=0.0, le=5.0)] = 0.5
-    """Of straight moves, in m/s²."""
+    """Acceleration of straight moves, in m/s²."""
     ptp_percent: Annotated[int, Field(ge=1, le=30)] = 10
     """Fastest ``PTP``, in percent of the axis speeds; the controller's program holds it too."""
     contact_stiffness: TranslationalStiffness = 2e6
-    """Of arm, tool and tooling in series, at most, in N/m."""
+    """Stiffness of arm, tool and tooling in series, at most, in N/m."""
     force_speed: Annotated[PositiveSpeed, Field(le=0.02)] = 0.005
     """Fastest movement in force control, in m/s."""
     collision_force: PositiveForce = 100.0

@@ -78,7 +78,7 @@ class Column:
 
     name: str
     unit: str | None
-    """Of time and lengths."""
+    """Unit of time and lengths."""
 
     @property
     def scale(self) -> float:
@@ -336,19 +336,19 @@ class LineStreamSettings(DeviceSettings):
     role: Literal["client", "server"] = "client"
     """Whether we connect to the adapter, or it connects to us."""
     address: str = LOOPBACK
-    """Of the adapter; as server, the one that we bind to."""
+    """Address of the adapter; as server, the one that we bind to."""
     port: _Port = 0
-    """Of the one line that all stations share."""
+    """Port of the one line that all stations share."""
     peer: str = LOOPBACK
     """As server: the only address that may connect."""
     stations: dict[Name, StationLine] = Field(default_factory=dict)
     """A line for each station, in place of ``port``."""
     columns: tuple[str, ...] = ()
-    """Of a stream without a header: ``[t[s], x[mm], y[mm], z[mm]]``."""
+    """Columns of a stream without a header: ``[t[s], x[mm], y[mm], z[mm]]``."""
     rate: SampleRate = 100.0
     """Points a second."""
     point: Point = (0.0, 0.0, 0.0)
-    """Of a 6D marker: the point that counts, in the marker's own frame, in m."""
+    """Point of a 6D marker: the point that counts, in the marker's own frame, in m."""
     silence: PositiveTime = 0.2
     """Without a line for longer the beam counts as broken, in s."""
     patience: PositiveTime = 10.0

@@ -335,7 +335,7 @@ class NetFtSettings(DeviceSettings):
     """What stands under a sensor whose driver is ``net_ft``."""
 
     address: str = LOOPBACK
-    """Of the box; ATI ships 192.168.1.1."""
+    """Address of the box; ATI ships 192.168.1.1."""
     port: _Port = 49152
     """UDP, RDT."""
     http_port: _Port = 80

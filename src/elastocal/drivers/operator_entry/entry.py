@@ -41,7 +41,7 @@ class OperatorEntrySettings(DeviceSettings):
     """Keys beside ``driver: operator_entry``."""
 
     unit: Literal["mm", "m", "in"] = "mm"
-    """Of what is typed."""
+    """Unit of what is typed."""
     sigma: PositiveLength = 30e-6
     """Standard deviation of a reading, in m."""
     file: str | None = None

@@ -85,7 +85,7 @@ def frame_along(direction: FloatArray, origin: FloatArray) -> FloatArray:
 
 _SOURCE = "rtde"
 _CYCLE = 0.01
-"""Of the thread, in s of the wall."""
+"""Cycle of the thread, in s of the wall."""
 _TOOL_ACCELERATION = 0.5
 """In m/s²."""
 _STOP = 2.0
@@ -435,7 +435,7 @@ class UrArm:
 _PORT = 30004
 """By which a controller is known, of those that it answers at."""
 _CONTROL_RATE = 500.0
-"""Of the commanding half, in Hz; controllers of version 5 take it."""
+"""Rate of the commanding half, in Hz; controllers of version 5 take it."""
 _FAR_OFF = 0.02
 """How far the controller's tcp may be from the model's, in m: nominal against calibrated arms."""
 
@@ -444,7 +444,7 @@ class RtdeSettings(DeviceSettings):
     """What stands under an arm or a sensor whose driver is ``rtde``."""
 
     address: str = LOOPBACK
-    """Of the controller, which has its ports fixed: 30004, 30003, 29999."""
+    """Address of the controller, which has its ports fixed: 30004, 30003, 29999."""
     rate: Annotated[FiniteFloat, Field(ge=10.0, le=500.0)] = 125.0
     """Samples a second."""
 

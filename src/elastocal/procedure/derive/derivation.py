@@ -487,7 +487,7 @@ class CommittedRun:
 
     folder: RunFolder
     entries: tuple[Entry, ...]
-    """Of the journal."""
+    """Entries of the journal."""
     record: RunRecord
     """Its first entry."""
     cell: Cell

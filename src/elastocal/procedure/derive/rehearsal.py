@@ -20,9 +20,9 @@ from elastocal.procedure.record import PoseLog, ReadingStatus, RunFolder, RunRec
 from elastocal.records import netcdf_image
 
 _COMPLIANCE = 1e-6
-"""Of the made-up arm, in m/N."""
+"""Compliance of the made-up arm, in m/N."""
 _SIGMA = 1e-5
-"""Of its made-up readings, in their units."""
+"""Standard deviation of its made-up readings, in their units."""
 
 
 def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record: RunRecord) -> None:

@@ -235,7 +235,7 @@ class RunSummary(Result):
     """What was counted on the lines of the devices, all sessions together; none of simulated ones,
     and of runs before it was."""
     dataset_sha256: str = ""
-    """Of the file ``dataset.nc`` that it was written with; empty before it was."""
+    """SHA-256 of the file ``dataset.nc`` that it was written with; empty before it was."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what a person wants to know first."""

@@ -401,7 +401,7 @@ _BAD_JSON = (ValueError, TypeError, LookupError, AttributeError, OverflowError, 
 """What JSON of another shape, of other types, of endless numbers or brackets raises."""
 
 _MOST_VALUES = Limit("ELASTOCAL_MAX_STREAM_VALUES", 20_000_000, "values")
-"""Of a topic; ten times as many as of a document: an hour of a pose takes 3 million."""
+"""Values of a topic; ten times as many as of a document: an hour of a pose takes 3 million."""
 
 _Stream = TypeVar("_Stream")
 

@@ -154,7 +154,7 @@ _MOST_STEPS = 20
 _ARRIVED = 1e-12
 """Step in rad and m below which Gauss-Newton has arrived."""
 _BOUNDS = [(math.log(1e-9), math.log(1e-2)), (math.log(0.05), math.log(20.0))]
-"""Of the two logarithms; weights need a scatter above zero."""
+"""Bounds of the two logarithms; weights need a scatter above zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ class Fit:
     errors: FloatArray
     """Robot errors, over those that are thought likely, shape (error,)."""
     scatter: float
-    """Of a coordinate, tracker noise taken out, in m."""
+    """Scatter of a coordinate, tracker noise taken out, in m."""
     size: float
     """Standard deviation of the robot errors, over those thought likely."""
     weight: FloatArray

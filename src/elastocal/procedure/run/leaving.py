@@ -29,11 +29,11 @@ class ToolLoad:
     """How to tell what presses on the tool from its weight."""
 
     weight_base: FloatArray
-    """Of the tool, base, shape (3,), in N; zero where nobody has stated a mass."""
+    """Weight of the tool, base, shape (3,), in N; zero where nobody has stated a mass."""
     R_tcp_sensor: FloatArray
     """Axes of the sensor in the tcp frame, shape (3, 3)."""
     force_limit: float
-    """Of the procedure, in N."""
+    """Force limit of the procedure, in N."""
 
     @property
     def tolerance(self) -> float:

@@ -135,7 +135,7 @@ class EthernetConfig:
     """The config file of an ETHERNET object."""
 
     address: str
-    """Of the PC."""
+    """Address of the PC."""
     port: int
     sentype: str
     only_send: bool

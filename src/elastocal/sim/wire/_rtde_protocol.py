@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from elastocal.errors import DeviceError
 
 VERSIONS = (1, 2)
-"""Of the protocol; a client that asks for none is spoken to in the first."""
+"""Versions of the protocol; a client that asks for none is spoken to in the first."""
 _HEADER = struct.Struct(">HB")
 _LARGEST = 1 << 16
 """Bytes of one client that wait to be understood, at most."""

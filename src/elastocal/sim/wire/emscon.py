@@ -74,7 +74,7 @@ class EmsconServer(TcpServer):
         self.refusal = 0
         """Status that the next StartMeasurement is answered with."""
         self.quality = 0
-        """Of every point: 1 fast, 2 too fast, 3 prism error."""
+        """Quality of every point: 1 fast, 2 too fast, 3 prism error."""
         self.weather = (20.0, 1013.0, 50.0)
         """Temperature in °C, pressure in mbar, humidity in %."""
         self.units_stay = False

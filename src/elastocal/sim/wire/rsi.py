@@ -711,7 +711,7 @@ def rsi_server(live: LiveCell, told: Told, context: RsiContext | None = None) ->
 
 
 _PATIENCE = 0.1
-"""Of a controller that `elastocal simulate` starts, in s."""
+"""Patience of a controller that `elastocal simulate` starts, in s."""
 _CONTEXTS = {
     "measure": RsiContext(),
     "contact": RsiContext(),

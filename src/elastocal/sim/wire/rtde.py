@@ -67,9 +67,9 @@ _ROBOT_RUNNING, _SAFETY_NORMAL, _PROTECTIVE_STOP = 7, 1, 3
 _PROGRAM_STOPPED, _PROGRAM_PLAYING = 1, 2
 _SETTINGS = ("set_tcp", "set_payload", "set_payload_cog", "set_gravity")
 _LINES = ("movej", "stopj", "stopl", "textmsg", *_SETTINGS)
-"""Of URScript, what is carried out as a single line."""
+"""Commands of URScript, what is carried out as a single line."""
 _LINE_SPEED = 1.05
-"""Of ``movej`` without one, in rad/s."""
+"""Speed of ``movej`` without one, in rad/s."""
 
 
 @dataclass
@@ -501,12 +501,13 @@ PORTS = {
 """Those of a controller, which its clients take for granted."""
 _MOST_RATE, _LEAST_RATE = 500.0, 1.0
 _RATE = 125.0
-"""Of outputs in version 1 of RTDE, in Hz; the least that clients of version 2 take for granted."""
+"""Rate of outputs in version 1 of RTDE, in Hz; the least that clients of version 2 take for
+granted."""
 _MOST_CLIENTS = 8
 _CYCLE = 0.002
-"""Of the controller, in s of the wall."""
+"""Cycle of the controller, in s of the wall."""
 _STATE_CYCLE = 0.1
-"""Of the primary and secondary port, in s of the wall."""
+"""Cycle of the primary and secondary port, in s of the wall."""
 _LISTEN = 0.05
 _MOST_SCRIPT = 1 << 20
 _QUIET = 0.05
@@ -535,7 +536,7 @@ class RtdeServer:
             raise DeviceError(f"RTDE knows six joints, {robot.name} has {len(robot.joint_names)}")
         self.robot = UrRobot(live)
         self._lock = threading.RLock()
-        """Of the robot: clients and its program come in threads of their own."""
+        """Lock of the robot: clients and its program come in threads of their own."""
         self._closed = threading.Event()
         self._lines = {name: bound(socket.SOCK_STREAM, ports[name], address) for name in PORTS}
         serve = {

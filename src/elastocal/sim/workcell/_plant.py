@@ -52,7 +52,7 @@ class FaultSpan:
     station: str | None
     """Tracker station; None: all."""
     force: float = 0.0
-    """Of a soft collision, in N."""
+    """Force of a soft collision, in N."""
 
     def holds(self, now: int) -> bool:
         """Return whether a time in µs lies in it."""

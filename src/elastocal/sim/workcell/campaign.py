@@ -84,7 +84,7 @@ class CampaignSimulator:
     offset: FloatArray
     """How far the tooling stands from where the cell file puts it, shape (3,), in m."""
     hysteresis: tuple[float, FloatArray]
-    """Of the force sensor, and its ranges (6,) in N and N·m; see `SensorHysteresis`."""
+    """Hysteresis of the force sensor, and its ranges (6,) in N and N·m; see `SensorHysteresis`."""
 
     def __repr__(self) -> str:
         return f"CampaignSimulator({self.statics.robot.linkage.name!r}, {self.springs} springs)"
