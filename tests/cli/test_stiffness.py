@@ -12,6 +12,7 @@ from elastocal.robot import Robot
 from elastocal.workflows._inputs import require_same_robot
 from support.cells import robot
 from support.cli import elastocal
+from support.geared import SLIPS, geared
 from support.paths import (
     calibrated,
     dome_course,
@@ -157,3 +158,13 @@ def test_a_cell_of_another_robot_is_refused():
     other = Robot.from_urdf(opw_arm_urdf(**KR_LIKE), "tcp")
     with pytest.raises(RobotError, match="mm apart"):
         require_same_robot(robot(), other, names)
+
+
+def test_a_model_with_friction_says_at_which_loads_the_stiffness_holds(folder):
+    write_model(folder / "geared.json", geared())
+    asked = (folder / "path.csv", "--start", start_text(), "--spins", 4, "--stations", 3)
+    found = elastocal("stiffness", folder / "geared.json", *asked, "--out", folder / "geared")
+    assert found.code == 0, found.err
+    words = " ".join(found.err.split())
+    assert f"well over {max(SLIPS):.0f} N·m in a joint" in words
+    assert "friction" not in run(folder, "plain").err

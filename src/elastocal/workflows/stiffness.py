@@ -269,7 +269,7 @@ def _surveyed(
         files=_FILES if folder is not None else (),
         tool=calibrated.tool_name,
     )
-    notes = (*_notes(summary, choice), *coverage_notes(calibrated))
+    notes = (*_notes(summary, choice), *_friction(calibrated), *coverage_notes(calibrated))
     result = StiffnessResult(
         summary, stations, direction, survey, choice, notes, robot.name, curves
     )
@@ -351,6 +351,18 @@ def _chosen(robot: Robot, curve: Curve, postures: PathPostures) -> ChosenStiffne
         spin=only(curve.spin),
         stand=only(curve.rail),
         posture_jumps=len(posture_jumps(robot, q, q[0])) if len(q) else 0,
+    )
+
+
+def _friction(calibrated: CalibratedModel) -> tuple[str, ...]:
+    """Return at which loads the stiffness holds, where a model has friction."""
+    friction = calibrated.model.friction
+    if not len(friction):
+        return ()
+    return (
+        "the stiffness is that with all friction in the gears sliding: it holds for changes of load"
+        f" of well over {friction.limit.max():.0f} N·m in a joint; to smaller ones, such as"
+        " vibrations, the arm is stiffer",
     )
 
 
