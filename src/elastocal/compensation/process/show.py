@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from elastocal.blocks import Block, Bullets, Facts, Paragraph, Row, Table
 from elastocal.compensation.process.result import SimulateProcessResult
 from elastocal.compensation.process.statistics import (
+    DeviationComparison,
     DeviationStatistics,
     SeedMean,
     SeedMeans,
@@ -103,34 +104,23 @@ def show_notes(found: SimulateProcessResult) -> Bullets:
 
 def _deviation_table(table: SimulateProcessResult, paper: PublishedCase | None) -> Table:
     """Return before, after and reduction of every line, and those of the paper."""
-    rows = list[Row]()
     deviation = _DEVIATIONS.get(
         table.process, phrase("Absolute deviation, {direction}", direction=table.direction)
     )
     spatial = phrase("3-D deviation")
-    named = [(deviation, line.name, line) for line in table.lines]
-    named += [(spatial, line.name, line) for line in table.spatial[-1:]]
+    own = [(deviation, line.name, line) for line in table.lines]
+    others = [(spatial, line.name, line) for line in table.spatial[-1:]]
     for each in table.loads:
         text = phrase(
             "at {load} of the load, {name}", load=f"{each.load:g}", name=each.lines[-1].name
         )
-        named += [(deviation, text, each.lines[-1]), (spatial, text, each.spatial[-1])]
+        others += [(deviation, text, each.lines[-1]), (spatial, text, each.spatial[-1])]
     if table.posture is not None:
         text = phrase("in the programmed posture")
-        named += [(deviation, text, table.posture.lines[-1])]
-        named += [(spatial, text, table.posture.spatial[-1])]
-    for what, name, line in named:
-        title = phrase(
-            "{what}, {name} ({points} points), without correction in mm",
-            what=what,
-            name=name,
-            points=line.points,
-        )
-        rows += [
-            (title, *_mm(line.before)),
-            (phrase("With correction in mm"), *_mm(line.after)),
-            (phrase("Reduction"), *(f"{share:.2%}" for share in _three(line.reduction))),
-        ]
+        others += [(deviation, text, table.posture.lines[-1])]
+        others += [(spatial, text, table.posture.spatial[-1])]
+    # The paper's rows are of the same component and load as those above them.
+    rows = [row for line in own for row in _rows(*line)]
     if paper is not None:
         rows += [
             (
@@ -140,7 +130,23 @@ def _deviation_table(table: SimulateProcessResult, paper: PublishedCase | None) 
             (phrase("Paper, with correction in mm"), *(f"{value:.3f}" for value in paper.after)),
             (phrase("Paper, reduction"), *(f"{share:.2%}" for share in paper.reduction)),
         ]
+    rows += [row for line in others for row in _rows(*line)]
     return Table(_title(paper), _HEADS, tuple(rows))
+
+
+def _rows(what: Phrase, name: str, line: DeviationComparison) -> tuple[Row, ...]:
+    """Return a line of the table as three rows: before, after, reduction."""
+    title = phrase(
+        "{what}, {name} ({points} points), without correction in mm",
+        what=what,
+        name=name,
+        points=line.points,
+    )
+    return (
+        (title, *_mm(line.before)),
+        (phrase("With correction in mm"), *_mm(line.after)),
+        (phrase("Reduction"), *(f"{share:.2%}" for share in _three(line.reduction))),
+    )
 
 
 def _title(paper: PublishedCase | None) -> Phrase:
