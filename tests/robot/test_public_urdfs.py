@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import FileAccessError, RobotError
-from elastocal.robot import Robot, collision_model, find_meshes, tip_links
+from elastocal.robot import Robot, collision_model, find_meshes, tip_links, tool_link
 from elastocal.robot.inverse import inverse_for, joints_along_path
 from elastocal.robot.urdf import parse_urdf
 from elastocal.workflows import check
@@ -501,3 +501,57 @@ def test_three_thousand_leaves_are_checked_once(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(Shape(extra=leaves).text())
     assert len(check(path).holds["tips"]) == 3001
+
+
+def with_branches(text, at, *branches):
+    """Return a URDF with chains behind a link, each of some kinds of joints."""
+    made = ""
+    for number, kinds in enumerate(branches):
+        parent = at
+        for k, kind in enumerate(kinds):
+            name, mimics = f"more_{number}_{k}", kind == "mimic"
+            made += (
+                f'<link name="{name}"/><joint name="{name}_joint"'
+                f' type="{"prismatic" if mimics else kind}"><parent link="{parent}"/>'
+                f'<child link="{name}"/><axis xyz="0 1 0"/>'
+                '<limit lower="0" upper="0.04" velocity="1" effort="10"/>'
+                f"{'<mimic joint=' + repr('more_0_0_joint') + '/>' if mimics else ''}</joint>"
+            )
+            parent = name
+    return text.replace("</robot>", f"{made}</robot>")
+
+
+class TestAGripper:
+    shape = SHAPES["flange and tool0 twins"]
+
+    @pytest.mark.parametrize(
+        "fingers",
+        [
+            (["prismatic"], ["mimic"]),
+            (["prismatic", "fixed"], ["prismatic", "fixed"]),
+            (["revolute", "revolute", "fixed"], ["revolute", "mimic"], ["revolute", "mimic"]),
+        ],
+    )
+    def test_the_hand_and_not_a_finger_is_the_tip(self, fingers):
+        text = with_branches(self.shape.text(), "tool0", *fingers)
+        assert tip_links(parse_urdf(text)) == tip_links(parse_urdf(self.shape.text()))
+        joints = [f"joint_{n + 1}" for n in range(len(self.shape.arm.axes))]
+        robot = Robot.from_urdf(text, tool_link(text))
+        assert len(robot.joint_names) == len(joints)
+        assert robot.external_axes == self.shape.external
+
+    def test_the_arms_of_a_torso_are_no_fingers(self):
+        arm = ["revolute"] * 5
+        text = with_branches(self.shape.text(), "tool0", arm, arm)
+        assert {"more_0_4", "more_1_4"} <= tip_links(parse_urdf(text)).keys()
+
+    def test_a_single_sliding_joint_is_an_axis(self):
+        text = with_branches(self.shape.text(), "tool0", ["prismatic"])
+        assert "more_0_0" in tip_links(parse_urdf(text))
+
+
+def test_an_srdf_is_refused_as_what_it_is(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text('<robot name="r"><group name="arm"><joint name="a"/></group></robot>')
+    with pytest.raises(RobotError, match=r"^.*arm\.urdf: this is an SRDF, which groups"):
+        check(path)

@@ -18,7 +18,7 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -240,6 +240,8 @@ def limits_of(joint: ElementTree.Element) -> dict[str, float]:
 _ENCODING = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([\w.-]+)")
 _BEFORE_ROOT = re.compile(r"\A(?:\ufeff|\s|<!--.*?-->)*(?:<\?xml\b.*?\?>)?", re.S)
 """What authors put before the XML declaration, where XML allows nothing; and the declaration."""
+_FEWEST_OF_AN_ARM, _MOST_OF_A_FINGER = 3, 4
+"""Joints before a gripper, and of one of its fingers."""
 _TOOL_LINKS = ("flange", "tool0", "tool_0")
 """Links that carry the tool in URDFs as they are published."""
 _NO_INERTIA = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
@@ -331,6 +333,10 @@ def parse_urdf(text: str, comments: bool = False) -> ElementTree.Element:
         if "<xacro:" in text:
             raise RobotError(_XACRO) from error
         raise RobotError(f"URDF is not valid XML: {error}") from error
+    if root.find("link") is None and root.find("group") is not None:
+        raise RobotError(
+            "this is an SRDF, which groups the joints of a robot: give the URDF that it is of"
+        )
     namespace = root.tag.removesuffix("robot")
     if namespace not in ("", f"{{{namespace[1:-1]}}}"):
         raise RobotError(f"URDF root element is <{root.tag}>, not <robot>")
@@ -397,6 +403,8 @@ def leaf_links(root: ElementTree.Element) -> list[str]:
 def tip_links(root: ElementTree.Element) -> dict[str, int]:
     """Return the candidates for a tool centre point: leaf links that a serial chain moves.
 
+    In place of a gripper's fingers the link that carries them counts.
+
     Returns
     -------
     dict of int
@@ -419,10 +427,62 @@ def tip_links(root: ElementTree.Element) -> dict[str, int]:
                 moved[link] = before + is_movable(joint)
         except RobotError as error:
             refusal = error
+    fingers = _fingers(root, moved)
     tips = {leaf: moved[leaf] for leaf in leaf_links(root) if moved.get(leaf)}
+    tips = {fingers.get(leaf, leaf): moved[fingers.get(leaf, leaf)] for leaf in tips}
     if not tips:
         raise refusal
     return tips
+
+
+def _fingers(root: ElementTree.Element, moved: Mapping[str, int]) -> dict[str, str]:
+    """Return the links of grippers' fingers, each with the link that carries its fingers.
+
+    That is one at the end of an arm from which two or more chains go on, of as many joints each,
+    and few. The arms of a torso have more; a wrist beside which something turns ends in a link of a
+    name that tools are mounted on, or has another number of joints.
+
+    Parameters
+    ----------
+    root : Element
+        The robot.
+    moved : mapping of str to int
+        Number of joints of the chain to each link that a chain moves.
+    """
+    joint_to, downward = joints_by_child(root), _links_downward(root)
+    # Movable joints behind each link, and the chains that go on from it.
+    behind = dict.fromkeys(downward, 0)
+    branches: dict[str, list[str]] = {link: [] for link in downward}
+    for link in reversed(downward[1:]):
+        own = behind[link] + (joint_to[link].get("type") != "fixed")
+        parent = link_of(joint_to[link], "parent")
+        behind[parent] += own
+        if own:
+            branches[parent].append(link)
+    # Links with a tool's link behind them, by its name.
+    named = set[str]()
+    for link in filter(set(_TOOL_LINKS).__contains__, downward):
+        above: str | None = link
+        while above is not None:
+            named.add(above)
+            above = link_of(joint_to[above], "parent") if above in joint_to else None
+    hands = {
+        link
+        for link, inner in branches.items()
+        if len(inner) > 1
+        and len({behind[each] for each in inner}) == 1
+        and behind[inner[0]] < _MOST_OF_A_FINGER
+        and moved.get(link, 0) >= _FEWEST_OF_AN_ARM
+        and not named & set(inner)
+    }
+    hand_of: dict[str, str] = {}
+    for link in downward[1:]:
+        parent = link_of(joint_to[link], "parent")
+        if parent in hand_of:
+            hand_of[link] = hand_of[parent]
+        elif parent in hands and link in branches[parent]:
+            hand_of[link] = parent
+    return hand_of
 
 
 def tool_link(text: str) -> str:

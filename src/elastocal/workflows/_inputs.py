@@ -49,8 +49,9 @@ from elastocal.wording import listed
 
 _LONGEST_TOOL = 10.0
 """In m: no tool of a robot is longer; what is, was meant in mm."""
-ROBOT_SUFFIXES = (".urdf", ".xml", ".xacro")
-"""Names of robot descriptions; a template of xacro is refused with the command that expands it."""
+ROBOT_SUFFIXES = (".urdf", ".xml", ".xacro", ".srdf")
+"""Names of robot descriptions; a template of xacro is refused with the command that expands it, an
+SRDF as what it is."""
 _TOOL_LINK = "tcp"
 """Name of the link that a tool given by numbers gets."""
 _NOT_COVERED = (
