@@ -156,7 +156,7 @@ def needed_schema(labels: Labels, arrays: Arrays, attributes: Mapping[str, objec
 
 
 def _news(names: Collection[str], attributes: Mapping[str, object]) -> list[str]:
-    """Return what is new in the second schema among variables, coordinates and attributes."""
+    """Return the variables, coordinates and attributes that only a later schema has."""
     late = [each.name for each in (*VARIABLES, *INTEGERS) if each.schema != SCHEMA]
     news = [f"variable {name!r}" for name in late if name in names]
     news += ["coordinate 'campaign'"] if "campaign" in names else []

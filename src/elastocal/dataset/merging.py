@@ -203,7 +203,7 @@ def usable_readings(
 
 
 def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | None:
-    """Return what pressed on the arm without a usable reading, as far as it is known."""
+    """Return the known presses on the arm that gave no usable reading; None: there are none."""
     known = np.isfinite(dataset.joint_position).all(axis=2) & np.isfinite(dataset.force).all(axis=2)
     if dataset.moment is not None:
         known &= np.isfinite(dataset.moment).all(axis=2)

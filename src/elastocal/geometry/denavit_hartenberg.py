@@ -49,7 +49,7 @@ class LinkNumber:
     calibrated: float
     low: float | None
     """Lower end of the 95 % interval of ``calibrated``; none where it is as drawn by convention, or
-    is not told by the positions."""
+    is not determined by the positions."""
     high: float | None
 
 

@@ -44,7 +44,7 @@ MOVED = Kind(
 
 
 def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[Finding, ...]:
-    """Return what a person should know of positions, a sentence each."""
+    """Return the findings about the positions of a fit."""
     notes = [] if problem.robot.has_masses else [NO_MASSES(name=problem.robot.name)]
     return (*notes, *_swapped_markers(problem, fit), *_moved_stations(problem, fit))
 

@@ -316,7 +316,7 @@ fewer."""
 _TRIED = 6
 """Mistakes whose undoing is fitted, the likeliest by the arm as drawn first."""
 _TIE = 1.5
-"""Two mistakes whose undoing leaves nearly the same are not told apart."""
+"""Two mistakes whose undoing leaves nearly the same are not distinguished."""
 _TOOL, _TOOL_TURN = 0.02, 0.1
 """How far a marker on a tool may be from where it is stated, in m, and beside it in rad about the
 tcp: the zero of a last joint turns it."""

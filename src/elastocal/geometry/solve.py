@@ -30,7 +30,7 @@ _FINEST = 1e-7
 PRIOR_WIDTH = 30.0
 """Standard deviation of the prior of an unknown, in its likely sizes."""
 _MOST_ROWS = 3000
-"""Positions by which it is told which unknowns are independent."""
+"""Largest number of positions that decide which unknowns are independent."""
 
 
 @dataclass(frozen=True)

@@ -205,7 +205,7 @@ class _Ablation:
     """Mean square errors of the chosen model at left-out pose blocks, shape (block,), in m^2."""
 
     def worth(self, term: TermName) -> TermWorth:
-        """Return what a term takes from the error at left-out poses."""
+        """Return the reduction of the error at left-out poses by a term."""
         taken, reason = self._taken(term), self._refusal(term)
         if reason:
             return TermWorth(term, taken, None, None, None, None, reason)
@@ -332,7 +332,7 @@ def _part(square: float, low: float | None, high: float | None, source: str) -> 
 
 
 def _fit(problem: Problem, held_out: HeldOut, compliance: FloatArray) -> ErrorPart:
-    """Return what another choice of poses would change: the jackknife over those left out."""
+    """Return the error that the choice of poses causes, by the jackknife over left-out poses."""
     folds = held_out.folds
     changes = problem.O @ (held_out.compliance - compliance).T
     square = (folds - 1) / folds * float(np.sum(np.square(changes))) / len(problem)
@@ -384,7 +384,7 @@ def stated_noise(model: ElasticModel, readings: Readings, compliance: FloatArray
 
 
 def _rest(total: ErrorPart, noise: ErrorPart, fit: ErrorPart) -> ErrorPart:
-    """Return what is left of the error beside noise and fit."""
+    """Return the part of the error that neither noise nor fit explains."""
     square, low, high = (
         (of_total or 0.0) ** 2 - (of_noise or 0.0) ** 2 - (fit.error or 0.0) ** 2
         for of_total, of_noise in (

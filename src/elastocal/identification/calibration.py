@@ -247,7 +247,7 @@ def _data_warnings(
     options: FitOptions,
     marker_offset: ArrayLike | None,
 ) -> list[Finding]:
-    """Return what is odd about the data, or refuse them."""
+    """Return a finding for each oddity of the data, or refuse them."""
     seen = find_implausible(model.robot, readings, marker_offset)
     warnings = _stated(seen, options)
     warnings += list(check_joints(model.robot, readings)) + [
@@ -303,7 +303,7 @@ def _stated(found: Sequence[Finding], options: FitOptions) -> list[Finding]:
 
 
 def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[Finding]:
-    """Return what limits the use of a fit, or refuse one that the data had no part in."""
+    """Return the findings that limit the use of a fit; refuse one that no data decide."""
     _require_data_decide(problem, calibrated.compliance)
     warnings: list[Finding] = []
     missing = reach - calibrated.observability.rank

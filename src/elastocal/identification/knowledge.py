@@ -69,7 +69,7 @@ class DriveCompliances:
         return cls(tuple(robot.joint_names), np.where(own, softness, softest))
 
     def known_springs(self, model: ElasticModel) -> tuple[KnownSpring, ...]:
-        """Return what that says of every parameter of a model of the arm."""
+        """Return the prior knowledge of every parameter of a model of the arm."""
         softness = dict(zip(self.joints, self.softness.tolist(), strict=True))
         return tuple(
             KnownSpring(each.name, compliance=0.0, sigma=softness[each.joint] * each.scale)

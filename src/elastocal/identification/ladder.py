@@ -75,7 +75,7 @@ class Climbed:
     """Root mean square distance of its predictions at left-out poses from those of the chosen
     rung, in m; NaN where it was not to choose from."""
     known: tuple[KnownSpring, ...] = ()
-    """What its fits were told of its springs."""
+    """Prior knowledge of its springs that its fits used."""
     forecast: ProductionForecast | None = None
     """What it predicts on production, where that is known."""
     production_error: float = float("nan")
@@ -107,7 +107,7 @@ class Choice:
 
     @property
     def known(self) -> tuple[KnownSpring, ...]:
-        """What a fit of the chosen rung is told of its springs."""
+        """Prior knowledge of the springs that a fit of the chosen rung uses."""
         return self._taken.known
 
     @property

@@ -71,7 +71,7 @@ class Observability:
     unobservable: tuple[tuple[Term, ...], ...]
     """Combinations of compliances that the data do not see, in a sparse basis, without parts too
     small to matter: adding any multiple of one of them changes no deflection that was measured.
-    Whether it changes others is told by `attainable_rank`."""
+    `attainable_rank` shows whether it changes others."""
     faint: tuple[FaintParameter, ...] = ()
     """Parameters that are too weak to see; not in a group, since only noise hides them."""
 

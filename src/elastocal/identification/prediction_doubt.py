@@ -140,7 +140,7 @@ class ProductionForecast:
     def of(
         cls, model: ElasticModel, problem: Problem, rows: ProductionRows
     ) -> "ProductionForecast":
-        """Return what the fit of a problem predicts of rows with a load, each pressed from rest."""
+        """Return the prediction by the fit of a problem at loaded rows, each pressed from rest."""
         n = problem.springs
         c, left = solve(problem).compliance[n], leave_poses_out(problem).compliance[:, n]
         blocks = model.observation_blocks(rows.joint_position, rows.force, rows.moment)

@@ -98,7 +98,7 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
 def _likeliest(
     robot: Robot, readings: Readings, offset: FloatArray, moved: FloatArray
 ) -> tuple[float, str]:
-    """Return what undoing the mistake that explains most leaves, and its name."""
+    """Return the rest after undoing the likeliest mistake, and the name of that mistake."""
     mistakes = [
         ReadingMistake(each.message, partial(_read, each.read))
         for each in joint_mistakes(

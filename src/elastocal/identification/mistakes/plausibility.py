@@ -166,7 +166,7 @@ _GRAIN = 0.05
 def find_implausible(
     robot: Robot, readings: Readings, marker_offset: ArrayLike | None = None
 ) -> tuple[Finding, ...]:
-    """Return what readings show to be wrong without a fit.
+    """Return the mistakes that readings show without a fit.
 
     Parameters
     ----------

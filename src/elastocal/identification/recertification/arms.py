@@ -56,7 +56,7 @@ class ComparedRows:
         return len(self.q)
 
     def friction(self, model: ElasticModel) -> FloatArray | None:
-        """Return what friction elements bear, shape (row, element); None: pressed from rest."""
+        """Return the friction state, shape (row, element); None: pressed from rest."""
         if self.visit is None or not len(model.friction):
             return None
         at = model.at(self.q)
@@ -112,7 +112,7 @@ def model_on(calibrated: CalibratedModel, arm: Robot) -> CalibratedModel:
 def arm_notes(
     models: tuple[CalibratedModel, CalibratedModel], arm: Robot, names: tuple[str, str]
 ) -> tuple[str, ...]:
-    """Return what differs between the arms of two models and the one that both are put on."""
+    """Return the differences between the arms of two models and the arm of the comparison."""
     notes = []
     for calibrated, name in zip(models, names, strict=True):
         robot = calibrated.model.robot

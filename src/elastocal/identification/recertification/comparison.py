@@ -306,7 +306,7 @@ def compare_calibrated_poses(
 
 
 def _misfit(models: tuple[CalibratedModel, CalibratedModel], deflection: FloatArray) -> FloatArray:
-    """Return what the springs of two models may miss of a change at each row, in m."""
+    """Return the error of a change by the misfit of two models, shape (row,), in m."""
     known = [each.misfit if np.isfinite(each.misfit) else 0.0 for each in models]
     sizes = np.linalg.norm(deflection, axis=2)
     return np.asarray(np.hypot(known[0] * sizes[0], known[1] * sizes[1]))
@@ -473,7 +473,7 @@ def _notes_on(
     outside: int,
     ground: CommonGround | None = None,
 ) -> tuple[str, ...]:
-    """Return what a reader has to know beside the figures, a sentence each.
+    """Return the remarks that belong to the figures of a comparison, one sentence each.
 
     Parameters
     ----------
