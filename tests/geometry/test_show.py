@@ -19,6 +19,9 @@ MODEL = SimpleNamespace(
         GeometryParameter("gear of joint 1", 2e-6, "1", -1e-6, 5e-6, False),
     ),
     fixed=(),
+    findings=(),
+    blunders=(),
+    T_tcp_built=None,
 )
 POSES = tuple(PoseAccuracy(n, "s", 0, 3, 3e-4 * n, 1e-4 * n, 5e-5 * n) for n in (1, 2))
 ACCURACY = SimpleNamespace(

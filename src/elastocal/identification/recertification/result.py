@@ -250,9 +250,9 @@ class CompareSummary:
                 names=", ".join(each.label for each in self.moved_springs),
             )
         return phrase(
-            "None of {count} compared springs and sums of springs moved beyond its interval."
+            "Of {count} compared springs and sums of springs, not one moved beyond its interval."
             if self.same_springs
-            else "None of {count} compared springs and sums of springs differs beyond its"
+            else "Of {count} compared springs and sums of springs, not one differs beyond its"
             " interval.",
             count=len(self.springs),
         )
