@@ -192,6 +192,28 @@ class TestAPlugInThatCannotBeUsed:
         with pytest.raises(ElastocalError, match=reason):
             layout(robot(), str(file))
 
+    @pytest.mark.parametrize(
+        ("law", "reason"),
+        [
+            ("((math.sqrt(load.torque[0]),),)", "cannot be used: TypeError: must be real number"),
+            ("((load.torque[0],) * 3,)", r"law of spring 'joint_2.odd-axial' has \[3\] entries by"),
+        ],
+    )
+    def test_a_law_that_takes_no_names_is_named_before_the_work(
+        self, tmp_path, monkeypatch, law, reason
+    ):
+        source = (
+            "import math\nfrom typing import Literal\nimport elastocal.elastic as e\n"
+            "from elastocal.records import record\n@record()\nclass THING(e.Hinge):\n"
+            "    kind: Literal['odd'] = 'odd'\n"
+            f"    def angles(self, load):\n        return {law}"
+        )
+        offered(tmp_path, monkeypatch, source, "elastocal.springs")
+        file = tmp_path / "springs.yaml"
+        file.write_text("schema: elastocal.springs/1\nsprings: [{joint: joint_2, kind: odd}]")
+        with pytest.raises(ElastocalError, match=reason):
+            ElasticModel(robot(), layout(robot(), str(file)))
+
     def test_two_of_one_name_are_refused_with_both_distributions(self, tmp_path, monkeypatch):
         for name in ("first", "second"):
             losses = {"elastocal.losses": {"odd": "math:e"}}

@@ -136,7 +136,9 @@ def test_models_with_other_springs_are_compared_with_a_word_of_warning(folder):
 
 
 def test_an_unchanged_cell_has_not_moved(folder):
-    assert "Of 14 compared springs and sums of springs, not one moved" in " ".join(run(folder, new="new").err.split())
+    assert "Of 14 compared springs and sums of springs, not one moved" in " ".join(
+        run(folder, new="new").err.split()
+    )
 
 
 @pytest.mark.parametrize("limit", ["0.1", "-0.1 mm", "0 mm", "5 N", "nan mm", ""])

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import Discriminator, PlainValidator, Tag, TypeAdapter
 
+from elastocal.elastic.springs.expression import Input
 from elastocal.elastic.springs.gear import Gear
 from elastocal.elastic.springs.hinge import Hinge
-from elastocal.elastic.springs.spring import Spring, SpringAxis, Unit
+from elastocal.elastic.springs.spring import Spring, SpringAxis, SpringLoad, Unit
 from elastocal.elastic.springs.tensor import Tensor
 from elastocal.errors import SpringError
 from elastocal.plugins import Registry, used
@@ -97,8 +98,10 @@ def check_springs(springs: Sequence[Spring], joint_names: Sequence[str]) -> None
     Raises
     ------
     SpringError
-        If the list is empty, a name occurs twice, a joint is not the robot's, or an axis is no
-        unit vector.
+        If the list is empty, a name occurs twice, a joint is not the robot's, an axis is no unit
+        vector, or a law has another number of entries than there are parameters.
+    PluginError
+        If the law of another package's kind fails.
     """
     if not springs:
         raise SpringError("a model needs at least one spring")
@@ -109,3 +112,22 @@ def check_springs(springs: Sequence[Spring], joint_names: Sequence[str]) -> None
     for spring in springs:
         for axis in spring.axes:
             axis.check(joint_names)
+        if type(spring) not in KINDS.own.values():
+            used("kind of spring", spring.kind, partial(_require_law, spring))
+
+
+def _require_law(spring: Spring) -> None:
+    """Refuse a law that takes no names: it would fail in the online step and in the exported C."""
+
+    def names(letter: str, count: int) -> tuple[Input, ...]:
+        return tuple(Input(f"{letter}{k}") for k in range(count))
+
+    n, weighs = len(spring.axes), spring.bears_weight
+    friction = names("r", len(spring.friction_limits))
+    rows = spring.angles(SpringLoad(names("t", n), names("w", n) if weighs else (), friction))
+    found, wanted = [len(row) for row in rows], [len(spring.parameters)] * n
+    if found != wanted:
+        raise SpringError(
+            f"law of spring {spring.name!r} has {found} entries by axis, not {wanted}, one a"
+            " parameter"
+        )
