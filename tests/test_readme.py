@@ -4,6 +4,7 @@ import ast
 import contextlib
 import io
 import re
+import runpy
 import shlex
 import shutil
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ from support.demos import demo_result, finished_demo
 
 ROOT = Path(__file__).parents[1]
 FANUC = ROOT / "examples" / "fanuc_r2000ic"
+OPTIONS = runpy.run_path(str(ROOT / "docs" / "hooks" / "command_options.py"))
+"""What fills the reference with the options of commands."""
 FACE = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
 """What docs/hooks/faces.py fills with the names that a package exports."""
 TOUR = (ROOT / "README.md").read_text(encoding="utf-8").split("## Five-minute tour")[1]
@@ -233,14 +236,46 @@ def test_every_command_stands_on_the_page_of_its_group():
     assert listed == told
 
 
-def test_the_reference_of_a_command_has_its_options_and_no_others():
+def parts_of_the_reference() -> dict[str, str]:
+    """Return what the reference says of each command."""
     pages = [*(ROOT / "docs/reference/commands").glob("*.md"), ROOT / "docs/reference/commands.md"]
     text = "".join(f"\n{page.read_text(encoding='utf-8')}" for page in pages)
-    told = {}
-    for part in re.split(r"\n###? elastocal ", text)[1:]:
-        rows = re.findall(r"^\| (`.*?) \|", part.split("\n## ")[0], flags=re.MULTILINE)
-        told[part.split("\n")[0]] = set(re.findall(r"`(--[a-z][\w-]*)", "".join(rows)))
-    assert told == options()
+    parts = re.split(r"\n###? elastocal ", text)[1:]
+    return {part.split("\n")[0]: part.split("\n## ")[0] for part in parts}
+
+
+def test_the_reference_of_a_command_has_the_table_of_its_options():
+    told = {name: OPTIONS["_MARK"].findall(part) for name, part in parts_of_the_reference().items()}
+    assert told == {name: [name] for name in COMMANDS}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_table_of_a_command_has_its_options_and_no_others(name):
+    rows = OPTIONS["options_table"](name).splitlines()[2:]
+    assert {
+        option for row in rows for option in re.findall(r"`(--[a-z][\w-]*)", row.split(" | ")[0])
+    } == options()[name]
+    assert all(len(re.split(r" (?<!\\)\| ", row)) == 3 for row in rows)
+    assert all(re.fullmatch(r"\| .* \| .* \| [^|]{8,} \|", row.replace("\\|", "")) for row in rows)
+
+
+def test_defaults_and_ranges_stand_in_the_table_of_a_command():
+    table = OPTIONS["options_table"]("calibrate")
+    assert "| `DATA …` | required | " in table
+    assert "| `--springs NAME\\|FILE` | `auto` | " in table
+    assert "| `--budget` | off | " in table
+    assert "| `--speed TEXT` | `50 mm/s` | " in OPTIONS["options_table"]("compensate")
+
+
+def test_the_options_that_the_reference_names_belong_to_its_command_or_to_another():
+    known = options()
+    every = set().union(*known.values(), {"--help", "--version"})
+    for name, part in parts_of_the_reference().items():
+        # Of another command, that is named in the same breath.
+        others = {each for each in known if f"`{each}" in part or f"#elastocal-{each}" in part}
+        named = set(re.findall(r"`(--[a-z][\w-]*)", part))
+        assert named <= every, name
+        assert named <= known[name].union(*(known[each] for each in others)), name
 
 
 def test_the_options_of_commands_that_pages_show_exist():

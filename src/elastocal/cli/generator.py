@@ -73,14 +73,22 @@ class Command:
         every = settings_fields(self.module, self.settings)
         return [each for each in every if each.name not in self.hidden and _is_shown(each)]
 
-    def callback(self) -> Callable[..., None]:
-        """Return the function that typer makes a command of."""
-        fields, more = self.fields(), self.more
-        here = () if more is None else settings_fields(more.__module__, more.__name__)
-        made = {each.name: _parameter(each) for each in _in_order(fields, here)}
-        made["as_json"] = inspect.Parameter(
+    def own_fields(self) -> tuple[SettingsField, ...]:
+        """Return the fields that the command line alone has."""
+        more = self.more
+        return () if more is None else settings_fields(more.__module__, more.__name__)
+
+    def parameters(self) -> list[inspect.Parameter]:
+        """Return its parameters as typer reads them, in the order of help."""
+        as_json = inspect.Parameter(
             "as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_JSON
         )
+        fields = _in_order(self.fields(), self.own_fields())
+        return [*(_parameter(each) for each in fields), as_json]
+
+    def callback(self) -> Callable[..., None]:
+        """Return the function that typer makes a command of."""
+        fields, here, made = self.fields(), self.own_fields(), self.parameters()
 
         def call(**given: Any) -> None:
             as_json = given.pop("as_json")
@@ -93,8 +101,8 @@ class Command:
             self.run(Given(read, own, as_json))
 
         call.__doc__ = self.summary
-        call.__signature__ = inspect.Signature(list(made.values()))  # type: ignore[attr-defined]
-        call.__annotations__ = {name: each.annotation for name, each in made.items()}
+        call.__signature__ = inspect.Signature(made)  # type: ignore[attr-defined]
+        call.__annotations__ = {each.name: each.annotation for each in made}
         return call
 
 
@@ -193,14 +201,13 @@ def _is_required(each: SettingsField) -> bool:
 def _parameter(each: SettingsField) -> inspect.Parameter:
     """Return the parameter of a field."""
     option, kind = each.option, _type(each)
-    help = option.help or each.doc
-    if option.default and not option.required:
-        help = f"{help} [default: {option.default}]"
-    words: dict[str, Any] = {"help": help}
+    words: dict[str, Any] = {"help": option.help or each.doc}
     if option.metavar:
         words["metavar"] = option.metavar
     if option.choices:
-        words |= _choice(option.choices, option.file, help)
+        words |= _choice(option.choices, option.file, words["help"])
+    if option.default and not option.required:
+        words["help"] = f"{words['help']} [default: {option.default}]"
     # A bracket without the backslash would be a mark-up of rich's, and would not be printed.
     words["help"] = words["help"].replace("[", "\\[")
     if kind in (int, float):
