@@ -33,7 +33,7 @@ def _row(parameter: inspect.Parameter) -> tuple[str, str, str]:
     text = " ".join(note.help.replace("\\[", "[").split())
     default = _DEFAULT.search(text)
     return (
-        f"`{_typed(parameter.name, str(hint), note)}`".replace("|", "\\|"),
+        f"`{_typed(parameter.name, str(hint), note)}`",
         f"`{default[1]}`" if default else _default(parameter.default),
         _marked(text[: default.start()] if default else text),
     )

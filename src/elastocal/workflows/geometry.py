@@ -48,7 +48,7 @@ class GeometrySettings:
 
     positions: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV of joints and markers."""
-    robot: Annotated[str | None, Option(choices="robot")] = None
+    robot: Annotated[str | None, Option(choices="robot", required=True)] = None
     """URDF file or catalogue name."""
     tcp: str | None = None
     """Link that carries the markers."""
