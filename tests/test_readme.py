@@ -245,7 +245,7 @@ def parts_of_the_reference() -> dict[str, str]:
 
 
 def test_the_reference_of_a_command_has_the_table_of_its_options():
-    told = {name: OPTIONS["_MARK"].findall(part) for name, part in parts_of_the_reference().items()}
+    told = {name: OPTIONS["MARK"].findall(part) for name, part in parts_of_the_reference().items()}
     assert told == {name: [name] for name in COMMANDS}
 
 
@@ -258,7 +258,7 @@ def test_the_table_of_a_command_has_its_options_and_no_others(name):
     assert all(re.fullmatch(r"\| `[^ ].*` \| .* \| [^|]{8,} \|", row) for row in rows)
 
 
-def test_defaults_and_ranges_stand_in_the_table_of_a_command():
+def test_defaults_and_choices_stand_in_the_table_of_a_command():
     table = OPTIONS["options_table"]("calibrate")
     assert "| `DATA …` | required | " in table
     assert "| `--springs NAME|FILE` | `auto` | " in table

@@ -78,17 +78,14 @@ class Command:
         more = self.more
         return () if more is None else settings_fields(more.__module__, more.__name__)
 
-    def parameters(self) -> list[inspect.Parameter]:
-        """Return its parameters as typer reads them, in the order of help."""
-        as_json = inspect.Parameter(
-            "as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_JSON
-        )
-        fields = _in_order(self.fields(), self.own_fields())
-        return [*(_parameter(each) for each in fields), as_json]
+    def shown(self) -> list[SettingsField]:
+        """Return all that a person can type, in the order of help."""
+        return [*_in_order(self.fields(), self.own_fields()), _AS_JSON]
 
     def callback(self) -> Callable[..., None]:
         """Return the function that typer makes a command of."""
-        fields, here, made = self.fields(), self.own_fields(), self.parameters()
+        fields, here = self.fields(), self.own_fields()
+        made = [_parameter(each) for each in self.shown()]
 
         def call(**given: Any) -> None:
             as_json = given.pop("as_json")
@@ -179,7 +176,9 @@ class _Plugged(Command):
         ]
 
 
-_JSON = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
+_AS_JSON = SettingsField(
+    "as_json", "bool", False, "Print the result as one JSON object.", Option("--json")
+)
 
 
 def _in_order(
@@ -198,29 +197,65 @@ def _is_required(each: SettingsField) -> bool:
     return each.default is REQUIRED or each.option.required
 
 
+@dataclass(frozen=True)
+class Described:
+    """A field as help and the reference show it."""
+
+    text: str
+    """What it is, and the choices where `taken` has no room for them."""
+    taken: str
+    """What stands for its value; empty where the type alone says it."""
+    kind: type
+    """Type that is read from the command line."""
+    is_repeated: bool
+    """Whether it may be given several times."""
+    default: Any
+    """`REQUIRED`; None where the settings have it and the text says which."""
+
+
+def described(each: SettingsField) -> Described:
+    """Return what help and the reference show of a field."""
+    option = each.option
+    text, taken = option.help or each.doc, option.metavar
+    names = CHOICES.get(option.choices)
+    if names:
+        taken = f"[{'|'.join(names)}]"
+        if option.file or len(taken) > _NARROW:
+            # Help would break it in the middle of a name.
+            text += f" One of {', '.join(names)}{', or a .yaml file' if option.file else ''}."
+            taken = "NAME|FILE" if option.file else "NAME"
+    default: Any = option.default or _typed_default(each)
+    if _is_required(each):
+        default = REQUIRED
+    return Described(text, taken, _type(each), _is_repeated(each), default)
+
+
+def _typed_default(each: SettingsField) -> Any:
+    """Return the default that a command line has, too; None where the settings alone have it."""
+    # What is read from a text is no default of a text.
+    if each.default in (REQUIRED, OWN) or each.option.required or each.option.read:
+        return None
+    return None if isinstance(each.default, tuple) else each.default
+
+
 def _parameter(each: SettingsField) -> inspect.Parameter:
     """Return the parameter of a field."""
-    option, kind = each.option, _type(each)
-    words: dict[str, Any] = {"help": option.help or each.doc}
-    if option.metavar:
-        words["metavar"] = option.metavar
-    if option.choices:
-        words |= _choice(option.choices, option.file, words["help"])
-    if option.default and not option.required:
-        words["help"] = f"{words['help']} [default: {option.default}]"
+    option, shown = each.option, described(each)
+    required, default = _is_required(each), _typed_default(each)
+    help = shown.text
+    if option.default and not required:
+        help = f"{help} [default: {option.default}]"
     # A bracket without the backslash would be a mark-up of rich's, and would not be printed.
-    words["help"] = words["help"].replace("[", "\\[")
-    if kind in (int, float):
+    words: dict[str, Any] = {"help": help.replace("[", "\\[")}
+    if shown.taken:
+        words["metavar"] = shown.taken
+    if option.choices:
+        words["autocompletion"] = _completion(option.choices)
+    if shown.kind in (int, float):
         words |= {"min": option.least, "max": option.most}
-    default: Any = each.default
-    # What is read from a text is no default of a text: the settings have it.
-    by_settings = bool(option.read) or isinstance(default, tuple)
-    if default in (REQUIRED, OWN) or option.required or by_settings:
-        default = None
-    required = _is_required(each)
     if not required and not isinstance(default, bool):
         words["show_default"] = default is not None
-    hint: Any = list[kind] if _is_repeated(each) else kind  # type: ignore[valid-type]
+    hint: Any = list[shown.kind] if shown.is_repeated else shown.kind  # type: ignore[name-defined]
     if default is None and not required:
         hint = hint | None
     note = typer.Argument(**words) if option.argument else typer.Option(each.flag, **words)
@@ -232,21 +267,15 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
     )
 
 
-def _choice(kind: str, file: bool, help: str) -> dict[str, Any]:
-    """Return what shows choices and completes them; the work refuses what is none of them."""
+def _completion(kind: str) -> Callable[[str], list[str]]:
+    """Return what completes choices for a shell; the work refuses what is none of them."""
     if kind == "robot":
-        return {"autocompletion": _robot_names}
-    names = CHOICES[kind]
-    shown = f"[{'|'.join(names)}]"
-    if file or len(shown) > _NARROW:
-        # Help would break it in the middle of a name.
-        help = f"{help} One of {', '.join(names)}{', or a .yaml file' if file else ''}."
-        shown = "NAME|FILE" if file else "NAME"
+        return _robot_names
 
     def complete(incomplete: str) -> list[str]:
-        return [name for name in names if name.startswith(incomplete)]
+        return [name for name in CHOICES[kind] if name.startswith(incomplete)]
 
-    return {"metavar": shown, "autocompletion": complete, "help": help}
+    return complete
 
 
 def _robot_names(incomplete: str) -> list[str]:
