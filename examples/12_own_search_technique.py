@@ -48,7 +48,7 @@ class Median:
         return Selection(np.array(order), self.name)
 
 
-TECHNIQUES["median"] = Median
+TECHNIQUES.add("median", Median)
 
 urdf = catalogue.urdf("KR 120 R2700 extra HA")
 urdf = with_tool(urdf, "flange", "tcp", T_from_xyzabc(0.15, 0.0, 0.35, 0.0, 0.0, 0.0))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from elastocal.elastic import KINDS, ElasticModel, bearing, layout
-from elastocal.errors import ElastocalError, PluginError, SchemaError
+from elastocal.errors import ElastocalError, PlanningError, PluginError, SchemaError
 from elastocal.identification import LOSSES, CalibratedModel, Observability, read_model, write_model
 from elastocal.planning.search import CRITERIA, TECHNIQUES
 from elastocal.plugins import KINDS as KINDS_OF_PLUGINS, Registry
@@ -344,3 +344,15 @@ def test_an_example_can_be_installed(name, tmp_path):
     alone.mkdir()
     shutil.copy(test, alone)
     passes(str(alone), sys.executable, str(site))
+
+
+def test_a_script_adds_one_for_its_process_and_takes_the_place_of_none():
+    own = {"cover": "elastocal.planning.search:Cover"}
+    techniques = Registry[type]("search technique", own, PlanningError)
+    techniques.add("median", list)
+    assert techniques["median"] is list
+    assert "median" in techniques
+    assert list(techniques)[:2] == ["cover", "median"]
+    for taken in ("cover", "median"):
+        with pytest.raises(PlanningError, match=f"there is a search technique '{taken}' already"):
+            techniques.add(taken, dict)

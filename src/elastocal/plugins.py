@@ -247,11 +247,25 @@ class Registry(Mapping[str, _T], Generic[_T]):
         error: type[ElastocalError],
     ) -> None:
         self.kind, self._own, self._error = kind, own, error
+        self._added: dict[str, _T | str] = {}
 
     @property
     def own(self) -> Mapping[str, _T | str]:
-        """Those of elastocal."""
-        return self._own() if callable(self._own) else self._own
+        """Those of elastocal, and those that this process has added."""
+        found = self._own() if callable(self._own) else self._own
+        return {**found, **self._added} if self._added else found
+
+    def add(self, name: str, each: _T) -> None:
+        """Add one for this process alone, as a script does; a package has an entry point for it.
+
+        Raises
+        ------
+        ElastocalError
+            If there is one of this name already.
+        """
+        if name in self:
+            raise self._error(f"there is a {self.kind} {name!r} already")
+        self._added[name] = each
 
     def __getitem__(self, name: str) -> _T:
         own = self.own
