@@ -13,7 +13,10 @@ BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "first_use.py"
 @pytest.mark.slow
 @pytest.mark.parametrize("arm", ["irb6700", "tx2_90"])
 def test_the_planted_compliances_lie_within_the_certificate(arm, tmp_path):
-    """With masses in the URDF, since the arm's sag is in what the tracker saw."""
+    """With masses in the URDF, since the arm's sag is in what the tracker saw.
+
+    One of twenty intervals of 95 % misses by chance; one wider by half misses once in three hundred.
+    """
     figures = tmp_path / "figures.json"
     words = [arm, "--masses", "--folder", str(tmp_path), "--json", str(figures)]
     subprocess.run([sys.executable, str(BENCHMARK), *words], check=True)
@@ -21,7 +24,10 @@ def test_the_planted_compliances_lie_within_the_certificate(arm, tmp_path):
     known = [each for each in found["springs"] if each["is_known"]]
     assert len(known) >= 5, "joint 6 turns about the tool: no press tells it"
     for each in known:
-        assert each["low"] <= each["planted"] <= each["high"], each
+        spare = 0.25 * (each["high"] - each["low"])
+        assert each["low"] - spare <= each["planted"] <= each["high"] + spare, each
+    inside = [each["low"] <= each["planted"] <= each["high"] for each in known]
+    assert sum(inside) >= len(known) - 1
     report, verified = (step["said"] for step in found["steps"][-2:])
     assert report.startswith("Within"), report
     for link in ("page", "signature", "files", "logs", "dataset", "model", "codec"):

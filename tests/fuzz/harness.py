@@ -163,7 +163,9 @@ def _absurd_command(rng: random.Random) -> str:
     words = PLAIN[name].split()
     command = _commands().get_command(None, name)
     options = [
-        each for each in command.params if each.param_type_name == "option" and each.name != "help"
+        each
+        for each in command.params
+        if each.param_type_name == "option" and not {"--help", "--for"} & set(each.opts)
     ]
     for _ in range(rng.choice((1, 1, 2))):
         if rng.random() < 0.15 and len(words) > 1:
@@ -214,14 +216,17 @@ PLAIN = {
     "krc-config": "krc-config {s}/kuka.yaml --out {o}",
     "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
     "release": "release {s}/cell.yaml",
-    "watch": "watch {s}/cell.yaml --for 0.5s",
+    "watch": "watch {s}/cell.yaml --for=0.5s",
     "live": "live {s}/kuka.yaml --model {s}/model.json --duration 1",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",
     "studio": "studio {s}/cell.yaml --no-browser",
     "new": "new --out {o}.yaml --mesh {s}/dome.stl --no-browser --no-ask",
     "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
 }
-"""Commands that work, to which absurd options are added; an option that stands twice: the last."""
+"""Commands that work, to which absurd options are added; an option that stands twice: the last.
+
+How long to watch is left as it is: 1e308 seconds are a wish like any other, and after a nanosecond
+no device has been heard, which is said in a line each."""
 
 
 def run_cases(

@@ -336,6 +336,12 @@ class TestDirectionsThatBoundsLeaveOpen:
         assert self.open_directions(corners, [True, True, True, False]) == 1
         assert self.open_directions(corners, [True, True, False, False]) == 3
 
+    @pytest.mark.parametrize("rounding", [0.0, 1e-15, -1e-15, 1e-13, -1e-13])
+    def test_opposite_rows_hold_themselves_whatever_the_rounding(self, rounding):
+        """Multipliers of 1e13 would reach any direction from rows that rounding keeps apart."""
+        rows = [[1, rounding, 0], [-1, rounding, 0], [0.3, 0.9, 0], [0, 0, 1]]
+        assert self.open_directions(rows, [True, True, True, False]) == 2
+
     @pytest.mark.parametrize("seed", [*range(40), 2458, 2512, 2930, 6676, 6913])
     def test_rows_that_nearly_depend_on_one_another_have_an_answer(self, seed):
         """Linear programmes of the last five ended without one: `calibrate` in a traceback."""

@@ -30,6 +30,8 @@ _DUST = 1e-6
 """Part of a sensible value below which a spring counts as not yielding at all."""
 _IN_CONE = 1e-6
 """Largest distance of a unit vector from a cone that it counts to."""
+_MODEST = 1e-9
+"""Multipliers of the cone's rows count as this much distance each: a thousand of them are too far."""
 _MOST_STEPS = 100
 """Steps of non-negative least squares by the longer side of their matrix."""
 _TWICE = 2.0
@@ -318,8 +320,11 @@ def _is_held(inward: FloatArray, row: int) -> bool:
     others = np.delete(inward, row, axis=0)
     if not len(others):
         return False
+    # Rows that are opposite but for rounding reach any direction by multipliers of 1e12.
+    modest = np.vstack([others.T, _MODEST * np.eye(len(others))])
+    opposite = np.concatenate([-inward[row], np.zeros(len(others))])
     try:
-        _, distance = nnls(others.T, -inward[row], maxiter=_MOST_STEPS * max(inward.shape))
+        _, distance = nnls(modest, opposite, maxiter=_MOST_STEPS * max(inward.shape))
     except RuntimeError:  # its steps go in circles: the spring counts as open, so as not known
         return False
     return bool(distance < _IN_CONE)
