@@ -111,7 +111,7 @@ class Finding(Phrase):
         return next((each.advice for each in self._inner() if each.advice), "")
 
     def __getnewargs__(self) -> Any:
-        """Return what a copy is made of."""
+        """Return the arguments that a copy is made of."""
         return self.kind, self.values, str.__str__(self)
 
     @property
@@ -131,7 +131,7 @@ class Finding(Phrase):
         return [each for each in self.values.values() if isinstance(each, Finding)]
 
     def stored(self) -> Any:
-        """Return what a file holds: kind, values, text; the text alone where there is no kind."""
+        """Return the data in a file: kind, values, text; the text alone where there is no kind."""
         text = str.__str__(self)
         if not self.kind:
             return text
@@ -195,14 +195,14 @@ def group_alike(found: Iterable[str], most: int = 3) -> list[str]:
 
 
 def _alike(found: str) -> tuple[str, ...]:
-    """Return what is the same for findings of one kind."""
+    """Return the key that findings of one kind have in common."""
     if not isinstance(found, Finding) or not found.kind:
         return "", str(found)
     return found.kind, *(name for each in found._inner() for name in _alike(each))
 
 
 def as_number(spec: str, scale: float = 1.0) -> Callable[[float], str]:
-    """Return what shows a number: in a format, after it was multiplied by a scale.
+    """Return the formatter of a number: multiplied by a scale, in a format.
 
     >>> as_number("+.1f", 1e3)(0.0025)
     '+2.5'
@@ -211,7 +211,7 @@ def as_number(spec: str, scale: float = 1.0) -> Callable[[float], str]:
 
 
 def as_count(noun: str) -> Callable[[int], str]:
-    """Return what shows a whole number with its noun.
+    """Return the formatter of a whole number with its noun.
 
     >>> as_count("pose")(3)
     '3 poses'

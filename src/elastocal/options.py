@@ -133,7 +133,7 @@ def settings_fields(module: str, name: str) -> tuple[SettingsField, ...]:
     module : str
         Module that has the class; it is read, not imported.
     name : str
-        Of the class.
+        Name of the class.
 
     Raises
     ------

@@ -316,7 +316,7 @@ _PATIENCE = 5
 
 
 def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Result:
-    """Return what ``work`` returns, done in a child process with bounded time and memory.
+    """Return the value of ``work``, done in a child process with bounded time and memory.
 
     For libraries that hang where no signal handler runs, ask for any amount of memory, crash, or
     print: with files of which a byte has changed HDF5 does all of that. Elsewhere than on Linux,
@@ -327,9 +327,9 @@ def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Resul
     work : callable
         What is to be done. Its result comes back over a pipe; what it prints is lost.
     seconds : int
-        Of a processor, at most.
+        Seconds of a processor, at most.
     megabytes : int
-        Of memory, at most, beside what this process has.
+        Megabytes of memory, at most, beside what this process has.
 
     Raises
     ------

@@ -159,7 +159,7 @@ def load(kind: str, name: str) -> Any:
 
 
 def load_all(kind: str, name: str) -> list[Any]:
-    """Return what every distribution has under a name, where several may, as words of a language.
+    """Return the plug-ins of every distribution that has one of this name, such as a language.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def _loaded(kind: str, entry: "EntryPoint") -> Any:
 
 
 def used(kind: str, name: str, make: Callable[[], _T]) -> _T:
-    """Return what a plug-in makes; where it fails, the message names its distribution.
+    """Return the product of a plug-in; where it fails, the message names its distribution.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _reason(error: BaseException) -> str:
 
 
 def imported(place: str) -> Any:
-    """Return what a place ``module:name`` names."""
+    """Return the object at a place ``module:name``."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)
 
@@ -232,7 +232,7 @@ class Registry(Mapping[str, _T], Generic[_T]):
     Parameters
     ----------
     kind : str
-        Of `KINDS`.
+        Kind of `KINDS`.
     own : mapping, or callable that returns it
         Those of elastocal; in place of one, its place ``module:name``, imported when it is asked
         for.

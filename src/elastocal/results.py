@@ -31,19 +31,19 @@ class Result:
     """
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first: pairs of a label and its text."""
+        """Return the main facts: pairs of a label and its text."""
         return tuple(
             (each.name.replace("_", " "), brief(getattr(self, each.name)))
             for each in dataclasses.fields(self)  # type: ignore[arg-type]
         )
 
     def show(self) -> Iterable[Any]:
-        """Return what a person sees of the result, as `elastocal.blocks`: by default its facts."""
+        """Return the result for a reader, as `elastocal.blocks`: by default its facts."""
         # Blocks stand above results in the layers.
         return (importlib.import_module("elastocal.blocks").Facts(tuple(self._shown())),)
 
     def pictured(self) -> object:
-        """Return what a picture is drawn of: the result itself, or data that it holds."""
+        """Return the subject of a picture: the result itself, or data that it holds."""
         return self
 
     def plot(self) -> Any:

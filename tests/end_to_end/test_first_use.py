@@ -15,7 +15,7 @@ BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "first_use.py"
 def test_the_planted_compliances_lie_within_the_certificate(arm, tmp_path):
     """With masses in the URDF, since the arm's sag is in what the tracker saw.
 
-    One of twenty intervals of 95 % misses by chance; one wider by half misses once in three hundred.
+    Of intervals of 95 % one in twenty misses by chance, of those wider by half one in 300.
     """
     figures = tmp_path / "figures.json"
     words = [arm, "--masses", "--folder", str(tmp_path), "--json", str(figures)]

@@ -200,7 +200,7 @@ def unit_vector(values: tuple[float, ...]) -> FloatArray:
 
 
 def needed_for(key: str, refusal: str) -> AfterValidator:
-    """Return what makes a field say where figures are from, as soon as a field before it has any.
+    """Return the validator that asks a field for the source of figures given before it.
 
     Parameters
     ----------

@@ -135,7 +135,7 @@ class CellFile(StrictModel):
         return before | loads.levels
 
     def summary(self) -> list[str]:
-        """Return what stands in the cell, one line a subject."""
+        """Return the contents of the cell, one line a subject."""
         robot, loads, sensor = self.robot, self.load_cases, self.sensor
         rail = " on a rail" if robot.rail else ""
         lines = [
@@ -367,7 +367,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
 
 
 def _at(place: str, make: Callable[[], _Result]) -> _Result:
-    """Return what ``make`` makes; its refusal names the place in the cell file."""
+    """Return the product of ``make``; its refusal names the place in the cell file."""
     try:
         return make()
     except FileAccessError as error:

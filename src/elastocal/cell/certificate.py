@@ -86,7 +86,7 @@ def certificate_of(entry: CertificateEntry, *stated: Mapping[str, str]) -> Certi
     Parameters
     ----------
     entry : CertificateEntry
-        Of the cell file.
+        Entry of the cell file.
     *stated : mapping of str to str
         Values by key, with a dot before a key within a key: ``{"sensor.serial": "FT-7"}``.
 

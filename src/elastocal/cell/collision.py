@@ -21,7 +21,7 @@ class CollisionWatch:
     Parameters
     ----------
     weight_base : ndarray, shape (3,)
-        Of the tool, in base, in N.
+        Weight of the tool, in base, in N.
     limit : float
         Change within the window, in N.
     largest : float
@@ -57,7 +57,7 @@ class CollisionWatch:
         return float(np.linalg.norm(rest - self._first))
 
     def look(self, time: float, force_sensor: FloatArray, R_base_sensor: FloatArray) -> str | None:
-        """Return what was hit, in words; None when nothing was.
+        """Return the collision in words; None when there was none.
 
         Parameters
         ----------

@@ -47,7 +47,7 @@ class LineCounts:
     """Why malformed messages were refused; empty where the driver does not say."""
 
     def sentence(self) -> str:
-        """Return what was counted, in words; what did not happen is left out."""
+        """Return the counts in words; zeros are left out."""
         return f"{self.device}: {self.figures()}"
 
     def figures(self) -> str:

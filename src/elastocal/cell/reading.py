@@ -112,7 +112,7 @@ def three(values: FloatArray) -> Three | None:
 
 
 def polled_readings(found: "DeviceSet") -> Callable[[], tuple[DeviceReading, ...]]:
-    """Return what asks the devices of a set by their protocols, one after another.
+    """Return the function that asks the devices of a set by their protocols, one after another.
 
     Parameters
     ----------

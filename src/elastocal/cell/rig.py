@@ -311,7 +311,7 @@ class WallClock:
         rate : float
             Seconds that it shows a second of the wall.
         monotonic, pause : callable, optional
-            Of the wall.
+            Clock and sleep of the PC.
         """
         self.rate = rate
         self._start, self._monotonic, self._pause = start, monotonic, pause

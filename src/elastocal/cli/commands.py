@@ -85,7 +85,7 @@ def _show(given: Given, data: object, shown: "Iterable[Block]", *lines: str) -> 
 
 
 def _as_file(result: object) -> dict[str, Any]:
-    """Return what a file of a result holds, without its schema: figures of a JSON object."""
+    """Return the content of a result's file, without its schema: figures of a JSON object."""
     return {key: value for key, value in _figures(result).items() if key != "schema"}
 
 
@@ -425,7 +425,7 @@ def _import(given: Given) -> None:
 
 
 def _ask(question: str) -> str:
-    """Return what a person answers on the terminal; empty leaves the question open."""
+    """Return a person's answer on the terminal; empty leaves the question open."""
     answer: str = typer.prompt(question, default="", show_default=False, err=True)
     return answer
 

@@ -214,7 +214,7 @@ class Described:
 
 
 def described(each: SettingsField) -> Described:
-    """Return what help and the reference show of a field."""
+    """Return the text on a field in help and the reference."""
     option = each.option
     text, taken = option.help or each.doc, option.metavar
     names = CHOICES.get(option.choices)
@@ -268,7 +268,7 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
 
 
 def _completion(kind: str) -> Callable[[str], list[str]]:
-    """Return what completes choices for a shell; the work refuses what is none of them."""
+    """Return the completer of choices for a shell; the work refuses anything else."""
     if kind == "robot":
         return _robot_names
 
@@ -308,7 +308,7 @@ def _is_repeated(each: SettingsField) -> bool:
 
 
 def _read(each: SettingsField, given: Any) -> Any:
-    """Return what a field is to hold; None where nothing was given."""
+    """Return the value for a field; None where nothing was given."""
     if given is None or given == []:
         return None
     if each.option.read:
@@ -317,7 +317,7 @@ def _read(each: SettingsField, given: Any) -> Any:
 
 
 def _quantity(dimension: str) -> Callable[[str, str], float]:
-    """Return what reads a quantity above zero."""
+    """Return the reader of a quantity above zero."""
 
     def read(text: str, flag: str) -> float:
         from elastocal.errors import UnitError

@@ -64,7 +64,7 @@ class _Display:
         self.show, self._out = show, out
 
     def text(self, chapter: "Chapter", result: "Result") -> str:
-        """Return what a chapter's command prints."""
+        """Return the printed output of a chapter's command."""
         printed = io.StringIO()
         words = chapter.words
         out = words[words.index("--out") + 1] if "--out" in words else None

@@ -66,7 +66,7 @@ def analyse(
     marker_offset: ArrayLike | None = None,
     with_indices: bool = False,
 ) -> CodecAnalysis:
-    """Return what the readings tell of a codec beyond its errors.
+    """Return the analysis of a codec beyond its errors.
 
     Parameters
     ----------

@@ -173,7 +173,7 @@ TRAINING_ENDS = Kind(
 
 
 def _draw_findings(measured: Readings, drawn: Readings, options: CodecOptions) -> list[Finding]:
-    """Return what a person has to know of a codec that was not made on all poses."""
+    """Return a warning about a codec that was not made on all poses."""
     poses, of = (len(np.unique(readings.pose)) for readings in (drawn, measured))
     if poses == of:
         return []

@@ -348,7 +348,7 @@ def _texts(dim: str, texts: Sequence[str]) -> LabelledArray:
 
 
 def _data_of(found: LabelledArrays) -> CodecData:
-    """Return what a file holds; variables that are not ours are left alone."""
+    """Return the data of a file; variables that are not ours are left alone."""
     arrays = array_fields(CodecData, found)
     rows = zip(
         found["variant"].values, *(found[f"variant_{key}"].values for key in KEYS), strict=True
@@ -385,7 +385,7 @@ def _data_of(found: LabelledArrays) -> CodecData:
 
 
 def _said(found: LabelledArrays, name: str, default: str = "") -> Any:
-    """Return what an attribute says as JSON."""
+    """Return the JSON value of an attribute."""
     return parse_json(str(found.attributes.get(name, default)), f"attribute {name!r}")
 
 

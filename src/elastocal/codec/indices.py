@@ -124,7 +124,7 @@ def write_index_table(folder: Path, data: CodecData, indices: Sequence[IndexValu
     data : CodecData
         The codec.
     indices : sequence of IndexValues
-        Of its variants.
+        Index values of its variants.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def correlate(data: CodecData, indices: IndexValues) -> tuple[Correlation, ...]:
     data : CodecData
         The codec.
     indices : IndexValues
-        Of one of its variants.
+        Index values of one of its variants.
     """
     overlap = Overlap.of(data.verification, len(data.contact))
     found = []

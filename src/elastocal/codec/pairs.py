@@ -199,7 +199,7 @@ def compare_variants(
     errors_a, errors_b : ndarray, shape (cv, n_train)
         Mean error norm of each verification set, in m.
     overlap : Overlap
-        Of the verification sets.
+        Overlap of the verification sets.
     at : int
         Number of training poses of the splits where both have saturated.
     left_out : ndarray, shape (2, pose), optional

@@ -194,7 +194,7 @@ def find_saturation(
     tolerance : Tolerance
         How near is near.
     overlap : Overlap
-        Of the verification sets.
+        Overlap of the verification sets.
     rng : Generator
         Draws the verification sets of the interval.
     zero : ndarray, shape (cv,), optional
@@ -252,7 +252,7 @@ def median_draws(values: FloatArray, overlap: Overlap, rng: Generator) -> FloatA
     values : ndarray, shape (cv, n)
         A figure above 0 of each verification set, for each number of training poses.
     overlap : Overlap
-        Of the sets.
+        Overlap of the sets.
     rng : Generator
         Source of randomness.
     """

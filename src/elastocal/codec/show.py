@@ -93,7 +93,7 @@ def saturation_table(found: Iterable[tuple[Variant, Saturation]]) -> Table:
 
 
 def enough_sentence(best: Saturation) -> Phrase:
-    """Return what the row that counts for the verdict comes to."""
+    """Return the value of the row that counts for the verdict."""
     if not best.explains or best.low is None or best.high is None:
         return phrase("How many poses are enough is not proved.")
     values = {"enough": counted(best.n_train, "pose"), "low": best.low, "high": best.high}

@@ -108,7 +108,7 @@ def read_comparisons(texts: Sequence[str]) -> dict[str, tuple[str, ...]]:
 def values_by_key(
     option: str, texts: Sequence[str], read: Callable[[str], tuple[str, tuple[_Value, ...]]]
 ) -> dict[str, tuple[_Value, ...]]:
-    """Return what was given to an option, one ``"KEY=A,B"`` a time, by key.
+    """Return the values given to an option, one ``"KEY=A,B"`` a time, by key.
 
     Parameters
     ----------

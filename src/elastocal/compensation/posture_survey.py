@@ -143,7 +143,7 @@ def read_stations(
     path : Path
         CSV as for `elastocal.compensation.offline.compensate_path`.
     solver : InverseKinematics
-        Of the model's robot.
+        Solver of the model's robot.
     most : int
         Number of stations.
     start : ndarray, shape (joint,), or None
@@ -269,7 +269,7 @@ def survey_postures(
     calibrated : CalibratedModel
         The model.
     solver : InverseKinematics
-        Of its robot.
+        Solver of its robot.
     T_base_tcp : ndarray, shape (station, 4, 4)
         Tool poses, in m.
     direction : ndarray, shape (station, 3)

@@ -359,7 +359,7 @@ def write_vector(vector: Vector, unit: str = "m") -> str:
 
 
 def read_vector(name: str, attributes: Mapping[str, str]) -> Vector | None:
-    """Return what an attribute of three numbers states, in m or m/s²; None: it is not there.
+    """Return three numbers of an attribute, in m or m/s²; None: it is not there.
 
     Raises
     ------

@@ -570,7 +570,7 @@ def _campaigns(table: TableText, grid: _Grid, text: Mapping[str, int]) -> list[s
 def _per_pose(
     table: TableText, grid: _Grid, columns: Sequence[str], values: FloatArray
 ) -> FloatArray:
-    """Return what a pose has one of, shape (pose, column), from rows that must agree on it.
+    """Return the single value of each pose, shape (pose, column), from rows that must agree on it.
 
     ``columns`` are the headers of the values in SI units.
     """

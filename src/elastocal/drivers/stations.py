@@ -53,7 +53,7 @@ class StationFeed:
     source : str
         Device and address, for messages.
     clock : Clock
-        Of the rig.
+        Clock of the rig.
     silence : float
         A station that has said nothing for longer counts as one whose beam is broken, in s.
     unit : str
@@ -161,7 +161,7 @@ class StationFeed:
         )
 
     def reading(self) -> DeviceReading:
-        """Return what the station shows; a fault is shown once, and what comes next is taken."""
+        """Return the station's state; a fault is shown once, and the next one is taken."""
         with self._lock:
             self._require_points()
             fault, self._fault = self._fault, ""
@@ -266,11 +266,11 @@ class StationsMetrology:
         return self._feeds[self._station].take()
 
     def readings(self) -> tuple[DeviceReading, ...]:
-        """Return what each station shows."""
+        """Return the state of each station."""
         return tuple(feed.reading() for feed in self._feeds.values())
 
     def lines(self) -> tuple[LineCounts, ...]:
-        """Return what was counted of each station."""
+        """Return the counts of each station."""
         return tuple(feed.counts for feed in self._feeds.values())
 
 
@@ -316,11 +316,11 @@ class StationLink(threading.Thread, ABC):
     Parameters
     ----------
     name : str
-        Of the thread.
+        Name of the thread.
     feeds : sequence of StationFeed
         Told when the connection is gone.
     clock : Clock
-        Of the rig.
+        Clock of the rig.
     patience : float
         How long a connection may be gone before that is a fault, in s. Infinite: nothing is one,
         it is connected again whatever it said.
@@ -354,7 +354,7 @@ class StationLink(threading.Thread, ABC):
             self.join()
 
     def receive(self, connection: socket.socket) -> bytes | None:
-        """Return what has come; None where nothing has, empty at the end of the connection."""
+        """Return the bytes that have come; None: none yet, empty: the connection has ended."""
         try:
             data = connection.recv(_RECEIVED)
         except TimeoutError:

@@ -150,7 +150,7 @@ class Knowledge(StrictModel):
         return any(each is not None for each in stated)
 
     def of_spring(self, spring: Spring) -> tuple[KnownSpring, ...]:
-        """Return what is known of a spring; of a gear, one for each stiffness of its data sheet.
+        """Return the known values of a spring; of a gear, one for each stiffness of its data sheet.
 
         Raises
         ------

@@ -378,7 +378,7 @@ def layout(robot: Robot, name: str, beside: Sequence[str] = ()) -> tuple[Spring,
 
 
 def known_springs(robot: Robot, name: str) -> tuple[KnownSpring, ...]:
-    """Return what a spring file knows of its springs; nothing for a layout by name.
+    """Return the springs that a spring file knows; none for a layout by name.
 
     Raises
     ------

@@ -101,7 +101,7 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
 
 
 def motion_terms(q: FloatArray, torque: FloatArray) -> FloatArray:
-    """Return what each error of a joint's motion is multiplied by, shape (pose, joint, 7)."""
+    """Return the factors of each error of a joint's motion, shape (pose, joint, 7)."""
     one = np.ones_like(q)
     return np.stack(
         [one, q, np.sin(q), np.cos(q), np.sin(2.0 * q), np.cos(2.0 * q), torque], axis=2
@@ -119,7 +119,7 @@ def screws(robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray) -> Fl
     robot : Robot
         The nominal arm.
     at : ArmFrames
-        Of the arm with its errors.
+        Frames of the arm with its errors.
     q, torque : ndarray, shape (pose, joint)
         As for `frames`.
 

@@ -148,7 +148,7 @@ class GeometryModel:
         return np.asarray(S[:, None, :3, 3] + np.einsum("nij,nmj->nmi", S[:, :3, :3], points))
 
     def tool_of(self, robot: Robot, payload: Payload | None = None) -> Callable[..., FloatArray]:
-        """Return what says where the tool of the same arm stands without process force.
+        """Return the function that gives the tool's place of the same arm without process force.
 
         Parameters
         ----------

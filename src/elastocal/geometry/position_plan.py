@@ -154,7 +154,7 @@ def plan_positions(
     search : str
         Name of the search technique.
     seed : int
-        Of everything random.
+        Seed of everything random.
     progress : Progress
         Called with stage, done and total.
 

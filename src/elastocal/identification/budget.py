@@ -136,7 +136,7 @@ def error_budget(
     options: FitOptions | None = None,
     marker_offset: ArrayLike | None = None,
 ) -> ErrorBudget:
-    """Return what the error at left-out poses is made of, and what each term takes from it.
+    """Return the terms of the error at left-out poses, and the part that each takes from it.
 
     Parameters
     ----------
@@ -370,7 +370,7 @@ def stated_noise(model: ElasticModel, readings: Readings, compliance: FloatArray
     readings : Readings
         With their standard deviations, or without: then it is not known.
     compliance : ndarray, shape (parameter,)
-        Of the springs.
+        Compliance of the springs.
     """
     if readings.marker_sigma is None:
         return ErrorPart(None, None, None, phrase("no stated deviation"))

@@ -90,7 +90,7 @@ def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
 def friction_states(
     model: ElasticModel, readings: Readings, loaded_at: ModelPosture, reference_at: ModelPosture
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what each friction element bears under load, and when the zero was read.
+    """Return the torques of each friction element under load, and at the reading of the zero.
 
     Parameters
     ----------

@@ -244,14 +244,14 @@ def spring_summaries(
     settings: FitSettings | None = None,
     known: Sequence[KnownSpring] = (),
 ) -> tuple[SpringSummary, ...]:
-    """Return what tables show of each spring: its characteristics, with their intervals.
+    """Return the rows of tables of springs: their characteristics, with their intervals.
 
     Parameters
     ----------
     calibrated : CalibratedModel
         The model.
     settings : FitSettings, optional
-        Of its fit, whose bounds count; by default those that make sense to each spring.
+        Settings of its fit, whose bounds count; by default those that make sense to each spring.
     known : sequence of KnownSpring, optional
         What was known of springs before the fit.
     """
@@ -351,7 +351,7 @@ def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
     Parameters
     ----------
     ladder : sequence of RungSummary
-        Of a choice between all rungs.
+        Ladder of a choice between all rungs.
     """
     taken = next(rung for rung in ladder if rung.chosen)
     best = min(ladder, key=lambda rung: rung.difference.mean)

@@ -291,7 +291,7 @@ def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
 
 
 def _errors_on_production(tried: Sequence[Climbed], found: Judgement) -> FloatArray:
-    """Return what the near rungs are expected to err on production, shape (rung,), in m, or NaN."""
+    """Return the expected errors of the near rungs on production, shape (rung,), in m, or NaN."""
     errors = np.full(len(tried), np.nan)
     forecasts = [each for number in found.near if (each := tried[number].forecast) is not None]
     if forecasts:
@@ -305,7 +305,7 @@ def try_rung(name: str, model: ElasticModel, problem: Problem, low: BoolArray) -
     Parameters
     ----------
     name : str
-        Of the rung.
+        Name of the rung.
     model : ElasticModel
         Its model.
     problem : Problem

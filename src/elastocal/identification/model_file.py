@@ -68,7 +68,7 @@ class CalibrateResult(Result):
     reads it asks for them first (`elastocal.plugins.require_distributions`)."""
 
     def show(self) -> Iterable[Block]:
-        """Return what a person asks of a calibration; of a model made otherwise, its facts."""
+        """Return the main facts of a calibration; of a model made otherwise, its own."""
         from elastocal.identification.show import show_calibration
 
         if self.calibration is None:
@@ -173,7 +173,7 @@ class CalibrateResult(Result):
         )
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         seen, figures = self.observability, self.calibration
         facts = [
             ("robot", f"{self.robot.name}, tool centre point {self.robot.tcp}"),

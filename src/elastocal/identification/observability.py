@@ -31,7 +31,7 @@ _DUST = 1e-6
 _IN_CONE = 1e-6
 """Largest distance of a unit vector from a cone that it counts to."""
 _MODEST = 1e-9
-"""Multipliers of the cone's rows count as this much distance each: a thousand of them are too far."""
+"""Distance that each multiplier of the cone's rows counts as: a thousand of them are too far."""
 _MOST_STEPS = 100
 """Steps of non-negative least squares by the longer side of their matrix."""
 _TWICE = 2.0
@@ -132,7 +132,7 @@ def observability(
     problem: Problem | None = None,
     compliance: FloatArray | None = None,
 ) -> Observability:
-    """Return what a factored system determines.
+    """Return the observability of a factored system.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def find_faint(
     Parameters
     ----------
     seen : Observability
-        Of the data.
+        Observability of the data.
     problem : Problem
         What was fitted.
     compliance : ndarray, shape (parameter,)
@@ -254,7 +254,7 @@ def unseen_groups(
     model : ElasticModel
         Robot with another tool, and the springs.
     seen : Observability
-        Of the calibration.
+        Observability of the calibration.
     calibrated : ElasticModel
         Robot with the calibrated tool, and the springs.
     """

@@ -107,7 +107,7 @@ def corrected_mean(values: FloatArray, overlap: Overlap) -> MeanOverSets:
     values : ndarray, shape (cv, n)
         A figure of each verification set, for each number of training poses.
     overlap : Overlap
-        Of the sets.
+        Overlap of the sets.
     """
     mean = values.mean(axis=0)
     if not overlap.known:
@@ -126,7 +126,7 @@ def paired_difference(errors_a: FloatArray, errors_b: FloatArray, overlap: Overl
     errors_a, errors_b : ndarray, shape (set, n)
         Mean error of each held-out set, in m.
     overlap : Overlap
-        Of the sets.
+        Overlap of the sets.
     """
     difference = errors_a - errors_b
     round_off = np.abs(difference) <= _ROUND_OFF * np.maximum(errors_a, errors_b)
@@ -156,7 +156,7 @@ def judge_models(errors: FloatArray, allowed: BoolArray, overlap: Overlap) -> Ju
     allowed : ndarray of bool, shape (model,)
         Which may be taken, at least one; the others are judged beside them.
     overlap : Overlap
-        Of the sets.
+        Overlap of the sets.
     """
     mean = np.where(allowed, errors.mean(axis=0), np.inf)
     best = int(np.argmin(mean))

@@ -163,7 +163,7 @@ def expected_errors(forecasts: Sequence[ProductionForecast]) -> FloatArray:
     Parameters
     ----------
     forecasts : sequence of ProductionForecast
-        Of the same rows, the richest model last.
+        Forecasts of the same rows, the richest model last.
     """
     richest = forecasts[-1]
     squares = []

@@ -178,7 +178,7 @@ def unit_columns(rows: FloatArray, size: FloatArray | float = 1.0) -> ScaledRows
 def column_scaling(
     norms: FloatArray, size: FloatArray | float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what columns are multiplied by, zero for an unloaded spring, and `ScaledRows.scale`.
+    """Return the columns' factors, zero for an unloaded spring, and `ScaledRows.scale`.
 
     Parameters
     ----------

@@ -185,7 +185,7 @@ def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:
     Parameters
     ----------
     grams : PoseGrams
-        Of the problem that was solved.
+        Grams of the problem that was solved.
     draws : int
         Number of resamples.
     rng : Generator

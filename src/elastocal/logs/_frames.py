@@ -185,7 +185,7 @@ def sensor_doubts(
 def _turned_sensor(
     postures: StaticPostures | None, sense: float, site: Site
 ) -> tuple[float, tuple[str, ...]]:
-    """Return what part of the weight's change another turn leaves, and how the sensor is turned.
+    """Return the part of the weight's change that the best turn leaves, and that turn in words.
 
     The part is infinite where weight and poses do not tell it.
     """

@@ -256,7 +256,7 @@ def _blurred(values: FloatArray, samples: int) -> FloatArray:
 
 
 def _values(log: LogStreams, lever: FloatArray) -> FloatArray:
-    """Return what changes in a log, shape (row, 3)."""
+    """Return the position or the force of a log, shape (row, 3)."""
     if log.arm is not None:
         T = log.arm.T_base_tcp
         return T[:, :3, 3] + T[:, :3, :3] @ lever

@@ -118,7 +118,7 @@ class GuessedLog:
 
 
 def guess_logs(files: Sequence[Path]) -> tuple[GuessedLog, ...]:
-    """Return what each log, and each topic of a recording, looks like.
+    """Return the apparent kind of each log, and of each topic of a recording.
 
     Raises
     ------
@@ -149,14 +149,14 @@ _ORDER = ("time", "handshake")
 
 
 def guess_log(log: str, topic: str | None, table: LogTable) -> GuessedLog:
-    """Return what the columns of a table look like.
+    """Return the apparent meaning of the columns of a table.
 
     Parameters
     ----------
     log : str
         Name of its file.
     topic : str or None
-        Of a recording.
+        Topic of a recording.
     table : LogTable
         Its columns.
     """

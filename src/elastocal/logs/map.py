@@ -264,7 +264,7 @@ def read_map(path: Path) -> LogMap:
 
 
 def site(path: Path, log_map: LogMap) -> Site:
-    """Return what a map says that its logs were taken from.
+    """Return the robot, tool, sensor and marker that the logs of a map were taken with.
 
     Parameters
     ----------

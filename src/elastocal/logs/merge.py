@@ -228,7 +228,7 @@ def postures_at_rest(
     readings : sequence of Reading
         In order of time.
     poses : sequence of int
-        Of each; -1: of none.
+        Poses of each; -1: of none.
     site : Site
         What the map says.
     """
@@ -619,7 +619,7 @@ def _warnings(
     registration: Registration,
     log_map: LogMap,
 ) -> tuple[str, ...]:
-    """Return what a person should look at before the dataset is believed."""
+    """Return the findings to look at before the dataset is used."""
     found = []
     unnamed = sum(each.pose < 0 and each.load == "" for each in plateaus)
     if unnamed:

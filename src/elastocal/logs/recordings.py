@@ -66,7 +66,7 @@ _Result = TypeVar("_Result")
 
 
 def read_bounded(path: Path, what: str, read: Callable[[], _Result]) -> _Result:
-    """Return what a library makes of a foreign file, read in a child of bounded time and memory.
+    """Return a library's reading of a foreign file, in a child of bounded time and memory.
 
     Parameters
     ----------

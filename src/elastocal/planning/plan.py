@@ -178,7 +178,7 @@ NO_WRIST = Kind(
 
 
 def unjudged_limits(cell: Cell) -> list[Finding]:
-    """Return what a limit of the cell file asks for and no check can judge on this robot."""
+    """Return the limits of the cell file that no check can judge on this robot."""
     known = zip(cell.robot.joint_names, np.isfinite(cell.torque_limits), strict=True)
     unknown = [name for name, is_known in known if not is_known]
     notes = [TORQUES_UNKNOWN(joints=unknown)] if unknown else []
@@ -363,7 +363,7 @@ MOVE_STATION = Kind(
 
 
 def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[Finding, ...]:
-    """Return what a user should know of how the poses were found, a line each."""
+    """Return remarks on how the poses were found, a line each."""
     notes: list[Finding] = []
     wanted = cell.file.search.pool
     if len(pool.postures) < wanted:
@@ -394,7 +394,7 @@ def _shortages(poses: tuple[PoseRecord, ...]) -> Iterator[Finding]:
 
 
 def _assumptions(cell: Cell) -> list[Finding]:
-    """Return what the robot's description assumes and the cell file does not replace."""
+    """Return the assumptions of the robot's description that the cell file does not replace."""
     given = set()
     if cell.file.limits.torque.values:
         given.add("effort")

@@ -203,7 +203,7 @@ def expected_errors(
     cell : Cell
         For ``search.sigma`` and ``search.floor``.
     information : Information
-        Of the candidates, with a process.
+        Information of the candidates, with a process.
     order : ndarray of int, shape (n,)
         Poses to begin with, in the order of choice.
     most : int

@@ -236,7 +236,7 @@ TILTED = Kind(
 
 
 def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Finding, ...]:
-    """Return what a user should know of the meshes, of where the surface stands, and of the arm.
+    """Return findings on the meshes, on the place of the surface, and on the arm.
 
     Parameters
     ----------

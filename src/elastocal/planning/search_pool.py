@@ -240,7 +240,7 @@ class SearchPool:
         return expected_errors(cell, self.information.take(some), order, _TABLE)
 
     def production(self, cell: Cell, chosen: IndexArray) -> ProductionRecord | None:
-        """Return what chosen poses promise for production; None where the cell names none."""
+        """Return the errors expected on production; None where the cell names no production."""
         search, process, coverage = (
             cell.file.search,
             cell.process,
@@ -301,7 +301,7 @@ def _pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArra
     cell : Cell
         For its load cases.
     model : ElasticModel
-        Of the cell's robot.
+        Model of the cell's robot.
     postures : Postures
         In contact.
 

@@ -117,7 +117,7 @@ def expected(plan: PlanResult, production: ProductionRecord) -> blocks.Table:
 
 
 def _checks(plan: PlanResult) -> blocks.Table:
-    """Return what each check refused, and how near the chosen poses come to it."""
+    """Return the refusals of each check, and how near the chosen poses come to its limit."""
     rows = []
     for check in plan.pool.checks:
         margins = {

@@ -174,7 +174,7 @@ def read_json(path: Path, cls: type[T], schema: str = "") -> T:
 
 
 def read_json_data(path: Path) -> Any:
-    """Return what a JSON file holds, whatever its schema.
+    """Return the data of a JSON file, whatever its schema.
 
     Raises
     ------

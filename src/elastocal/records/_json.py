@@ -26,7 +26,7 @@ _SHOWN = 12
 def parse_json(
     text: str | bytes, what: str, *, finite: bool = False, most: Limit = MOST_VALUES
 ) -> Any:
-    """Return what a JSON text says.
+    """Return the value of a JSON text.
 
     Parameters
     ----------

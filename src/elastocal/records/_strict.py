@@ -126,7 +126,7 @@ def read_yaml(path: Path, model: type[Model], schema: str) -> Model:
 
 
 def read_yaml_data(path: Path) -> Any:
-    """Return what a YAML file holds, whatever its schema.
+    """Return the data of a YAML file, whatever its schema.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def read_yaml_data(path: Path) -> Any:
 
 
 def parse_yaml(text: str, path: Path) -> Any:
-    """Return what the text of a YAML file holds; the path is for messages. See `read_yaml_data`."""
+    """Return the data of a YAML text; the path is for messages. See `read_yaml_data`."""
     _MOST_YAML.require(len(text) / _KILOBYTE, f"{path} has {len(text) / _KILOBYTE:.0f} kB, which")
     try:
         # The loader is PyYAML's safe one with duplicate keys refused.

@@ -60,7 +60,7 @@ def validate(data: Any, cls: type[T], what: str) -> T:
 
 @cache
 def _validator(cls: Any) -> SchemaValidator:
-    """Return what validates a class; of a list with wrong items it tells the first alone.
+    """Return the validator of a class; of a list with wrong items it reports the first alone.
 
     A million of them would otherwise take gigabytes.
     """
@@ -115,7 +115,7 @@ def _bound(context: Mapping[str, Any]) -> float | None:
 
 
 def _at(data: Any, path: Sequence[int | str]) -> object:
-    """Return what a file says at a place; None where the place is none of the file's."""
+    """Return the value at a place of a file; None where the file has no such place."""
     for part in path:
         try:
             data = data[part]

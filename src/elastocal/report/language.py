@@ -91,7 +91,7 @@ def language_of(code: str, option: str = "--language") -> Language:
     Parameters
     ----------
     code : str
-        Of `LANGUAGES`.
+        Code of `LANGUAGES`.
     option : str
         Where it was given.
 

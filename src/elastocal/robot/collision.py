@@ -71,7 +71,7 @@ _Shapes = dict[str, tuple[coal.CollisionGeometry, str]]
 
 
 def _take_shapes(root: ElementTree.Element, places: Mapping[str, Path]) -> _Shapes:
-    """Return what Pinocchio is not to read: it gets spheres in their places.
+    """Take out and return the shapes that Pinocchio is not to read: it gets spheres instead.
 
     Raises
     ------

@@ -506,7 +506,7 @@ def tool_link(text: str) -> str:
 
 
 def assumptions(root: ElementTree.Element) -> tuple[Assumption, ...]:
-    """Return what the URDF itself marks as having no source."""
+    """Return the values that the URDF itself marks as having no source."""
     return tuple(
         Assumption(element.get("field", ""), element.get("reason", ""))
         for element in root.iter("assumption")

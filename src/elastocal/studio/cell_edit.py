@@ -366,7 +366,7 @@ class CellText:
 
 
 def form_of(cell: Cell) -> CellForm:
-    """Return what stands in the fields of a page for a cell."""
+    """Return the values in the fields of a page for a cell."""
     loads, region = cell.file.load_cases, cell.file.surface.region
     box = None if region is None else region.box
     plain = region is None or (box is not None and "pose" not in region.model_fields_set)

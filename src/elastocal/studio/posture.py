@@ -196,7 +196,7 @@ class CellView:
         q : sequence of float
             The posture until then, in rad or m.
         origin, direction : sequence of float
-            Of the line, in base, in m.
+            Origin and direction of the line, in base, in m.
 
         Raises
         ------

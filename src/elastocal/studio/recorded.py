@@ -86,7 +86,7 @@ class RunView:
         return f"{poses}, goes on" if self.live else f"{poses}; {last.text}"
 
     def summary(self) -> dict[str, object]:
-        """Return what happened, JSON-ready: state, poses, the last entries, the last target."""
+        """Return the recorded state, JSON-ready: poses, the last entries, the last target."""
         moves = [
             entry.target
             for entry in self.entries

@@ -85,7 +85,7 @@ class _Door:
     port: int
 
     def require(self, headers: Any, path: str) -> str:
-        """Return what is asked for behind the token.
+        """Return the answer to a request behind the token.
 
         Raises
         ------

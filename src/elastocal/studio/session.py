@@ -198,7 +198,7 @@ class Session:
         Parameters
         ----------
         number : int
-            Of the news that is known; -1: none.
+            Number of the news that is known; -1: none.
         patience : float
             How long to wait for another, in s.
         """

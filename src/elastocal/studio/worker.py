@@ -62,7 +62,7 @@ class Outbox:
     Parameters
     ----------
     line : Connection
-        Of a pipe.
+        End of a pipe.
     """
 
     def __init__(self, line: "Connection[object, object]") -> None:

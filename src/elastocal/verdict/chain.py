@@ -208,7 +208,7 @@ def _broken(name: str, text: str) -> Link:
 
 
 def _made_from(evidence: Evidence) -> Mapping[str, str]:
-    """Return what the dataset states that it was made from; nothing for one of before."""
+    """Return the origins that the dataset states; none for one of an earlier version."""
     return {} if evidence.dataset is None else read_made_from(evidence.dataset.attributes)
 
 
@@ -368,7 +368,7 @@ def _rewritten(run: RunFolder, summary: RunSummary) -> Iterator[Link]:
 
 
 def _unlike(old: bool, name: str, text: str, advice: str) -> Link:
-    """Return what differs beside the readings: an earlier version said other things about them."""
+    """Return the link of a difference beside the readings: earlier versions wrote other remarks."""
     if old:
         return Link(name, LinkState.UNSTATED, f"{text} ({_OLD}, by another version){advice}")
     return _broken(name, f"{text}{advice}")

@@ -327,7 +327,7 @@ def check_process(record: SimulatedProcess, evidence: Evidence, path: Path) -> S
 
 
 def find_doubts(evidence: Evidence) -> tuple[str, ...]:
-    """Return what does not fit together although each part by itself is sound."""
+    """Return contradictions between parts that are each sound by themselves."""
     return tuple(_doubts(evidence))
 
 

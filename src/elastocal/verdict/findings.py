@@ -78,7 +78,7 @@ def reading_findings(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _advice_on_missing(values: Mapping[str, Any]) -> str:
-    """Return what to do about poses without a usable reading: not all of it can be resumed."""
+    """Return the advice on poses without a usable reading: not all of it can be resumed."""
     if values["committed"] is None:
         return phrase("Measure them in another run, and calibrate with both datasets.")
     spoiled, texts = values["committed"], []

@@ -151,7 +151,7 @@ def _untrusted(evidence: Evidence) -> Phrase:
 
 
 def _not_released(evidence: Evidence) -> Phrase:
-    """Return what follows where something is not proved."""
+    """Return the consequence of something that is not proved."""
     if evidence.simulated:
         return phrase(
             "A simulation releases nothing; a real cell with this result would not be released for"
@@ -161,7 +161,7 @@ def _not_released(evidence: Evidence) -> Phrase:
 
 
 def _meaning(evidence: Evidence, light: Light | None, by_the_errors: bool, useless: bool) -> Phrase:
-    """Return what is proved, and what follows for the use of the model."""
+    """Return the proved statement, and its consequence for the use of the model."""
     tolerance = mm(evidence.limits.tolerance or 0.0)
     if evidence.calibrated is None:
         return phrase("There is no calibrated model, so nothing can be released.")
@@ -215,7 +215,7 @@ def _meaning(evidence: Evidence, light: Light | None, by_the_errors: bool, usele
 
 
 def _not_proved(unseen: UnseenErrors, limits: AcceptanceLimits) -> Phrase:
-    """Return what is not proved, with the readings that are against it."""
+    """Return the statement that is not proved, with the readings that are against it."""
     tolerance = limits.tolerance or 0.0
     beyond, limit = unseen.beyond(tolerance), mm(tolerance)
     readings = counted(len(unseen.error), "reading")

@@ -92,7 +92,7 @@ def manifest_of(
     verdict : Verdict
         What the page says of them.
     version : str
-        Of elastocal.
+        Version of elastocal.
     sign : callable, optional
         Returns the signature of a hash; by default the report is not signed.
     """

@@ -113,7 +113,7 @@ def _tracker(evidence: Evidence) -> UncertaintySource:
 
 
 def _sensor(evidence: Evidence) -> UncertaintySource:
-    """Return what the sensor's calibration adds: forces scale the deflections."""
+    """Return the contribution of the sensor's calibration: forces scale the deflections."""
     name, stated = (
         phrase("Calibration of the force sensor"),
         evidence.certificate.sensor.uncertainty,

@@ -97,7 +97,7 @@ class CoarseSolid:
         return np.unique(drawn[drawn[:, 0] < drawn[:, 1]], axis=0)
 
     def note(self, what: str) -> str:
-        """Return what to tell of it; nothing when it is drawn whole."""
+        """Return a remark on the drawing; nothing when it is drawn whole."""
         drawn = len(self.solid.faces)
         if drawn == self.whole:
             return ""
@@ -115,7 +115,7 @@ def robot_solids(scene: CollisionScene, q: FloatArray) -> RobotSolids:
     Parameters
     ----------
     scene : CollisionScene
-        Of the cell.
+        Scene of the cell.
     q : ndarray, shape (posture, joint)
         Joint positions in rad or m, in the order of the robot's joints.
     """

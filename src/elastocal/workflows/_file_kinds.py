@@ -237,7 +237,7 @@ def process_folder(path: Path) -> FileDescription:
 def record_file(
     kind: str, record: Callable[[], type], *names: str
 ) -> Callable[[Path], FileDescription]:
-    """Return what describes files of a record, imported only then, by some of its figures."""
+    """Return the describer of files of a record, imported only then, by some of its figures."""
 
     def describe(path: Path) -> FileDescription:
         found: object = read_json(path, record())

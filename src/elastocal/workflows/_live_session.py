@@ -190,9 +190,9 @@ class LiveSession:
     ready : Prepared
         What is to be done.
     rig : ReservedRig
-        Of the cell.
+        Rig of the cell.
     arming : Arming
-        Of the cell.
+        Arming of the cell.
     report : callable
         Called twice a second.
     interrupted : callable

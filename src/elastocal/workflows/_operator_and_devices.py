@@ -128,7 +128,7 @@ class Rig:
         command : str
             Which command has them, for others who want them.
         kinds : collection of str, optional
-            Of the devices that it talks to.
+            Kinds of the devices that it talks to.
 
         Raises
         ------
@@ -177,7 +177,7 @@ class ReservedRig:
         Parameters
         ----------
         seed : int
-            Of simulated devices.
+            Seed of simulated devices.
         start : float
             What the clock shows at the beginning, in s.
 
@@ -255,13 +255,13 @@ def arm_devices(
     Parameters
     ----------
     rig, arm : Rig, RobotArm
-        Of the cell.
+        Rig and arm of the cell.
     operator : Operator
         Is asked, where a real arm is to move and nobody has agreed yet.
     confirmed : bool
         A person has agreed to this command on the cell file as it is now.
     arming : Arming, optional
-        Of a person who agreed earlier, to the cell file as it was then.
+        Arming of a person who agreed earlier, to the cell file as it was then.
     asks : bool
         Whether somebody has to agree even where nothing real moves.
 

@@ -198,7 +198,7 @@ class CheckResult(Result):
     """Figures by name, JSON-ready."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         held = ((name, brief(text)) for name, text in self.lines())
         return (("file", self.file), ("kind", self.kind), *held)
 
@@ -328,7 +328,7 @@ def _stated(data: object) -> object:
 
 
 def _kind(path: Path, stated: object, known: Mapping[str, _Describe]) -> _Describe:
-    """Return what describes files of a schema; one that is not known is refused with all that are.
+    """Return the describer of files of a schema; an unknown one is refused with all that are known.
 
     Its version is left to whoever reads the file.
     """

@@ -103,7 +103,7 @@ class CodecResult(Result):
     """Names of the files in the folder."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         found = self.summary
         verdicts = tuple(("verdict", sentence) for sentence in found.sentences)
         return (("robot", found.robot), ("splits", found.settings.sentence), *verdicts)

@@ -104,7 +104,7 @@ class CompensateResult(Result, CorrectionFigures):
     """Files of the robot program that was written, the main one first."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         lengths = {
             "deviation as programmed": self.deviation,
             "a first-order step would leave": self.first_order,

@@ -94,7 +94,7 @@ class DemoDisplay(Protocol):
         """Show a chapter while it is at work."""
 
     def text(self, chapter: Chapter, result: Result) -> str:
-        """Return what its command prints."""
+        """Return the printed output of its command."""
 
 
 class _Plain:
@@ -144,7 +144,7 @@ class DemoResult(Result):
     """Deviations before and after correction: the paper's Table 1."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person who has watched the demo wants to know."""
+        """Return the summary after the demo."""
         line = self.process.lines[-1]
         before, after, share = line.before, line.after, line.reduction
         return (
@@ -223,7 +223,7 @@ def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:
     out : Path
         Folder of the demo.
     seed : int
-        Of the simulated cell.
+        Seed of the simulated cell.
 
     Raises
     ------

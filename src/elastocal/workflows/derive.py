@@ -44,7 +44,7 @@ class DeriveResult(Result):
     summary: RunSummary
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         return (
             ("measured", self.poses()),
             ("readings", self.counts()),

@@ -85,7 +85,7 @@ class ExportResult(Result):
     """How sure the model is on the production that it was calibrated for; none: none was named."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         limits = self.limits
         return (
             ("robot", f"{self.robot}: {self.joints} joints, {self.springs} springs"),
@@ -162,7 +162,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
 
 
 def _around(settings: ExportSettings, model: Robot) -> tuple[LinuxTarget, PathLimits, Cell] | None:
-    """Return what the program of a target is told of the cell; None without one.
+    """Return the target's settings, the path limits and the cell; None without a target.
 
     Raises
     ------

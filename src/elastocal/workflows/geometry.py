@@ -82,7 +82,7 @@ class GeometryResult(Result):
     """Errors of every position before and after, at poses that were left out."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         model = self.model
         before, after = model.held_out.registration, model.held_out.chosen
         known = sum(each.known for each in model.parameters)

@@ -71,7 +71,7 @@ class ImportLogsResult(Result):
         return self.found.dataset
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         figures = self.figures
         return (
             (
@@ -187,7 +187,7 @@ class GuessMapResult(Result):
     """The map."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what each column was taken for, and why."""
+        """Return the meaning that each column was given, and why."""
         return tuple(
             (
                 each.log if each.topic is None else f"{each.log} {each.topic}",

@@ -43,7 +43,7 @@ class InitResult(Result):
     """Production path: joints and forces; none where the example has none."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what was written."""
+        """Return the files that were written."""
         return (
             ("cell", str(self.cell)),
             ("meshes", ", ".join(map(str, self.meshes)) or "none"),

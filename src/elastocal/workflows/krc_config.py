@@ -55,7 +55,7 @@ class KrcConfigResult(Result):
     notes: tuple[str, ...]
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         bounds = self.bounds
         return (
             ("mode", self.mode),
@@ -118,7 +118,7 @@ def krc_config(settings: KrcConfigSettings, progress: Progress) -> KrcConfigResu
 
 
 def kuka_settings(cell: Cell) -> RsiSettings:
-    """Return what stands under the arm of a cell, a KUKA.
+    """Return the settings of RSI of a cell with a KUKA.
 
     Raises
     ------

@@ -107,7 +107,7 @@ class LiveResult(Result):
     """Sentences that a person must know."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         loop, limits = self.loop, self.limits
         longest = (
             f"{in_unit(loop.largest_correction, 'mm'):.3f} of {quantity(limits.correction, 'mm')}"

@@ -64,7 +64,7 @@ class MeasureDelayResult(Result):
     measured: CommissioningRecord
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         found, chirps = self.measured, self.measured.chirps
         each = ", ".join(f"{in_unit(chirp.delay, 'ms'):.1f}" for chirp in chirps)
         lag = max(chirp.lag for chirp in chirps)

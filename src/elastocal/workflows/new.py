@@ -121,7 +121,7 @@ def _prepared(cell: Cell) -> tuple[Surface, FloatArray]:
 
 
 def _findings(path: Path, cell: Cell, surface: Surface) -> tuple[str, ...]:
-    """Return what ``check`` finds in the file, and what the joints do not bear; or refuse it."""
+    """Return the findings of ``check``, and presses that the joints do not bear; or refuse it."""
     found = of_kind(cell_file(path)[1]["findings"], list, "findings")
     return (*found, *_unbearable(cell, surface))
 

@@ -168,7 +168,7 @@ class NewSettings:
         )
 
     def offered(self, name: str) -> str:
-        """Return what is guessed for a field of settings with robot and mesh."""
+        """Return the value guessed for a field of settings with robot and mesh."""
         if name == "flange":
             return self.flange or self._tool_link()
         return str(getattr(self.filled(), name))

@@ -219,7 +219,7 @@ def plan_figures(
     program, language : str
         Name of the robot program, and the language that was asked for.
     free : PositionPlan, optional
-        Of the poses in free space, where the plan has them.
+        Poses in free space, where the plan has them.
     """
     robot = Robot.from_urdf(found.robot.urdf, found.robot.tcp, found.robot.base)
     writer, reason = choose_writer(robot, language)

@@ -71,7 +71,7 @@ class PredictResult(Result):
     summary: PredictSummary
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         figures = self.summary
         return (
             ("tool", figures.tool),

@@ -96,7 +96,7 @@ class ReleaseResult(Result):
     """What was said before."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know at the end."""
+        """Return the facts shown at the end."""
         way = mm(self.figures.distance)
         return (("way off the surface", way), ("tool", self.figures.message))
 
@@ -227,7 +227,7 @@ def _way(cell: Cell, bench: _Bench, force: FloatArray | None) -> _Way:
 
 
 def _plan(bench: _Bench, way: _Way, force: FloatArray | None) -> tuple[str, ...]:
-    """Return what a person reads before anything moves."""
+    """Return the summary that is read before anything moves."""
     x, y, z = in_unit(bench.arm.state().T_base_tcp[:3, 3], "mm")
     guarded = f"it stops where the force grows by {_GROWTH:g} N"
     blind = "no force is watched: it goes slowly, in position control"

@@ -130,7 +130,7 @@ class ReportResult(Result):
     figures: ReportFigures
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         return (
             (f"{self.verdict.word}{self.light}", f"{self.verdict.meaning} {self.verdict.sentence}"),
             *(("because", reason) for reason in self.verdict.reasons),

@@ -53,7 +53,7 @@ _CONTACT = {
 
 
 def contact_sentence(state: ArmState) -> str:
-    """Return what an arm says of contact."""
+    """Return an arm's reading of contact."""
     return f"the arm {_CONTACT[state.in_contact]}"
 
 
@@ -147,7 +147,7 @@ class RunResult(Result):
     """Why nothing was derived of a run that is done."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         found = self.figures
         return (
             ("run", f"{found.run}, {found.state}"),
@@ -194,7 +194,7 @@ class RunResult(Result):
             yield "readings that are not ok", f"{more} more in summary.json, readings.not_ok"
 
     def pictured(self) -> object:
-        """Return what was derived: the picture shows how well the stations are registered."""
+        """Return the derived readings: their picture shows how well the stations are registered."""
         return self if self.summary is None else self.summary
 
 
@@ -234,7 +234,7 @@ class DryRunResult(Result):
         return pose_lines(self.plan, seconds)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         return (
             ("steps", f"{len(self.steps)}, of which none was made"),
             ("poses", str(self.poses)),
@@ -440,7 +440,7 @@ def _figures(
 
 
 def _session(job: _Job, known: LastKnown | None, devices: Devices) -> Session:
-    """Return what is left to do, and the way to HOME from where the arm stands."""
+    """Return the poses left to do, and the way to HOME from where the arm stands."""
     state, limit = devices.arm.state(), job.settings.procedure.travel_limit
     likely = known.uncommitted if known else None
     return Session(

@@ -72,7 +72,7 @@ class SimulateResult(Result):
         return [f"{name} {self._places(name)}" for name in self.ports.ports]
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         return (
             ("cell", self.cell),
             ("seconds a second of the wall", f"{self.rate:g}"),
@@ -137,7 +137,7 @@ def simulate(
 
 
 def _told(rig: Rig, devices: Iterable[str]) -> Mapping[str, Told]:
-    """Return what each server is told, by driver."""
+    """Return the settings handed to each server, by driver."""
     known = wire_servers()
     named = [name for name in rig.wanted if name != SIMULATED]
     chosen = list(devices) or named or list(suited_servers(rig.cell.robot))

@@ -146,7 +146,7 @@ class StiffnessResult(Result):
     """Stiffness of each choice along the path."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         counts = self.summary.postures
         return (
             ("tool", self.summary.tool),
@@ -285,7 +285,7 @@ def _surveyed(
 def _grid(
     robot: Robot, settings: StiffnessSettings
 ) -> tuple[compensation.PostureGrid, tuple[compensation.PostureConstraint, ...]]:
-    """Return what may be chosen at every station, and what a posture must pass."""
+    """Return the grid of postures at every station, and the constraints on them."""
     spins = np.linspace(0.0, 2.0 * np.pi, settings.spins, endpoint=False)
     external = _external_grid(robot, settings.external_positions)
     if settings.cell is None:

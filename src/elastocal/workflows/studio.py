@@ -93,7 +93,7 @@ class StudioResult(Result):
     """What is left to be done when the studio ends."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         found = self.figures
         return (("cell", found.cell), ("page", found.address), *(("note", n) for n in found.notes))
 
@@ -246,7 +246,7 @@ class _PageOperator(Unattended):
     outbox : Outbox
         To the page.
     steps : sequence of PlannedStep
-        Of the run, in order.
+        Steps of the run, in order.
     stations : sequence of str
         Station of each pose.
     rate : float

@@ -103,7 +103,7 @@ class StudyResult(Result):
     """Names of the files with tables, summary and charts in its folder."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         conditions = tuple(
             (each.name, f"{micrometres(each.error_mean.median)} µm median mean error")
             for each in self.summary.conditions
@@ -261,7 +261,7 @@ class _StudySimulation:
         return found
 
     def _pressed(self, spec: str) -> tuple[str, ...]:
-        """Return what is pressed under a condition: everything, or some cases at the reference.
+        """Return the load cases under a condition: all of them, or some at the reference.
 
         The load case that checks the fit is pressed too: friction feels it.
         """
@@ -309,7 +309,7 @@ def _prepare_study(
     conditions : sequence of Condition
         What is studied.
     seed : int
-        Of the study; poses are drawn from the cell file's ``search.seed``.
+        Seed of the study; poses are drawn from the cell file's ``search.seed``.
     verification : int
         Number of verification poses.
     jobs : int, optional

@@ -63,7 +63,7 @@ class VerifyResult(Result):
         return next((link for link in self.links if link.state is LinkState.BROKEN), None)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         return tuple((link.name, f"{link.state.value}: {link.text}") for link in self.links)
 
     def show(self) -> Iterator[Block]:

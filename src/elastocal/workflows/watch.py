@@ -66,7 +66,7 @@ class WatchResult(Result):
         return f"not heard: {whys}" if silent else None
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first: a line a device."""
+        """Return the main facts: a line a device."""
         return tuple(
             (f"{each.kind} {each.device}", "  ".join(filter(None, each.cells())))
             for each in self.figures.devices
@@ -140,11 +140,11 @@ class _Line(threading.Thread):
     Parameters
     ----------
     rig : Rig
-        Of the cell.
+        Rig of the cell.
     name : str
-        Of the driver.
+        Name of the driver.
     clock : Clock
-        Of the rig.
+        Clock of the rig.
     epoch : float
         Time of day of the PC where that shows 0, in s.
     over : Event

@@ -139,7 +139,7 @@ def calibrated(
     model : ElasticModel
         Robot and springs.
     readings : Readings
-        Of the calibration poses.
+        Readings of the calibration poses.
     marker_offset : array_like, shape (3,)
         Metrology marker in the tcp frame, in m.
     verification : Verification

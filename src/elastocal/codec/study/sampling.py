@@ -115,7 +115,7 @@ def batch_executor(
     jobs : int, optional
         Processes on this machine; all cores by default.
     address : str, optional
-        Of a Dask scheduler, whose workers are used instead, e.g. ``tcp://10.0.0.5:8786``.
+        Address of a Dask scheduler, whose workers are used instead, e.g. ``tcp://10.0.0.5:8786``.
     prepare : callable
         What each process does first, such as imports; can be pickled.
 
@@ -223,7 +223,7 @@ def _connected(address: str) -> Any:
 
 
 async def _identity(address: str) -> str:
-    """Return what kind of Dask process answers."""
+    """Return the kind of Dask process that answers."""
     from distributed.comm.core import connect
 
     reach: Callable[..., Any] = connect

@@ -105,12 +105,12 @@ class StudySummary:
 def study_summary(
     design: StudyDesign, results: Sequence[SampleResult], target: float | None
 ) -> StudySummary:
-    """Return what a study says.
+    """Return the findings of a study.
 
     Parameters
     ----------
     design : StudyDesign
-        Of the study.
+        Design of the study.
     results : sequence of SampleResult
         Its samples.
     target : float, optional
@@ -180,7 +180,7 @@ def write_study(
 
 
 def read_study(path: Path) -> StudySummary:
-    """Return what a study says, from its folder or its `_SUMMARY`.
+    """Return the findings of a study, from its folder or its `_SUMMARY`.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def summarise(
     Parameters
     ----------
     design : StudyDesign
-        Of the study.
+        Design of the study.
     results : sequence of SampleResult
         Its samples.
     target : float, optional
@@ -273,7 +273,7 @@ def advice(conditions: Sequence[ConditionSummary], target: float | None) -> str:
     Parameters
     ----------
     conditions : sequence of ConditionSummary
-        Of the study.
+        Conditions of the study.
     target : float, optional
         In m.
     """

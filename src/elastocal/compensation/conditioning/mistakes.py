@@ -49,14 +49,14 @@ def tool_doubts(
     known_mass: float | None = None,
     known_centre: FloatArray | None = None,
 ) -> tuple[str, ...]:
-    """Return what a person should look at before a tool is believed.
+    """Return the findings to look at before a tool is used.
 
     Parameters
     ----------
     postures : StaticPostures
         That it was fitted to.
     fit : ToolFit
-        Of these.
+        Fit of these postures.
     known_mass : float, optional
         Mass of the tool by another source, in kg.
     known_centre : ndarray, shape (3,), optional
@@ -118,7 +118,7 @@ def other_centre(fit: ToolFit, known: FloatArray) -> tuple[str, ...]:
     Parameters
     ----------
     fit : ToolFit
-        Of static postures.
+        Fit of static postures.
     known : ndarray, shape (3,)
         By the drawing, in the sensor's frame, in m.
     """
@@ -435,7 +435,7 @@ def refuse_mistakes(
     postures : StaticPostures
         As stated.
     fit : ToolFit
-        Of these.
+        Fit of these postures.
     R_nominal : ndarray, shape (3, 3), optional
         Rotation of the sensor in the flange as it was mounted.
     expected_centre : ndarray, shape (3,), optional
@@ -539,7 +539,7 @@ def _suspects(postures: StaticPostures, fit: ToolFit) -> Iterable[int]:
 
 
 def _left(postures: StaticPostures, fit: ToolFit) -> FloatArray:
-    """Return what is left of a component of force and moment, root mean square."""
+    """Return the rest of a component of force and moment, root mean square."""
     return np.array([_rms(part) for part in tool_residual(postures, fit)])
 
 
@@ -551,7 +551,7 @@ def _allowed(postures: StaticPostures) -> FloatArray:
 
 
 def _turning(postures: StaticPostures) -> FloatArray:
-    """Return what changes with the posture of a component of force and moment."""
+    """Return the part of a component of force and moment that changes with the posture."""
     return np.array([_rms(part - part.mean(axis=0)) for part in (postures.force, postures.moment)])
 
 

@@ -93,7 +93,7 @@ def _facts(found: ToolResult) -> Iterator[tuple[str, str]]:
 
 
 def _matrix(found: ToolResult) -> str:
-    """Return what is known of the sensor's matrix, and what it does."""
+    """Return the details of the sensor's matrix, and its effect."""
     shares = np.array(found.matrix_determined)
     known = [
         f"{_AXES[i]}<-{_AXES[k]}" for i in range(6) for k in range(6) if shares[i, k] > _DETERMINED

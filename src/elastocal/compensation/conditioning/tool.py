@@ -103,7 +103,7 @@ class ToolResult(Result):
         )
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
 
         def vector(values: _Triple, unit: str, scale: float = 1.0) -> str:
             return f"({', '.join(f'{scale * value:.4g}' for value in values)}) {unit}"
@@ -150,7 +150,7 @@ def tool_result(
     Parameters
     ----------
     found : ToolChoice
-        Of static postures.
+        Choice of a tool from static postures.
     mount : SensorMount
         Where the sensor sits.
     source : str

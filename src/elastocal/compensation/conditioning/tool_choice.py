@@ -148,7 +148,7 @@ def _beside_cross_talk(
 
 
 def affine_scatter(postures: StaticPostures) -> FloatArray | None:
-    """Return what the best affine law of gravity leaves of force and moment components, (2,).
+    """Return the rest of force and moment components after the best affine law of gravity, (2,).
 
     It is the noise of the postures whatever tool and sensor are; None with too few postures.
     """

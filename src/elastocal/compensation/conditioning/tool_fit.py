@@ -231,7 +231,7 @@ def fit_tool(
 
 
 def tool_residual(postures: StaticPostures, fit: ToolFit) -> tuple[FloatArray, FloatArray]:
-    """Return what a fit leaves of forces and moments, shapes (posture, 3)."""
+    """Return the rest of forces and moments after a fit, shapes (posture, 3)."""
     weight = fit.mass * (postures.gravity_flange @ fit.R_flange_sensor)
     wrench = np.hstack([weight, np.cross(fit.centre, weight)]) @ fit.matrix.T
     wrench += postures.course[:, None] * fit.drift
@@ -269,7 +269,7 @@ class _WeighedFit:
     """Weights of a force and of a moment component, shape (2,)."""
 
     def left(self) -> FloatArray:
-        """Return what is left of forces and moments, shape (posture, 6)."""
+        """Return the rest of forces and moments, shape (posture, 6)."""
         measured = np.hstack([self.postures.force, self.postures.moment])
         return measured - tool_wrenches(self.postures, self.values, self.R, self.model)
 

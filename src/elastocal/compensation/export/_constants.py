@@ -102,7 +102,7 @@ def constants_of(numbers: Design) -> list[Constant]:
 
 
 def _header(numbers: Design) -> list[Constant]:
-    """Return what the header defines: edited there, nothing would follow it."""
+    """Return the constants that the header defines: edited there, nothing would follow them."""
     filters = numbers.filters
     values = {
         "JOINTS": numbers.joints,

@@ -354,7 +354,7 @@ class _Episode:
 
 
 def _from_model(calibrated: CalibratedModel) -> ModelFunctions:
-    """Return what a compensator asks of a model, answered by the model itself."""
+    """Return the functions that a compensator needs, answered by the model itself."""
     model, c = calibrated.model, calibrated.compliance
     if len(model.friction):
         remembering = _Remembering(model, c)
@@ -431,7 +431,7 @@ class _Remembering:
         moment: Sequence[float],
         memory: Sequence[float],
     ) -> tuple[FloatArray, tuple[float, ...]]:
-        """Return what the elements bear under a load, and the memory after it."""
+        """Return the torques of the elements under a load, and the memory after it."""
         model, n, axes = self.model, len(self.model.friction), self._axes
         load = model.load_torques(q, force, moment)
         total = load + model.weight_torques(q)
@@ -591,7 +591,7 @@ def _reading(numbers: Design, q: list[float], size: float, rng: Generator) -> Re
 
 
 def _raw(numbers: Design, wrench: FloatArray, R_base_tcp: FloatArray) -> FloatArray:
-    """Return what the sensor reads of a wrench in the tcp frame: the conditioner backwards."""
+    """Return the sensor's reading of a wrench in the tcp frame: the conditioner backwards."""
     f, m = wrench[:3], wrench[3:]
     at_sensor = np.concatenate([f, m - np.cross(numbers.sensor_origin, f)])
     weight = numbers.weight_response @ (numbers.gravity @ R_base_tcp)

@@ -105,7 +105,7 @@ class Program:
         Parameters
         ----------
         name : str
-            Of the constant.
+            Name of the constant.
         number : float
             Finite.
         """
@@ -147,7 +147,7 @@ class Program:
         Parameters
         ----------
         name : str
-            Of the sum, where it needs one.
+            Name of the sum, where it needs one.
         products : iterable of tuples of Value
             The summands.
         """

@@ -141,7 +141,7 @@ def programmed_rows(
     Parameters
     ----------
     solver : InverseKinematics
-        Of the robot.
+        Solver of the robot.
     joints : ndarray, shape (row, …)
         All joints, or the external axes that a path of poses gives, in rad or m.
     T_base_tcp : ndarray, shape (row, 4, 4), or None

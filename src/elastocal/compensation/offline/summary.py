@@ -89,7 +89,7 @@ class CorrectionSummary:
         Parameters
         ----------
         correction : PathCorrection
-            Of these rows.
+            Correction of these rows.
         shift : ndarray, shape (row, 3)
             Corrected minus programmed position, in m.
         labels : list of str

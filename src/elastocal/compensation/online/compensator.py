@@ -143,7 +143,7 @@ class Compensator:
     Parameters
     ----------
     numbers : Design
-        Of the compensator.
+        Design of the compensator.
     functions : ModelFunctions, optional
         What it asks of the model; by default the compiled kernel.
     """

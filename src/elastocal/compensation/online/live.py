@@ -119,7 +119,7 @@ _FLAGS = {
 
 
 def newest_sample(feed: WrenchFeed) -> Callable[[], Sequence[LiveSample]]:
-    """Return what reads the newest wrench of a cycle: where the filters have the cycle's rate."""
+    """Return the reader of a cycle's newest wrench: where the filters have the cycle's rate."""
 
     def read() -> Sequence[LiveSample]:
         found = feed.newest()
@@ -133,7 +133,7 @@ def newest_sample(feed: WrenchFeed) -> Callable[[], Sequence[LiveSample]]:
 
 
 def every_sample(sensor: ForceSensor) -> Callable[[], Sequence[LiveSample]]:
-    """Return what reads all wrenches since the last cycle: for filters at the sensor's rate."""
+    """Return the reader of all wrenches since the last cycle: for filters at the sensor's rate."""
 
     def read() -> Sequence[LiveSample]:
         block = sensor.read()

@@ -142,7 +142,7 @@ def is_live_log(path: Path) -> bool:
 
 
 def read_live_log_facts(path: Path) -> LiveLogFacts:
-    """Return what a log says of itself.
+    """Return the facts that a log states of itself.
 
     Raises
     ------

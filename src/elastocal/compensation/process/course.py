@@ -58,7 +58,7 @@ class Course:
         return -self.T_base_tcp[:, :3, 2] if self.normal is None else self.normal
 
     def ripple_at(self, time: FloatArray) -> FloatArray:
-        """Return what swings about the mean force at times in s, over that force, (time,)."""
+        """Return the swing about the mean force at times in s, over that force, (time,)."""
         swing = np.zeros(len(time))
         for ripple in self.ripple:
             swing += ripple.share * np.sin(2.0 * np.pi * ripple.frequency * time)

@@ -140,7 +140,7 @@ class TrueCell(Protocol):
         """
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
-        """Return what the sensor says of true wrenches, shape (..., sample, 6)."""
+        """Return the sensor's readings of true wrenches, shape (..., sample, 6)."""
 
 
 @dataclass(frozen=True)
@@ -380,7 +380,7 @@ def _readings(
 
 
 def _between(here: FloatArray, there: FloatArray, part: FloatArray) -> FloatArray:
-    """Return what lies between a row and the next, shape (part, …)."""
+    """Return the values at parts of the way from a row to the next, shape (part, …)."""
     return here + part * (there - here)
 
 

@@ -327,7 +327,7 @@ def process_courses(name: str, cell: Cell, seed: int, count: int | None) -> tupl
     cell : Cell
         The cell.
     seed : int
-        Of the forces.
+        Seed of the forces.
     count : int, optional
         Number of courses or rings; by default the process's.
 
@@ -417,7 +417,7 @@ def stiffest_posture(
     Parameters
     ----------
     calibrated : CalibratedModel
-        Of the cell's robot.
+        Calibrated model of the cell's robot.
     cell : Cell
         The cell.
     courses : tuple of Course

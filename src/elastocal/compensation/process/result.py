@@ -104,7 +104,7 @@ class SimulateProcessResult(Result):
             raise ValueError(f"{len(self.lines)} lines for {len(self.runs)} runs")
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         return (
             ("process", f"{self.process} in cell {self.cell}"),
             *((("tool", self.tool),) if self.tool else ()),
@@ -193,7 +193,7 @@ def read_table(path: Path) -> SimulateProcessResult:
 
 
 def read_process(folder: Path) -> SimulatedProcess:
-    """Return what `write_process` wrote.
+    """Return the files that `write_process` wrote.
 
     Raises
     ------

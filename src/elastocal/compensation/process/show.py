@@ -216,7 +216,7 @@ def _truth(table: SimulateProcessResult) -> Iterator[Phrase]:
 
 
 def budget_table(found: SimulateProcessResult) -> Table:
-    """Return what each part of the error budget leaves."""
+    """Return the table of the error budget: the deviation after each of its parts."""
     rows = tuple(
         (
             line.name,

@@ -107,7 +107,7 @@ class FanucWriter(ProgramWriter):
         )
 
     def mover(self, program: RobotProgram) -> Mover:
-        """Return what says a move; see `ProgramWriter.mover`."""
+        """Return the writer of a move; see `ProgramWriter.mover`."""
         numbers = {move.name: index for index, move in enumerate(program.targets, start=1)}
 
         def lines(move: AxisMove | StraightMove) -> Iterator[str]:

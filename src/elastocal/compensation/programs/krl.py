@@ -131,7 +131,7 @@ def _read_lines(path: Path) -> list[str]:
 
 
 def _code_of(line: str) -> str:
-    """Return what stands on a line before its comment.
+    """Return the text of a line before its comment.
 
     >>> _code_of('LIN XP1 ; not "this"')
     'LIN XP1'

@@ -97,7 +97,7 @@ class KrlWriter(ProgramWriter):
         return f"{{{', '.join(f'{key} {number(value, 3)}' for key, value in values)}}}"
 
     def mover(self, program: RobotProgram) -> Mover:  # noqa: ARG002 - of the protocol
-        """Return what says a move; see `ProgramWriter.mover`."""
+        """Return the writer of a move; see `ProgramWriter.mover`."""
         # A block says its speeds anew: a person may begin in the middle of a program.
         speed: float | None = None
 

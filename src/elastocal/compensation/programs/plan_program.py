@@ -52,9 +52,9 @@ def write_plan_program(
     plan : PlanResult
         The plan.
     writer : ProgramWriter
-        Of the language.
+        Writer of the language.
     name : str
-        Of the program.
+        Name of the program.
     after : RobotProgram, optional
         What the same program does then, from HOME to HOME; its targets have names of their own.
 
@@ -93,7 +93,7 @@ def plan_program(plan: PlanResult, writer: ProgramWriter, name: str = "calib") -
     writer : ProgramWriter
         Whose words its head uses.
     name : str
-        Of the program.
+        Name of the program.
 
     Raises
     ------

@@ -136,7 +136,7 @@ class ControllerProgram(Protocol):
         """
 
     def notes(self, assumed: Sequence[str], out: Path, frame_given: bool) -> tuple[str, ...]:
-        """Return what a person must know of a corrected program.
+        """Return the warnings on a corrected program.
 
         Parameters
         ----------

@@ -108,7 +108,7 @@ class RapidWriter(ProgramWriter):
             yield f"CONST speeddata {name} := [{number(1e3 * speed, 3)},{_AXES_TURN},5000,1000];"
 
     def mover(self, program: RobotProgram) -> Mover:  # noqa: ARG002 - of the protocol
-        """Return what says a move; see `ProgramWriter.mover`."""
+        """Return the writer of a move; see `ProgramWriter.mover`."""
 
         def lines(move: AxisMove | StraightMove) -> Iterator[str]:
             if isinstance(move, AxisMove):

@@ -80,7 +80,7 @@ class UrScriptWriter(ProgramWriter):
         return f"at {_joint_speed(robot, percent):.4g} rad/s ({percent} percent)"
 
     def mover(self, program: RobotProgram) -> Mover:
-        """Return what says a move; see `ProgramWriter.mover`."""
+        """Return the writer of a move; see `ProgramWriter.mover`."""
         speed = _joint_speed(program.robot, program.axis_percent)
 
         def lines(move: AxisMove | StraightMove) -> Iterator[str]:

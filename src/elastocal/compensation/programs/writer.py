@@ -176,7 +176,7 @@ class ProgramWriter(ABC):
 
     @abstractmethod
     def mover(self, program: RobotProgram) -> Mover:
-        """Return what says the moves of one block; it is asked for anew for each block."""
+        """Return the writer of the moves of one block; every block has its own."""
 
     @abstractmethod
     def halt(self, stop: Stop) -> Iterable[str]:
@@ -251,7 +251,7 @@ class ProgramWriter(ABC):
         Parameters
         ----------
         name : str
-            Of the program, and of its files without suffix.
+            Name of the program, and of its files without suffix.
         taken : frozenset of str
             Names that the program uses itself, in capitals.
 

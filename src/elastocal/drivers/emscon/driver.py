@@ -157,7 +157,7 @@ class Dialogue:
     feed : StationFeed
         Where points go.
     clock : Clock
-        Of the rig.
+        Clock of the rig.
     fresh : bool
         Whether this is the first connection: only then is the tracker initialised.
     """
@@ -324,7 +324,7 @@ def _step(code: Code, *values: float, form: str = "", may_fail: bool = False) ->
 
 
 def _setup(settings: EmsconSettings, *, fresh: bool) -> list[_Step]:
-    """Return what makes a tracker measure."""
+    """Return the commands that make a tracker measure."""
     probe = settings.marker == "probe"
     mode = Mode.PROBE_CONTINUOUS_TIME if probe else Mode.CONTINUOUS_TIME
     units = (_METRES, _RADIANS, _CELSIUS, _MILLIBAR, _RELATIVE)
@@ -349,7 +349,7 @@ def _setup(settings: EmsconSettings, *, fresh: bool) -> list[_Step]:
 
 
 def _search(settings: EmsconSettings, distance: float) -> list[_Step]:
-    """Return what finds the marker near a distance in m, and measures it."""
+    """Return the commands that find the marker near a distance in m, and measure it."""
     start = _step(Code.START_MEASUREMENT, may_fail=True)
     if settings.marker == "probe":
         return [start]

@@ -80,7 +80,7 @@ STATUS_TEXTS = {
 
 
 def status_text(status: int) -> str:
-    """Return what a status means, with its number."""
+    """Return the meaning of a status, with its number."""
     return f"{STATUS_TEXTS.get(status, 'it refuses')} (status {status})"
 
 

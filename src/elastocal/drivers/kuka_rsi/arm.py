@@ -78,7 +78,7 @@ def adopt(cycle: Cycle, number: int) -> Motion:
     cycle : Cycle
         State at the beginning.
     number : int
-        Of the command.
+        Number of the command.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def require_ready(cycle: Cycle, silent: float, mode: str) -> None:
     silent : float
         Its age, in s.
     mode : str
-        Of the settings.
+        Mode of the settings.
 
     Raises
     ------
@@ -307,7 +307,7 @@ def _programmed(cycle: Cycle) -> FloatArray:
 def feeling(
     cell: Cell, settings: RsiSettings, feed: WrenchFeed | None
 ) -> tuple[ForceReader | None, CollisionWatch | None]:
-    """Return what an arm that presses feels by; nothing where it does not press."""
+    """Return the force reader and the collision watch of an arm that presses, or none of them."""
     if settings.mode != "contact":
         return None, None
     T_sensor_tcp = cell.T_sensor_tcp

@@ -166,11 +166,11 @@ class RsiContext:
         Parameters
         ----------
         name : str
-            Of the context; the ETHERNET file has the same.
+            Name of the context; the ETHERNET file has the same.
         ethernet : EthernetFile
             Its channels.
         bounds : Bounds
-            Of the same mode.
+            Bounds of the same mode.
         timeout : int
             Cycles without an answer until RSI ends.
         """
@@ -196,7 +196,7 @@ class RsiContext:
         return cls(name, (*sources, line, *sinks, monitor))
 
     def table(self) -> dict[str, ContextEntry]:
-        """Return what a reader of its files finds, by the names of the objects."""
+        """Return the objects that a reader of its files finds, by their names."""
         return {
             each.name: ContextEntry(
                 each.type_id,
@@ -272,7 +272,7 @@ _Entries = dict[str, ContextEntry]
 
 
 def read_context(text: str) -> _Entries:
-    """Return what ``.rsi.xml``, ``.rsix`` or ``.rsi`` says, by kind and index of the KRL variable.
+    """Return the content of a file of RSI objects, by kind and index of the KRL variable.
 
     Parameters
     ----------

@@ -85,12 +85,12 @@ class HeldCorrection:
         self._answered = False
 
     def look(self, message: RobMessage, arrival: Arrival, now: float) -> Effect | None:
-        """Return what is in effect; None where it cannot be told, and no answer is safe.
+        """Return the corrections in effect; None where they are unknown, and no answer is safe.
 
         Parameters
         ----------
         message : RobMessage
-            Of this cycle.
+            Message of this cycle.
         arrival : Arrival
             How it follows.
         now : float
@@ -122,7 +122,7 @@ class HeldCorrection:
         self._recent.append(shift)
 
     def _decide(self, message: RobMessage, stopped: bool) -> Effect | None:
-        """Return what is in effect after a jump or a silence."""
+        """Return the corrections in effect after a jump or a silence."""
         offset, held = offset_of(message), self._before
         small = math.hypot(*held) <= self._step * _ROUNDED
         if not self._answered:
@@ -189,7 +189,7 @@ class CorrectionGuard:
     bounds : Bounds
         Limits.
     cycle, delay : float
-        Of the controller, and from command to motion, in s.
+        Cycle and delay of the controller, and from command to motion, in s.
     """
 
     def __init__(self, bounds: Bounds, cycle: float, delay: float) -> None:
@@ -269,7 +269,7 @@ class CorrectionSource(Protocol):
         Parameters
         ----------
         message : RobMessage
-            Of this cycle.
+            Message of this cycle.
         now : float
             When it came, in s of the clock.
         effect : Effect
@@ -363,9 +363,9 @@ class CorrectedKuka:
     cell : Cell
         The cell.
     settings : RsiSettings
-        Of its arm, in mode ``compensation``.
+        Settings of its arm, in mode ``compensation``.
     context : RigContext
-        Of the rig.
+        Context of the rig.
     source : PathSource
         Computes the corrections.
     """
@@ -396,7 +396,7 @@ class CorrectedKuka:
         """The port that it listens at."""
 
     def correction(self, message: RobMessage, now: float, effect: Effect) -> Shift | None:
-        """Return what the source wants; see `CorrectionSource`."""
+        """Return the wanted correction of the source; see `CorrectionSource`."""
         if effect.begins:
             # Once a program: tool, base and signs of the axes are those of the description.
             cycle = self._reader.read(message, now, "compensation")

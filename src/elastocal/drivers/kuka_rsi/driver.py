@@ -65,9 +65,9 @@ class KukaListener:
     cell : Cell
         The cell.
     settings : RsiSettings
-        Of its arm.
+        Settings of its arm.
     context : RigContext
-        Of the rig.
+        Context of the rig.
 
     Raises
     ------
@@ -90,7 +90,7 @@ class KukaListener:
         self._link.start()
 
     def devices(self) -> DeviceSet:
-        """Return what a rig has of it: readings, and no arm."""
+        """Return the part for a rig: readings, and no arm."""
         return DeviceSet(close=self._link.close, readings=lambda: (self._reading(),))
 
     def step(self, message: RobMessage, arrival: Arrival, now: float) -> SenMessage:

@@ -60,7 +60,7 @@ class ForceLaw:
         Parameters
         ----------
         stiffness : float
-            Of arm, tool and tooling in series, in N/m.
+            Stiffness of arm, tool and tooling in series, in N/m.
         motion_delay : float
             From command to motion, as it was measured, in s.
         cycle : float
@@ -104,7 +104,7 @@ def overshoot(speed: float, stiffness: float, delay: float) -> float:
     speed : float
         In m/s.
     stiffness : float
-        Of the contact, in N/m.
+        Stiffness of the contact, in N/m.
     delay : float
         From force to standstill, in s.
     """

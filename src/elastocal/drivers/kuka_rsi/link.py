@@ -523,7 +523,7 @@ class RsiLink:
         return datagram, sender, 0.0
 
     def _newest(self, first: _Arrived) -> list[_Arrived]:
-        """Return what is waiting, of the controller the newest alone."""
+        """Return the waiting messages, of the controller the newest alone."""
         line, waiting = present(self._socket, "socket"), [first]
         line.setblocking(False)
         try:

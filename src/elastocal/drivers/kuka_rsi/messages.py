@@ -174,7 +174,7 @@ class IpocWatch:
         Parameters
         ----------
         ipoc : int
-            Of the message.
+            Number of the message.
         anew : bool
             Whether something else tells that the sender was started anew.
         """

@@ -74,7 +74,7 @@ class PostureReader:
         now : float
             When it came, in s of the clock.
         mode : str
-            Of `RsiSettings`; who only measures needs less.
+            Mode of `RsiSettings`; who only measures needs less.
 
         Raises
         ------

@@ -269,7 +269,7 @@ class NetFtSensor:
         )
 
     def reading(self) -> DeviceReading:
-        """Return what the stream shows; without a state where no record comes.
+        """Return the readings of the stream; without a state where no record comes.
 
         Raises
         ------
@@ -297,7 +297,7 @@ class NetFtSensor:
         )
 
     def lines(self) -> tuple[LineCounts, ...]:
-        """Return what was counted on the stream."""
+        """Return the counts of the stream."""
         counts = LineCounts(
             device=self.source,
             received=self.taken,
@@ -360,7 +360,7 @@ class BoxLine:
     settings : NetFtSettings
         Where the box is.
     clock : Clock
-        Of the rig.
+        Clock of the rig.
     """
 
     def __init__(self, settings: NetFtSettings, clock: Clock) -> None:
@@ -412,7 +412,7 @@ class BoxLine:
             thread.start()
 
     def reading(self) -> DeviceReading:
-        """Return what the box shows.
+        """Return the readings of the box.
 
         A stream that another client has taken is not taken back; it may come again by itself.
 

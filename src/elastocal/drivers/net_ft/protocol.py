@@ -132,7 +132,7 @@ def parse_records(datagram: bytes) -> list[RdtRecord]:
 
 
 def status_names(status: int) -> str:
-    """Return what a status word says, by name.
+    """Return the meaning of a status word, by name.
 
     >>> status_names(0x80020000)
     '0x80020000: error, gauge saturated'
@@ -142,7 +142,7 @@ def status_names(status: int) -> str:
 
 
 def status_of(status: int) -> SensorStatus:
-    """Return what a status word means for the sample that bears it.
+    """Return the meaning of a status word for the sample that bears it.
 
     A latched threshold alone is a remark. A saturated gauge spoils the sample, anything else the
     sensor.
@@ -219,7 +219,7 @@ class BoxConfiguration:
 
 
 def parse_configuration(page: bytes) -> BoxConfiguration:
-    """Return what a configuration page says.
+    """Return the content of a configuration page.
 
     Raises
     ------
@@ -270,7 +270,7 @@ def _all_numbers(found: dict[str, str], prefix: str) -> tuple[float, ...]:
 
 
 def parse_calibration(reply: bytes) -> CountScale:
-    """Return what the reply to `ASK_CALIBRATION` says.
+    """Return the content of the reply to `ASK_CALIBRATION`.
 
     Raises
     ------

@@ -61,7 +61,7 @@ class OperatorEntry:
     settings : OperatorEntrySettings
         Unit and uncertainty.
     clock : Clock
-        Of the rig.
+        Clock of the rig.
     lines : iterator of str
         What is typed; may wait, is read by a thread of its own from the first question on.
     tell : callable

@@ -132,9 +132,9 @@ class UrArm:
         line, control : UrLine, UrControl
             Both halves of the connection.
         clock : Clock
-            Of the rig.
+            Clock of the rig.
         cell : Cell
-            Of six joints, in the order of the controller.
+            Cell of six joints, in the order of the controller.
         """
         self._line, self._control, self._clock = line, control, clock
         motion = cell.file.motion
@@ -391,7 +391,7 @@ class UrArm:
     def _ramp_to(
         self, wanted: FloatArray, rate: float, after: Motion | None
     ) -> Callable[[UrSample], _Step]:
-        """Return what ramps the force; ``after``: what follows at its end, None: it is held."""
+        """Return the lines that ramp the force; ``after``: what follows them, None: it is held."""
         if not (np.isfinite(rate) and rate > 0.0):
             raise DeviceError(f"{_SOURCE}: force rate {rate:g} N/s: must be above 0 and finite")
 

@@ -124,14 +124,14 @@ class UrLine:
         return taken
 
     def lines(self) -> tuple[LineCounts, ...]:
-        """Return what was counted; of samples that a newer one overtook none was looked at."""
+        """Return the counts; samples that a newer one overtook were not looked at."""
         counts = LineCounts(
             device="rtde", received=self._received, lost=self._skipped, status=tuple(self._faults)
         )
         return (counts,)
 
     def readings(self, kinds: Iterable[str]) -> tuple[DeviceReading, ...]:
-        """Return what the controller shows, a reading for each kind of device.
+        """Return the controller's state, a reading for each kind of device.
 
         Raises
         ------

@@ -59,7 +59,7 @@ def require_possible(parameters: Sequence[Parameter], rows: FloatArray, what: st
     Parameters
     ----------
     parameters : sequence of Parameter
-        Of all springs.
+        Parameters of all springs.
     rows : ndarray, shape (row, parameter)
         Their values, in SI.
     what : str

@@ -206,7 +206,7 @@ def _motion_mistakes(
 
 
 def _of_turn(turn: FloatArray) -> str:
-    """Return what it means that a turned controller displacement agrees with the joints."""
+    """Return the meaning of a turned controller displacement that agrees with the joints."""
     if np.abs(turn).max(axis=1).min() > _ALONG:
         read = ", ".join(
             f"{'-' if row.sum() < 0.0 else ''}{AXES[int(np.abs(row).argmax())]}" for row in turn

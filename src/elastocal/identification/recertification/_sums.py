@@ -87,7 +87,7 @@ def _stiffens(spring: Spring) -> bool:
 
 
 def _identity(spring: Spring) -> object:
-    """Return what two springs have in common that are the same one."""
+    """Return the key by which two springs are the same one."""
     if not _stiffens(spring):
         return spring
     return (type(spring), *(getattr(spring, name) for name in sorted(spring.places)))

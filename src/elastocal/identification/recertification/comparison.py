@@ -144,7 +144,7 @@ class Spread:
 def common_ground(
     old: CalibratedModel, new: CalibratedModel, rows: ComparedRows | None, arm: Robot
 ) -> tuple[CommonGround | None, IndexArray]:
-    """Return what both campaigns cover, and the numbers of the rows that are compared.
+    """Return the range that both campaigns cover, and the numbers of the rows that are compared.
 
     Where both models say how gears stiffen, other loads are no obstacle to hold springs against
     one another: those of gears are compared over the torques that both met.
@@ -203,7 +203,7 @@ def over(numbers: FloatArray, scale: FloatArray) -> FloatArray:
 def _row_blocks(
     models: tuple[ElasticModel, ElasticModel], rows: ComparedRows, number: IndexArray
 ) -> Callable[[slice], _Blocks]:
-    """Return what gives the blocks of some of the numbered rows, for the old and the new model."""
+    """Return the function that gives the blocks of numbered rows, for the old and the new model."""
     if rows.readings is not None:
         shown = [displacement_blocks(each, rows.readings)[number] for each in models]
         return lambda part: (shown[0][part], shown[1][part])
@@ -239,7 +239,7 @@ def compare_rows(
     old, new : CalibratedModel
         Two calibrations of one robot.
     spread : Spread
-        Of these two.
+        Spread of the two models.
     rows : ComparedRows
         All of them, since friction remembers.
     number : ndarray of int, shape (row,), optional
@@ -344,7 +344,7 @@ def compare_springs(
     old, new : CalibratedModel
         Two calibrations of one robot.
     spread : Spread
-        Of these two.
+        Spread of the two models.
     """
     numbers = shared_numbers(old, new)
     sums = comparable_sums(old, new, numbers)
@@ -443,7 +443,7 @@ def _judge(
 
 
 def _what_decides(deflection: RowComparison, limit: float) -> str:
-    """Return what would decide a verdict that is open, if the estimate stays.
+    """Return advice on how to decide an open verdict, if the estimate stays.
 
     The old calibration cannot be repeated: that arm is gone. Only the new one's part of the
     variance shrinks, as one over its poses.
@@ -521,7 +521,7 @@ def _notes_on(
 
 
 def _load_note(old: float | None, new: float | None) -> str | None:
-    """Return what other loads do to a comparison, or None where they were alike.
+    """Return the effect of other loads on a comparison, or None where they were alike.
 
     Parameters
     ----------
@@ -540,7 +540,7 @@ def _load_note(old: float | None, new: float | None) -> str | None:
 
 
 def _frame_note(old: CalibrationSummary | None, new: CalibrationSummary | None) -> str | None:
-    """Return what frames that were estimated do to a comparison; None where they were alike."""
+    """Return the effect of estimated frames on a comparison; None where they were alike."""
     free = [
         "none" if each is None or each.settings is None else each.settings.free_frame
         for each in (old, new)

@@ -337,7 +337,7 @@ class CompareResult(Result):
     """See `CompareSummary.calibrated`."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         found = self.summary
         return (
             ("robot", found.robot),

@@ -269,12 +269,12 @@ BUMPS_UNSEEN = Kind(
 
 
 def station_shortage(station: str, poses: tuple[int, ...]) -> Finding:
-    """Return what becomes of the poses of a station that cannot be registered."""
+    """Return the consequence for the poses of a station that cannot be registered."""
     return SHORTAGE(station=station, seen=len(poses), needed=REGISTRATION_POSES, poses=poses)
 
 
 def unseen_bumps(seen_by: Sequence[str | None]) -> tuple[Finding, ...]:
-    """Return what poses that are so few do not show of their stations, if anything.
+    """Return a warning where there are too few poses to check their stations, if there are.
 
     How large a bump half way is found from 8 and from 30 poses was tried on simulated cells: the
     page on registration has the table.

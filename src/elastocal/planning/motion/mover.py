@@ -229,7 +229,7 @@ class Mover:
 
 
 def mover_for(cell: Cell, scene: CollisionScene) -> Mover:
-    """Return what moves a cell's robot, with the speeds and the clearance of its file.
+    """Return the mover of a cell's robot, with the speeds and the clearance of its file.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ class Criterion(ABC):
         matrix : ndarray, shape (r, r)
             ``S`` before the addition.
         information : Information
-            Of the poses that could be added.
+            Information of the poses that could be added.
 
         Returns
         -------
@@ -229,7 +229,7 @@ def o1(information: Information, chosen: ArrayLike) -> float:
     Parameters
     ----------
     information : Information
-        Of the pool.
+        Information of the pool.
     chosen : array_like of int, shape (n,)
         Numbers of the poses, at least one.
     """

@@ -132,7 +132,7 @@ class ExchangeSearch:
         Parameters
         ----------
         information : Information
-            Of the whole pool; one serves searches for any number of poses.
+            Information of the whole pool; one serves searches for any number of poses.
         count : int
             Number of poses wanted, from 1 to the size of the pool.
         rng : numpy.random.Generator, optional
@@ -181,7 +181,7 @@ def _exchange_poses(
     Parameters
     ----------
     information : Information
-        Of the pool.
+        Information of the pool.
     criterion : Criterion
         What to raise.
     start : array_like of int, shape (n,)

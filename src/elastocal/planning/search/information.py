@@ -90,7 +90,7 @@ class Information:
 
 
 def build_information(candidates: Candidates) -> Information:
-    """Return what each candidate tells about the springs.
+    """Return the information of each candidate about the springs.
 
     The directions are those singular vectors of the column-scaled rows of the whole pool whose
     singular value is above `RANK_TOLERANCE` of the largest, as in the fit.

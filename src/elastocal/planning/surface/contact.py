@@ -81,7 +81,7 @@ def fit_disk(surface: Surface, points: SurfacePoints, radius: float) -> DiskFit:
     points : SurfacePoints
         Centres of the disks, on that surface.
     radius : float
-        Of the disk, in m.
+        Radius of the disk, in m.
 
     Raises
     ------

@@ -100,7 +100,7 @@ OF_WRONG_MESHES = frozenset(kind.name for kind in (TINY, SOLID_TINY, INCHES, INS
 
 
 def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
-    """Return what is odd about the mesh itself. None of it stops the work.
+    """Return the oddities of the mesh itself. None of them stops the work.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
 def placement_findings(
     surface: Surface, first_joints: FloatArray, reach: float, reachable: Reachable, rng: Generator
 ) -> tuple[Finding, ...]:
-    """Return what is odd about where the surface is, seen from the robot.
+    """Return the oddities of the surface's place, seen from the robot.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def placement_findings(
     first_joints : ndarray, shape (place, 3)
         Where the arm's first joint can be, in base, in m: one row without a rail.
     reach : float
-        Of the arm with its tool, in m; an upper bound will do.
+        Reach of the arm with its tool, in m; an upper bound will do.
     reachable : callable
         The robot; see `Reachable`.
     rng : Generator
@@ -154,7 +154,7 @@ def tiny_finding(surface: Surface, reach: float) -> tuple[Finding, ...]:
     surface : Surface
         The surface.
     reach : float
-        Of the arm with its tool, in m.
+        Reach of the arm with its tool, in m.
     """
     size = float(np.linalg.norm(np.ptp(surface.mesh.vertices, axis=0)))
     if not size < _TINY * reach:
@@ -202,7 +202,7 @@ def size_findings(path: Path, unit: float, key: str, reach: float) -> tuple[Find
     key : str
         Where the cell file names it: under ``tool``, or else.
     reach : float
-        Of the arm with its tool, in m; an upper bound will do.
+        Reach of the arm with its tool, in m; an upper bound will do.
 
     Raises
     ------

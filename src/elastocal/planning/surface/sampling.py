@@ -126,7 +126,7 @@ def _eliminate(position: FloatArray, normal: FloatArray, count: int, area: float
     count : int
         Number of points to keep.
     area : float
-        Of the part of the surface that the points cover, in m².
+        Area of the part of the surface that the points cover, in m².
 
     Returns
     -------

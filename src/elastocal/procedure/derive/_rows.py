@@ -123,7 +123,7 @@ def _row(
 def _press(
     pose: PoseReadings, load: Reading, lever: FloatArray, tool: SensorLoad
 ) -> LoadValues | None:
-    """Return what friction in the gears felt of a press that gave no reading, if it is known."""
+    """Return the load of a press that gave no reading, if it is known: friction remembers it."""
     pair = _unseen(pose, load)
     return None if pair is None else _numbers(pair, lever, tool)
 

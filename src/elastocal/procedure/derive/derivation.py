@@ -628,7 +628,7 @@ def derive_poses(
     plan : PlanResult
         The plan; its load cases are the dataset's.
     entries : sequence of Entry
-        Of the journal, for times, retries and faults.
+        Entries of the journal, for times, retries and faults.
     provenance : str
         Where the data come from.
     sensor : SensorLoad, optional
@@ -660,7 +660,7 @@ def derive_poses(
 
 
 def measured_arm(cell: Cell) -> MeasuredArm:
-    """Return what the readings of a cell are taken with."""
+    """Return the arm that the readings of a cell are taken with."""
     conditioned, check = cell.file.procedure.conditioning, cell.file.load_cases.check_case
     urdf, gravity = cell.urdf_with_tool_mass, cell.gravity_of_mounting
     return MeasuredArm(cell.robot, urdf, gravity, conditioned, check)

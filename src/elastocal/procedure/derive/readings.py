@@ -93,7 +93,7 @@ def average(streams: Streams, window: Window, least: int = LEAST_SAMPLES) -> Rea
     Parameters
     ----------
     streams : Streams
-        Of the window's pose.
+        Streams of the window's pose.
     window : Window
         When, and which station measured.
     least : int

@@ -238,7 +238,7 @@ class RunSummary(Result):
     """SHA-256 of the file ``dataset.nc`` that it was written with; empty before it was."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return what a person wants to know first."""
+        """Return the main facts, a label and a text each."""
         counts = ", ".join(f"{n} {status}" for status, n in self.readings.counts.items() if n)
         return (
             ("poses", f"{self.poses.committed} of {self.poses.planned} committed"),

@@ -75,7 +75,7 @@ def sensor_load(cell: Cell) -> SensorLoad:
 
 
 def wrench_on_robot(loaded: RawWrench, tare: RawWrench, sensor: SensorLoad) -> RobotWrench:
-    """Return what presses on the robot, tool weight and bias removed.
+    """Return the press on the robot, tool weight and bias removed.
 
     ``[f; t] = D (y - y_tare) - K (g - g_tare)``, with the sensor's matrix ``D`` and its response
     ``K`` to gravity ``g``; see `elastocal.cell.sensor`.
@@ -301,7 +301,7 @@ def estimate_tool(
 
 
 def _misreadings(weight: FloatArray, ranges: FloatArray) -> FloatArray:
-    """Return what each entry of a sensor's matrix adds to forces and moments of the tool's weight.
+    """Return the effect of each entry of a sensor's matrix on the tool's weight and its moment.
 
     Shape (2, entry, row), per part of the ranges; ``weight`` has forces and moments, shape
     (reading, 6).

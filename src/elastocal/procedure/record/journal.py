@@ -304,7 +304,7 @@ class Logbook:
     journal : Journal
         Where to.
     clock : Clock
-        Of the devices.
+        Clock of the devices.
     """
 
     def __init__(self, journal: Journal, clock: Clock) -> None:

@@ -165,7 +165,7 @@ def read_mcap(path: Path) -> Contents:
 
 
 def _contents(data: bytes) -> Contents:
-    """Return what a file holds, in its chunks and beside them."""
+    """Return the data of a file, in its chunks and beside them."""
     metadata: dict[str, Mapping[str, str]] = {}
     topics: dict[str, Messages] = {}
     channels: dict[int, Messages] = {}

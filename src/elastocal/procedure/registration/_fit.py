@@ -92,7 +92,7 @@ def determined(position: FloatArray, scatter: float) -> bool:
 
 
 def moments(position: FloatArray) -> FloatArray:
-    """Return what `determined_by` adds up of each point, shape (point, 4, 4).
+    """Return the summands of `determined_by` for each point, shape (point, 4, 4).
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def fit(readings: UnloadedReadings, group: IndexArray, lever_prior: FloatArray) 
 
 
 def motion_columns(centred: FloatArray) -> FloatArray:
-    """Return what a rotation about the centre and a shift do to points, shape (point, 3, 6).
+    """Return the derivatives of points by a rotation about the centre and a shift, (point, 3, 6).
 
     Parameters
     ----------

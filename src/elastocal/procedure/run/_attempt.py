@@ -97,7 +97,7 @@ class Attempt:
         return len(self.settings.loads) - self.loads_done
 
     def guard(self, *, beam: bool = True) -> Guard:
-        """Return what must hold in the present state."""
+        """Return the limits that hold in the present state."""
         if self.step in ON_APPROACH_LINE:
             limit = self.settings.force_limit
             if self.step is Step.ENGAGE:
@@ -141,7 +141,7 @@ class Attempt:
             self.loads_done, self.window_tries = self.loads_done + 1, 0
 
     def log(self) -> PoseLog:
-        """Return what is committed."""
+        """Return the log to commit."""
         return PoseLog(
             pose=self.pose.id,
             attempt=self.number,

@@ -200,7 +200,7 @@ class Supervisor:
         return self.arm_state()
 
     def arm_state(self) -> ArmState | None:
-        """Return what the arm says now; None when it does not answer."""
+        """Return the state of the arm; None when it does not answer."""
         with contextlib.suppress(*DEVICE_ERRORS):
             return self._read_arm()
         return None

@@ -67,7 +67,7 @@ class Watchdog:
     beam_timeout : float
         Longest time without beam, in s.
     collisions : CollisionWatch
-        Of free moves.
+        Collisions of free moves.
     R_tcp_sensor : ndarray, shape (3, 3)
         Axes of the sensor in the tcp frame.
     """
@@ -211,7 +211,7 @@ def check_arm(state: ArmState, joints: int) -> None:
     Parameters
     ----------
     state : ArmState
-        Of the arm.
+        State of the arm.
     joints : int
         Number of its joints.
 

@@ -468,7 +468,7 @@ def _place(a: Attempt) -> str:
 
 
 def between_poses(supervisor: Supervisor) -> ArmLocation:
-    """Return what the force on the tool says of a tool between two poses."""
+    """Return the location of an arm between two poses, by the force on its tool."""
     free = supervisor.feels_free()
     return ArmLocation.BETWEEN_POSES if free else ArmLocation.NOT_KNOWN
 

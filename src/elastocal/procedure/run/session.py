@@ -120,7 +120,7 @@ class LastKnown:
         return self.entry.event is Event.FINISH and text.startswith(RunEnd.DONE.value)
 
     def left_to_do(self, poses: int) -> str:
-        """Return what `--resume` would do of a plan of so many poses; empty: nothing."""
+        """Return the work left for `--resume` in a plan of so many poses; empty: none."""
         left = sorted(set(range(poses)) - set(self.committed))
         if left:
             return f"measures pose {spans(left)}"

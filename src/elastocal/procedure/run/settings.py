@@ -80,7 +80,7 @@ class RunSettings:
         return ToolLoad(self.weight_base, self.R_tcp_sensor, self.force_limit)
 
     def collision_watch(self) -> CollisionWatch:
-        """Return what finds collisions of free moves."""
+        """Return the watch for collisions on free moves."""
         weight, limit = self.tool_weight, self.collision_limit
         # What is wrong with the mass turns with the tool; without one all of its weight does.
         largest = limit + _WRONG_WEIGHT * weight if weight > 0.0 else np.inf

@@ -71,7 +71,7 @@ def why_off(found: Steadiness, target: FloatArray, tolerance: float) -> str:
     Parameters
     ----------
     found : Steadiness
-        Of the dwell.
+        Steadiness of the dwell.
     target : ndarray, shape (3,)
         The mean that is wanted, in N.
     tolerance : float
@@ -87,7 +87,7 @@ def why_unsteady(found: Steadiness, limits: ProcedureSettings) -> str:
     Parameters
     ----------
     found : Steadiness
-        Of the dwell.
+        Steadiness of the dwell.
     limits : ProcedureSettings
         Drift and spread that are allowed.
     """

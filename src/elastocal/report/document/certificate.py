@@ -153,7 +153,7 @@ _Row = tuple[Phrase, tuple[str | Stamp, ...]]
 
 
 def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
-    """Return what is known of the calibration in rows, and what nobody stated."""
+    """Return the details of the calibration in rows, and those that nobody stated."""
     entry, cell = evidence.certificate, evidence.cell
     sensor = None if cell is None else cell.file.sensor
     named = None if sensor is None else sensor.name
@@ -194,7 +194,7 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
 
 
 def _equipment(thing: Equipment, own: str | None) -> tuple[tuple[str, ...], list[Phrase]]:
-    """Return what is known of a thing, and what is not; ``own`` stands where it has no type."""
+    """Return the details of a thing, and the missing ones; ``own`` stands where it has no type."""
     kind = thing.type or own
     parts, lacking = [kind] if kind else [], [] if kind else [phrase("type")]
     if thing.serial:

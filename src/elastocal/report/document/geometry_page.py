@@ -57,7 +57,7 @@ def write_geometry_page(path: Path, found: GeometryFindings, language: Language 
     found : GeometryFindings
         What it shows.
     language : Language
-        Of its words.
+        Language of its words.
 
     Raises
     ------

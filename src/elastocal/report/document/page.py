@@ -64,7 +64,7 @@ def write_report(
     sign : callable, optional
         Returns the signature of a hash, here of the manifest; by default there is none.
     language : Language
-        Of its words; what other parts of the program said stays English.
+        Language of its words; what other parts of the program said stays English.
     signer : str
         Public key of who signs it.
     beside : callable, optional

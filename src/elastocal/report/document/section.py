@@ -58,7 +58,7 @@ class Section:
     blocks: Callable[[Evidence], Iterable[Block]]
 
     def body(self, evidence: Evidence) -> Content:
-        """Return what the section shows."""
+        """Return the blocks of the section."""
         return Content(tuple(self.blocks(evidence)))
 
 

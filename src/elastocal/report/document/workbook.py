@@ -53,7 +53,7 @@ def write_workbook(
     sheets : iterable of (str, iterable of Block)
         The title of each, and what it shows; a sheet without tables and key figures is left out.
     language : Language
-        Of captions and heads.
+        Language of captions and heads.
 
     Raises
     ------

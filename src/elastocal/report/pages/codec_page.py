@@ -129,7 +129,7 @@ def write_codec_page(
         What each variant tells apart; without it the page shows no compliances, since it could
         not say which of them are findings.
     correlations : sequence of Correlation, optional
-        Of all variants; without them the page has no table of indices.
+        Correlations of all variants; without them the page has no table of indices.
 
     Raises
     ------

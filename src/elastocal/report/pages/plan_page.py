@@ -46,9 +46,9 @@ def write_plan_page(
     cell, surface : Cell, Surface
         That the plan was made for.
     plan, pool : PlanResult, PoolData
-        Of one run.
+        Plan and pool of one run.
     language : Language
-        Of the page's words.
+        Language of the page's words.
 
     Raises
     ------

@@ -125,7 +125,7 @@ def draw_boxes(axes: Axes, boxes: Boxes, variant: VariantStyle) -> None:
     boxes : Boxes
         In the unit of the panel.
     variant : VariantStyle
-        Of the variant.
+        Style of the variant.
     """
     x, half = variant.at(boxes.n), 0.5 * variant.width
     left, right = x - half, x + half
@@ -227,13 +227,13 @@ def draw_error_panel(
     axes : Axes
         Panel.
     boxes : sequence of Boxes
-        Of each variant.
+        Boxes of each variant.
     styles : sequence of VariantStyle
-        Of the variants.
+        Styles of the variants.
     last : int
         Number of groups.
     label : str
-        Of the values.
+        Label of the values.
     """
     low, high = extent(boxes)
     log = reads_better_in_decades(low, high)
@@ -253,7 +253,7 @@ def label_sizes(axes: Axes, last: int, width: float, shown: bool = True) -> None
     last : int
         Largest number of training poses.
     width : float
-        Of the panel, in inches.
+        Width of the panel, in inches.
     shown : bool
         Whether labels are written; panels above others go without.
     """
@@ -277,7 +277,7 @@ def reads_better_in_decades(low: float, high: float) -> bool:
 
 
 def legend_handles(styles: Sequence[VariantStyle]) -> list[Patch]:
-    """Return what a legend shows of variants."""
+    """Return the legend entries of variants."""
     return [
         Patch(facecolor=variant.fill, edgecolor=variant.colour, label=literal(variant.name))
         for variant in styles
@@ -313,7 +313,7 @@ def draw_legend(
     figure : Page
         Where to.
     styles : sequence of VariantStyle
-        Of the variants.
+        Styles of the variants.
     left, top : float
         Its corner, from the left and the upper edge of the figure, in inches.
     across : float

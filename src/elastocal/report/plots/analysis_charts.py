@@ -265,9 +265,9 @@ def index_chart(
     data : CodecData
         The arrays.
     indices : sequence of IndexValues
-        Of each variant, in order.
+        Indices of each variant, in order.
     correlations : sequence of Correlation
-        Of all variants.
+        Correlations of all variants.
 
     Raises
     ------

@@ -265,7 +265,7 @@ def headline(data: CodecData) -> str:
 
 
 def how_to_read(data: CodecData) -> str:
-    """Return what boxes are, in two lines."""
+    """Return the explanation of boxes, in two lines."""
     sets, size = data.verification.shape
     return (
         f"Each box: {counted(sets, 'verification set')} of {counted(size, 'held-out pose')} under"

@@ -146,9 +146,9 @@ def _box_traces(
     boxes : Boxes
         In the unit of the panel.
     variant : VariantStyle
-        Of the variant.
+        Style of the variant.
     number : int
-        Of the variant; kept as ``meta``, by which the page switches it on and off.
+        Number of the variant; kept as ``meta``, by which the page switches it on and off.
     what, unit : str
         What the values are, and their unit.
     panel : int

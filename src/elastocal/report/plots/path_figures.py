@@ -93,7 +93,7 @@ def write_stiffness_figure(
     path : Path
         Its suffix decides the kind: SVG, PNG or PDF.
     title : str
-        Of the figure.
+        Title of the figure.
     stations : PathStations
         Where along the path.
     survey : PostureSurvey

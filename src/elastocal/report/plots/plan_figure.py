@@ -289,7 +289,7 @@ def write_plan_figure(path: Path, surface: Surface, plan: PlanResult, pool: Pool
     surface : Surface
         That the plan was made for.
     plan, pool : PlanResult, PoolData
-        Of one run. Without a comparison in the plan there is one panel.
+        Plan and pool of one run. Without a comparison in the plan there is one panel.
 
     Raises
     ------
@@ -328,7 +328,7 @@ def plan_figure(surface: Surface, plan: PlanResult, pool: PoolData) -> Figure:
 
 
 def _choices(plan: PlanResult, pool: PoolData) -> list[_Choice]:
-    """Return what the plan's technique chose, and the one that it is compared with."""
+    """Return the choice of the plan's technique, and the one that it is compared with."""
     candidate = {pose.id: pose.candidate for pose in plan.poses}
     search, other = plan.search, plan.comparison
     ids = [str(pose) for pose in search.order]

@@ -195,7 +195,7 @@ def plot_result(result: object) -> Figure:
 
 
 def drawn(figure: Callable[_P, Figure], *arguments: _P.args, **options: _P.kwargs) -> Figure:
-    """Return what a function draws, with the settings of print."""
+    """Return the drawing of a function, with the settings of print."""
     with matplotlib.rc_context(style.print_settings()):
         return figure(*arguments, **options)
 

@@ -71,7 +71,7 @@ def spring_bars(model: CalibratedModel, settings: FitSettings | None = None) -> 
     model : CalibratedModel
         The model.
     settings : FitSettings, optional
-        Of its fit; see `spring_summaries`.
+        Settings of its fit; see `spring_summaries`.
     """
     bars = []
     for row in spring_summaries(model, settings):

@@ -141,7 +141,7 @@ def tint(colour: str, part: float = _FILL, ground: int = 255) -> str:
     part : float
         How much of it is left, from 0 to 1.
     ground : int
-        Of each channel: 255 for paper, 0 for black.
+        Background of each channel: 255 for paper, 0 for black.
     """
     channels = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
     return "#" + "".join(f"{round(ground + part * (each - ground)):02x}" for each in channels)
@@ -201,9 +201,9 @@ def open_frame(
     axes : Axes
         To change.
     grid : str
-        Of which axis; empty for no grid.
+        Axis that has a grid; empty: none.
     colour : str
-        Of the grid.
+        Colour of the grid.
     also : str
         A further edge to take off, for example ``left``.
     """
@@ -390,6 +390,6 @@ def _has_many_parts(artist: Artist) -> bool:
 
 
 def _metadata(suffix: str, title: str = "", description: str = "") -> dict[str, str | None]:
-    """Return what the file says about itself; what is empty is left out."""
+    """Return the metadata of the file; empty entries are left out."""
     found = {"Title": title, "Subject" if suffix == ".pdf" else "Description": description}
     return _UNDATED[suffix] | {key: text for key, text in found.items() if text}

@@ -29,7 +29,7 @@ def write_timeline_figure(path: Path, found: ImportedLogs, title: str) -> Path:
     found : ImportedLogs
         Streams by one clock, plateaus and clocks.
     title : str
-        Of the figure.
+        Title of the figure.
 
     Raises
     ------

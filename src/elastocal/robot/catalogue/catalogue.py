@@ -236,7 +236,7 @@ def inertias_like(sister: WristEntry, arm: Dimensions) -> Inertias:
     sister : WristEntry
         Robot of about the same size whose masses have a source.
     arm : Dimensions
-        Of the robot that the estimate is for.
+        Dimensions of the robot that the estimate is for.
     """
     had = sister.dimensions
     along = {
@@ -566,7 +566,7 @@ def names() -> tuple[str, ...]:
 
 
 def entry(name: str) -> CatalogueEntry:
-    """Return what is known of a robot, with the sources.
+    """Return a robot's entry in the catalogue, with the sources.
 
     Parameters
     ----------
@@ -598,7 +598,7 @@ def maker_of(name: str) -> Maker | None:
     Parameters
     ----------
     name : str
-        Of the robot, as its URDF has it.
+        Name of the robot, as its URDF has it.
     """
     for known, robot in _entries().items():
         if _key(known) == _key(name):
@@ -698,7 +698,7 @@ def _key(name: str) -> str:
 
 
 def _suggestion(name: str, table: Mapping[str, CatalogueEntry]) -> str:
-    """Return what a name may stand for: the robots of that family or maker, or the nearest."""
+    """Return the robots that a name may mean: those of that family or maker, or the nearest."""
     key, by_key = _key(name), {_key(known): known for known in table}
     family = [known for each, known in by_key.items() if key and key in each]
     if not family:

@@ -12,7 +12,7 @@ from elastocal.wording import phrase, phrases
 
 
 def robot_figures(name: str) -> dict[str, object]:
-    """Return what the catalogue knows of a robot as a JSON object has it; None: not known.
+    """Return a robot's entry in the catalogue as JSON data; None: not known.
 
     Raises
     ------

@@ -296,7 +296,7 @@ class NumericalInverse(InverseKinematics):
         return _MOST_SOLUTIONS
 
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
-        """Return what the descents found; see `InverseKinematics.candidates`."""
+        """Return the solutions of the descents; see `InverseKinematics.candidates`."""
         length = characteristic_length(self.robot)
         arm_starts = self._arm_starts(length)
         shape = (len(T_base_tcp), _MOST_SOLUTIONS, arm_starts.shape[1])

@@ -92,7 +92,7 @@ def joints_along_path(
     Parameters
     ----------
     solver : InverseKinematics
-        Of the robot.
+        Solver of the robot.
     T_base_tcp : ndarray, shape (row, 4, 4)
         Poses, in m.
     external : ndarray, shape (row, external axis)

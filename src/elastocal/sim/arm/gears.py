@@ -196,7 +196,7 @@ class GearLaws:
         return height
 
     def strain(self, stroke: FloatArray) -> FloatArray | None:
-        """Return what a stroke leaves of the friction, shape (..., gear, stop), in rad.
+        """Return the friction that a stroke leaves, shape (..., gear, stop), in rad.
 
         Parameters
         ----------

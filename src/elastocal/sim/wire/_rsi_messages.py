@@ -261,7 +261,7 @@ class SenReader:
         self._sentype = sentype
 
     def read(self, datagram: bytes) -> Answer | None:
-        """Return what a datagram says; None where the controller does not take it."""
+        """Return the content of a datagram; None where the controller does not take it."""
         if len(datagram) > LARGEST or b"<!" in datagram:
             return None
         try:

@@ -195,7 +195,7 @@ class RsiRobot:
         self._live.apart(lambda sim: sim.arm.stop())
 
     def values(self) -> dict[str, float | Sequence[float]]:
-        """Return what the controller says now, in mm and deg."""
+        """Return the controller's message of now, in mm and deg."""
         return self._live.apart(self._values) if self._moving else self._said
 
     def _values(self, sim: SimulatedCell) -> dict[str, float | Sequence[float]]:
@@ -428,7 +428,7 @@ def ethernet_config(address: str, port: int, mode: str = "contact", sentype: str
     Parameters
     ----------
     address, port : str, int
-        Of the PC.
+        Address and port of the PC.
     mode : str
         ``contact``: the program of a run, its corrections relative; ``compensation``: corrections
         alone, which keep their value when no answer comes; ``measure``: no answer is expected.
@@ -495,7 +495,7 @@ class RsiServer:
         context : RsiContext, optional
             How the controller is set up.
         address, port : str, int
-            Of the robot; 0: any free port.
+            Address and port of the robot; 0: any free port.
 
         Raises
         ------

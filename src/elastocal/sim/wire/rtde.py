@@ -457,7 +457,7 @@ def version_message(values: Mapping[str, Value], version: Sequence[int]) -> byte
 
 
 def shown_text(values: Mapping[str, Value], text: str) -> bytes:
-    """Return what a program shows by ``textmsg``."""
+    """Return the text that a program shows by ``textmsg``."""
     return _message(values, _TEXT, text.encode("latin-1", "replace"))
 
 

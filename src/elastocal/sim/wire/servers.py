@@ -100,7 +100,7 @@ def bound(kind: socket.SocketKind, port: int, address: str = LOOPBACK) -> socket
     port : int
         0: any that is free.
     address : str
-        Of this machine.
+        Address of this machine.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class VisitChance:
 
     @classmethod
     def of(cls, seed: int, key: str) -> "VisitChance":
-        """Return what belongs to a seed and a posture or course."""
+        """Return the random errors of a seed and a posture or course."""
         rng = generator(seed, "visit", key)
         stroke, tilt = rng.standard_normal(6), rng.standard_normal(2)
         return cls(stroke, tilt, rng.standard_normal((DRAWS, 2)), np.array(rng.uniform()))
@@ -69,7 +69,7 @@ def built(linkage: Linkage, entry: Geometry, external: int, seed: int) -> Linkag
     external : int
         Number of joints before the arm, which are right.
     seed : int
-        Of the cell: a robot stays what it is.
+        Seed of the cell: a robot stays what it is.
     """
     if entry.tcp == 0.0 and entry.links == 0.0:
         return linkage
@@ -162,7 +162,7 @@ class SensorHysteresis:
         self._load = np.zeros(6)
 
     def lag(self, load: FloatArray) -> FloatArray:
-        """Return what the axes read beside each load, in order in time, (..., 6) as given.
+        """Return the readings that the axes add to each load, in order in time, (..., 6) as given.
 
         Parameters
         ----------

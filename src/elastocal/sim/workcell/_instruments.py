@@ -346,20 +346,20 @@ def sensor_range(cell: Cell) -> FloatArray:
 
 
 def sensor_zero(cell: Cell, seed: int) -> FloatArray:
-    """Return what the sensor reads under nothing, shape (6,), in N and N·m."""
+    """Return the sensor's zero, shape (6,), in N and N·m."""
     zero = generator(seed, "sensor", "zero").standard_normal(6)
     return truth_of(cell).sensor.bias * sensor_range(cell) * zero
 
 
 def sensor_matrix(cell: Cell, seed: int) -> FloatArray:
-    """Return what the sensor reads per true wrench, shape (6, 6)."""
+    """Return the sensor's reading per true wrench, shape (6, 6)."""
     scale, share = sensor_range(cell), truth_of(cell).sensor.cross_talk
     talk = share * generator(seed, "sensor", "cross-talk").standard_normal((6, 6))
     return np.eye(6) + talk * np.divide.outer(scale, scale)
 
 
 def force_gain(cell: Cell, seed: int) -> ForceGain:
-    """Return what the sensor's force axes read."""
+    """Return the gain of the sensor's force axes."""
     matrix, T_sensor_tcp = sensor_matrix(cell, seed), cell.T_sensor_tcp
     T_sensor_tcp = present(T_sensor_tcp, "T_sensor_tcp")
     moment = np.cross(T_sensor_tcp[:3, 3], np.eye(3)).T
@@ -376,7 +376,7 @@ def _station(seed: int, name: str, position: FloatArray, placing: float) -> Floa
 
 
 def _draw(slow: float, rate: float) -> Draw:
-    """Return what draws a block of noise of unit size, shape (`BLOCK`, 3)."""
+    """Return the generator of a block of noise of unit size, shape (`BLOCK`, 3)."""
     keep = math.exp(-1.0 / (rate * _AIR_TIME))
 
     def draw(rng: np.random.Generator) -> FloatArray:

@@ -136,7 +136,7 @@ class FaultSchedule:
         Parameters
         ----------
         kind : str
-            Of fault.
+            Kind of fault.
         times : ndarray of int, shape (sample,)
             In µs.
         station : str, optional

@@ -102,7 +102,7 @@ class Quasistatics:
         return sag.copy() if unsprung is None else sag + unsprung
 
     def _unsprung(self, q: FloatArray) -> FloatArray | None:
-        """Return what is off without any spring, shape (..., 9); None: nothing."""
+        """Return the errors of a rigid arm, shape (..., 9); None: none."""
         robot, off = self.robot, None
         if robot.built is not robot.linkage:
             off = np.zeros((*q.shape[:-1], 9))

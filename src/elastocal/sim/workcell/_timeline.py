@@ -43,7 +43,7 @@ def generator(seed: int, *words: object) -> np.random.Generator:
     Parameters
     ----------
     seed : int
-        Of the simulated cell.
+        Seed of the simulated cell.
     *words : object
         What it is for; objects with distinct `repr`.
     """
@@ -52,7 +52,7 @@ def generator(seed: int, *words: object) -> np.random.Generator:
 
 
 def posture_key(q: FloatArray) -> str:
-    """Return what stands for a posture: its joint positions to a nanoradian.
+    """Return the key of a posture: its joint positions to a nanoradian.
 
     Parameters
     ----------
@@ -306,7 +306,7 @@ class Segment:
         return float(self.law.at((now - self.begin) / MICROSECONDS))
 
     def seen(self, times: IndexArray) -> FloatArray:
-        """Return what instruments see at times in µs, without unrest of the force.
+        """Return the state that instruments see at times in µs, without unrest of the force.
 
         Shape (time, 9), or (1, 9) where nothing changes any more; see `Knots.seen`.
         """

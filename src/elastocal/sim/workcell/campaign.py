@@ -140,7 +140,7 @@ class CampaignSimulator:
         visits: VisitChance | None = None,
         reference: int | None = None,
     ) -> TrueReadings:
-        """Return what is true at every place under every load case, in this order.
+        """Return the true readings at every place under every load case, in this order.
 
         Parameters
         ----------
@@ -149,7 +149,7 @@ class CampaignSimulator:
         force_tcp : ndarray, shape (load, 3)
             Wanted readings of the sensor, tcp frame, in N.
         seed : int
-            Of what differs from visit to visit.
+            Seed of what differs from visit to visit.
         visits : VisitChance, optional
             That itself, with a leading axis of places, in place of what the seed gives.
         reference : int, optional
@@ -177,7 +177,7 @@ class CampaignSimulator:
         visits: VisitChance,
         reference: int | None,
     ) -> TrueReadings:
-        """Return what is true in visits whose chance the statics have."""
+        """Return the true readings of visits whose random errors the statics have."""
         T = self.statics.robot.forward(places.q)
         near = self._free(self._along(places.q, T, self.near * places.normal), None)
         touch, contacts = self._touch(places, T, near)

@@ -128,7 +128,7 @@ class CampaignErrors:
         settled : TrueReadings
             The truth.
         draws : ErrorDraws
-            Of these places and load cases.
+            Random errors of these places and load cases.
         scales : ErrorScales
             How large the errors are.
         station : ndarray, shape (place, 3)

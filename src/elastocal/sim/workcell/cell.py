@@ -299,7 +299,7 @@ def simulated_devices(cell: Cell, seed: int, start: float = 0.0) -> Devices:
     cell : Cell
         The cell; its sections ``simulation`` and ``faults`` say what is hidden in it.
     seed : int
-        Of everything random.
+        Seed of everything random.
     start : float
         What the clock shows at the beginning, in s.
 
@@ -492,7 +492,7 @@ class ProcessCell:
         return seen.reshape(*state.force.shape[:-1], 6)
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
-        """Return what the sensor says: cross-talk, zero, drift, noise, end of its range.
+        """Return the sensor's samples: cross-talk, zero, drift, noise, end of its range.
 
         Parameters
         ----------
@@ -521,6 +521,6 @@ class _Noise:
         return drawn[self._names[0]] if self._alone else np.stack([drawn[n] for n in self._names])
 
     def chance(self) -> VisitChance:
-        """Return what belongs to the visit of each run."""
+        """Return the random errors of the visit of each run."""
         visits = [VisitChance.of(self._seed, f"process {name}") for name in self._names]
         return visits[0] if self._alone else VisitChance.stack(visits)
