@@ -137,3 +137,32 @@ def test_without_the_mass_forces_in_kgf_are_not_seen():
     fit = fit_tool(light, TOOL.R_flange_sensor)
     assert tool_doubts(light, fit) == ()
     assert "are the forces in kgf?" in tool_doubts(light, fit, TOOL.mass)[0]
+
+
+class TestFewDirections:
+    """A campaign that tilts its tool to three attitudes alone, as on the example of roughing."""
+
+    LEVER = 0.13
+
+    def postures(self, seed):
+        rng = np.random.default_rng(seed)
+        attitudes = Rotation.from_rotvec(np.outer([0.0, 0.5, 1.0], [0.0, np.pi, 0.0])).as_matrix()
+        return TOOL.raw(np.repeat(attitudes, (9, 5, 1), axis=0), rng)
+
+    @pytest.mark.parametrize("seed", range(40))
+    def test_a_cross_talk_of_five_percent_is_no_mistake(self, seed):
+        sound = self.postures(seed)
+        matrix = 0.05 * np.random.default_rng(seed).standard_normal((6, 6))
+        wrench = np.hstack([sound.force, sound.moment / self.LEVER])
+        wrench = wrench + (wrench - wrench.mean(axis=0)) @ matrix.T
+        talked = sound.read_as(wrench[:, :3], self.LEVER * wrench[:, 3:])
+        refuse_other_readings(talked, TOOL.R_flange_sensor, self.LEVER)
+
+    @pytest.mark.parametrize("pair", [(0, 1), (0, 2), (1, 2)])
+    def test_exchanged_axes_are_found_all_the_same(self, pair):
+        sound, order = self.postures(0), [0, 1, 2]
+        order[pair[0]], order[pair[1]] = pair[::-1]
+        with pytest.raises(CompensationError, match="are exchanged"):
+            refuse_other_readings(
+                sound.read_as(sound.force[:, order], sound.moment), TOOL.R_flange_sensor, self.LEVER
+            )

@@ -27,7 +27,7 @@ from elastocal.compensation.conditioning.tool_choice import affine_scatter
 from elastocal.compensation.conditioning.tool_fit import ToolFit, ToolModel, fit_tool, tool_residual
 from elastocal.errors import CompensationError
 from elastocal.parallel import one_blas_thread
-from elastocal.robot import nearest_rotation
+from elastocal.robot import nearest_rotation, xyzabc_from_T
 
 _LEAST_SPREAD = np.radians(15.0)
 """Least spread of the postures that tells a weight, in rad."""
@@ -137,6 +137,11 @@ _NOTICEABLE = 0.05
 """Part of what turns with the posture that is left, from which on mistakes are looked for."""
 _CROSS_TALK = 0.03
 """Share of the ranges that cross-talk may carry over from forces to moments and back."""
+_MOST_CROSS_TALK = 2.0 * 0.05 * np.sqrt(3.0)
+"""Two standard deviations of what three components carry into another one where each entry of the
+matrix is of 5 %, as of sensors before they are calibrated (`elastocal.sim.truth`)."""
+_FITTED_BY_CROSS_TALK = 4
+"""Directions of gravity that cross-talk always explains."""
 _FAR_BETTER = 0.3
 """Part of it that undoing a mistake leaves at most."""
 _TIE = 1.3
@@ -186,9 +191,8 @@ def force_mistake(
     """
     u, F = postures.gravity_flange @ R_flange_sensor, postures.force
     others = _force_readings(postures, R_flange_sensor)
-    cross = _CROSS_TALK * _scatter(postures.moment) / lever
-    least = _NOTICEABLE * _scatter(F)
-    return _judged(_solved(F, [u])[1], others, (least, least + cross), "force", "N")
+    floors = _floors(u, F, postures.moment / lever)
+    return _judged(_solved(F, [u])[1], others, floors, "force", "N")
 
 
 def moment_mistake(
@@ -216,9 +220,32 @@ def moment_mistake(
         for pair, order in _exchanges("moment"):
             yield _Reading(pair, _solved(M[:, order], terms)[1])
 
-    least = _NOTICEABLE * _scatter(M)
-    cross = _CROSS_TALK * _scatter(postures.force) * lever
-    return _judged(_solved(M, terms)[1], readings(), (least, least + cross), "moment", "N*m")
+    floors = _floors(u, M, postures.force * lever)
+    return _judged(_solved(M, terms)[1], readings(), floors, "moment", "N*m")
+
+
+def _floors(u: FloatArray, own: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """Return what must be left to look for mistakes, and for those that cross-talk imitates.
+
+    Cross-talk is an affine law of gravity of twelve numbers, which four directions always fit: then
+    only what is beyond any cross-talk is a mistake, of whatever kind.
+
+    Parameters
+    ----------
+    u : ndarray, shape (posture, 3)
+        Gravity in the sensor, in m/s².
+    own, other : ndarray, shape (posture, 3)
+        What is judged, and what may talk into it, in the same unit.
+    """
+    directions = list[FloatArray]()
+    for each in u / np.linalg.norm(u, axis=1, keepdims=True):
+        if all(_angle_between(each, known) > _LEAST_TURN for known in directions):
+            directions.append(each)
+    if len(directions) <= _FITTED_BY_CROSS_TALK:
+        most = _MOST_CROSS_TALK * float(np.hypot(_scatter(own), _scatter(other)))
+        return most, most
+    least = _NOTICEABLE * _scatter(own)
+    return least, least + _CROSS_TALK * _scatter(other)
 
 
 def _judged(
@@ -343,7 +370,9 @@ def _other_orientations(postures: StaticPostures, R_sensor: FloatArray) -> Itera
     yield read(np.swapaxes(R, 1, 2), F, inverse)
     yield read(R[:-1], F[1:], "the wrenches belong to the orientations of the row before")
     yield read(R[1:], F[:-1], "the wrenches belong to the orientations of the row after")
-    angles = Rotation.from_matrix(R).as_euler("ZYX")
+    T = np.tile(np.eye(4), (len(R), 1, 1))
+    T[:, :3, :3] = R
+    angles = xyzabc_from_T(T)[:, 3:]
     about_x = Rotation.from_euler("ZYX", angles[:, ::-1]).as_matrix()
     yield read(about_x, F, "the columns of the angles a and c are exchanged")
     for order in _ORDERS:
