@@ -71,23 +71,29 @@ def errors(*means: float) -> np.ndarray:
 ANY = np.ones(3, dtype=bool)
 
 
-def test_the_simplest_model_near_the_best_is_taken():
+def test_a_model_within_one_standard_error_is_near_the_best_and_not_the_best():
     judged = judge_models(errors(60.0, 50.4, 50.0), ANY, Overlap.leaving_one_out(31))
-    assert judged.chosen == 1
+    assert judged.best == 2
+    assert judged.near.tolist() == [1, 2]
     assert judged.difference.low[0] > 0.0 > judged.difference.low[1]
 
 
-def test_a_model_that_is_far_better_is_taken_however_rich():
-    assert judge_models(errors(60.0, 55.0, 50.0), ANY, Overlap.leaving_one_out(31)).chosen == 2
+def test_no_model_is_near_one_that_is_far_better_however_rich():
+    judged = judge_models(errors(60.0, 55.0, 50.0), ANY, Overlap.leaving_one_out(31))
+    assert judged.near.tolist() == [2]
 
 
-def test_a_model_that_is_not_allowed_is_judged_and_not_taken():
+def test_of_equal_models_the_simplest_is_the_best():
+    assert judge_models(np.ones((31, 3)), ANY, Overlap.leaving_one_out(31)).best == 0
+
+
+def test_a_model_that_is_not_allowed_is_judged_and_not_the_best():
     judged = judge_models(errors(60.0, 50.0, 55.0), ~ANY | [True, False, False], Overlap(31, 0.4))
-    assert judged.chosen == 0
+    assert judged.best == 0
     assert judged.difference.high[1] < 0.0
 
 
-def test_one_set_tells_no_standard_error_and_the_best_is_taken():
+def test_one_set_tells_no_standard_error_and_a_best_model():
     judged = judge_models(errors(60.0, 50.0, 55.0)[:1], ANY, Overlap(1, 1.0))
-    assert judged.chosen == 1
+    assert judged.best == 1
     assert np.isnan(judged.difference.low).all()

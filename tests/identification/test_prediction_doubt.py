@@ -18,7 +18,7 @@ from elastocal.identification import (
     choose_model,
     expected_errors,
     solve,
-    take_simplest,
+    take_best,
     with_knowledge,
 )
 from elastocal.identification.prediction_doubt import DOUBT_ROWS
@@ -84,26 +84,26 @@ def test_production_is_judged_by_rows_with_a_load():
     assert few.joint_position[[0, -1], 0].tolist() == [500.0, 999.0]
 
 
-def test_without_production_the_simplest_of_the_near_rungs_is_taken():
+def test_without_production_the_rung_that_errs_least_is_taken():
     tried = [replace(each, forecast=None) for each in choice().ladder]
     names = [each.name for each in tried]
-    chosen = take_simplest(tried, names)
-    taken = names.index(chosen.taken)
+    chosen = take_best(tried, names)
     assert all(np.isnan(each.production_error) for each in chosen.ladder)
-    near = [n for n, each in enumerate(chosen.ladder) if each.difference <= each.standard_error]
-    assert taken == near[0] < near[-1]
+    assert chosen.taken == min(chosen.ladder, key=lambda each: each.difference).name
+    near = [each for each in chosen.ladder if each.difference <= each.standard_error]
+    assert near[0].name != chosen.taken, "a simpler one is near, and is not taken"
 
 
 def test_of_the_near_rungs_the_one_that_errs_least_on_production_is_taken():
-    plain = take_simplest([replace(each, forecast=None) for each in choice().ladder], list_names())
+    plain = take_best([replace(each, forecast=None) for each in choice().ladder], list_names())
     near = [each.name for each in plain.ladder if each.difference <= each.standard_error]
-    sure = near[1]
+    sure = near[0]
     tried = [
         replace(each, forecast=forecast(1e-3, 1e-10 if each.name == sure else 1e-8))
         for each in choice().ladder
     ]
-    found = take_simplest(tried, list_names())
-    assert plain.taken == near[0]
+    found = take_best(tried, list_names())
+    assert plain.taken != sure
     assert found.taken == sure
     told = [each.name for each in found.ladder if np.isfinite(each.production_error)]
     assert told == near
@@ -119,15 +119,15 @@ def test_a_rung_that_is_not_sure_of_production_cannot_be_taken_though_it_fits_be
         replace(each, forecast=forecast(4e-3, 16e-6)) if each.name == "links" else each
         for each in tried
     ]
-    assert take_simplest(tried, list_names()).taken == "links"
-    found = take_simplest(unsure, list_names())
+    assert take_best(tried, list_names()).taken == "links"
+    found = take_best(unsure, list_names())
     assert found.taken != "links"
     assert [each.name for each in found.ladder if not each.is_backed] == ["links"]
 
 
 def test_where_no_rung_is_sure_of_production_one_is_taken_all_the_same():
     tried = [replace(each, forecast=forecast(1e-3, 1e-4)) for each in choice().ladder]
-    assert take_simplest(tried, list_names()).taken in list_names()
+    assert take_best(tried, list_names()).taken in list_names()
 
 
 def list_names() -> list[str]:

@@ -25,22 +25,41 @@ from scipy.spatial.transform import Rotation
 
 mujoco = pytest.importorskip("mujoco", reason="needs the engine: pip install 'elastocal[nightly]'")
 
-AXIAL = np.array([2.4e6, 2.9e6, 2.6e6, 8e5, 6e5, 3e5])
-"""Stiffness of the gears of a heavy arm far beyond their knee, in N·m/rad."""
 TILT = (4.0, 6.0)
 """How many times as stiff each bearing is against tilting."""
-BENDING = 9e6
-"""Stiffness of a bending link, in N·m/rad."""
-KNEE = 0.35e-3
-"""Twist at which a gear has stiffened, in rad."""
-LOADS_TCP = np.array(
-    [[0, 0, -1100], [280, 0, -1100], [-280, 0, -1100], [0, -280, -1100], [0, 280, -1100]], float
+_ASIDE = 280.0 / 1100.0
+PRESSES = np.array(
+    [[0, 0, -1], [_ASIDE, 0, -1], [-_ASIDE, 0, -1], [0, -_ASIDE, -1], [0, _ASIDE, -1]]
 )
-"""The paper's five load cases, as force on the robot in the tcp frame, in N."""
-GAP, CONTACT = 3e-3, 3e6
-"""Way to the tooling from where the zero is read, in m, and stiffness of the tooling, in N/m."""
+"""The paper's five load cases, as force on the robot in the tcp frame, over the press."""
+GAP = 3e-3
+"""Way to the tooling from where the zero is read, in m."""
 _ENGINE = '<mujoco><compiler fusestatic="false" discardvisual="true" strippath="true"/></mujoco>'
 _ROUNDS = 200
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """An arm with its tool as its maker draws it, and how stiff it is."""
+
+    urdf: str
+    stiffness: tuple[float, ...]
+    """Of the gears far beyond their knee, in N·m/rad."""
+    bending: float
+    """Stiffness of a bending link, in N·m/rad."""
+    links: tuple[str, ...]
+    """Joints before which a link bends at its middle, where the laws say so."""
+    press: float
+    """Force of the load cases, in N."""
+    knee: float
+    """Twist at which a gear has stiffened, in rad."""
+    tooling: float
+    """Stiffness of the tooling, in N/m."""
+
+    @property
+    def loads_tcp(self) -> np.ndarray:
+        """The load cases, as force on the robot in the tcp frame, shape (load, 3), in N."""
+        return self.press * PRESSES
 
 
 @dataclass(frozen=True)
@@ -49,8 +68,8 @@ class Laws:
 
     softening: float = 0.0
     """How much softer than beyond the knee a gear is at rest, as a part."""
-    bending: tuple[str, ...] = ()
-    """Joints before which the link bends at its middle."""
+    bending: bool = False
+    """Whether links bend."""
     lost_motion: float = 0.0
     """Angle between a torque and its opposite that friction leaves in every gear, in rad."""
     dahl: float = 2.0
@@ -60,11 +79,11 @@ class Laws:
 class MujocoArm:
     """An arm with springs, in equilibrium; see the module."""
 
-    def __init__(self, urdf: str, laws: Laws) -> None:
-        self.laws = laws
-        spec = mujoco.MjSpec.from_string(urdf.replace("</robot>", f"{_ENGINE}</robot>"))
+    def __init__(self, drawing: Drawing, laws: Laws) -> None:
+        self.drawing, self.laws = drawing, laws
+        spec = mujoco.MjSpec.from_string(drawing.urdf.replace("</robot>", f"{_ENGINE}</robot>"))
         spec.option.gravity = [0.0, 0.0, -9.80665]
-        names, stiffness, is_gear = _insert_springs(spec, laws.bending)
+        names, stiffness, is_gear = _insert_springs(spec, drawing, laws)
         tip = spec.body("tcp")
         tip.add_site(name="tcp")
         self.model = spec.compile()
@@ -153,7 +172,7 @@ class MujocoArm:
 
     def _twist(self, torque: np.ndarray) -> np.ndarray:
         """Return how far each spring turns under the torque that it bears itself."""
-        knee = self.k * KNEE
+        knee = self.k * self.drawing.knee
         soft = np.where(self.is_gear, self.laws.softening, 0.0)
         return (torque + soft * knee * np.tanh(torque / knee)) / self.k
 
@@ -176,7 +195,7 @@ class MujocoArm:
 
 
 def _insert_springs(
-    spec: "mujoco.MjSpec", bending: tuple[str, ...]
+    spec: "mujoco.MjSpec", drawing: Drawing, laws: Laws
 ) -> tuple[list[str], dict[str, float], set[str]]:
     """Put the springs before each motor; return all joints, stiffnesses, and names of gears."""
     stiffness, gears, names = dict[str, float](), set[str](), list[str]()
@@ -192,15 +211,15 @@ def _insert_springs(
         if k is not None:
             stiffness[name] = k
 
-    for (name, axis, body), k in zip(motors, AXIAL, strict=True):
-        if name in bending:
+    for (name, axis, body), k in zip(motors, drawing.stiffness, strict=True):
+        if laws.bending and name in drawing.links:
             # From the middle of the link before, seen in the frame of the body that it carries.
             link = Rotation.from_quat(np.roll(body.quat, -1)).inv().apply(body.pos)
             along = link / np.linalg.norm(link)
             first = np.cross(along, np.eye(3)[np.abs(along).argmin()])
             first /= np.linalg.norm(first)
             for n, each in enumerate((first, np.cross(along, first))):
-                add(body, f"{name}.bend{n}", each, BENDING, -0.5 * link)
+                add(body, f"{name}.bend{n}", each, drawing.bending, -0.5 * link)
         across = [each for each in np.eye(3) if abs(each @ axis) < 0.5]
         for n, (each, times) in enumerate(zip(across, TILT, strict=True)):
             add(body, f"{name}.tilt{n}", each, times * k)
@@ -244,7 +263,8 @@ class Procedure:
 
 def campaign(arm: MujocoArm, q: np.ndarray, how: Procedure, rng: np.random.Generator) -> Campaign:
     """Press at poses whose undeformed tool touches the tooling, shape (pose, joint)."""
-    loads = np.vstack([LOADS_TCP, *(level * LOADS_TCP[:1] for level in how.levels)])
+    five = arm.drawing.loads_tcp
+    loads = np.vstack([five, *(level * five[:1] for level in how.levels)])
     shape = (len(q), len(loads), 3)
     joints, seen = np.empty((*shape[:2], q.shape[1])), np.empty(shape)
     shown, forces, references = np.empty(shape), np.empty(shape), np.empty_like(q)
@@ -291,7 +311,7 @@ class _Visit:
 
     def press(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Press; return the joints of the controller and the true tcp."""
-        held = self.zero + GAP * self.T[:3, 2] - force / CONTACT
+        held = self.zero + GAP * self.T[:3, 2] - force / self.arm.drawing.tooling
         friction = self.friction
         for _ in range(4):
             tcp, torque = self.arm.equilibrium(self.q, force, friction)
@@ -305,20 +325,25 @@ class _Visit:
         return self.q, tcp
 
 
-def fresh_deflection(arm: MujocoArm, q: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the true deflection of a press from rest, against the unloaded arm there.
+def true_deflection(arm: MujocoArm, q: np.ndarray, *presses: np.ndarray) -> np.ndarray:
+    """Return the true deflection of the last of some presses, of which the first is from rest.
+
+    Against the unloaded arm before the first. The force goes straight from each press to the next.
 
     Parameters
     ----------
     q : ndarray, shape (pose, joint)
-    force : ndarray, shape (pose, 3)
+    presses : ndarray, shape (pose, 3)
+        Forces one after another.
     """
-    rest, found = np.zeros(len(arm.k)), np.empty_like(force)
-    for pose, (joints, load) in enumerate(zip(q, force, strict=True)):
-        free, start = arm.equilibrium(joints, np.zeros(3), rest)
-        _, torque = arm.equilibrium(joints, load, rest)
-        for _ in range(3):
-            friction = arm.slide(rest, start, torque)
-            pressed, torque = arm.equilibrium(joints, load, friction)
+    rest, found = np.zeros(len(arm.k)), np.empty_like(presses[-1])
+    for pose, joints in enumerate(q):
+        free, torque = arm.equilibrium(joints, np.zeros(3), rest)
+        friction = rest
+        for force in presses:
+            before, start = friction, torque
+            for _ in range(4):
+                pressed, torque = arm.equilibrium(joints, force[pose], friction)
+                friction = arm.slide(before, start, torque)
         found[pose] = pressed - free
     return found

@@ -32,7 +32,7 @@ from elastocal.identification import (
     choose_model,
     low_loads,
     rung_of,
-    take_simplest,
+    take_best,
     try_rung,
     usable_for_choice,
 )
@@ -124,7 +124,7 @@ class Entrant:
             try_rung(each.springs, each.model, each.problem.take(rows), self.low[rows])
             for each in self.allowed
         ]
-        return take_simplest(tried, [each.name for each in tried]).taken
+        return take_best(tried, [each.name for each in tried]).taken
 
     def with_springs(self, name: str) -> PreparedVariant:
         """Return the variant with the springs of this name."""
@@ -149,7 +149,7 @@ def climbed_ladder(
 
 def taken_springs(ladder: Choice, springs: str) -> str:
     """Return the name of the springs that `calibrate` takes for a user's word."""
-    return take_simplest(ladder.ladder, allowed_rungs(springs)).taken
+    return take_best(ladder.ladder, allowed_rungs(springs)).taken
 
 
 def make_entrant(

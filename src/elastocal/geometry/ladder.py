@@ -97,7 +97,7 @@ def climb(
     errors = np.array([[each.distance[fold == k].mean() for each in rungs] for k in range(FOLDS)])
     overlap = Overlap(FOLDS, 0.0, 1.0 / FOLDS)
     judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)
-    chosen = RUNGS[judged.chosen]
+    chosen = RUNGS[judged.near[0]]
     progress("geometry", 3, 4)
     begin = _without(reference, problem, chosen)
     final = fit(problem, free[chosen], begin, reference.used, reference.J)

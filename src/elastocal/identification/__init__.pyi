@@ -47,7 +47,7 @@ from .ladder import (
     Choice as Choice,
     Climbed as Climbed,
     choose_model as choose_model,
-    take_simplest as take_simplest,
+    take_best as take_best,
     try_rung as try_rung,
     usable_for_choice as usable_for_choice,
 )

@@ -363,11 +363,6 @@ def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
         return f"{um(found.mean)} (95 % interval {um(found.low)} to {um(found.high)})"
 
     text = f"{taken.springs} is taken, the best at left-out poses"
-    if taken is not best:
-        text = (
-            f"{taken.springs} is taken, the simplest within one standard error of the best at"
-            f" left-out poses, {best.springs}: worse by {by(taken)}"
-        )
     if taken.production_error is not None:
         text = (
             f"{taken.springs} is taken: of the rungs within one standard error of the best at"

@@ -3,10 +3,10 @@
 More springs always fit better; whether they predict better is seen at poses that a refit has not
 seen, and at a low load that it has not seen, where there is one. (A refit without the full load, or
 without a pose that stands alone, would have to extrapolate, which no rung is asked to.) The rung
-taken is the simplest that is not worse than the best by more than one standard error of their
-paired difference, which counts that the refits overlap (`elastocal.identification.paired`). Where
-production is known, it decides between rungs that the poses do not tell apart
-(`elastocal.identification.prediction_doubt`).
+with the lowest such error is taken, of those that do not have more parameters than the readings
+hold numbers. Where production is known, it decides between rungs that are
+not worse by more than one standard error of their paired difference
+(`elastocal.identification.paired`, `elastocal.identification.prediction_doubt`).
 """
 
 from collections.abc import Sequence
@@ -83,6 +83,11 @@ class Climbed:
     that left-out poses show to be worse."""
 
     @property
+    def is_carried(self) -> bool:
+        """Whether the readings hold as many numbers as the model has parameters."""
+        return bool(self.held_out.compliance.shape[1] <= self.predicted.size)
+
+    @property
     def is_backed(self) -> bool:
         """Whether it is as sure of production as a correction has to be; also where none is known.
 
@@ -144,7 +149,7 @@ def choose_model(
         Other layouts or spring files to judge with the ladder; none of them is taken.
     production : ProductionRows, optional
         Where the model is to predict. Rungs to choose from are then fitted with what the drives say
-        of other springs (`DriveCompliances`), and chosen by production: see `take_simplest`.
+        of other springs (`DriveCompliances`), and chosen by production: see `take_best`.
 
     Raises
     ------
@@ -194,7 +199,7 @@ def climb(
     marker_offset: ArrayLike | None = None,
     production: ProductionRows | None = None,
 ) -> Choice:
-    """Return the simplest of the allowed rungs that is not worse than the best of them.
+    """Return the allowed rung that errs least at left-out poses, or on production.
 
     Parameters
     ----------
@@ -240,14 +245,16 @@ def climb(
             reason = str(error)
     if not any(each.name in allowed for each in tried):
         raise IdentificationError(reason)
-    return take_simplest(tried, allowed)
+    return take_best(tried, allowed)
 
 
-def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
-    """Return the simplest of the allowed rungs that is not worse than the best of them.
+def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
+    """Return the allowed rung that errs least at left-out poses.
 
-    Where production is known, a rung that is not sure of it is not taken while there is one that
-    is, and of those that are not worse the one that is expected to err least on production.
+    Of rungs with more parameters than the readings hold numbers none is taken while there is a
+    smaller one: a few left-out poses find one of them the best by chance. Where production is
+    known, a rung that is not sure of it is not taken while there is one that is; and of those
+    within one standard error of the best the one is taken that is expected to err least there.
 
     Parameters
     ----------
@@ -264,14 +271,15 @@ def take_simplest(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
     may = np.array([each.name in allowed for each in tried])
     if not np.any(may):
         raise IdentificationError(f"springs {', '.join(allowed)} were not tried: {NO_LEVELS}")
-    backed = may & [each.is_backed for each in tried]
-    may = backed if np.any(backed) else may
+    for mark in ("is_carried", "is_backed"):
+        fit = may & np.array([getattr(each, mark) for each in tried])
+        may = fit if np.any(fit) else may
     score = np.stack([each.score for each in tried], axis=1)
     score = score if tried[0].counted is None else score[tried[0].counted]
     found = judge_models(score, may, Overlap.leaving_one_out(len(score)))
     on_production = _errors_on_production(tried, found)
     known = np.isfinite(on_production).any()
-    chosen = int(np.nanargmin(on_production)) if known else found.chosen
+    chosen = int(np.nanargmin(on_production)) if known else found.best
     each = found.difference
     figures = (each.mean, each.low, each.high, np.nan_to_num(each.standard_error))
     ladder = tuple(

@@ -10,10 +10,10 @@ sets, and those of a leave-one-out, share less, even nothing, but their training
 nearly the same poses; so ``rho`` is never taken below that of random sets. How often this claims
 a difference that is none: docs/decisions/0069-one-judgement.md.
 
-Of models from simple to rich the simplest is taken that is not worse than the best by more than
-one standard error of their paired difference (L. Breiman, J. Friedman, R. Olshen, C. Stone,
-*Classification and Regression Trees*, 1984, section 3.4.3). Why not a 95 % interval: see
-docs/decisions/0066-ladder.md.
+Models that are not worse than the best by more than one standard error of their paired difference
+are near it (L. Breiman, J. Friedman, R. Olshen, C. Stone, *Classification and Regression Trees*,
+1984, section 3.4.3, who take the simplest of them). Springs take the best itself, geometry the
+simplest near it: why, and why not by a 95 % interval, is in docs/decisions/0066-ladder.md.
 """
 
 from dataclasses import dataclass
@@ -140,14 +140,14 @@ class Judgement:
 
     difference: MeanOverSets
     """Error of each model minus that of the best allowed one, arrays of shape (model,), in m."""
-    chosen: int
-    """Number of the simplest allowed model that is not worse by more than a standard error."""
+    best: int
+    """Number of the allowed model with the lowest mean error; of equal ones the simplest."""
     near: IndexArray
-    """Numbers of all of those."""
+    """Numbers of the allowed models that are not worse by more than one standard error."""
 
 
 def judge_models(errors: FloatArray, allowed: BoolArray, overlap: Overlap) -> Judgement:
-    """Return which of some models to take.
+    """Return which of some models predict best, and which nearly as well.
 
     Parameters
     ----------
@@ -163,4 +163,4 @@ def judge_models(errors: FloatArray, allowed: BoolArray, overlap: Overlap) -> Ju
     difference = paired_difference(errors, errors[:, [best]], overlap)
     within = difference.mean <= np.nan_to_num(difference.standard_error)
     near = np.flatnonzero(allowed & within)
-    return Judgement(difference, int(near[0]), near)
+    return Judgement(difference, best, near)

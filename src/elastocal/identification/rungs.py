@@ -29,6 +29,9 @@ _KNEES_OF_PLAYS = (0.5, 2.0)
 """Knees of gears with friction, whose elements are knees as well."""
 _SLIPS = (0.15, 0.3, 0.6, 1.5)
 """Limits of the friction elements, likewise: from what barely matters to gears that stick."""
+_FINE_SLIPS = (0.05, *_SLIPS)
+"""With one that slides under a light press already, as friction does that is small beside the loads
+of production: a harmonic drive's, or a strong gear's."""
 _SLIDES = 0.6
 """Part of the joint's largest load torque up to which a friction element is fitted. One that slid
 little or never has a column near zero, and a compliance that says nothing of the arm: where
@@ -104,6 +107,11 @@ RUNGS: dict[str, Rung] = {
             lambda robot, readings: gears(robot, readings, _SLIPS),
             needs_levels=True,
         ),
+        Rung(
+            "gears+fine-friction",
+            lambda robot, readings: gears(robot, readings, _FINE_SLIPS),
+            needs_levels=True,
+        ),
     )
 }
 """Rungs by name, the simplest first."""
@@ -111,7 +119,8 @@ RUNGS: dict[str, Rung] = {
 
 def allowed_rungs(springs: str) -> tuple[str, ...]:
     """Return the names of the rungs that a user's word for springs leaves to choose from."""
-    return {AUTO: tuple(RUNGS), "gears": ("gears", "gears+friction")}.get(springs, (springs,))
+    gears = tuple(name for name in RUNGS if name.startswith("gears"))
+    return {AUTO: tuple(RUNGS), "gears": gears}.get(springs, (springs,))
 
 
 def rung_of(robot: Robot, name: str) -> Rung:

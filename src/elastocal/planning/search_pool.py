@@ -43,7 +43,7 @@ from elastocal.results import brief_repr
 _SPRINGS = "bearing"
 """Spring layout that poses are judged by: the paper's 18 on a six-axis arm."""
 _GEARS, _GEARS_AND_FRICTION = "gears", "gears+friction"
-"""Models that they are judged by where production is known: the richest that the load cases carry.
+"""Models that they are judged by where production is known: rich ones that most campaigns carry.
 Friction memory shows in low loads beside full ones."""
 _LOW_LEVEL = 0.6
 _SCALED_BY = 200
