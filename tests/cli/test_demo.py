@@ -43,7 +43,7 @@ def test_the_log_of_a_demo_holds_every_command_with_its_output():
     assert commands == [c.words[0] for c in chapters("afp", Path("demo"), 0)]
     assert "written to" in log
     # The low level of the example tells friction from compliance.
-    assert re.search(r"^gears\+friction .* taken", log, flags=re.MULTILINE)
+    assert re.search(r"^gears\+fine-friction .* taken", log, flags=re.MULTILINE)
 
 
 def test_the_light_of_the_demo_is_yellow_for_the_reason_that_the_page_gives():

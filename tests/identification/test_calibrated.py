@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError
-from elastocal.identification import CalibratedModel, Observability
+from elastocal.identification import CalibratedModel, Misfit, Observability
 from support.problems import elastic
 from support.virtual_chain import configurations
 
@@ -49,8 +49,8 @@ def test_its_interval_is_that_of_the_predictions_of_the_draws(calibrated):
 
 def test_what_would_be_measured_lies_within_the_misfit_and_the_fits_interval_together(calibrated):
     q, force, _ = rows(7)
-    found = replace(calibrated, misfit=0.05).predict(q, force)
-    error = 0.05 * np.linalg.norm(found.deflection, axis=1)[:, None]
+    found = replace(calibrated, misfit=Misfit(20e-6, 0.05)).predict(q, force)
+    error = np.hypot(20e-6, 0.05 * np.linalg.norm(found.deflection, axis=1)[:, None])
     below = np.sqrt((found.deflection - found.low) ** 2 + error**2)
     np.testing.assert_allclose(found.measured_low, found.deflection - below, rtol=1e-9, atol=1e-15)
     assert np.all(found.measured_low <= found.low)
@@ -66,7 +66,7 @@ def test_without_a_known_misfit_there_is_no_interval_of_a_measurement(calibrated
 
 def test_a_long_path_is_predicted_as_its_parts(calibrated):
     q, force, moment = rows(2003)
-    calibrated = replace(calibrated, misfit=0.02)
+    calibrated = replace(calibrated, misfit=Misfit(10e-6, 0.02))
     whole = calibrated.predict(q, force, moment)
     tail = calibrated.predict(q[1990:], force[1990:], moment[1990:])
     for name in ("deflection", "low", "high", "measured_low", "measured_high"):

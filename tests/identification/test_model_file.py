@@ -92,12 +92,13 @@ def test_it_predicts_the_same(path):
 
 def test_a_file_that_does_not_know_its_misfit_has_no_interval_of_a_measurement(path):
     edit(path, lambda data: data.pop("misfit"))
-    assert np.isnan(read_model(path).misfit)
+    assert not read_model(path).misfit.is_known
 
 
+@pytest.mark.parametrize("name", ["misfit", "misfit_floor"])
 @pytest.mark.parametrize("value", [-0.1, 1e999])
-def test_a_misfit_that_is_no_share_is_refused(path, tmp_path, value):
-    data = json.loads(path.read_text()) | {"misfit": value}
+def test_a_misfit_that_is_no_size_is_refused(path, tmp_path, name, value):
+    data = json.loads(path.read_text()) | {name: value}
     (tmp_path / "edited.json").write_text(json.dumps(data))
     with pytest.raises(SchemaError, match="misfit"):
         read_model(tmp_path / "edited.json")

@@ -11,7 +11,7 @@ from elastocal.identification import (
     CalibrateResult,
     Calibration,
     FitOptions,
-    HeldOut,
+    Misfit,
     calibrate,
     leave_poses_out,
     summary,
@@ -158,7 +158,7 @@ def test_the_coverage_of_the_fit_is_not_claimed_but_explained():
 def test_a_misfit_that_is_too_small_for_the_errors_lowers_the_coverage():
     problem, _ = planted(20e-6, seed=1)
     held_out = leave_poses_out(problem)
-    shrunk = HeldOut(held_out.error, held_out.fold, held_out.compliance, 0.2 * held_out.share)
+    shrunk = replace(held_out, axis_error=0.2 * held_out.axis_error)
     nothing = np.zeros((40, problem.columns))
     assert measured_coverage(problem, held_out, nothing).measurement.share > 0.9
     assert measured_coverage(problem, shrunk, nothing).measurement.share < 0.6
@@ -168,14 +168,15 @@ def test_a_left_out_reading_is_inside_where_draws_and_misfit_together_reach_it()
     """Each side by itself, and draws that all lie to one side of the estimate widen that alone."""
     problem, truth = planted(20e-6, seed=1)
     held_out = leave_poses_out(problem)
-    held_out = replace(held_out, share=0.3 * held_out.share)
+    held_out = replace(held_out, axis_error=0.3 * held_out.axis_error)
     spread = 0.02 + 0.01 * np.random.default_rng(0).normal(size=(60, problem.columns))
     deviations = truth * spread
     inside = []
     for rows, d, fold in zip(problem.O, problem.d, held_out.fold, strict=True):
         predicted = rows @ held_out.compliance[fold]
-        others = replace(held_out, share=held_out.share[held_out.fold != fold])
-        error = others.misfit * np.linalg.norm(predicted)
+        kept = held_out.fold != fold
+        others = Misfit.of(held_out.axis_error[kept], held_out.size[kept])
+        error = others.error(np.linalg.norm(predicted))
         low, high = np.percentile(deviations @ rows.T, [2.5, 97.5], axis=0)
         down, up = np.minimum(low, 0.0), np.maximum(high, 0.0)
         off = d - predicted

@@ -12,7 +12,7 @@ import pytest
 
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
-from elastocal.identification import FitOptions, build, choose_model, solve
+from elastocal.identification import FitOptions, build, calibrate, choose_model, solve
 from elastocal.robot import Robot
 from independent.arms import ARMS, drawing, poses
 from independent.mujoco_truth import Campaign, Laws, MujocoArm, Procedure, campaign, true_deflection
@@ -66,20 +66,17 @@ def truth(arm: str, laws: Laws) -> tuple[np.ndarray, np.ndarray, dict[str, np.nd
     return q, force, {name: true_deflection(real, q, *each) for name, each in presses.items()}
 
 
-def predicted(
-    model: ElasticModel, compliance: np.ndarray, q: np.ndarray, presses: list[np.ndarray]
-) -> np.ndarray:
-    """Return the deflection of the last of some presses, of which the first is from rest."""
-    borne = None
-    if len(model.friction):
-        before, borne = np.zeros((len(q), len(model.friction))), np.zeros(len(model.friction))
-        torque = np.zeros_like(before)
-        for force in presses:
-            now = model.load_torques(q, force)[:, model.friction.axis]
-            limit = model.friction.limit
-            borne = np.clip(before + now - torque, -limit, limit)
-            before, torque = borne, now
-    return model.deflection(compliance, q, presses[-1], friction=borne)
+def borne_by_friction(
+    model: ElasticModel, q: np.ndarray, presses: list[np.ndarray]
+) -> np.ndarray | None:
+    """Return what friction bears after some presses from rest; None without friction."""
+    if not len(model.friction):
+        return None
+    borne = torque = np.zeros((len(q), len(model.friction)))
+    for force in presses:
+        now, limit = model.load_torques(q, force)[:, model.friction.axis], model.friction.limit
+        borne, torque = np.clip(borne + now - torque, -limit, limit), now
+    return borne
 
 
 @cache
@@ -100,12 +97,44 @@ def relative_errors(
     q, force, true = truth(arm, laws)
     errors = {}
     for name, course in COURSES.items():
-        found = predicted(choice.model, compliance, q, [level * force for level in course])
+        presses = [level * force for level in course]
+        friction = borne_by_friction(choice.model, q, presses)
+        found = choice.model.deflection(compliance, q, presses[-1], friction=friction)
         error = np.linalg.norm(found - true[name], axis=1)
         errors[name] = float(error.mean() / np.linalg.norm(true[name], axis=1).mean())
     shown = ", ".join(f"{name} {error:.2%}" for name, error in errors.items())
     print(f"{arm} {choice.taken}: {shown}")
     return errors
+
+
+def coverage(laws: Laws, how: Procedure) -> dict[str, tuple[float, float]]:
+    """Return the mean share of components at unseen poses inside the two intervals, four arms.
+
+    Of the fit the true deflections, of a measurement the same with the noise of a tracker; for
+    each of `COURSES`.
+    """
+    inside: dict[str, list[tuple[float, float]]] = {name: [] for name in COURSES}
+    for arm in ARMS:
+        rng = np.random.default_rng(1)
+        measured = campaign(MujocoArm(drawing(arm), laws), poses(arm, POSES, 1), how, rng)
+        seen = readings(measured, how.conditioned)
+        choice = choose_model(robot(arm), seen, "auto", FitOptions())
+        fitted = calibrate(choice.model, seen, rng, FitOptions(), ladder=choice.ladder).calibrated
+        q, force, true = truth(arm, laws)
+        for name, course in COURSES.items():
+            presses = [level * force for level in course]
+            friction = borne_by_friction(choice.model, q, presses)
+            found = fitted.predict(q, presses[-1], friction=friction)
+            noise = np.sqrt(2.0) * how.marker_noise * rng.standard_normal(true[name].shape)
+            ends = (
+                (found.low, true[name], found.high),
+                (found.measured_low, true[name] + noise, found.measured_high),
+            )
+            fit, reading = (float(np.mean((a <= x) & (x <= b))) for a, x, b in ends)
+            inside[name].append((fit, reading))
+    found = {name: tuple(np.mean(each, axis=0).round(3)) for name, each in inside.items()}
+    print(found)
+    return found
 
 
 def of_four_arms(laws: Laws, how: Procedure, count: int = POSES) -> dict[str, tuple[float, float]]:
@@ -177,6 +206,29 @@ def test_six_poses_leave_a_few_percent_and_no_more_than_ten():
         found = of_four_arms(STICKING, how, 6)
         assert found["full"][0] < 0.040
         assert found["full"][1] < 0.100
+
+
+@pytest.mark.parametrize(
+    ("laws", "how"),
+    [
+        (HARD, FIVE_LOADS_AND_A_LOW_ONE),
+        (STICKING, FIVE_LOADS_AND_A_LOW_ONE),
+        (STICKING, CONDITIONED),
+    ],
+    ids=["hard", "friction", "conditioned"],
+)
+def test_both_intervals_hold_at_full_and_at_half_load(laws, how):
+    found = coverage(laws, how)
+    for name in ("full", "half"):
+        fit, reading = found[name]
+        assert fit > 0.80
+        assert reading > 0.93
+    assert found["reversed"][1] > 0.85
+
+
+@pytest.mark.xfail(strict=True, reason="64 to 68 %: what friction does to a reversal, draws do not")
+def test_the_interval_of_the_fit_holds_at_a_reversal():
+    assert coverage(STICKING, FIVE_LOADS_AND_A_LOW_ONE)["reversed"][0] > 0.85
 
 
 @pytest.mark.xfail(strict=True, reason="0.6 %; 0.15 % without noise of 15 µm")

@@ -18,7 +18,7 @@ from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
 from elastocal.identification.observability import Observability
 from elastocal.identification.prediction_doubt import PredictionDoubt, ProductionRows
 from elastocal.identification.production import CoveredRows, ProductionCoverage, covered_rows
-from elastocal.identification.uncertainty import interval
+from elastocal.identification.uncertainty import UNKNOWN_MISFIT, Misfit, interval
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.robot import (
@@ -192,9 +192,8 @@ class CalibratedModel:
     observability: Observability
     provenance: str = ""
     """Where the data came from."""
-    misfit: float = float("nan")
-    """Share of a predicted deflection that 95 % of the errors along an axis stayed below at
-    left-out poses; NaN: not known. See `HeldOut.misfit`."""
+    misfit: Misfit = UNKNOWN_MISFIT
+    """What 95 % of the errors along an axis stayed below at left-out poses."""
     tool: ToolChange | None = None
     """The tool that the model is for; none: the one that it was calibrated with."""
     domain: CalibrationDomain | None = None
@@ -367,7 +366,7 @@ class CalibratedModel:
         self, deflection: FloatArray, low: FloatArray, high: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Widen the intervals of the fit by the misfit, as independent errors add up."""
-        error = self.misfit * np.linalg.norm(deflection, axis=1, keepdims=True)
+        error = self.misfit.error(np.linalg.norm(deflection, axis=1, keepdims=True))
         # The point estimate may lie outside the draws when a spring is at its bound.
         below, above = np.maximum(deflection - low, 0.0), np.maximum(high - deflection, 0.0)
         return deflection - np.hypot(below, error), deflection + np.hypot(above, error)

@@ -86,7 +86,9 @@ class HeldOutSummary:
     folds: int
     """Number of refits."""
     misfit: float | None = None
-    """See `HeldOut.misfit`; none where there are too few errors for it."""
+    """Share of `HeldOut.misfit`; none where there are too few errors for it."""
+    misfit_floor: float | None = None
+    """Floor of it, in m; none likewise, and in calibrations of before."""
     split: str = "leave-poses-out"
     p95: float | None = None
     """What 95 % of them stay below; none in calibrations of before."""
@@ -322,12 +324,14 @@ def _suspicious(
 
 
 def _held_out(held_out: HeldOut) -> HeldOutSummary:
+    misfit = held_out.misfit
     return HeldOutSummary(
         mean=held_out.mean,
         max=held_out.max,
         readings=len(held_out.error),
         folds=held_out.folds,
-        misfit=held_out.misfit if np.isfinite(held_out.misfit) else None,
+        misfit=misfit.share if misfit.is_known else None,
+        misfit_floor=misfit.floor if misfit.is_known else None,
         p95=float(np.percentile(held_out.error, 95)),
     )
 

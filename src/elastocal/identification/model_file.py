@@ -18,6 +18,7 @@ from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
+from elastocal.identification.uncertainty import UNKNOWN_MISFIT, Misfit
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot, parse_urdf
@@ -53,7 +54,10 @@ class CalibrateResult(Result):
     provenance: str
     """Where the data came from."""
     misfit: float | None = None
-    """See `CalibratedModel.misfit`; none where it is not known, as in files of elastocal 0.1.0."""
+    """Share of `CalibratedModel.misfit`; none where it is not known, as in files of elastocal
+    0.1.0."""
+    misfit_floor: float = 0.0
+    """Floor of it, in m; 0 in files of before."""
     calibration: CalibrationSummary | None = None
     """The figures of the calibration; none for a model that was made otherwise."""
     tool: ToolChange | None = None
@@ -96,8 +100,9 @@ class CalibrateResult(Result):
         gravity = impossible("acceleration", *(self.robot.gravity or ()))
         if gravity is not None:
             raise SchemaError(f"robot.gravity is {gravity}")
-        if self.misfit is not None and not 0.0 <= self.misfit < np.inf:
-            raise SchemaError(f"misfit {self.misfit:g} must be 0 or more")
+        for name, value in (("misfit", self.misfit), ("misfit_floor", self.misfit_floor)):
+            if value is not None and not 0.0 <= value < np.inf:
+                raise SchemaError(f"{name} {value:g} must be 0 or more")
         seen = self.observability
         if seen.parameters != n or not 0 <= seen.rank <= n:
             raise SchemaError(f"observability (rank {seen.rank}) does not fit {n} parameters")
@@ -136,7 +141,8 @@ class CalibrateResult(Result):
             draws=calibrated.draws,
             observability=calibrated.observability,
             provenance=calibrated.provenance,
-            misfit=calibrated.misfit if np.isfinite(calibrated.misfit) else None,
+            misfit=calibrated.misfit.share if calibrated.misfit.is_known else None,
+            misfit_floor=calibrated.misfit.floor if calibrated.misfit.is_known else 0.0,
             calibration=calibration,
             tool=calibrated.tool,
             domain=calibrated.domain,
@@ -165,7 +171,7 @@ class CalibrateResult(Result):
             self.draws,
             self.observability,
             self.provenance,
-            float("nan") if self.misfit is None else self.misfit,
+            UNKNOWN_MISFIT if self.misfit is None else Misfit(self.misfit_floor, self.misfit),
             self.tool,
             self.domain,
             float("nan") if self.calibration is None else self.calibration.unexplained,

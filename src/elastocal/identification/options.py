@@ -115,8 +115,10 @@ def bounds(
         If a bound has another shape, is NaN, or a lower bound exceeds the upper one.
     """
     zero = np.ndim(options.lower) == 0 and options.lower == 0.0
-    wanted = (natural if zero else options.lower, options.upper)
     try:
+        # What couples two axes is no larger, either way, than the larger compliance about one.
+        least = np.maximum(natural, -np.asarray(options.upper, dtype=float))
+        wanted = (least if zero else options.lower, options.upper)
         lower, upper = (
             np.broadcast_to(np.asarray(each, dtype=float), (parameters,)) for each in wanted
         )

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
+from scipy.optimize import nnls
 from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import FloatArray, IndexArray
@@ -38,6 +39,80 @@ _READINGS = 2000
 """Readings whose predictions by all draws are in memory at once."""
 MOST_FOLDS = 100
 """With more pose blocks than this, several are left out together."""
+_RANGE, _ALIKE = (0.05, 0.95), 1.5
+"""Quantiles of the deflections that are alike where one is no more than this many times the other:
+what is left then does not tell what of it grows with them."""
+_REWEIGHTED = 6
+"""Rounds of weights, after which a split no longer changes."""
+_LEAST_VARIANCE = 1e-3
+"""Of the mean square: no reading counts more than this allows."""
+
+
+@brief_repr
+@dataclass(frozen=True)
+class Misfit:
+    """How far a reading lies from its prediction, beside what the draws of the fit tell.
+
+    The noise of a reading stays the same when the load becomes smaller; what springs cannot express
+    shrinks with it. They add up as independent errors do, so that the interval holds at every load.
+    """
+
+    floor: float
+    """The part that every reading has, in m; NaN: not known."""
+    share: float
+    """The part that grows with the deflection, over it; NaN: not known."""
+
+    @classmethod
+    def of(cls, error: FloatArray, size: FloatArray) -> "Misfit":
+        """Return the misfit that 95 % of some errors stay below; NaN of too few.
+
+        The variance is a sum of two parts, by non-negative least squares with the weights of normal
+        errors. Where the deflections are alike there is nothing to split, and all of it grows with
+        them. Then both parts are scaled to the quantile of split-conformal prediction, which counts
+        the next error too (V. Vovk, A. Gammerman and G. Shafer, "Algorithmic Learning in a Random
+        World", 2005).
+
+        Parameters
+        ----------
+        error : ndarray, shape (reading, 3)
+            Sizes of the errors along the axes, in m.
+        size : ndarray, shape (reading,)
+            Norms of the predicted deflections, in m.
+        """
+        floor, share = _split(np.mean(np.square(error), axis=1), size)
+        expected = np.hypot(floor, share * size)[:, None]
+        missed = np.divide(error, expected, out=np.full_like(error, np.inf), where=expected > 0.0)
+        ordered = np.sort(missed, axis=None)
+        rank = int(np.ceil(CONFIDENCE * (len(ordered) + 1)))
+        if rank > len(ordered) or not np.isfinite(ordered[rank - 1]):
+            return UNKNOWN_MISFIT
+        return cls(float(ordered[rank - 1]) * floor, float(ordered[rank - 1]) * share)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there were errors enough."""
+        return bool(np.isfinite(self.floor) and np.isfinite(self.share))
+
+    def error(self, size: FloatArray) -> FloatArray:
+        """Return the error along an axis where deflections are predicted, of their shape, in m."""
+        return np.asarray(np.hypot(self.floor, self.share * size))
+
+
+UNKNOWN_MISFIT = Misfit(float("nan"), float("nan"))
+
+
+def _split(square: FloatArray, size: FloatArray) -> tuple[float, float]:
+    """Return the constant part of an error and that which grows, from mean squares and sizes."""
+    low, high = np.quantile(size, _RANGE) if len(size) else (0.0, 0.0)
+    if not high > _ALIKE * low or not np.any(square):
+        return 0.0, 1.0
+    terms = np.column_stack([np.ones_like(size), np.square(size / high)])
+    least, expected = _LEAST_VARIANCE * float(square.mean()), np.full_like(size, square.mean())
+    for _ in range(_REWEIGHTED):
+        parts, _ = nnls(terms / expected[:, None], square / expected)
+        expected = np.maximum(terms @ parts, least)
+    floor, share = np.sqrt(parts)
+    return float(floor), float(share) / float(high)
 
 
 @brief_repr
@@ -51,20 +126,15 @@ class HeldOut:
     """Which refit predicted each reading, shape (reading,)."""
     compliance: FloatArray
     """Compliances of each refit, and free frames behind them, shape (fold, column)."""
-    share: FloatArray
-    """Size of the error along each axis as a share of the predicted deflection's norm, shape
-    (reading, 3); infinite where no deflection was predicted."""
+    axis_error: FloatArray
+    """Size of the prediction error along each axis, shape (reading, 3), in m."""
+    size: FloatArray
+    """Norm of the predicted deflection, shape (reading,), in m."""
 
     @property
-    def misfit(self) -> float:
-        """Share of the predicted deflection that 95 % of the errors along an axis stay below.
-
-        It holds what no springs of the layout can express, and measurement noise with it. The
-        quantile is the one of split-conformal prediction, which counts the next error too (V.
-        Vovk, A. Gammerman and G. Shafer, "Algorithmic Learning in a Random World", 2005). NaN
-        where there are too few errors for it, or too many without a deflection.
-        """
-        return _conformal(self.share)
+    def misfit(self) -> Misfit:
+        """What 95 % of the errors along an axis stay below."""
+        return Misfit.of(self.axis_error, self.size)
 
     @property
     def mean(self) -> float:
@@ -80,14 +150,6 @@ class HeldOut:
     def folds(self) -> int:
         """Number of refits."""
         return len(self.compliance)
-
-
-def _conformal(share: FloatArray) -> float:
-    sizes = np.sort(share, axis=None)
-    rank = int(np.ceil(CONFIDENCE * (len(sizes) + 1)))
-    if rank > len(sizes) or not np.isfinite(sizes[rank - 1]):
-        return float("nan")
-    return float(sizes[rank - 1])
 
 
 @record()
@@ -129,13 +191,12 @@ def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArra
     deviations : ndarray, shape (draw, parameter)
         Bootstrap draws minus the estimate.
     """
-    fitted, n = held_out.compliance[held_out.fold], problem.springs
-    predicted = np.einsum("rin,rn->ri", problem.O, fitted)
-    deflection = np.einsum("rin,rn->ri", problem.O[:, :, n], fitted[:, n])
-    misfit = np.array(
-        [_conformal(held_out.share[held_out.fold != fold]) for fold in range(held_out.folds)]
-    )
-    error = misfit[held_out.fold, None] * np.linalg.norm(deflection, axis=1, keepdims=True)
+    predicted = np.einsum("rin,rn->ri", problem.O, held_out.compliance[held_out.fold])
+    error = np.empty((len(problem), 1))
+    for fold in range(held_out.folds):
+        own = held_out.fold == fold
+        others = Misfit.of(held_out.axis_error[~own], held_out.size[~own])
+        error[own, 0] = others.error(held_out.size[own])
     pieces = range(0, len(problem), _READINGS)
     ends = [
         interval(np.moveaxis(problem.O[i : i + _READINGS] @ deviations.T, -1, 0)) for i in pieces
@@ -145,7 +206,7 @@ def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArra
     inside = (off >= -np.hypot(np.minimum(low, 0.0), error)) & (
         off <= np.hypot(np.maximum(high, 0.0), error)
     )
-    known = np.isfinite(misfit).all()
+    known = np.isfinite(error).all()
     return Coverage(
         measurement=IntervalCoverage(
             CONFIDENCE,
@@ -174,9 +235,8 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     predicted = np.einsum("rin,rn->ri", problem.O, compliance[fold])
     error, n = predicted - problem.d, problem.springs
     deflection = np.einsum("rin,rn->ri", problem.O[:, :, n], compliance[fold][:, n])
-    norm = np.linalg.norm(deflection, axis=1, keepdims=True)
-    share = np.divide(np.abs(error), norm, out=np.full_like(error, np.inf), where=norm > 0.0)
-    return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, share)
+    size = np.linalg.norm(deflection, axis=1)
+    return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, np.abs(error), size)
 
 
 def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:

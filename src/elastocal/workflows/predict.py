@@ -47,7 +47,9 @@ class PredictSummary:
     deflection: DeflectionSummary
     """Predicted deflection norms in m."""
     misfit: float | None
-    """See `CalibratedModel.misfit`; none where the model does not know it."""
+    """Share of `CalibratedModel.misfit`; none where the model does not know it."""
+    misfit_floor: float | None
+    """Floor of it, in m; none likewise."""
     tool: str
     """The tool that the rows are of, in words."""
     notes: tuple[str, ...]
@@ -116,10 +118,10 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
         T_base_tcp = controller.forward(loads.joints)
         wrench = loads.wrench_in_base(T_base_tcp)
         prediction = calibrated.predict(loads.joints, *wrench, loads.names("visit"))
-        misfit = float(calibrated.misfit) if np.isfinite(calibrated.misfit) else None
+        misfit = calibrated.misfit
         covered = calibrated.covered_rows(loads.joints, *wrench)
         if settings.out is not None:
-            added = _columns(prediction, covered, misfit is not None)
+            added = _columns(prediction, covered, misfit.is_known)
             if unloaded is not None:
                 off = unloaded(loads.joints) - T_base_tcp[:, :3, 3]
                 added |= {f"arm_error_{axis}[m]": off[:, i] for i, axis in enumerate("xyz")}
@@ -131,7 +133,15 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     coverage = None
     if covered is not None:
         coverage = covered.figures(name=loads.label)
-    summary = PredictSummary(len(norms), size, misfit, calibrated.tool_name, notes, coverage)
+    summary = PredictSummary(
+        rows=len(norms),
+        deflection=size,
+        misfit=misfit.share if misfit.is_known else None,
+        misfit_floor=misfit.floor if misfit.is_known else None,
+        tool=calibrated.tool_name,
+        notes=notes,
+        coverage=coverage,
+    )
     return PredictResult(prediction, summary)
 
 

@@ -307,9 +307,11 @@ def compare_calibrated_poses(
 
 def _misfit(models: tuple[CalibratedModel, CalibratedModel], deflection: FloatArray) -> FloatArray:
     """Return the error of a change by the misfit of two models, shape (row,), in m."""
-    known = [each.misfit if np.isfinite(each.misfit) else 0.0 for each in models]
-    sizes = np.linalg.norm(deflection, axis=2)
-    return np.asarray(np.hypot(known[0] * sizes[0], known[1] * sizes[1]))
+    errors = [
+        each.misfit.error(size) if each.misfit.is_known else np.zeros_like(size)
+        for each, size in zip(models, np.linalg.norm(deflection, axis=2), strict=True)
+    ]
+    return np.asarray(np.hypot(*errors))
 
 
 def _widest(blocks: _Blocks, spread: Spread) -> tuple[FloatArray, FloatArray]:
