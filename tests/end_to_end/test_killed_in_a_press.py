@@ -15,12 +15,11 @@ from elastocal.errors import ProcedureError
 from elastocal.procedure import RunEnd
 from elastocal.workflows import Supervision, release
 from elastocal.workflows._operator_and_devices import Unattended
-from support.cli import PATIENCE
+from support.cli import ENTRY, PATIENCE
 from support.fault_matrix import Lines, _Watch, begun, wired
 from support.run_cells import planned_cell
 
 pytestmark = [pytest.mark.slow, pytest.mark.end_to_end]
-ENTRY = "from elastocal.cli.main import run; run()"
 NOISE = 10.0
 """Force that a standing arm may seem to gain, in N."""
 

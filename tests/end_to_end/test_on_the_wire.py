@@ -20,7 +20,7 @@ from elastocal.dataset import read_dataset
 from elastocal.drivers import rtde
 from elastocal.sim.wire.rtde import PORTS
 from support import live_bench
-from support.cli import PATIENCE
+from support.cli import ENTRY, PATIENCE
 from support.live_on_wire import free
 from support.run_cells import PlannedCell, planned_cell
 from support.ur_client import UrClient
@@ -33,7 +33,6 @@ NOISE = 16e-6
 """Standard deviation of a deflection's component between two runs in process, in m: over six seeds
 of the fibre placement cell and its plan (the UR20: 18e-6 over four); stops, slips, ramps and
 sensors differ."""
-ENTRY = "from elastocal.cli.main import run; run()"
 
 
 def devices() -> str:

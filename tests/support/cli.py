@@ -13,6 +13,16 @@ PATIENCE = 300.0
 """How long is waited for what must come of another process, in s: on a machine at work two seconds
 of a processor may take a minute, and what hangs hangs for ever."""
 
+ENTRY = """
+import ctypes, signal, sys
+if sys.platform == "linux":
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+from elastocal.cli.main import run
+run()
+"""
+"""The command line as a program of its own, for ``python -c``, which ends with the process that
+started it: a simulator that a killed test left behind would keep its port."""
+
 
 @dataclass(frozen=True)
 class Result:

@@ -16,7 +16,7 @@ from elastocal.cell.examples import write_example
 from elastocal.errors import DeviceError
 from elastocal.sim.wire import LiveCell
 from elastocal.sim.wire.rtde import PORTS, RtdeServer
-from support.cli import PATIENCE
+from support.cli import ENTRY, PATIENCE
 from support.simulated import example_cell
 from support.ur_client import RtdeClient
 
@@ -171,8 +171,7 @@ def test_ur_rtde_moves_and_presses_in_force_mode(folder, tmp_path):
     devices = f"devices: {{arm: {{driver: rtde, address: {address}}}}}\n\nsimulation:"
     served = folder / "served.yaml"
     served.write_text(text.replace("simulation:", devices, 1), encoding="utf-8")
-    start = "from elastocal.cli.main import run; run()"
-    command = [sys.executable, "-c", start, "simulate", served, "--ports", ports]
+    command = [sys.executable, "-c", ENTRY, "simulate", served, "--ports", ports]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as simulator:
         try:
             for _ in range(600):
