@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError
-from elastocal.identification import CalibratedModel, Misfit, Observability
+from elastocal.identification import CalibratedModel, Observability
+from elastocal.identification.uncertainty import Misfit
 from support.problems import elastic
 from support.virtual_chain import configurations
 

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification import Misfit, leave_poses_out, solve
-from elastocal.identification.uncertainty import MOST_FOLDS
+from elastocal.identification import leave_poses_out, solve
+from elastocal.identification.uncertainty import MOST_FOLDS, Misfit
 from support.problems import made_up, planted
 
 

@@ -11,13 +11,12 @@ from elastocal.identification import (
     CalibrateResult,
     Calibration,
     FitOptions,
-    Misfit,
     calibrate,
     leave_poses_out,
     summary,
 )
 from elastocal.identification.recertification import recertify
-from elastocal.identification.uncertainty import measured_coverage
+from elastocal.identification.uncertainty import Misfit, measured_coverage
 from elastocal.records import from_data, to_data
 from support.cells import Cell, linear_truth
 from support.problems import elastic, linear_readings, planted

@@ -137,7 +137,6 @@ from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_UNEXPLAINED as MOST_UNEXPLAINED,
     HeldOut as HeldOut,
-    Misfit as Misfit,
     interval as interval,
     leave_poses_out as leave_poses_out,
 )
