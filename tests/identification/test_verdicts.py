@@ -52,6 +52,10 @@ class _Weak(type(elastic("actuated"))):
         return blocks * np.where(np.arange(blocks.shape[-1]) == blocks.shape[-1] - 1, self.lever, 1)
 
 
+NONE = np.zeros(0, dtype=bool)
+"""No readings of low load."""
+
+
 def test_a_spring_whose_column_is_below_the_noise_is_not_observable():
     found = faint()
     row = summary(found).springs[-1]
@@ -159,8 +163,23 @@ def test_a_misfit_that_is_too_small_for_the_errors_lowers_the_coverage():
     held_out = leave_poses_out(problem)
     shrunk = replace(held_out, axis_error=0.2 * held_out.axis_error)
     nothing = np.zeros((40, problem.columns))
-    assert measured_coverage(problem, held_out, nothing).measurement.share > 0.9
-    assert measured_coverage(problem, shrunk, nothing).measurement.share < 0.6
+    assert measured_coverage(problem, held_out, nothing, NONE).measurement.share > 0.9
+    assert measured_coverage(problem, shrunk, nothing, NONE).measurement.share < 0.6
+
+
+def test_the_coverage_at_low_load_is_that_of_its_readings():
+    problem, _ = planted(20e-6, seed=1)
+    held_out, nothing = leave_poses_out(problem), np.zeros((40, problem.columns))
+
+    def measured(is_low):
+        return measured_coverage(problem, held_out, nothing, is_low).measurement
+
+    everything, size = np.ones(len(problem), dtype=bool), held_out.size
+    whole, small = measured(everything), size < np.median(size)
+    assert whole.low_share == whole.share
+    assert measured(~everything).low_share is None
+    parts = [measured(each).low_share * each.mean() for each in (small, ~small)]
+    assert sum(parts) == pytest.approx(whole.share)
 
 
 def test_a_left_out_reading_is_inside_where_draws_and_misfit_together_reach_it():
@@ -181,14 +200,14 @@ def test_a_left_out_reading_is_inside_where_draws_and_misfit_together_reach_it()
         off = d - predicted
         inside.append((off >= -np.hypot(down, error)) & (off <= np.hypot(up, error)))
     assert 0.1 < np.mean(inside) < 0.9
-    found = measured_coverage(problem, held_out, deviations).measurement
+    found = measured_coverage(problem, held_out, deviations, NONE).measurement
     assert found.share == pytest.approx(np.mean(inside), abs=1e-12)
 
 
 def test_with_too_few_errors_the_coverage_is_none_with_a_reason():
     problem, _ = planted(20e-6, poses=31)
     few = problem.take(np.isin(problem.block, np.unique(problem.block)[:3]) & _first(problem))
-    coverage = measured_coverage(few, leave_poses_out(few), np.zeros((40, few.columns)))
+    coverage = measured_coverage(few, leave_poses_out(few), np.zeros((40, few.columns)), NONE)
     assert (coverage.measurement.share, coverage.measurement.count) == (None, 0)
     assert "too few" in coverage.measurement.reason
 

@@ -33,6 +33,7 @@ from elastocal.identification.observability import (
 )
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build, same_configuration
+from elastocal.identification.rungs import low_loads
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
 from elastocal.identification.uncertainty import (
@@ -211,7 +212,9 @@ def calibrate(
         attainable_rank=reach,
         held_out=held_out,
         ladder=tuple(ladder),
-        coverage=measured_coverage(weighted, held_out, widened - solution.compliance),
+        coverage=measured_coverage(
+            weighted, held_out, widened - solution.compliance, low_loads(readings.take(used))
+        ),
         widening=by,
         screening=screening,
         solution=solution,

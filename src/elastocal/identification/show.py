@@ -116,6 +116,12 @@ def _coverage(coverage: Coverage) -> str:
             count=measured.count,
             nominal=f"{measured.nominal:.0%}",
         )
+        if measured.low_share is not None:
+            inside = phrase(
+                "{inside}, {share} of those at low load",
+                inside=inside,
+                share=f"{measured.low_share:.1%}",
+            )
     return phrase(
         "interval of a measurement: {inside}; interval of the fit: coverage not known ({reason})",
         inside=inside,

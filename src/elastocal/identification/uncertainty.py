@@ -22,7 +22,7 @@ from numpy.random import Generator
 from scipy.optimize import nnls
 from scipy.special import ndtri, stdtrit
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.identification._least_squares import minimise
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import PoseGrams, factor
@@ -164,6 +164,8 @@ class IntervalCoverage:
     """Number of components that were counted."""
     reason: str | None = None
     """Why it is not known."""
+    low_share: float | None = None
+    """Share of those at low load that lay inside; none without any. See `low_loads`."""
 
 
 @record()
@@ -176,7 +178,9 @@ class Coverage:
     """Coverage of the interval of the fit, which is one of the true deflection."""
 
 
-def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArray) -> Coverage:
+def measured_coverage(
+    problem: Problem, held_out: HeldOut, deviations: FloatArray, is_low: BoolArray
+) -> Coverage:
     """Return how many left-out readings lie inside the interval of a measurement there.
 
     The interval is that of the refit without the reading's pose; its misfit is that of the other
@@ -190,6 +194,8 @@ def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArra
         Its refits.
     deviations : ndarray, shape (draw, parameter)
         Bootstrap draws minus the estimate.
+    is_low : ndarray of bool, shape (reading,)
+        Readings of low load, whose coverage is told by itself.
     """
     predicted = np.einsum("rin,rn->ri", problem.O, held_out.compliance[held_out.fold])
     error = np.empty((len(problem), 1))
@@ -213,6 +219,7 @@ def measured_coverage(problem: Problem, held_out: HeldOut, deviations: FloatArra
             float(inside.mean()) if known else None,
             int(inside.size) if known else 0,
             None if known else "too few errors at left-out poses for an interval",
+            float(inside[is_low].mean()) if known and np.any(is_low) else None,
         ),
         fit=IntervalCoverage(
             CONFIDENCE, None, 0, "readings hold noise, and the true deflection is not measured"
