@@ -15,9 +15,10 @@ from scipy.optimize import least_squares
 
 from elastocal.geometry import GeometryProblem
 from elastocal.geometry.arm import frames
+from elastocal.geometry.determined import told_apart
 from elastocal.geometry.ladder import climb
 from elastocal.geometry.problem import State
-from elastocal.geometry.solve import fit, register, told_apart
+from elastocal.geometry.solve import fit, register
 from elastocal.progress import silent
 from elastocal.robot import catalogue
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from elastocal.geometry import GeometryProblem
+from elastocal.geometry.determined import told_apart
 from elastocal.geometry.ladder import climb
-from elastocal.geometry.solve import fit, register, told_apart
+from elastocal.geometry.solve import fit, register
 from elastocal.identification import interval
 from elastocal.progress import silent
 from support.measured_arms import ARMS, measure

@@ -9,8 +9,9 @@ import xarray
 from elastocal.errors import GeometryError
 from elastocal.geometry import GeometryModel, GeometryProblem, geometry_model, read_positions
 from elastocal.geometry.arm import ArmErrors, frames, screws
+from elastocal.geometry.determined import told_apart
 from elastocal.geometry.ladder import climb
-from elastocal.geometry.solve import fit, register, told_apart
+from elastocal.geometry.solve import fit, register
 from elastocal.progress import silent
 from elastocal.records import read_json
 from elastocal.robot import GRAVITY, Robot, with_joint_origins

@@ -39,8 +39,13 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     compliance: float = 0.0,
     gears: float = 0.0,
     blunders: int = 0,
+    span: float = 0.0,
+    joints: np.ndarray | None = None,
 ) -> Measured:
-    """Return positions of markers on an arm whose joints stand and turn elsewhere than drawn."""
+    """Return positions of markers on an arm whose joints stand and turn elsewhere than drawn.
+
+    Joints go all over their range, or as far as `span` from one posture, or are given.
+    """
     rng = np.random.default_rng(seed)
     truth = Robot.from_urdf(
         with_joint_origins(robot.urdf, {n: random_errors(rng, error) for n in robot.joint_names}),
@@ -48,6 +53,9 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     )
     low, high = np.maximum(robot.limits.lower, -2.0), np.minimum(robot.limits.upper, 2.0)
     q = rng.uniform(low, high, (rows, len(low)))
+    if span:
+        q = 0.5 * q[0] + span * (2.0 * (q - low) / (high - low) - 1.0)
+    q = q if joints is None else joints
     payload = np.resize(payloads, rows).astype(float)
     yielded = q + compliance * weight_torque(robot, q, payload)
     for turn, (a, b) in enumerate(
@@ -118,14 +126,15 @@ _CHAIN = """<robot name="parallel"><link name="l0"/>{}<link name="tcp"/>
 <joint name="tip" type="fixed"><parent link="l6"/><child link="tcp"/>
 <origin xyz="0 0 0.09"/></joint></robot>"""
 _JOINT = """<link name="l{n}"/><joint name="j{n}" type="revolute"><parent link="l{m}"/>
-<child link="l{n}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>
+<child link="l{n}"/><origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>
 <limit lower="-3" upper="3" effort="0" velocity="0"/></joint>"""
 
 
-def chain(*joints: tuple[str, str]) -> Robot:
-    """Return an arm of revolute joints: place in the link before, axis."""
+def chain(*joints: tuple[str, str] | tuple[str, str, str]) -> Robot:
+    """Return an arm of revolute joints: place in the link before, axis, turn in the link before."""
     parts = [
-        _JOINT.format(n=n, m=n - 1, xyz=xyz, axis=axis) for n, (xyz, axis) in enumerate(joints, 1)
+        _JOINT.format(n=n, m=n - 1, xyz=xyz, axis=axis, rpy="".join(turn) or "0 0 0")
+        for n, (xyz, axis, *turn) in enumerate(joints, 1)
     ]
     text = _CHAIN.format("".join(parts)).replace('"l6"/><child', f'"l{len(joints)}"/><child')
     return Robot.from_urdf(text, "tcp")
@@ -151,6 +160,15 @@ def seven_axes() -> Robot:
     return chain(
         ("0 0 0.16", z), ("0 0 0.2", y), ("0 0 0.2", z), ("0 0 0.22", y), ("0 0 0.2", z),
         ("0 0 0.2", y), ("0 0 0.1", z),
+    )  # fmt: skip
+
+
+def rounded(quarter: str) -> Robot:
+    """Return six axes whose quarter turns are as exact as a drawing writes them."""
+    z, q = "0 0 1", quarter
+    return chain(
+        ("0 0 0.1345", z), ("0 0.0062 0", z, f"0 -{q} -{q}"), ("0.411 0 0", z, f"0 0 {q}"),
+        ("0 -0.368 0", z, f"{q} 0 0"), ("0 0 0", z, f"-{q} 0 0"), ("0 -0.121 0", z, f"{q} 0 0"),
     )  # fmt: skip
 
 

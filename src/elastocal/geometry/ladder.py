@@ -12,8 +12,9 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import GeometryError
-from elastocal.geometry.problem import RUNGS, GeometryProblem, State
-from elastocal.geometry.solve import PRIOR_WIDTH, Fixed, GeometryFit, fit, register, told_apart
+from elastocal.geometry.determined import Fixed, told_apart
+from elastocal.geometry.problem import RUNGS, GeometryProblem, State, prior_weight
+from elastocal.geometry.solve import GeometryFit, fit, register
 from elastocal.identification import Overlap, judge_models
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
@@ -82,7 +83,7 @@ def climb(
     # Unknowns are taken rung by rung, so that the richest tells of those below it, too.
     apart = told_apart(nominal, problem, RUNGS[-1])
     free = {rung: _up_to(rung, problem, *apart) for rung in RUNGS}
-    reference = fit(problem, free["weight"], start, J=nominal)
+    reference = fit(problem, free["weight"], start)
     progress("geometry", 2, 4)
     block = blocks(problem)
     sums = _Sums(problem, reference, block)
@@ -100,7 +101,7 @@ def climb(
     chosen = RUNGS[judged.near[0]]
     progress("geometry", 3, 4)
     begin = _without(reference, problem, chosen)
-    final = fit(problem, free[chosen], begin, reference.used, reference.J)
+    final = fit(problem, free[chosen], begin, reference.used)
     values = problem.values(final.state)
     spread = _Sums(problem, final, block).draws(draws, rng)
     progress("geometry", 4, 4)
@@ -155,7 +156,7 @@ class _Sums:
             own = rows == k
             self.G[k] = self.A[own].T @ self.A[own]
             self.h[k] = self.A[own].T @ self.b[own]
-        self.ridge = (about.sigma / PRIOR_WIDTH) ** 2
+        self.ridge = prior_weight(problem, about.sigma)
 
     def held_out(self, rung: str, free: IndexArray) -> RungErrors:
         """Return the errors of a rung at each fold, fitted to the others."""
@@ -192,4 +193,4 @@ class _Sums:
 
     def _solved(self, G: FloatArray, h: FloatArray, free: IndexArray) -> FloatArray:
         own = G[np.ix_(free, free)]
-        return np.asarray(np.linalg.solve(own + self.ridge * np.eye(len(free)), h[free]))
+        return np.asarray(np.linalg.solve(own + np.diag(self.ridge[free]), h[free]))

@@ -21,9 +21,9 @@ from elastocal.cell import Cell, fingerprint
 from elastocal.errors import PlanningError, present
 from elastocal.findings import Finding, Kind
 from elastocal.geometry.arm import ArmErrors
+from elastocal.geometry.determined import told_apart
 from elastocal.geometry.positions import Payload, Positions
 from elastocal.geometry.problem import GeometryProblem, State
-from elastocal.geometry.solve import told_apart
 from elastocal.planning import (
     CellRecord,
     CollisionScene,

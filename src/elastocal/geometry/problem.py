@@ -11,12 +11,26 @@ from elastocal.files import Limit
 from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, ArmFrames, frames, screws
 from elastocal.geometry.positions import Positions, joint_torques
 from elastocal.results import brief_repr
-from elastocal.robot import ChainJoint, Robot
+from elastocal.robot import GRAVITY, ChainJoint, Robot
 
 RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics")
 """From the frames alone to errors of the gears; each has all of those before."""
-_SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3, "compliance": 1e-6}
-"""Likely sizes in m, rad, rad/(N·m): a column is weighed by its parameter's."""
+_SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3}
+"""Likely sizes in m, rad: a column is weighed by its parameter's."""
+PRIOR_WIDTH = 3.0
+"""Standard deviation of the prior of an error of the arm, in its likely sizes."""
+_COARSEST = 1e-3
+"""No noise of positions is larger, in m."""
+_FRAME_WIDTH = 30.0
+"""The same of frames and markers, about where they are."""
+_YIELD = {True: 3e-3, False: 1e-3}
+"""What a joint that turns (slides) yields under the load that it carries in its class, in rad (m):
+a KR 210's main axes 1 to 2 mrad, a UR10's 8, an iiwa's with torque sensors 6 to 14."""
+_MASS = 15.0
+"""Least mass of an arm, whatever its description has, in kg over the square of its length in m: a
+UR10 has 13, a KR 210 100."""
+_LEAST_ARM = 0.1
+"""Part of the arm's length that the load of a wrist's joints acts on at least."""
 _OF_ANY_JOINT = ("offset", "scale", "compliance")
 """Errors of motion that linear axes have too."""
 _GEAR_SIZE = 2e-4
@@ -193,15 +207,52 @@ def unknowns(robot: Robot, data: Positions) -> tuple[Unknown, ...]:
         size = _SIZES[KINDS[kind].split("_")[0]]
         unit = "m" if kind < 3 else "rad"
         found.append(Unknown(f"{joints[joint].name}.{KINDS[kind]}", unit, "geometry", size))
+    yields = compliance_sizes(robot)
     for joint, kind in _moving(joints):
-        found.append(_motion_unknown(joints[joint], MOTION[kind]))
+        found.append(_motion_unknown(joints[joint], MOTION[kind], float(yields[joint])))
     return tuple(found)
 
 
-def _motion_unknown(joint: ChainJoint, kind: str) -> Unknown:
+def compliance_sizes(robot: Robot) -> FloatArray:
+    """Return the likely compliance of each joint, by the class of the arm, shape (joint,).
+
+    A joint is built for a quarter of the arm's weight at the length of the links behind it, and
+    yields to it by `_YIELD`. In rad/(N·m), of linear axes in m/N.
+    """
+    joints = robot.chain.joints
+    steps = [float(np.linalg.norm(each.placement[:3, 3])) for each in joints[1:]]
+    steps.append(float(np.linalg.norm(robot.chain.T_last_tip[:3, 3])))
+    behind = np.cumsum(steps[::-1])[::-1]
+    length = max(float(behind[robot.external_axes]), _LEAST_ARM)
+    masses = sum(each.mass for each in joints[robot.external_axes :])
+    weight = float(np.linalg.norm(GRAVITY)) * max(masses, _MASS * length**2)
+    torque = 0.25 * weight * np.maximum(behind, _LEAST_ARM * length)
+    turns = np.array([each.revolute for each in joints])
+    return np.where(turns, _YIELD[True] / torque, _YIELD[False] / weight)
+
+
+def prior_weight(problem: GeometryProblem, sigma: float) -> FloatArray:
+    """Return the weight of the prior beside squares of positions, shape (unknown,), in m².
+
+    By likely sizes: ``sigma² / width²``. What a fit leaves before it has found the arm is no
+    noise, which would make the prior so strong that it never finds it. Frames and markers have next
+    to no prior: it only keeps those finite that left-out poses leave open.
+
+    Parameters
+    ----------
+    problem : GeometryProblem
+        Whose unknowns.
+    sigma : float
+        Standard deviation of a coordinate, in m.
+    """
+    arm = np.array([each.rung != "registration" for each in problem.unknowns])
+    width = np.where(arm, PRIOR_WIDTH, _FRAME_WIDTH)
+    return np.asarray((min(sigma, _COARSEST) / width) ** 2)
+
+
+def _motion_unknown(joint: ChainJoint, kind: str, compliance: float) -> Unknown:
     unit = {"scale": "1", "compliance": "rad/(N*m)" if joint.revolute else "m/N"}
     length = "rad" if joint.revolute else "m"
     rung = {"offset": "offsets", "compliance": "weight"}.get(kind, "harmonics")
-    return Unknown(
-        f"{joint.name}.{kind}", unit.get(kind, length), rung, _SIZES.get(kind, _GEAR_SIZE)
-    )
+    size = compliance if kind == "compliance" else _SIZES.get(kind, _GEAR_SIZE)
+    return Unknown(f"{joint.name}.{kind}", unit.get(kind, length), rung, size)

@@ -1,4 +1,4 @@
-"""Register, find what the positions do not tell apart, and fit."""
+"""Register, and fit by least squares until a step no longer matters beside the noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,37 +8,30 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import GeometryError
 from elastocal.geometry.arm import ArmErrors
-from elastocal.geometry.problem import RUNGS, GeometryProblem, State
+from elastocal.geometry.determined import Fixed
+from elastocal.geometry.problem import GeometryProblem, State, prior_weight
 from elastocal.results import brief_repr
 from elastocal.robot import nearest_rotation
-from elastocal.wording import phrase
 
-_DEPENDENT = 1e-7
-"""Part of a weighed column that is new beside those before it, below which nothing is."""
-_STEPS, _ROBUST_STEPS = 40, 5
+_STEPS, _ROBUST_STEPS = 60, 5
 """Most steps of a fit, and how many of the first weigh far positions less."""
-_LINEAR = 1e-2
-"""Move of a marker, in m, from which derivatives are taken anew."""
-_DONE = 1e-7
-"""Largest move of a marker by a step that ends the iteration, in m."""
+_RETURNS = 20
+"""Steps after which a position that was left out once stays out, so that the set settles."""
+_DONE = 1e-6
+"""Decrease of the sum of squares, in variances of a coordinate, that a step must promise to be
+taken: a smaller one moves every unknown by less than a thousandth of its standard deviation."""
+_TRIES = 12
+"""Most times that a step is shortened."""
+_ROUNDING = 1e-9
+"""Part of the sum of squares that is lost in rounding."""
+_FAIR = 1e-4
+"""Part of the promised decrease from which a step is taken."""
 _BLUNDER = 7.0
 """Distance in standard deviations of a coordinate from which a position is a blunder."""
 _CHI = 1.538
 """Median distance of three coordinates of standard deviation 1."""
 _FINEST = 1e-7
 """No tracker is finer, in m."""
-PRIOR_WIDTH = 30.0
-"""Standard deviation of the prior of an unknown, in its likely sizes."""
-_MOST_ROWS = 3000
-"""Largest number of positions that decide which unknowns are independent."""
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """An unknown that the positions do not tell apart from others."""
-
-    name: str
-    why: str
 
 
 def register(problem: GeometryProblem) -> State:
@@ -80,63 +73,6 @@ def _aligned(points: FloatArray, measured: FloatArray, weight: FloatArray) -> Fl
     return T
 
 
-def told_apart(
-    J: FloatArray, problem: GeometryProblem, rung: str
-) -> tuple[IndexArray, list[Fixed]]:
-    """Return the unknowns of a rung that are determined, and why the others are not.
-
-    Unknowns are taken in the order of the ladder; one whose weighed column is a combination of
-    those before is fixed at zero, and named with them. The derivatives are to be those of the
-    nominal arm: small errors turn what cannot be told apart into what hardly can.
-    """
-    rungs = RUNGS[: RUNGS.index(rung) + 1]
-    order = [i for r in rungs for i, u in enumerate(problem.unknowns) if u.rung == r]
-    size = np.array([u.size for u in problem.unknowns])
-    # Positions of every station and marker, evenly; all of them tell no more.
-    some = np.unique(np.linspace(0, len(J) - 1, _MOST_ROWS).astype(np.intp))
-    flat = J[some].reshape(-1, J.shape[2])[:, order] * size[order]
-    R: FloatArray = np.asarray(np.linalg.qr(flat, mode="r"))
-    # A column of rounding errors is none.
-    scale = 1e-3 * float(np.median(np.linalg.norm(R, axis=0)))
-    kept: list[int] = []
-    basis = np.zeros((R.shape[0], 0))
-    fixed = []
-    for column, index in enumerate(order):
-        v = R[:, column]
-        length = float(np.linalg.norm(v))
-        rest = v - basis @ (basis.T @ v)
-        rest -= basis @ (basis.T @ rest)
-        new = float(np.linalg.norm(rest))
-        if new > _DEPENDENT * max(length, scale):
-            kept.append(index)
-            basis = np.column_stack([basis, rest / new])
-        else:
-            why = (
-                phrase("moves no marker")
-                if length <= _DEPENDENT * scale
-                else _why(problem, R, order, kept, column)
-            )
-            fixed.append(Fixed(problem.unknowns[index].name, why))
-    return np.array(kept), fixed
-
-
-def _why(
-    problem: GeometryProblem, R: FloatArray, order: Sequence[int], kept: Sequence[int], column: int
-) -> str:
-    """Return with which unknowns a column moves the markers alike."""
-    v = R[:, column]
-    places = [order.index(i) for i in kept]
-    share = np.linalg.lstsq(R[:, places], v)[0]
-    big = np.argsort(np.abs(share))[::-1]
-    names = [
-        problem.unknowns[kept[i]].name for i in big if abs(share[i]) > 0.05 * abs(share[big[0]])
-    ]
-    alike = names[0]
-    for name in names[1:4]:
-        alike = phrase("{first} with {second}", first=alike, second=name)
-    return phrase("as {names} and others" if len(names) > 4 else "as {names}", names=alike)
-
-
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class GeometryFit:
@@ -161,12 +97,14 @@ def fit(
     chosen: tuple[IndexArray, Sequence[Fixed]],
     start: State,
     used: BoolArray | None = None,
-    J: FloatArray | None = None,
 ) -> GeometryFit:
     """Return the fit of a rung by least squares, blunders left out.
 
-    Derivatives are taken anew only when markers have moved by a centimetre: until then they change
-    by some thousandths, and so does what is left after each step.
+    Steps are Levenberg's and Marquardt's (D. W. Marquardt, SIAM Journal on Applied Mathematics
+    11(2), 1963), with derivatives taken anew at each but the first: near-dependent unknowns are
+    told from one another by differences of derivatives that a step of a millimetre changes
+    altogether. A step is taken only if it lowers the sum of squares, and the fit ends where the
+    best one would lower it by less than the noise does by chance (`_DONE`).
 
     Parameters
     ----------
@@ -178,9 +116,7 @@ def fit(
         From `register`, or of another rung.
     used : ndarray of bool, shape (point,), optional
         Positions to use; by default the first steps weigh by Huber's loss, and what is then more
-        than 6 standard deviations away is left out, again after each step.
-    J : ndarray, shape (point, 3, unknown), optional
-        Derivatives near the start, where they are known.
+        than 7 standard deviations away is left out, again after each step.
 
     Raises
     ------
@@ -193,48 +129,99 @@ def fit(
             f"{len(problem)} positions of markers cannot tell {len(free)} unknowns: measure more"
             " poses"
         )
-    r, J = problem.linearise(at) if J is None else (problem.residual(at), J)
-    size, gone = np.array([each.size for each in problem.unknowns])[free], 0.0
-    columns = J[:, :, free] * size
     keep = np.ones(len(problem), dtype=bool) if used is None else used
+    first_plain = 0 if used is not None else _ROBUST_STEPS
+    (r, J), damping = problem.linearise(at), 0.0
     for step in range(_STEPS):
-        distance = np.linalg.norm(r, axis=1)
-        sigma = max(float(np.median(distance[keep])) / _CHI, _FINEST)
-        robust = used is None and step < _ROBUST_STEPS
-        weight = np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)) if robust else 1.0
-        now = distance < _BLUNDER * sigma if used is None and step >= _ROBUST_STEPS else keep
-        ridge = (sigma / PRIOR_WIDTH) ** 2
-        pull = ridge * problem.values(at)[free] / size
-        scaled = _step(columns, r, np.where(now, weight, 0.0), ridge, pull)
+        robust, returns = step < first_plain, step <= _RETURNS
+        weight, now, sigma = _weights(r, keep, used, robust=robust, returns=returns)
         same, keep = bool((now == keep).all()), now
-        x = np.zeros(len(problem.unknowns))
-        x[free] = size * scaled
-        at = problem.moved(at, x)
-        step_length = float(np.abs(columns @ scaled).max())
-        gone += step_length
-        if gone > _LINEAR:
-            (r, J), gone = problem.linearise(at), 0.0
-            columns = J[:, :, free] * size
-        else:
-            r = problem.residual(at)
-        if step >= (0 if used is not None else _ROBUST_STEPS) and same and step_length < _DONE:
+        squares = _Squares(problem, free, weight, sigma)
+        found = squares.lowered(at, r, J, damping)
+        at, r, damping = found.state, found.residual, found.damping
+        if not robust and same and found.promised <= _DONE * sigma**2:
             return GeometryFit(at, r, J, free, tuple(fixed), keep, sigma)
+        # Weights of the first steps are rough anyway.
+        if step + 1 >= first_plain:
+            J = problem.linearise(at)[1]
+    names = [problem.unknowns[free[i]].name for i in found.most_moved]
     raise GeometryError(
-        f"the fit does not settle: after {_STEPS} steps the markers still move by"
-        f" {1e3 * step_length:.3g} mm; are joints, units or frames mistaken?"
+        f"the fit does not settle: after {_STEPS} steps {', '.join(names)} still change together"
+        " by more than the noise; are joints, units or frames mistaken?"
     )
 
 
-def _step(
-    columns: FloatArray, r: FloatArray, weight: FloatArray, ridge: float, pull: FloatArray
-) -> FloatArray:
-    """Return the least-squares step of weighed points, shape (column,).
+def _weights(
+    r: FloatArray, keep: BoolArray, used: BoolArray | None, *, robust: bool, returns: bool
+) -> tuple[FloatArray, BoolArray, float]:
+    """Return the weight of each position, which are no blunders, and the noise of a coordinate."""
+    distance = np.linalg.norm(r, axis=1)
+    sigma = max(float(np.median(distance[keep])) / _CHI, _FINEST)
+    if robust:
+        return np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)), keep, sigma
+    if used is not None:
+        return used.astype(float), used, sigma
+    now = distance < _BLUNDER * sigma
+    if not returns:
+        now &= keep
+    return now.astype(float), now, sigma
 
-    The prior pulls errors of the arm to zero: as a mere damping of the step, directions that the
-    positions hardly tell would creep for hundreds of steps.
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A step that was taken, or the same state where none lowers the sum."""
+
+    state: State
+    residual: FloatArray
+    damping: float
+    """For the next one."""
+    promised: float
+    """Decrease of the sum that a step without damping promised, in m²; 0 where only rounding is
+    left."""
+    most_moved: IndexArray
+    """The free unknowns that it would have moved most, in their likely sizes, the first four."""
+
+
+class _Squares:
+    """A sum of weighed squares with the prior of the arm's errors, and steps that lower it.
+
+    The prior pulls errors of the arm to zero; frames and markers have none.
     """
-    root = np.sqrt(weight)
-    A = (columns * root[:, None, None]).reshape(-1, columns.shape[2])
-    G = A.T @ A
-    G[np.diag_indices_from(G)] += ridge
-    return np.asarray(np.linalg.solve(G, A.T @ (r * root[:, None]).ravel() - pull))
+
+    def __init__(
+        self, problem: GeometryProblem, free: IndexArray, weight: FloatArray, sigma: float
+    ) -> None:
+        self.problem, self.free, self.weight = problem, free, weight
+        self.size = np.array([each.size for each in problem.unknowns])[free]
+        self.prior = prior_weight(problem, sigma)[free]
+
+    def _sum(self, at: State, r: FloatArray) -> float:
+        pulled = self.problem.values(at)[self.free] / self.size
+        return float(self.weight @ (r**2).sum(axis=1) + self.prior @ pulled**2)
+
+    def lowered(self, at: State, r: FloatArray, J: FloatArray, damping: float) -> _Step:
+        """Return a step that lowers the sum, by derivatives near the state."""
+        root = np.repeat(np.sqrt(self.weight), 3)
+        A = J[:, :, self.free].reshape(len(root), -1)
+        A *= self.size
+        A *= root[:, None]
+        h = A.T @ (r.ravel() * root)
+        h -= self.prior * self.problem.values(at)[self.free] / self.size
+        G = A.T @ A
+        G[np.diag_indices_from(G)] += self.prior
+        now, diagonal = self._sum(at, r), np.diag(G) + np.finfo(float).tiny
+        whole = np.linalg.solve(G, h)
+        best, most = float(whole @ h), np.argsort(np.abs(whole))[::-1][:4]
+        for _ in range(_TRIES):
+            x = whole if not damping else np.linalg.solve(G + np.diag(damping * diagonal), h)
+            promised = float(2.0 * x @ h - x @ G @ x)
+            move = np.zeros(len(self.problem.unknowns))
+            move[self.free] = self.size * x
+            there = self.problem.moved(at, move)
+            left = self.problem.residual(there)
+            fall = now - self._sum(there, left)
+            if fall > _FAIR * promised:
+                calm = damping / 10.0 if fall > 0.5 * promised else damping
+                return _Step(there, left, calm if calm > _DONE else 0.0, best, most)
+            damping = max(10.0 * damping, 1e-4)
+        return _Step(at, r, damping, best if best > _ROUNDING * now else 0.0, most)
