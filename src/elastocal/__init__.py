@@ -2,15 +2,15 @@
 
 The method is that of Monsarrat et al., "In-situ elastic calibration of robots", Robotics and
 Computer-Integrated Manufacturing (2024), doi:10.1016/j.rcim.2024.102743, called *the paper*
-throughout. The usual way in::
+throughout. Typical use::
 
     import elastocal as ec
 
     result = ec.calibrate("dataset.nc")
     result.plot()
 
-The work of every command is a function here; equations and parts are in the subpackages.
-Nothing is imported before it is used.
+Every command is a function here; the subpackages hold the equations and components. Subpackages are
+imported when they are first used.
 """
 
 import ast
@@ -30,7 +30,7 @@ _exports = {
     for each in _statements("__init__.pyi")
     if isinstance(each, ast.ImportFrom) and each.module
 }
-# The stub takes all commands at once, "*"; `lazy_loader` has to be given their names.
+# The stub exports all commands by "*"; `lazy_loader` needs their names.
 _commands = next(s for s in _statements("workflows/__init__.pyi") if isinstance(s, ast.Assign))
 _exports["workflows"] = ast.literal_eval(_commands.value)
 __getattr__, __dir__, __all__ = lazy_loader.attach(__name__, submod_attrs=_exports)

@@ -35,7 +35,7 @@ class _ArrayField:
         return array
 
     def _refusal(self, value: Any) -> Exception:
-        """Return an error that names the first wrong item by where it stands."""
+        """Return an error that names the position of the first wrong item."""
         from pydantic_core import PydanticCustomError
 
         at, given = _first_wrong(value, _ITEMS[self.kind], [])
@@ -47,7 +47,7 @@ class _ArrayField:
 def _first_wrong(
     value: Any, kinds: tuple[type, ...], at: list[int]
 ) -> tuple[list[int] | None, Any]:
-    """Return the place of the first item that is none of these types; none: only lengths differ."""
+    """Return the position of the first item of a wrong type; None if only the lengths differ."""
     if not isinstance(value, list):
         fits = type(value) in kinds and (type(value) is not float or np.isfinite(value))
         return (None if fits else at), value

@@ -1,8 +1,7 @@
-"""Blocks: the pieces that a result is shown in, on whatever a person reads.
+"""Blocks: the elements in which a result is shown, on a terminal, page, workbook or notebook.
 
-A feature says what there is to see of its result once, as blocks; a terminal, a page, a workbook
-and a notebook show any of them. Texts are phrases, so that every reader's language can be used, and
-figures are drawn where they are shown.
+A feature describes its result once, as blocks, and every shell renders them. Texts are phrases, so
+that they can be translated, and figures are drawn by the shell that shows them.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -104,7 +103,7 @@ class Table(Block):
     rows: tuple[Row, ...]
     """The first cell of each names the row."""
     texts: int = 1
-    """Columns that hold text and stand to the left; the others hold numbers."""
+    """Text columns, aligned to the left; the others hold numbers."""
     name: str = ""
     """Identifier, where a script looks for the table."""
 
@@ -123,7 +122,7 @@ class Picture(Block):
 
 @dataclass(frozen=True)
 class Verbatim(Block):
-    """A text as it stands."""
+    """Text shown unchanged, in a fixed-width font."""
 
     text: str
 

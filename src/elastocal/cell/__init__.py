@@ -1,4 +1,4 @@
-"""The cell: the file that describes it, and the devices that carry a procedure out in it.
+"""The cell: the file that describes it, and the devices that carry out a procedure in it.
 
 ============  =================================================================================
 `cell`        the whole file, and `Cell`: robot made, files found; its fingerprint

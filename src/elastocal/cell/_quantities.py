@@ -36,7 +36,7 @@ def _label(text: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(_label)]
-"""As the labels of a dataset: not empty, printable, no spaces around it."""
+"""Label of a dataset: not empty, printable, without spaces around it."""
 
 
 OptionalName = Annotated[str, AfterValidator(lambda text: _label(text) if text else text)]

@@ -1,7 +1,7 @@
-"""The capability to move an arm that can hurt: a person's word for one cell file, to the byte.
+"""Permission to move a real arm: a person's agreement to the exact contents of one cell file.
 
-It is made where a person agrees (`elastocal.workflows`), handed down through the rig, and asked for
-by the driver that enables the arm: a cell file that has changed since is another one.
+It is created where a person agrees (`elastocal.workflows`), passed through the rig, and required by
+the driver that enables the arm. A cell file that has changed since is refused.
 """
 
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 @brief_repr
 @dataclass(frozen=True)
 class Arming:
-    """What a person has agreed to."""
+    """Agreement of a person to move an arm."""
 
     cell_sha256: str = ""
-    """SHA-256 of the cell file that the person was shown; see `Cell.sha256`. Empty: nobody has
-    agreed."""
+    """SHA-256 of the cell file that the person was shown; see `Cell.sha256`. Empty: no
+    agreement."""
     real: bool = False
     """Whether an arm that is not simulated may move."""
 

@@ -298,7 +298,7 @@ class Cell:
 
     @property
     def urdf_with_tool_mass(self) -> str:
-        """URDF of the robot whose tcp link has the tool's mass, for whoever reads it alone."""
+        """URDF of the robot whose tcp link has the tool's mass, for programs that read it alone."""
         mass = self.file.tool.mass
         return with_tool_mass(self.robot.urdf, self.robot.tip, mass, self.tool_centre_tcp)
 

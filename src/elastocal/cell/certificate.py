@@ -56,7 +56,7 @@ class TrackerIdentity(Equipment):
 
 
 class CertificateEntry(StrictModel):
-    """What the first page of a report says of a calibration beside its result."""
+    """An entry of the certificate, shown on the first page of a report."""
 
     number: Name | None = None
     """Number of the certificate."""
@@ -70,14 +70,14 @@ class CertificateEntry(StrictModel):
     operator: Name | None = None
     place: Name | None = None
     date: Annotated[str, AfterValidator(_day)] | None = None
-    """By default the day on which the run began."""
+    """Day on which the run began, unless stated."""
 
 
 ASKED = (
     "operator", "place", "temperature", "robot.serial", "controller.serial", "tool.serial",
     "sensor.serial", "sensor.certificate", "tracker.serial", "tracker.certificate",
 )  # fmt: skip
-"""What a person is asked for before a run, where neither cell file nor options state it."""
+"""Entries that are asked for before a run if neither cell file nor options state them."""
 
 
 def certificate_of(entry: CertificateEntry, *stated: Mapping[str, str]) -> CertificateEntry:

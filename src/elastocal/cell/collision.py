@@ -50,7 +50,7 @@ class CollisionWatch:
         self._first = None
 
     def departure(self, force_sensor: FloatArray, R_base_sensor: FloatArray) -> float:
-        """Return how far a force is from that at the beginning, the weight taken off, in N."""
+        """Return the deviation of a force from its initial value, weight removed, in N."""
         if self._first is None:
             return math.inf
         rest = force_sensor - R_base_sensor.T @ self._weight_base

@@ -1,14 +1,13 @@
-"""Protocols of arm, force sensor, tracker and clock, and the samples that they hand out.
+"""Protocols of arm, force sensor, tracker and clock, and the samples that they return.
 
-An arm does the steps of paper Procedure 1 (4-25). Every command returns at once; the arm is asked
-how far it is by `RobotArm.state`. A caller looks again each supervision cycle, so that a watchdog
-can stop the arm at any step. Forces are those on the robot at the tool centre point, as in
-docs/conventions.md.
+An arm does the steps of paper Procedure 1 (4-25). Every command returns at once; `RobotArm.state`
+reports the progress. A caller reads it in each supervision cycle, so that a watchdog can stop the
+arm at any step. Forces are those on the robot at the tool centre point, as in docs/conventions.md.
 
-No call may take longer than a supervision cycle (``procedure.cycle``, 40 ms): the watchdog that
-calls is the same that stops the arm. A driver whose line may be slow talks to it in a thread of
-its own and answers from what came last. A call may raise `DeviceError`, or an `OSError` of its
-line; the arm is then brought off the surface with what still works.
+No call may take longer than a supervision cycle (``procedure.cycle``, 40 ms): the calling thread is
+the watchdog that stops the arm. A driver whose line may be slow communicates in a thread of its own
+and answers from the last message. A call may raise `DeviceError`, or an `OSError` of its line; the
+arm is then retracted from the surface by the devices that still work.
 
 A new driver is one package, ``drivers/NAME``; see `elastocal.cell.rig` and
 docs/how-to/write-a-driver.md.
@@ -28,7 +27,7 @@ from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
 _UNIT = 1e-6
-"""How far the length of a direction may be from 1."""
+"""Largest deviation of the length of a direction from 1."""
 
 
 class Motion(Enum):
@@ -39,15 +38,15 @@ class Motion(Enum):
     IDLE = "idle"
     """Standing in position control; the last command is done."""
     MOVING = "moving"
-    """On a joint-space move."""
+    """Joint-space move."""
     APPROACHING = "approaching"
-    """On a guarded linear move."""
+    """Guarded linear move."""
     HOLDING = "holding"
-    """In force control, building up or holding a load case."""
+    """Force control, building up or holding a load case."""
     RELEASING = "releasing"
-    """In force control, ramping the force to zero."""
+    """Force control, ramping the force to zero."""
     RETRACTING = "retracting"
-    """On a linear move away from the surface."""
+    """Linear move away from the surface."""
     STOPPED = "stopped"
     """Stopped by a fault, a limit or `RobotArm.stop`; needs `RobotArm.enable` again."""
 
@@ -90,10 +89,10 @@ class RobotArm(Protocol):
         """Return the newest state, within a supervision cycle; it does not wait for a newer one."""
 
     def enable(self) -> None:
-        """Release the arm for motion; it then is idle. Refused while a fault stands."""
+        """Enable motion; the arm then is idle. Refused while a fault persists."""
 
     def disable(self) -> None:
-        """Take the release back; the arm stands."""
+        """Disable motion; the arm stands still."""
 
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a synchronous joint-space move.
@@ -107,10 +106,11 @@ class RobotArm(Protocol):
         """
 
     def adopt_position(self) -> None:
-        """Take the place where the arm stands for its programmed place.
+        """Take the present position of the arm as its programmed position.
 
-        A joint move can begin from here when it returns. The arm stands meanwhile, and may be
-        silent for some seconds: nobody watches it then. To be called off the surface, idle.
+        On return a joint move can begin from here. Meanwhile the arm stands still and may send
+        nothing for some seconds, during which it is not supervised. Call it off the surface, when
+        the arm is idle.
         """
 
     def approach(
@@ -153,7 +153,7 @@ class RobotArm(Protocol):
 
 @dataclass(frozen=True)
 class CommandChecks:
-    """Checks of what an arm is told, before anything is begun; refusals name the arm."""
+    """Checks of a command before its motion begins; refusals name the arm."""
 
     source: str
 
@@ -248,7 +248,7 @@ class Clock(Protocol):
         """Return the time in s since an origin of the clock's own."""
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass, and no more than that; devices go on meanwhile."""
+        """Wait while the devices go on."""
 
 
 class SensorStatus(Enum):
@@ -322,9 +322,9 @@ class PointBlock:
     """Standard deviation of one sample along each axis of the tracker frame, shape (sample, 3),
     in m; NaN when the maker does not say."""
     beam: BeamState
-    """At the end of the block."""
+    """State of the beam at the end of the block."""
     station: str
-    """Which station measures."""
+    """Station that measures."""
     source: str
     note: str = ""
     """Why the beam is broken, where the device says so."""
@@ -357,12 +357,13 @@ class Metrology(Protocol):
 
 @runtime_checkable
 class AskedMetrology(Metrology, Protocol):
-    """Metrology that measures when it is asked: a person reads the instrument."""
+    """Metrology that measures on request: a person reads the instrument."""
 
     def ask(self, what: str) -> None:
         """Ask for a reading of the marker, which stands still; returns at once.
 
-        Until it has come the beam is broken; from then on it stands, until the next is asked for.
+        Until the reading arrives, the beam counts as broken; the reading then remains until the
+        next request.
 
         Parameters
         ----------
@@ -372,7 +373,7 @@ class AskedMetrology(Metrology, Protocol):
 
 
 def close_nothing() -> None:
-    """Give nothing back: of devices that hold no line and no thread."""
+    """Close nothing: the default for devices that hold neither line nor thread."""
 
 
 @brief_repr
@@ -387,4 +388,4 @@ class Devices:
     close: Callable[[], None] = close_nothing
     """Gives lines and threads back, at the end of a run, whatever happened."""
     lines: Callable[[], tuple[LineCounts, ...]] = no_lines
-    """What was counted on the lines so far; never raises."""
+    """Function that returns the counts of the lines so far; never raises."""

@@ -16,7 +16,7 @@ from elastocal.results import brief_repr
 _DOME_RADII = (2.4, 1.5)
 """Radius and height in m of the ellipsoid of revolution that a rear pressure dome resembles."""
 _DOME_POLAR = (0.366, 0.934)
-"""From where to where the section reaches along the meridian, as ellipse parameter in rad."""
+"""Range of the section along the meridian, as ellipse parameter in rad."""
 _DOME_AZIMUTH = np.pi / 8.0
 """Half the angle that the section spans about the dome's axis, in rad (one of eight)."""
 _DOME_CELLS = 32
@@ -45,7 +45,7 @@ _WITH_PROCESS = (
         "process: {file: process.csv}          # joints or tcp poses and forces of production\n",
     ),
 )
-"""Lines of an example's cell file, and what stands there once its process is named."""
+"""Lines of an example's cell file and their replacement once its process is named."""
 
 
 def dome_section() -> FloatArray:

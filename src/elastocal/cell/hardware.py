@@ -173,7 +173,8 @@ class SurfaceEntry(MeshFile):
     flip_normals: bool = False
     """Turn the normals round; they must point to the robot's side."""
     crease_angle: PositiveAngleUpToPi = math.radians(30.0)
-    """Neighbouring faces that differ by more meet in an edge that the disk must not hang over."""
+    """Adjacent faces whose normals differ by more meet in an edge that the disk must not
+    overhang."""
 
 
 def _in_polygon(points: FloatArray, corners: FloatArray) -> BoolArray:
@@ -275,7 +276,7 @@ class SensorEntry(StrictModel):
 
 
 class Tracker(StrictModel):
-    """One station: where a tracker stands."""
+    """One tracker station and its position."""
 
     name: Name
     position: Point

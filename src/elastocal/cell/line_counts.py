@@ -1,4 +1,4 @@
-"""What drivers count on the lines of their devices, for whoever inspects a run."""
+"""Counts of drivers on the lines of their devices, for the inspection of a run."""
 
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -19,19 +19,19 @@ COUNTED = (
 @brief_repr
 @record()
 class LineCounts:
-    """What a driver has counted on the line of a device since it was opened."""
+    """Counts of a driver on the line of a device since it was opened."""
 
     device: str
-    """With its address."""
+    """Name of the device with its address."""
     received: int
     """Messages, records or points."""
     lost: int = 0
-    """Those that never came, or that a newer one overtook."""
+    """Messages that never arrived, or that a newer one overtook."""
     late: int = 0
-    """Answers, or samples, that came too late to be of use."""
+    """Answers or samples that came too late for use."""
     out_of_order: int = 0
     jumps: int = 0
-    """Times that the device's count has jumped: it was started anew."""
+    """Number of times that the device's counter has jumped because it was restarted."""
     malformed: int = 0
     foreign: int = 0
     """Messages of others than the device; they are not read."""
@@ -40,7 +40,7 @@ class LineCounts:
     breaks: int = 0
     """Times that the beam, or the connection, was lost."""
     status: tuple[str, ...] = ()
-    """What the device has said is wrong, by name."""
+    """Errors that the device has reported, by name."""
     answer: tuple[float, float, float] | None = None
     """Time of answers, median, 99 %, longest, in s; None where nothing is answered."""
     refused: str = ""

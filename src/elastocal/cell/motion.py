@@ -1,4 +1,4 @@
-"""How the robot moves: HOME, speeds, margins, torques, and where the external axes may stand."""
+"""How the robot moves: HOME, speeds, margins, torques, and positions of the external axes."""
 
 import itertools
 import math
@@ -26,11 +26,11 @@ _STEP_LENGTH = 0.25
 _STEP_ANGLE = math.radians(15.0)
 """Largest angle between positions of a turning axis that are searched, in rad."""
 _INSIDE_LENGTH = 1e-3
-"""How far inside the margins of a linear axis the outermost searched positions lie, in m."""
+"""Distance of the outermost searched positions of a linear axis from its margins, in m."""
 _INSIDE_ANGLE = math.radians(0.1)
 """The same for a turning axis, in rad."""
 _ROUNDING = 1e-9
-"""How near to the end of its range a position counts as on it, in m or rad."""
+"""Largest distance from the end of a range at which a position counts as on it, in m or rad."""
 _MOST = 500
 """Largest number of combinations of positions that are tried."""
 
@@ -47,7 +47,7 @@ class MotionEntry(StrictModel):
         needed_for("speed", "say where the speeds are from"),
         Field(validate_default=True),
     ] = None
-    """Where the speeds are from; needed when there are any."""
+    """Source of the speeds; required if any are given."""
     override: Annotated[FiniteFloat, Field(ge=0.01, le=1.0)] = 0.2
     """Part of the speeds that is used; controllers know no less than a percent."""
     acceleration_time: PositiveTime = 0.5
@@ -59,7 +59,7 @@ class MotionEntry(StrictModel):
     unloaded_time: PositiveTime = 4.0
     """Without effect, and read for cells of earlier versions: times follow from ``procedure``."""
     load_time: PositiveTime = 8.0
-    """Without effect, likewise."""
+    """Accepted in old files; it has no effect."""
 
 
 def home_position(robot: Robot, entry: MotionEntry) -> FloatArray:

@@ -1,7 +1,8 @@
-"""An arm on a programmed path that takes corrections each cycle, and what its driver has to do.
+"""An arm on a programmed path that takes corrections each cycle, and the protocol of its driver.
 
-`elastocal live` needs no `RobotArm`: the controller's own program moves the arm, the PC adds to
-it. A driver that can do so is a `PathDriver` besides a `Driver`; nothing above it knows a brand.
+`elastocal live` needs no `RobotArm`: the controller's own program moves the arm and the PC adds
+corrections. A driver that can do so is a `PathDriver` as well as a `Driver`; the layers above it
+know no brand.
 """
 
 from bisect import bisect_left
@@ -20,7 +21,7 @@ Shift = tuple[float, float, float]
 _BIN = 5e-6
 """Resolution of the times of answers, in s."""
 _BINS = 8000
-"""What takes longer than 40 ms is in the last one; the longest of all is kept as it is."""
+"""The last bin counts what takes longer than 40 ms; the longest time is kept as it is."""
 
 
 class PathCycle(NamedTuple):
@@ -31,7 +32,7 @@ class PathCycle(NamedTuple):
     q: Sequence[float]
     """Joint positions of the controller, in rad or m, in the order of the robot's joints."""
     begins: bool
-    """Whether the program begins, without correction: the first cycle, or it was started anew."""
+    """Whether the program begins without correction: in the first cycle or after a restart."""
     effect: Shift | None = None
     """Correction in effect, in m, that the answer goes on from; None: the last answer."""
     holds: bool = False
@@ -45,7 +46,8 @@ class PathSource(Protocol):
     def correction(self, cycle: PathCycle) -> Shift | None:
         """Return the whole correction, at once, in the axes that `PathLimits.frame` names.
 
-        None when corrections are over: the arm then has none, and its controller is told to end.
+        None ends the corrections: the arm then has none, and its controller is sent the order to
+        end.
         """
 
 
@@ -75,7 +77,8 @@ class CycleStatistics:
     """Messages that were not answered, because a newer one had come."""
     out_of_order: int
     jumps: int
-    """Times that the controller's own count has jumped: its program was started anew."""
+    """Number of times that the controller's counter has jumped because its program was
+    restarted."""
     malformed: int
     foreign: int
     """Datagrams of others than the controller."""
@@ -96,7 +99,7 @@ class CycleStatistics:
     """Largest change of the correction from one answer to the next, in m; from zero where a program
     begins."""
     withheld: int = 0
-    """Cycles that were not answered, because nothing told which correction is in effect."""
+    """Cycles that were not answered because the correction in effect was unknown."""
     refused: str = ""
     """Why malformed messages were refused; empty: none was, or the driver does not say."""
 

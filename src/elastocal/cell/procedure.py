@@ -1,8 +1,8 @@
 """How the robot presses, how poses are searched for, and how Procedure 1 is carried out and judged.
 
 The load cases are those of the paper's section 4.1, as force on the robot in the tcp frame. The
-bounds are there so that a slip of the pen in the cell file is refused and not carried out. They
-are wide: what is within them may still be wrong for a machine.
+bounds refuse typing errors in the cell file. They are wide: a value within them may still be wrong
+for a machine.
 """
 
 import math
@@ -59,7 +59,7 @@ CONDITIONING = "conditioning"
 LIGHT_CONTACT = "light_contact"
 """Name of the press under which the reference is read; it is no load case of a dataset."""
 _PERCENT = 1e-9
-"""How near to a whole percent a level is."""
+"""Largest distance of a level from a whole percent."""
 
 
 def _whole_percent(level: float) -> float:
@@ -86,11 +86,11 @@ class LoadCases(StrictModel):
     """Factor by which the friction must exceed the lateral force."""
     cases: Annotated[tuple[_CaseName, ...], Field(validate_default=True)] = get_args(_CaseName)
     level: _Level | None = None
-    """Part of ``fz`` that is pressed with before the cases, on the way up, and after them, on the
-    way down: it tells play and stiffening from compliance. None: the full cases alone."""
+    """Part of ``fz`` that is pressed before and after the cases; it separates play and stiffening
+    from compliance. None: no low load."""
     check: _Level | None = None
-    """Part of ``fz`` that is pressed with and kept out of every fit: it shows what the model is
-    worth between the loads that it has seen. None: there is no such press."""
+    """Part of ``fz`` whose press is kept out of every fit, to measure the error of the model at a
+    load between those fitted. None: there is no such press."""
 
     @field_validator("cases")
     @classmethod
@@ -145,7 +145,7 @@ def _level_name(level: float) -> str:
 
 
 class Engagement(StrictModel):
-    """Contact disk, and the way to it."""
+    """Contact disk and approach to the surface."""
 
     disk_radius: PositiveLength
     """In m."""
@@ -182,7 +182,7 @@ class TorqueLimits(StrictModel):
         needed_for("values", "say where the torque values are from"),
         Field(validate_default=True),
     ] = None
-    """Where the figures are from; needed when there are any."""
+    """Source of the figures; required if any are given."""
 
     @field_validator("values")
     @classmethod
@@ -249,7 +249,7 @@ class Search(StrictModel):
     """Name of a search technique (`elastocal.planning.search`); `Cell.technique` says which is
     taken where the file names none."""
     metric: Literal["euclidean", "geodesic"] = "euclidean"
-    """How COVER measures the distance between contact points."""
+    """Distance between contact points that COVER uses."""
     poses: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] | None = None
     """Largest number of poses N."""
     d_max: PositiveLength | None = None
@@ -265,7 +265,7 @@ class Search(StrictModel):
     pool: Annotated[int, Field(ge=1, le=_MOST_CANDIDATES)] = 3000
     """Number of candidates."""
     sampling: Literal["blue_noise", "uniform"] = "blue_noise"
-    """How candidate points are spread: keeping their distance, or each by itself."""
+    """Whether candidate points keep a distance from one another or are drawn independently."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """Seed of everything random."""
 
@@ -293,9 +293,8 @@ class ProcedureSettings(StrictModel):
     approach_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.25)] = 0.02
     """Between approach pose and near contact, and back, in m/s."""
     contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.02)] = 0.005
-    """Speed of the guarded approach from near contact to the surface, in m/s: how fast `elastocal
-    run` touches. ``motion.contact_speed`` is another: the KRL program's limit on the whole straight
-    way."""
+    """Speed of the guarded approach from near contact to the surface, in m/s, in `elastocal run`.
+    ``motion.contact_speed`` is another: the limit of the KRL program on the whole straight path."""
     contact_force: PositiveForce = 60.0
     """Force at which the guarded approach stops, in N."""
     ramp: Annotated[PositiveForceRate, Field(ge=1.0, le=2e3)] = 400.0
@@ -308,27 +307,27 @@ class ProcedureSettings(StrictModel):
     collision, in N; by default 50 N and a fifth of the tool's weight. A slow one is found when it
     is as much and a third of the weight more."""
     travel_limit: Annotated[PositiveLength, Field(le=50e-3)] = 15e-3
-    """How far the tool may go beyond the expected contact, or aside, in m."""
+    """Largest travel of the tool beyond the expected contact, or sideways, in m."""
     contact_compliance: Annotated[TranslationalCompliance, Field(le=10e-6)] = 0.5e-6
     """Lateral movement of the marker under load that is expected without slip (disk, tooling,
     tilt of the tool), in m/N of the load case."""
     force_tolerance: Annotated[PositiveForce, Field(le=50.0)] | None = None
-    """Largest distance of the mean force from the load case, in N; by default 1 % of the largest
-    load case, at least 5 N. The fit takes the force that was measured, so that this is no error
-    of the reading: it tells an arm that does not do what it is told."""
+    """Largest deviation of the mean force from the load case, in N; by default 1 % of the largest
+    load case, at least 5 N. The fit uses the measured force, so the deviation is no error of the
+    reading; a large one shows that the arm does not follow its commands."""
     force_drift: Annotated[PositiveForceRate, Field(le=50.0)] = 5.0
     """Largest drift of the force over the dwell, in N/s."""
     force_spread: Annotated[PositiveForce, Field(le=50.0)] = 8.0
     """Largest width of the force about its drift that holds 95 % of the samples, each axis, in N;
     counted as four standard deviations."""
     reference: Literal["unloaded", "light_contact"] = "unloaded"
-    """Where the zero of the displacements is read: near contact without load, or pressing with
-    ``contact_force``, so that the settling of disk and tooling is no displacement."""
+    """State in which the zero of the displacements is read: near contact without load, or pressed
+    with ``contact_force``, so that settling of disk and tooling does not count as displacement."""
     conditioning: bool = False
-    """Whether a full press goes before the reference, so that the gears' friction starts from a
-    known load at every pose and not from wherever the way there has left it."""
+    """Whether a full press precedes the reference, so that the friction of the gears starts from a
+    known load at every pose instead of an unknown one."""
     dwell: Annotated[PositiveTime, Field(le=60.0)] = 0.5
-    """How long the force must be like that before it is averaged, in s."""
+    """Time for which the force must be stable before it is averaged, in s."""
     average: Annotated[PositiveTime, Field(le=60.0)] = 1.0
     """Time over which a loaded reading is averaged, in s."""
     unloaded_average: Annotated[PositiveTime, Field(le=60.0)] = 1.0
@@ -338,10 +337,10 @@ class ProcedureSettings(StrictModel):
     slip_limit: Annotated[PositiveLength, Field(le=5e-3)] = 0.2e-3
     """Largest lateral movement of the marker that is not expected, in m."""
     timeout: Annotated[PositiveTime, Field(le=600.0)] = 20.0
-    """How long a load case may take to become stable after its ramp, in s; also what every other
-    step may take beyond its expected time."""
+    """Largest time from the end of the ramp until a load case is stable, in s; also the time that
+    every other step may take beyond its expected duration."""
     beam_timeout: Annotated[PositiveTime, Field(le=600.0)] = 5.0
-    """How long a tracker may look for the marker, in s."""
+    """Largest time for which a tracker searches the marker, in s."""
     stale: Annotated[PositiveTime, Field(le=1.0)] = 0.3
     """Oldest data that are trusted, in s."""
     retries: Annotated[int, Field(ge=0, le=5)] = 1

@@ -1,10 +1,10 @@
-"""Where production runs: the path that a cell file names, in joints, with its forces.
+"""The production path that a cell file names, in joints, with its forces.
 
 The file is the table that ``elastocal compensate`` reads: joints or tcp poses, forces on the robot
-in base or in the tcp frame. A column ``course`` names the stretches of it. Poses are turned into
-joints as production would take them: each course begins on the branch nearest to ``process.start``,
-goes on without a jump, and its rail stands where the file says, or where all of the course is
-reached farthest from the joint limits.
+in base or in the tcp frame. A column ``course`` names its sections. Poses are converted to joints
+as production would reach them: each course begins on the branch nearest to ``process.start`` and
+continues without a jump. Its rail is at the position in the file, or at the one that keeps the
+whole course farthest from the joint limits.
 """
 
 from collections.abc import Iterator, Sequence
@@ -179,7 +179,7 @@ class _PostureSearch:
         return joints_along_path(self.solver, T_base_tcp, given, self.start, where)
 
     def _best_position(self, T_base_tcp: FloatArray) -> FloatArray:
-        """Return where the external axes stand farthest from the arm's joint limits."""
+        """Return the positions of the external axes that keep the arm farthest from its limits."""
         some = np.unique(np.linspace(0, len(T_base_tcp) - 1, _FEW).astype(int))
         arm = slice(self.solver.robot.external_axes, None)
         margins = []

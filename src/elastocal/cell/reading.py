@@ -1,7 +1,7 @@
-"""What one device shows now, to a person who only looks: `elastocal watch`.
+"""Present state of a device, as `elastocal watch` shows it.
 
-A driver reports it by `DeviceSet.readings`. Where it does not, the protocols of
-`elastocal.cell.devices` are asked (`polled_readings`).
+A driver reports it by `DeviceSet.readings`; otherwise it is polled through the protocols of
+`elastocal.cell.devices` (`polled_readings`).
 """
 
 from collections.abc import Callable, Iterator
@@ -35,7 +35,7 @@ Three = tuple[float, float, float]
 @brief_repr
 @record()
 class DeviceReading:
-    """What one device shows now. What a device does not state is None."""
+    """Present state of one device. None marks a value that the device does not state."""
 
     COLUMNS = ("state", "now", "line", "clock against the PC")
     """Headings of `cells`."""
@@ -43,15 +43,15 @@ class DeviceReading:
     kind: str
     """One of `elastocal.cell.KINDS`."""
     device: str
-    """With its address."""
+    """Name of the device with its address."""
     heard: bool
     """Whether anything that could be read has come from it."""
     problem: str = ""
     """Why it is not heard, or not to be relied on; empty where nothing is known to be wrong."""
     state: str = ""
-    """What it does."""
+    """Activity of the device."""
     counts: LineCounts | None = None
-    """What was counted on its line since that was opened."""
+    """Counts on its line since it was opened."""
     rate: float | None = None
     """Messages, samples or points a second, over the last two seconds."""
     cycle: tuple[float, float] | None = None
@@ -62,7 +62,8 @@ class DeviceReading:
     """Its time less the PC's, in s. Of a driver: less the rig's; `elastocal watch` makes it that
     against the PC's time of day, from 1970-01-01 UTC."""
     drift: float | None = None
-    """How much faster its clock runs than the PC's, without dimension; None: too early to tell."""
+    """Rate of its clock relative to the PC's, minus 1, dimensionless; None: too early to
+    estimate."""
     position: Three | None = None
     """Position of the tool in base, or of the marker in the station's frame, in m."""
     turn: Three | None = None
@@ -106,7 +107,7 @@ class DeviceReading:
 
 
 def three(values: FloatArray) -> Three | None:
-    """Return the numbers of an array, shape (3,); None where one of them is none."""
+    """Return the numbers of an array, shape (3,); None if one of them is not finite."""
     x, y, z = map(float, values)
     return (x, y, z) if np.isfinite(values).all() else None
 

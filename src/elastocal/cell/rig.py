@@ -1,8 +1,8 @@
-"""The rig of a cell: which driver makes arm, sensor and metrology, and what a driver has to do.
+"""The rig of a cell: the drivers of arm, sensor and metrology, and the protocol of a driver.
 
 A driver is one package, found by its name: an entry point of the group ``elastocal.drivers``. Arm,
-sensor and metrology of different drivers make one rig. What stands under a device in the cell file
-is checked by the driver's own settings; which drivers there are is known to `elastocal run`.
+sensor and metrology of different drivers make one rig. The driver's own settings validate the
+section of a device in the cell file; `elastocal run` knows which drivers exist.
 """
 
 import math
@@ -50,7 +50,7 @@ KINDS = ("arm", "sensor", "metrology")
 
 
 class DeviceChoice(StrictModel):
-    """Which driver makes a device: its name, or a mapping with what that driver is told besides."""
+    """Driver of a device: its name, or a mapping with its name and its settings."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -67,7 +67,7 @@ class DeviceChoice(StrictModel):
 
     @property
     def told(self) -> Mapping[str, object]:
-        """The other keys, as they stand in the cell file; the driver's settings check them."""
+        """The other keys as given in the cell file; the driver's settings validate them."""
         return self.model_extra or {}
 
     def __str__(self) -> str:
@@ -96,7 +96,7 @@ class DeviceChoices(StrictModel):
 
 
 class DevicePlace(NamedTuple):
-    """Where a device is: no two programs may talk to it at a time."""
+    """Address of a device, which only one program may use at a time."""
 
     host: str
     port: int
@@ -140,10 +140,10 @@ class LocalPort(NamedTuple):
 
 
 class DeviceSettings(StrictModel):
-    """Base of what stands under a device in the cell file, beside the name of its driver."""
+    """Base class of the settings of a device in the cell file, without the name of its driver."""
 
     def device_places(self) -> tuple[DevicePlace, ...]:
-        """Return where the devices are, which are locked while somebody talks to them.
+        """Return the addresses of the devices, which are locked while they are in use.
 
         By default what ``address`` (``robot``) and ``port`` name, for each station where there are
         several.
@@ -193,19 +193,20 @@ class WrenchFeed(Protocol):
     """
 
     def newest(self) -> WrenchSample | None:
-        """Return the newest sample, whoever has seen it before; None before the first."""
+        """Return the newest sample, including those already returned; None before the first."""
 
 
 @brief_repr
 @dataclass(frozen=True)
 class RigContext:
-    """What all drivers of a rig share."""
+    """Data that all drivers of a rig share."""
 
     clock: Clock
     seed: int
     """Seed of simulated devices."""
     start: float
-    """What the clock showed when the rig was made, in s: later than all of a run that goes on."""
+    """Time of the clock at the creation of the rig, in s: later than all samples of a run that is
+    resumed."""
     feed: WrenchFeed | None
     """Wrench feed of another driver of the rig; None where none has one."""
     ports: Mapping[LocalPort, socket.socket] = field(default_factory=dict)
@@ -215,15 +216,15 @@ class RigContext:
     """Arming of an arm that moves as soon as its path is corrected, see
     `elastocal.cell.PathDriver`."""
     watches: bool = False
-    """Whether somebody only looks (`elastocal watch`): a driver then commands no arm, waits for
-    nobody, and goes on to listen whatever it hears."""
+    """Whether the rig only observes (`elastocal watch`): a driver then commands no arm, does not
+    wait for a device, and keeps listening after errors."""
 
     def patience(self, seconds: float) -> float:
-        """Return how long a device may be away, in s: for ever where it is only watched."""
+        """Return how long a device may be silent, in s: without limit when it is only watched."""
         return math.inf if self.watches else seconds
 
     def listener(self, port: LocalPort) -> socket.socket:
-        """Return a socket for a port, to be closed by whoever asked.
+        """Return a socket for a port, which the caller closes.
 
         Raises
         ------
@@ -237,7 +238,7 @@ class RigContext:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class DeviceSet:
-    """What one driver made: at least what was wanted of it."""
+    """Devices that one driver made: at least those requested."""
 
     arm: RobotArm | None = None
     sensor: ForceSensor | None = None
@@ -249,10 +250,10 @@ class DeviceSet:
     close: Callable[[], None] = close_nothing
     """Gives lines and threads back; called once."""
     lines: Callable[[], tuple[LineCounts, ...]] = no_lines
-    """What was counted on its lines so far; called at any time until `close`, never raises."""
+    """Function that returns the counts of its lines until `close`; never raises."""
     readings: Callable[[], tuple[DeviceReading, ...]] | None = None
-    """What the devices show, where `RigContext.watches`; a `DeviceError` of it lets them be closed
-    and connected anew. None: arm, sensor and metrology are asked."""
+    """Function that returns the state of the devices if `RigContext.watches`; after a `DeviceError`
+    they may be closed and reconnected. None: arm, sensor and metrology are polled."""
 
 
 @runtime_checkable
@@ -261,14 +262,14 @@ class Driver(Protocol):
 
     @property
     def kinds(self) -> frozenset[str]:
-        """Those of `KINDS` that it makes."""
+        """Members of `KINDS` that the driver provides."""
 
     @property
     def real(self) -> bool:
-        """Whether something moves that can hurt: a person is asked before each run."""
+        """Whether a real arm moves: a person is asked before each run."""
 
     def settings(self, kind: str) -> type[DeviceSettings]:
-        """Return the model of what stands under a device of a kind in the cell file."""
+        """Return the settings model of a device of a kind in the cell file."""
 
     def connect(
         self, cell: "Cell", wanted: Mapping[str, DeviceSettings], context: RigContext
@@ -322,7 +323,7 @@ class WallClock:
         return self._start + self.rate * (self._monotonic() - self._origin)
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass.
+        """Wait.
 
         Raises
         ------

@@ -28,7 +28,8 @@ from elastocal.robot import GRAVITY
 from elastocal.units import impossible
 
 SENSOR_CORRECTED = "sensor corrected by a tool file"
-"""In the provenance of data whose forces were corrected by a tool file's rotation and matrix."""
+"""Entry in the provenance of data whose forces were corrected by the rotation and matrix of a tool
+file."""
 _RIGID = 1e-6
 """Largest distance of a component of R R^T from the identity's."""
 _FAR = 0.5
@@ -116,7 +117,8 @@ class SensorLoad:
             weight_response(self.mass, self.centre) if self.response is None else self.response
         )
         object.__setattr__(self, "response", _finite("response", response, (6, 3)))
-        # What a reading gives way per gravity: a mass, and a mass times a lever of some metres.
+        # Unknowns that a reading depends on per gravity: a mass, and a mass times a lever of some
+        # metres.
         problem = impossible("mass", *np.abs(response).ravel().tolist())
         if problem is not None:
             raise CompensationError(f"response of the tool is {problem}")

@@ -1,9 +1,9 @@
-"""The time that a pose takes in contact: the one model that plan, KRL program, run and study share.
+"""Time that a pose takes in contact: the model that plan, KRL program, run and study share.
 
-Each step of Procedure 1 takes the time of what it does: a way at its speed, a force at the rate of
-the ramp, a dwell, an average; and one cycle, in which the devices are looked at before it begins.
-What waits for something (the beam, a force that settles) is taken at its shortest. The simulated
-cell needs three to five percent more.
+Each step of Procedure 1 takes the time of its action (a motion at its speed, a force at the rate of
+the ramp, a dwell, an average) and one cycle, in which the devices are checked before it begins.
+Waiting times (for the beam, for a force to settle) count with their minimum. The simulated cell
+needs three to five percent more.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,9 +21,9 @@ class VisitStep:
     """One step of the visit of a pose, from its approach pose and back to it."""
 
     name: str
-    """As `elastocal.procedure.Step` names it."""
+    """Name in `elastocal.procedure.Step`."""
     what: str
-    """For people."""
+    """Description for people."""
     seconds: float
     """Estimated."""
 
@@ -76,7 +76,7 @@ def contact_time(cell: Cell) -> float:
 
 
 def straight_time(cell: Cell) -> float:
-    """Return how much of `contact_time` the straight ways to the surface and back take, in s."""
+    """Return the part of `contact_time` spent on straight motions to and from the surface, in s."""
     ways = ("near", "engage", "lift", "retract")
     return sum(step.seconds for step in _steps_of(cell) if step.name in ways)
 

@@ -33,7 +33,7 @@ from elastocal.workflows import LiveReport, Supervision, WatchResult
 REFRESH = 0.1
 """Shortest time between two changes of the line, in s of the wall."""
 PATIENCE = 2.0
-"""How long the end of a run waits for its view to be written, in s of the wall."""
+"""Largest time that the end of a run waits for its view to be written, in s of wall time."""
 _BAR = 20
 _LIVE_LINES = 10.0
 """Between two lines of a live compensation where no terminal is, in s."""
@@ -61,8 +61,8 @@ def progress_text(step: Progress) -> str:
 def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None]]:
     """Yield a function that shows progress reports.
 
-    It returns at once: a thread of its own does the writing, as a terminal that takes nothing
-    would stop whoever writes to it, and with it the watchdog. One that is gone is left alone.
+    It returns at once, since a separate thread writes: a terminal that accepts no output blocks the
+    writer, which must not be the watchdog. A terminal that was closed is ignored.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ class _Screen(threading.Thread, abc.ABC):
 
     def run(self) -> None:
         """Write reports until closed, or until they cannot be written."""
-        # Rich ends the program, SystemExit, when nobody reads a pipe any more, and before that
-        # it cuts standard output off, which may still be asked for data.
+        # Rich raises SystemExit when nobody reads a pipe any more, after it has closed standard
+        # output, which may still be needed for data.
         self._console.on_broken_pipe = _leave_off  # type: ignore[method-assign]
         with contextlib.suppress(OSError, ValueError):
             self.write()
@@ -187,16 +187,16 @@ def _duration(seconds: float) -> str:
 
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
-"""Signals by which a person, a terminal or a system ends a program, or halts it, which would leave
-the arm pressing with nobody to watch. Not every system has all of them."""
+"""Signals by which a person, a terminal or a system ends or halts a program, which would leave the
+arm pressing without supervision. Not every system has all of them."""
 
 
 @contextlib.contextmanager
 def interruption() -> Iterator[Callable[[], bool]]:
-    """Yield a function that says whether somebody wants the run to stop.
+    """Yield a function that returns whether the run was asked to stop.
 
-    Meanwhile the signals of `NAMES` do not break into the middle of a step: the runner asks once
-    a cycle, releases, retracts and stops.
+    Meanwhile the signals of `NAMES` do not interrupt a step: the runner checks the function once a
+    cycle, releases the force, retracts and stops.
     """
     asked = threading.Event()
 
@@ -249,7 +249,7 @@ class TerminalOperator:
             raise ProcedureError("not confirmed: nothing was moved")
 
     def identify(self, missing: Sequence[str]) -> Mapping[str, str]:
-        """Ask for what the certificate still lacks; an answer that is none is asked for again."""
+        """Ask for missing entries of the certificate; an invalid answer is asked for again."""
         found: dict[str, str] = {}
         if not (missing and self._asks and sys.stdin.isatty()):
             return found

@@ -1,7 +1,7 @@
 """Signals that end a program: each arrives, and ends it with its own exit code and no traceback.
 
-Importing this module makes Ctrl-C end the program at once, until `heard_again`: the imports of the
-command line come between, and a traceback from within them tells nobody anything.
+Importing this module makes Ctrl-C end the program at once until `heard_again`, because a traceback
+from within the imports of the command line would be of no use.
 """
 
 import _thread
@@ -16,7 +16,7 @@ _Handler = Callable[[int, FrameType | None], None]
 _PAUSE = 0.05
 """Until a signal is sent once more, in s."""
 _IMPORTS = "<frozen importlib"
-"""How the file names of Python's import machinery begin."""
+"""Prefix of the file names of Python's import machinery."""
 _waiting: set[int] = set()
 """Signals that came at a bad moment, and are going to be sent once more."""
 
@@ -40,18 +40,18 @@ def heard_again() -> None:
 
 @contextlib.contextmanager
 def ended_cleanly() -> Iterator[None]:
-    """Turn signals that end a program into exceptions that arrive.
+    """Turn signals that end a program into exceptions that reach the program.
 
     SIGINT raises KeyboardInterrupt, SIGTERM, SIGHUP and SIGXCPU (``ulimit -t``) raise SystemExit
-    with 128 and their number, so that whoever writes a folder cleans it up. What ignores a signal
-    already, as ``nohup`` does, goes on ignoring it.
+    with 128 and their number, so that unfinished folders are removed. A signal that is already
+    ignored, as by ``nohup``, stays ignored.
 
-    Python loses such an exception in two places, and a command would go on as if nothing had
-    happened: in finalisers and callbacks of weak references, where it is dropped, and in libraries
-    that catch everything while they are imported. So a signal that arrives during an import waits
-    for its end, and one that was dropped is sent once more; where the command has ended before,
-    it ends by the signal. `elastocal run`, which has an arm to bring to safety, has a way of its
-    own: `elastocal.cli._operator`.
+    Python loses such an exception in two places, after which a command would continue: in
+    finalisers and callbacks of weak references, where it is dropped, and in libraries that catch
+    everything while they are imported. So a signal that arrives during an import waits for its end,
+    and one that was dropped is sent once more; where the command has ended before, it ends by the
+    signal. `elastocal run`, which has an arm to bring to safety, handles signals itself:
+    `elastocal.cli._operator`.
 
     Afterwards there is nothing left to clean up, and Ctrl-C ends the program at once.
     """
@@ -89,7 +89,7 @@ def ended_cleanly() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _warned_of_its_time() -> Iterator[None]:
-    """Let the system say that the time of this process is used up a second before it kills it."""
+    """Let the system signal a second before it kills the process that its time limit is reached."""
     if not hasattr(signal, "SIGXCPU"):
         yield
         return

@@ -1,7 +1,7 @@
-"""The commands: each calls its work with what a person has given, and shows the result.
+"""The commands: each calls its workflow with the given options and shows the result.
 
-The options are those of the settings (`elastocal.cli.generator`); only what belongs to a terminal
-alone stands here.
+The options are those of the settings (`elastocal.cli.generator`); only what concerns the terminal
+is defined here.
 """
 
 import sys
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from elastocal.blocks import Block
 
 COMMANDS: dict[str, Command] = {}
-"""By the name that people type, in the order of help."""
+"""Commands by name, in the order of help."""
 
 
 def command(
@@ -328,7 +328,7 @@ def _run(given: Given) -> None:
         _show(given, rehearsed.figures, rehearsed.show(), "Nothing was moved.")
         return
     finished = workflows.run(settings)
-    # Of a run that is not done people are told why, whatever a program asked for.
+    # The reason why a run is not carried out is printed even with --json.
     if given.as_json and finished.end is RunEnd.DONE:
         output.print_json(finished.figures)
     else:
@@ -425,7 +425,7 @@ def _import(given: Given) -> None:
 
 
 def _ask(question: str) -> str:
-    """Return a person's answer on the terminal; empty leaves the question open."""
+    """Return the answer given on the terminal; an empty one leaves the question open."""
     answer: str = typer.prompt(question, default="", show_default=False, err=True)
     return answer
 

@@ -1,7 +1,7 @@
-"""Commands made from settings: a parameter of the command line for each field that it has.
+"""Commands generated from settings: one parameter of the command line for each field.
 
-What a field says (`elastocal.options`) becomes a parameter of typer's; what is given is handed to
-the command by the names of the fields, and what is not given is left to the settings.
+The metadata of a field (`elastocal.options`) becomes a parameter of typer. Given values are passed
+to the command by the names of the fields; the settings supply the defaults.
 """
 
 import inspect
@@ -35,7 +35,7 @@ _NARROW = 20
 
 @dataclass(frozen=True)
 class Given:
-    """What a person has given to a command."""
+    """Values given to a command on the command line."""
 
     settings: dict[str, Any]
     """Fields of the settings, by name; only those that were given."""
@@ -49,7 +49,7 @@ class Command:
     """A command of the program."""
 
     group: str
-    """Where help lists it."""
+    """Group in which help lists it."""
     module: str
     """Module of its settings, and of the function whose docstring is the command's."""
     settings: str
@@ -57,19 +57,19 @@ class Command:
     function: str
     """The function."""
     run: Callable[[Given], None]
-    """What it does."""
+    """Function that carries it out."""
     more: type | None = None
     """Class of the parameters that the command line alone has."""
     hidden: tuple[str, ...] = ()
-    """Fields that its parameters stand for in another form."""
+    """Fields that its parameters replace in another form."""
 
     @property
     def summary(self) -> str:
-        """What help says of it."""
+        """Its line in the help."""
         return summary_of(self.module, self.function)
 
     def fields(self) -> list[SettingsField]:
-        """Return the fields of its settings that a person can type."""
+        """Return the fields of its settings that can be given on the command line."""
         every = settings_fields(self.module, self.settings)
         return [each for each in every if each.name not in self.hidden and _is_shown(each)]
 
@@ -79,7 +79,7 @@ class Command:
         return () if more is None else settings_fields(more.__module__, more.__name__)
 
     def shown(self) -> list[SettingsField]:
-        """Return all that a person can type, in the order of help."""
+        """Return all parameters that can be given, in the order of help."""
         return [*_in_order(self.fields(), self.own_fields()), _AS_JSON]
 
     def callback(self) -> Callable[..., None]:
@@ -104,7 +104,7 @@ class Command:
 
 
 OTHERS = "Of other packages"
-"""Where help lists commands of plug-ins."""
+"""Group in which help lists commands of plug-ins."""
 
 
 def plugged(name: str) -> Command:
@@ -167,7 +167,7 @@ class _Plugged(Command):
     """A command of another package: its settings say what it is for."""
 
     def fields(self) -> list[SettingsField]:
-        """Return the fields; what has to be given has its place."""
+        """Return the fields; required ones keep their position."""
         return [
             replace(each, option=replace(each.option, argument=True))
             if each.default is REQUIRED
@@ -184,7 +184,7 @@ _AS_JSON = SettingsField(
 def _in_order(
     fields: Iterable[SettingsField], here: Iterable[SettingsField]
 ) -> list[SettingsField]:
-    """Return fields as help lists them: places, what has to be given, and the rest."""
+    """Return fields in the order of help: positional, required, optional."""
 
     def place(each: SettingsField) -> tuple[bool, bool, bool]:
         # What guards files is read last.
@@ -202,9 +202,9 @@ class Described:
     """A field as help and the reference show it."""
 
     text: str
-    """What it is, and the choices where `taken` has no room for them."""
+    """Description, and the choices if `taken` does not show them."""
     taken: str
-    """What stands for its value; empty where the type alone says it."""
+    """Placeholder for its value; empty if the type suffices."""
     kind: type
     """Type that is read from the command line."""
     is_repeated: bool
@@ -297,7 +297,7 @@ _TYPES: dict[str, type] = {"Path": Path, "bool": bool, "str": str, "int": int, "
 
 
 def _is_shown(each: SettingsField) -> bool:
-    """Return whether a person can type what a field holds."""
+    """Return whether the value of a field can be given on the command line."""
     typed = not re.search("Callable|Mapping", each.kind) and any(n in each.kind for n in _TYPES)
     return typed or bool(each.option.choices or each.option.read)
 

@@ -43,7 +43,7 @@ class _Commands(TyperGroup):
         return list(dict.fromkeys((*COMMANDS, *plugins.entries("command"))))
 
     def get_command(self, ctx: Any, cmd_name: str) -> TyperCommand | None:
-        """Return a command; None where there is none of that name."""
+        """Return a command; None if there is none of that name."""
         if cmd_name not in self.commands and cmd_name in self.list_commands(ctx):
             self.commands[cmd_name] = _made(cmd_name, COMMANDS.get(cmd_name) or plugged(cmd_name))
         return cast("TyperCommand | None", self.commands.get(cmd_name))
@@ -139,8 +139,8 @@ def _root(
     """In-situ elastic calibration of industrial robots."""
     import logging  # not for help
 
-    # What libraries log is, as their warnings are, for whoever sets up a handler. Without any,
-    # logging would say that there is none.
+    # Log messages of libraries, like their warnings, are for handlers that the user sets up.
+    # Without any handler logging would print a complaint.
     logging.basicConfig(handlers=[logging.NullHandler()])
 
 
@@ -150,13 +150,13 @@ def run() -> None:
     # time when all is taken down, takes a sixth of the time of a calibration.
     gc.set_threshold(_GARBAGE)
     atexit.register(gc.freeze)
-    # Warnings of libraries (an overflow, a division by zero) are for whoever looks for a mistake in
-    # the program, with -W; what a user is to know is a note of ours.
+    # Warnings of libraries (an overflow, a division by zero) help to find errors in the program,
+    # with -W; notes for users are printed by elastocal itself.
     warnings.simplefilter("ignore", append=True)
     # Figures go into files; Matplotlib would refuse a name here that it does not know.
     os.environ["MPLBACKEND"] = "agg"
     if sys.stdin is None:
-        # Closed by `<&-`: nobody answers, which is said where something is asked.
+        # Standard input closed by `<&-`: a question then reports that nobody can answer.
         sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: PTH123, SIM115 - to the end
     try:
         _check_output()
@@ -192,7 +192,7 @@ def _check_output() -> None:
 
 
 def _drop_output() -> None:
-    """Lead standard output away, so that Python does not try once more at its end."""
+    """Redirect standard output, so that Python does not write to it again at exit."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

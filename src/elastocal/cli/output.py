@@ -1,10 +1,9 @@
-"""Where output goes: people read standard error, programs read standard output.
+"""Output: text for people goes to standard error, data for programs to standard output.
 
-Whatever is printed for people holds names and paths of other people. None of it is taken for
-markup: what is to stand out passes through `bold` and its like, and what moves a terminal's cursor
-or changes its colours is shown as it would be typed.
+Printed text contains names and paths from files. None of it is interpreted as markup: emphasis uses
+`bold` and similar functions, and control sequences of the terminal are shown escaped.
 
-Rich is imported when something is printed: help does without most of it.
+Rich is imported when something is printed: help needs little of it.
 """
 
 import json
@@ -48,7 +47,7 @@ bold, dim, red, yellow, green = (partial(_styled, style) for style in _STYLES)
 
 
 def console(**options: Any) -> "Console":
-    """Return the console that people read; standard output stays free for data.
+    """Return the console on standard error; standard output stays free for data.
 
     Parameters
     ----------
@@ -149,7 +148,7 @@ def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
 
 
 def print_result(screen: "Console", result: Result, out: object = None) -> None:
-    """Print what a person sees of a result, and where it was written."""
+    """Print the blocks of a result and the files that were written."""
     print_blocks(screen, result.show())
     if out is not None:
         screen.print(f"written to {bold(out)}", soft_wrap=True)
@@ -251,7 +250,7 @@ def table_of(block: "Table", width: int = 80) -> "RichTable":
 
 
 def _folded(head: str, width: int) -> list[str]:
-    """Return the lines of a heading; a unit stands below what it is of."""
+    """Return the lines of a heading, with the unit below the quantity."""
     parts = head.split(", ")
     found = [line for part in parts for line in textwrap.wrap(part, width, break_long_words=False)]
     return found or [""]

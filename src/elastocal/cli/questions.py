@@ -28,11 +28,11 @@ _QUESTIONS = {
     "marker_place": "Marker from the tool tip: x, y, z",
     "accepted": "Largest error of a predicted deflection that the report lets pass, or none",
 }
-"""What is asked, in this order; the key is the field."""
+"""Questions in their order; the key is the field."""
 
 
 def answered(settings: "NewSettings") -> "NewSettings":
-    """Return settings with the answers of a person; an empty answer takes what is offered."""
+    """Return settings with the answers of a person; an empty answer accepts the default."""
     for name, question in _QUESTIONS.items():
         if getattr(settings, name) is not None or _needless(settings, name):
             continue

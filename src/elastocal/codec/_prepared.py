@@ -1,10 +1,10 @@
-"""Variants prepared for a campaign: their rows, and the springs that readings carry.
+"""Variants prepared for a campaign: their rows and the springs that the readings support.
 
-Where a variant leaves its springs to the readings (``auto``), the ladder of `calibrate` is climbed
-once on all of them, which says what springs the file carries; and anew on training poses of each
-split, at some sizes of the training set, so that errors at the verification poses have seen no
-choice that these or later training poses had a part in. Rows are those of all readings at a pose,
-so that friction remembers the same in any split.
+Where a variant leaves its springs to the readings (``auto``), the ladder of `calibrate` is fitted
+once to all of them, which gives the springs that the file supports, and again to the training poses
+of each split, at some sizes of the training set. So no verification pose has influenced the choice
+whose error it measures. Rows are those of all readings at a pose, so that the friction memory is
+the same in any split.
 """
 
 from collections.abc import Mapping, Sequence
@@ -105,9 +105,10 @@ class Entrant:
     """A variant with all springs that a split may choose from."""
 
     taken: PreparedVariant
-    """With the springs that the file carries."""
+    """Variant with the springs that the file supports."""
     allowed: tuple[PreparedVariant, ...]
-    """With each of the springs to choose from, the simplest first; one where they are given."""
+    """Variants with each of the springs to choose from, the simplest first; a single one if the
+    springs are given."""
     low: BoolArray
     """Whether each reading is of low load, shape (reading,)."""
 

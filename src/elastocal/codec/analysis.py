@@ -1,7 +1,8 @@
-"""The training sets of a finished codec: which springs they tell apart, and their indices.
+"""The training sets of a finished codec: the springs that they determine, and their indices.
 
-A compliance that is not told apart has a value, the smallest one that explains the data, but the
-value is no finding (docs/explanation/observability.md). Charts of compliances say so.
+A compliance that is not separately observable has a value, the smallest one that explains the data,
+but the value means nothing by itself (docs/explanation/observability.md). Charts of compliances say
+so.
 """
 
 from dataclasses import dataclass
@@ -25,23 +26,22 @@ _SHARE = 1e-6
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class SpringObservability:
-    """The springs that the training sets of one variant tell apart."""
+    """Springs that the training sets of one variant determine."""
 
     variant: str
     determined: BoolArray
-    """Whether a training set tells a spring apart from all others, shape
-    (cv, n_train, spring)."""
+    """Whether a training set determines a spring separately, shape (cv, n_train, spring)."""
     groups: tuple[tuple[Term, ...], ...]
     """Combinations that even all poses do not see; see `Observability.unobservable`."""
 
     @property
     def share(self) -> FloatArray:
-        """Return the part of the splits that tell a spring apart, shape (n_train, spring)."""
+        """Return the share of the splits that determine a spring, shape (n_train, spring)."""
         return np.asarray(self.determined.mean(axis=0))
 
     @property
     def never(self) -> BoolArray:
-        """Return which springs no training set tells apart, shape (spring,)."""
+        """Return the springs that no training set determines, shape (spring,)."""
         return np.asarray(~self.determined.any(axis=(0, 1)))
 
 
@@ -51,7 +51,7 @@ class CodecAnalysis:
     """The training sets of every variant, in order of the variants."""
 
     seen: tuple[SpringObservability, ...]
-    """The springs that its training sets tell apart."""
+    """Springs that its training sets determine."""
     indices: tuple[IndexValues, ...] = ()
     """Indices of its training sets; empty where they were not asked for."""
     correlations: tuple[Correlation, ...] = ()

@@ -46,7 +46,7 @@ _STAGE = "splits"
 _WORTH_PROCESSES = 4.0
 """Processor time from which on all cores are used, in s; processes need half of it to start."""
 _GROWTH = 1.8
-"""Ratio of training sizes at which springs are chosen anew."""
+"""Ratio of training sizes at which springs are chosen again."""
 _PACKAGES = ("elastocal", "numpy", "scipy")
 
 
@@ -55,7 +55,7 @@ class _LearningCurve:
     """Choices, fits and errors of a variant on a split, for 1, 2, … training poses."""
 
     springs: tuple[str, ...]
-    """Names of the springs that the errors are of, by number of training poses."""
+    """Names of the springs behind the errors, by number of training poses."""
     chosen: tuple[IndexArray, ...]
     """Numbers of the training poses, in the order of choice."""
     compliance: FloatArray
@@ -64,7 +64,7 @@ class _LearningCurve:
     error_mean: FloatArray
     """Mean absolute residual at the verification poses, shape (n_train, 4), in m; see `AXES`."""
     error_max: FloatArray
-    """Largest absolute residual, likewise."""
+    """Largest absolute residual, of the same shape and unit."""
 
 
 @one_blas_thread()
@@ -181,7 +181,7 @@ def _draw_findings(measured: Readings, drawn: Readings, options: CodecOptions) -
 
 
 def _zero_error(problem: Problem, split: Split) -> float:
-    """Return the mean deflection at the verification poses: what no model at all leaves."""
+    """Return the mean deflection at the verification poses: the error without any model."""
     verified = np.isin(problem.block, split.verification)
     return float(np.linalg.norm(problem.d[verified], axis=1).mean())
 
@@ -208,7 +208,7 @@ def _run_splits(
 ) -> list[list[_LearningCurve]]:
     """Return the learning curves by variant and split.
 
-    The first split tells how long the others would take one process.
+    The duration of the first split decides whether the others run in parallel.
     """
     run = partial(_run_split, entrants, most, seed)
     progress(_STAGE, 0, len(splits))
@@ -310,10 +310,9 @@ def _train(
 
 
 def _sizes_of_choices(most: int) -> list[slice]:
-    """Return ranges of places in a learning curve, springs being chosen anew at each start.
+    """Return ranges of sizes in a learning curve; springs are chosen again at the start of each.
 
-    The largest training set makes a choice of its own, and so does one of 5 poses for each 9 of
-    the next, down to the smallest that carries a choice.
+    The largest training set has a choice of its own, and below it every size that is 5\
     """
     starts = [most - 1]
     while starts[0] + 1 > MINIMUM_BLOCKS:
@@ -350,8 +349,8 @@ def _choices(prepared: PreparedVariant, split: Split, most: int, seed: int) -> l
 
     candidates = Candidates(prepared.contact[poses])
     if not wanted.nested:
-        # To a technique that looks at a production, the training poses under all loads stand
-        # for it: nothing of the verification poses is known to any technique.
+        # For a technique that uses production, the training poses under all loads represent it: no
+        # technique knows anything of the verification poses.
         everything = prepared.rows(poses, np.ones_like(prepared.trains))
         process = everything.reshape(-1, everything.shape[2])
         observation = prepared.rows(poses, prepared.trains)

@@ -73,10 +73,10 @@ class SpringLabels:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class CodecData:
-    """Everything that a repeated cross-validation found; arrays are read-only copies.
+    """Results of a repeated cross-validation; arrays are read-only copies.
 
-    Sizes of training sets are 1, 2, … ``n_train``. Poses are numbered from 0; what they are
-    called in the dataset stands in ``pose_labels``.
+    Sizes of training sets are 1, 2, … ``n_train``. Poses are numbered from 0; ``pose_labels`` holds
+    their labels in the dataset.
 
     Raises
     ------
@@ -121,7 +121,7 @@ class CodecData:
         FloatArray,
         Variable(_ERROR_DIMS, "m", "largest absolute residual at the verification poses"),
     ]
-    """Largest absolute residual, likewise."""
+    """Largest absolute residual, of the same shape and unit."""
     load_cases: tuple[str, ...]
     """Load cases that are verified with."""
     options: CodecOptions
@@ -134,12 +134,12 @@ class CodecData:
     versions: dict[str, str] = field(default_factory=dict)
     """Version of each package that the numbers come from."""
     zero_error: FloatArray | None = None
-    """Mean error norm of no model at all, which is the mean deflection, at the verification poses,
-    shape (cv,), in m; none in files of elastocal 0.1.0."""
+    """Mean error norm without any model, which is the mean deflection, at the verification poses,
+    shape (cv,), in m; None in files of elastocal 0.1.0."""
     layouts: tuple[str, ...] = ()
     """Springs of each variant: what `calibrate` takes on this file for the variant's word."""
     split_layouts: tuple[tuple[tuple[str, ...], ...], ...] = ()
-    """Springs that the errors are of, by variant, split and number of training poses: chosen from
+    """Springs behind the errors, by variant, split and number of training poses; chosen from the
     training poses of that split where there is a choice."""
     ladder: tuple[RungSummary, ...] = ()
     """The ladder of `calibrate` on this file, and other compared layouts; empty in files before."""

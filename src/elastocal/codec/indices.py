@@ -1,20 +1,20 @@
-"""The indices of each training set: how good it ought to be, by what is known beforehand.
+"""Indices of each training set: its expected quality, computed before any measurement.
 
-Do indices foretell accuracy? (paper 4.2.3, where the question is left open). Three rank
-correlations (C. Spearman, 1904) between an index of the training set and the measured error at
-held-out poses; +1: a better index always goes with a smaller error, 0: it tells nothing.
+Do indices predict accuracy? (paper 4.2.3, where the question is left open). Three rank correlations
+(C. Spearman, 1904) between an index of the training set and the measured error at held-out poses;
++1: a better index always goes with a smaller error, 0: no relation.
 
 ``growth``
-    Within each split, over all numbers of training poses; mean over the splits. Nearly
-    everything grows with the number of poses, so that nearly everything correlates.
+    Within each split, over all numbers of training poses; mean over the splits. Nearly every index
+    grows with the number of poses, so nearly all of them correlate.
 ``size``
-    At one number of training poses, over the splits; mean over the numbers. Whether of two sets
-    of as many poses the one with the better index is the more accurate one. Splits that are
-    hard to verify weigh in.
+    At one number of training poses, over the splits; mean over the numbers. It shows whether, of
+    two sets of equal size, the one with the better index is more accurate. Splits that are hard to
+    verify have an influence.
 ``size_and_split``
-    The same after each split's mean rank was taken off: whether an index that is better than is
-    usual for its split and its number goes with an error that is smaller than usual. Neither the
-    number of poses nor a hard verification set can make it.
+    The same after the mean rank of each split was subtracted: whether an index above the average of
+    its split and size goes with an error below the average. Neither the number of poses nor a hard
+    verification set can cause this correlation.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +42,7 @@ COVERING_RADIUS = "covering_radius"
 INDICES = ("o1", "o2", "o3", "o4", "o5", "d", "a", "e", "i", COVERING_RADIUS)
 """Names, in the order of tables."""
 _PLAIN = ("o2", "o3", "o4", "o5", "d", "a", "e")
-"""Those that need the information matrix alone."""
+"""Indices that need the information matrix alone."""
 _TABLE = "indices.csv"
 """Name of the table in a codec's folder."""
 _ERRORS = ("mean", "max")
@@ -59,8 +59,8 @@ class IndexValues:
 
     variant: str
     values: dict[str, FloatArray]
-    """By the names of `INDICES`, each of shape (cv, n_train). Values as their criteria define
-    them, larger is better; only of the covering radius, in m, less is better."""
+    """By the names of `INDICES`, each of shape (cv, n_train). Values as their criteria define them,
+    larger is better; except the covering radius, in m, where smaller is better."""
 
     def goodness(self, name: str) -> FloatArray:
         """Return an index turned so that more is better, shape (cv, n_train)."""
@@ -71,10 +71,10 @@ class IndexValues:
 def index_values(data: CodecData, prepared: PreparedVariant) -> IndexValues:
     """Return the indices of all training sets of a variant.
 
-    All sets are measured by one rule: over the directions that all poses together observe under
-    the variant's load cases (docs/explanation/observability.md), columns scaled over all poses. O1
-    is Eq. 20 of the paper. For ``i``, the verification poses of the split under all load cases
-    stand for the production. The covering radius is that over all poses of the codec.
+    All sets are measured by one rule: over the directions that all poses together observe under the
+    variant's load cases (docs/explanation/observability.md), columns scaled over all poses. O1 is
+    Eq. 20 of the paper. For ``i``, the verification poses of the split under all load cases
+    represent production. The covering radius is that over all poses of the codec.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class PairVerdict:
     """Number of training poses at which the pair is judged: all but one where only the springs
     differ, else where both variants have saturated."""
     better: str | None
-    """The variant with the smaller error there; None: cannot be told."""
+    """Variant with the smaller error there; None: the difference is not significant."""
     proved_from: int | None
     """Number of training poses from which on, up to `at`, every interval says so; None: none."""
     crossing: int | None
@@ -78,7 +78,7 @@ class PairedDifference:
 
     @property
     def better(self) -> str | None:
-        """The variant that is better where the pair is judged; None: cannot be told."""
+        """Variant that is better where the pair is judged; None: not significant."""
         low, high = self.judged.low, self.judged.high
         if low is None or high is None:
             return None

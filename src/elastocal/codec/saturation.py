@@ -30,7 +30,8 @@ class Tolerance:
     relative: float = 0.05
     """Part of the last error."""
     floor: float = 5e-6
-    """Least tolerance, in m: below what a laser tracker repeats, a difference is of no use."""
+    """Smallest tolerance, in m: a difference below the repeatability of a laser tracker is
+    irrelevant."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.relative < 1.0:
@@ -85,8 +86,8 @@ class SaturationInterval:
     rises: bool
     """Whether that is below the last error by more than the tolerance: more poses did harm."""
     unexplained: float | None = None
-    """Last error as a share of what no model at all leaves, median over the verification sets; none
-    where that is not known."""
+    """Last error as a share of the error without any model, median over the verification sets; None
+    where it is not known."""
 
     @property
     def explains(self) -> bool:

@@ -36,7 +36,7 @@ def show_codec(found: CodecSummary) -> Iterator[Block]:
 
 
 def split_facts(data: CodecData) -> Facts:
-    """Return how the poses of a codec were split."""
+    """Return the facts about the splits of a codec."""
     sets, size = data.verification.shape
     last = phrase("1 to {last}", last=int(data.n_train[-1]))
     return Facts(

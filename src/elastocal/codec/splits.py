@@ -58,7 +58,7 @@ class CodecOptions:
         return not self.keep_blunders
 
     def __post_init__(self) -> None:
-        # Work and memory grow with the cube of their number; too few tell nothing.
+        # Work and memory grow with the cube of their number; too few say nothing.
         if not self.poses >= MINIMUM_BLOCKS:
             raise CodecError(f"{self.poses} poses: at least {MINIMUM_BLOCKS} are needed")
         if not 0.0 < self.ratio < np.inf:
@@ -74,7 +74,7 @@ class CodecOptions:
 class Campaign:
     """Readings grouped by physical pose.
 
-    A configuration that was measured twice is one pose, or it would be verified by itself.
+    A configuration that was measured twice is one pose, so that it is never verified by itself.
     """
 
     readings: Readings

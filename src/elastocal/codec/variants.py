@@ -30,7 +30,7 @@ same with any sign allowed, and bounded fits by robust losses."""
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to choose poses, load them and fit springs.
+    """Combination of search technique, load cases and springs that a codec compares.
 
     Raises
     ------

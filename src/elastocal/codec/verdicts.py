@@ -47,8 +47,8 @@ class Verdicts:
     sentences: tuple[str, ...]
     """One for each variant, then one for each pair."""
     springs: tuple[str, ...] = ()
-    """What springs the readings carry, as `calibrate` says, then what variants took for springs
-    that they leave to the readings; empty in codecs of before."""
+    """Springs that the readings support, as `calibrate` states, then the springs of variants that
+    leave the choice to the readings; empty in older codecs."""
 
 
 @brief_repr
@@ -68,7 +68,7 @@ class Curve:
     layout: str = ""
     """Springs that `calibrate` takes on this file for the word in ``springs``."""
     layouts: dict[str, int] = field(default_factory=dict)
-    """Springs that the errors at the largest training sets are of, with the number of splits whose
+    """Springs behind the errors at the largest training sets, with the number of splits whose
     training poses chose them."""
 
 
@@ -101,15 +101,15 @@ class CodecSetup:
 @brief_repr
 @record(VERDICTS_SCHEMA, sealed=True, reads=("elastocal.codec_verdicts/1",))
 class CodecSummary:
-    """The figures of a codec: contents of ``codec.json``, for people's scripts."""
+    """Figures of a codec: contents of ``codec.json``, for scripts of users."""
 
     robot: str
     provenance: str
     settings: CodecSetup
     variants: dict[str, Curve]
     saturation: dict[str, int | None]
-    """By variant: smallest number of training poses whose error is that of the last; none for
-    springs that leave more than half of what no model at all leaves."""
+    """By variant: smallest number of training poses whose error equals the last within the
+    tolerance; None for springs that leave more than half of the error without any model."""
     saturation_interval: dict[str, SaturationInterval]
     paired: tuple[DifferenceAtSize, ...]
     crossings: tuple[PairVerdict, ...]
@@ -184,7 +184,7 @@ def _springs(data: CodecData) -> tuple[str, ...]:
 
 
 def _chosen_by_size(splits: Sequence[Sequence[str]]) -> str:
-    """Return how many splits chose which springs, at each size where one of them changes."""
+    """Return how many splits chose which springs, at each size where the numbers change."""
     sizes = list(zip(*splits, strict=True))
     changes = [0, *(n for n in range(1, len(sizes)) if sizes[n] != sizes[n - 1])]
     return "; ".join(

@@ -1,7 +1,7 @@
 """Compensation of the predicted deflection: online, offline, and on a real-time target.
 
 ================  ================================================================
-`settings`        how a compensator corrects, as a person writes it
+`settings`        settings of a compensator, as in its file
 `conditioning`    from the raw wrench to the wrench at the tcp: tool, bias, filters
 `online`          the correction of a cycle, from joints and readings
 `kernel`          the statements that Python and C both run
@@ -14,7 +14,7 @@
 ================  ================================================================
 
 A new filter goes into `conditioning.filters`, a new controller beside `programs.krl`, a new
-process beside `process.placement`; each of these says what else it touches.
+process beside `process.placement`; each of these names the other places to change.
 """
 
 import lazy_loader

@@ -37,8 +37,8 @@ class PostureChoice:
     """The postures to choose from."""
 
     one: PathPostures | None
-    """One spin, one external position and one branch that are allowed at every station, and of
-    these the stiffest where it is softest; None: there is none."""
+    """One spin, external position and branch that are allowed at every station, and of these the
+    one whose softest station is stiffest; None: there is none."""
     each: PathPostures
     """The stiffest posture of each station, however far from that of its neighbour."""
 

@@ -6,12 +6,12 @@ stiffness is its inverse,
 
     k(u) = 1 / (u^T C u),    u^T C u = sum_i (J_i^T u)^2 c_i,
 
-while the tool is free to yield sideways. The second form is a row of the observation matrix
-(Eq. 11) times the compliances: of springs that cannot be told apart only the sum counts, which is
+while the tool may move sideways. The second form is a row of the observation matrix (Eq. 11) times
+the compliances: of springs that are not separately observable only the sum enters, which is
 determined. The principal stiffnesses are the inverse eigenvalues of C.
 
-Postures are compared at stations, rows of the path that are evenly taken. What may be chosen: the
-spin about the tool's axis, the positions of the external axes, and the branch of the arm (elbow,
+Postures are compared at stations, evenly spaced rows of the path. What may be chosen: the spin
+about the tool's axis, the positions of the external axes, and the branch of the arm (elbow,
 shoulder, wrist). What a posture must pass: margins to the limits and to singularity, no collision.
 """
 
@@ -174,7 +174,7 @@ class PostureConstraint:
 
     name: str
     allows: Callable[[FloatArray], BoolArray]
-    """From joints, shape (row, joint), to whether each row passes, shape (row,)."""
+    """Function from joints, shape (row, joint), to whether each row is allowed, shape (row,)."""
 
 
 def joint_limit_constraint(robot: Robot, margin: FloatArray) -> PostureConstraint:

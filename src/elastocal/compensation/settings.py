@@ -1,4 +1,4 @@
-"""Settings of the online compensator, as a person writes them.
+"""Settings of the online compensator, as in its file.
 
 Example::
 
@@ -41,11 +41,11 @@ from elastocal.robot import T_from_xyzabc
 _SCHEMA = "elastocal.compensator/1"
 
 _LARGEST_CORRECTION = 0.05
-"""In m: no arm that is worth calibrating yields so far."""
+"""In m: no arm in use deflects by more."""
 _LARGEST_RATE = 1.0
 """In m/s."""
 _LONGEST_HOLD = 1.0
-"""In s: what was measured before is not what acts now."""
+"""In s: an older measurement does not describe the present load."""
 
 
 _RangeForce = Annotated[PositiveForce, Field(le=LARGEST_FORCE)]
@@ -136,7 +136,7 @@ class CompensatorSettings(StrictModel):
 
     @property
     def chain(self) -> FilterChain:
-        """The filters; made anew at every call. See `FilterSettings.chain` for what it refuses."""
+        """The filters, new at every call. See `FilterSettings.chain` for its errors."""
         return self.filter.chain(self.cycle)
 
     @property

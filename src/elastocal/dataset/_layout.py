@@ -147,7 +147,7 @@ JOINT_VARIABLES = (JOINT_POSITION, REFERENCE_JOINT_POSITION, LINK_JOINT_POSITION
 """The variables that have a value for each joint."""
 
 JOINT_PREFIXES = {"reference_": REFERENCE_JOINT_POSITION, "link_": LINK_JOINT_POSITION}
-"""What stands before a joint's name in the CSV column of a variable."""
+"""Prefix of a joint's name in the CSV column of a variable."""
 
 VECTORS = (
     Variable("force", _READING, "force", "N", "force on the robot at the TCP, in base", True),
@@ -224,8 +224,8 @@ SIMILAR = 0.85
 def joint_name_problem(name: str) -> str | None:
     """Return why ``name`` cannot name a joint column, or None when it can.
 
-    A joint column is every column that is not known otherwise, so a name that is all but equal
-    to a known column must be refused: it is a slip of the pen, not a joint.
+    A joint column is every column that is not known otherwise, so a name that nearly equals a known
+    column must be refused: it is a typing error, not a joint.
 
     >>> joint_name_problem("joint_a1") is None
     True
@@ -281,7 +281,7 @@ def require_labels(kind: str, labels: Iterable[object]) -> None:
 
 
 def require_unique(kind: str, labels: Sequence[object]) -> None:
-    """Refuse labels that stand twice.
+    """Refuse repeated labels.
 
     Raises
     ------

@@ -2,8 +2,7 @@
 
 The header of a dataset's CSV file: its attributes, and which column holds what in which unit.
 
-Attributes stand above the header as comment lines, their texts in JSON so that each fits on one
-line.
+Attributes precede the header as comment lines, their texts in JSON so that each fits on one line.
 """
 
 import difflib
@@ -152,7 +151,7 @@ def _preamble(lines: Sequence[str]) -> dict[str, object]:
 
 
 def _attribute(line: str, number: int) -> dict[str, object]:
-    """Return the attribute that a comment line states; none when it is a person's remark."""
+    """Return the attribute that a comment line states; None for any other comment."""
     match = _ATTRIBUTE.fullmatch(line)
     if match is None:
         return {}
@@ -372,7 +371,7 @@ def _read_netcdf(path: Path) -> LabelledArrays:
 
 
 read_dataset = read
-"""`read` under the name that it has in the face of `elastocal`."""
+"""`read` under its name in the public face of `elastocal`."""
 
 
 @dataclass(frozen=True)
@@ -479,7 +478,7 @@ def write_table(data: Dataset, path: Path) -> None:
 
 
 def _grid(table: TableText, text: Mapping[str, int]) -> _Grid:
-    """Return the place of each row; a (pose, load case) that stands twice is refused."""
+    """Return the position of each row; a repeated (pose, load case) is refused."""
     poses: dict[int, int] = {}
     cases: dict[str, int] = {}
     line_of: dict[tuple[int, int], int] = {}

@@ -1,12 +1,12 @@
 """The dataset: the labelled arrays of the paper's Procedure 1.
 
-Checks of the numbers of a dataset; its names and shapes are already right here.
+The checks of its numbers assume that names and shapes are right.
 
 Two kinds: numbers that a reading cannot have, and numbers that look like the unit mistakes of the
-shop floor, told apart from blunders. Degrees in a radian column or millimetres in
-a metre column shift *every* number by a factor; a broken beam shifts one. Displacements and forces
-are therefore judged by their median over the usable readings, which a single blunder cannot move;
-the fit names the blunder.
+shop floor, as distinct from blunders. Degrees in a radian column or millimetres in a metre column
+shift *every* number by a factor; a broken beam shifts one. Displacements and forces are therefore
+judged by their median over the usable readings, which a single blunder cannot move; the fit names
+the blunder.
 """
 
 import math
@@ -181,7 +181,7 @@ def _offences(
 
 
 def _place(labels: Labels, variable: Variable, index: NDArray[np.intp]) -> str:
-    """Return where in a dataset a number stands, in words."""
+    """Return the position of a number in a dataset, in words."""
     label = {dim: labels[dim][int(i)] for dim, i in zip(variable.dims, index, strict=True)}
     component = label.get("axis", label.get("joint"))
     where = f"{variable.name} {component} of pose {label['pose']}"
@@ -372,7 +372,7 @@ class Dataset(Result):
         check_numbers(self._labels, self._variables)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return how much was measured, and where it comes from."""
+        """Return the size and origin of the measurements."""
         usable, poses = self.usable, len(self.poses)
         return (
             ("robot", self.robot_name or "without a name"),
@@ -487,7 +487,7 @@ class Dataset(Result):
     def from_labelled(cls, arrays: LabelledArrays) -> "Dataset":
         """Return the dataset of labelled arrays, such as a NetCDF file holds them.
 
-        Dimensions and axes may stand in any order; units that are not SI are converted.
+        Dimensions and axes may be in any order; units that are not SI are converted.
 
         Raises
         ------
@@ -608,7 +608,7 @@ class Dataset(Result):
 
     @property
     def provenance(self) -> str:
-        """Where the data come from; empty when not known."""
+        """Origin of the data; empty when not known."""
         return self.attributes["provenance"]
 
     def select(

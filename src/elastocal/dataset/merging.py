@@ -38,11 +38,11 @@ def merge(
 ) -> "Dataset":
     """Return all poses of several datasets of the same robot.
 
-    Poses keep their labels, and one that stands in two datasets is refused: whether it is the
-    same pose measured again or another one is for the user to say. Load cases are the union, in
-    order of first appearance; a pose that lacks one has NaN and the status missing there. Joints
-    are matched by name. Provenances are joined with ``"; "``; the marker is the first one's.
-    Readings keep their order in time, and a reference without a recorded force was unloaded.
+    Poses keep their labels, and one that is in two datasets is refused: the user must state whether
+    it is the same pose. Load cases are the union, in order of first appearance; a pose that lacks
+    one has NaN and the status missing there. Joints are matched by name. Provenances are joined
+    with ``"; "``; the marker is the first one's. Readings keep their order in time, and a reference
+    without a recorded force was unloaded.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _check(datasets: Sequence["Dataset"]) -> dict[str, str]:
 
 
 def _sequence(datasets: Sequence["Dataset"], cases: Sequence[str]) -> IntArray | None:
-    """Return the order in time; None where it is that of the load cases at all poses."""
+    """Return the order in time; None where it is the order of the load cases at all poses."""
     places = [[cases.index(case) for case in dataset.load_cases] for dataset in datasets]
     ordered = all(place == sorted(place) for place in places)
     if ordered and all(dataset.sequence is None for dataset in datasets):

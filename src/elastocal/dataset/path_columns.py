@@ -1,8 +1,8 @@
-"""Columns of rows of joints or poses with a wrench, by the header, and what their numbers may be.
+"""Columns of a table of joints or poses with a wrench, by its header, and the allowed numbers.
 
 A row is an instant. It has the robot's joints, or a pose of the tcp (beside one, columns of
-external axes), and the force on the robot, in base or in axes of the programmed tcp; a moment
-likewise.
+external axes), and the force on the robot, in base or in axes of the programmed tcp; and optionally
+a moment.
 """
 
 import math
@@ -17,7 +17,7 @@ from elastocal.tables import Column
 from elastocal.units import dimension_of_unit, factor, largest, split_column
 
 LARGEST_FORCE, LARGEST_MOMENT = 1e5, 1e5
-"""In N and N·m: what no sensor on a robot reads. Beyond, a number is no reading."""
+"""In N and N·m: a larger number is beyond any sensor on a robot, hence no reading."""
 _BEYOND = 0.1
 """Distance from a joint's limit, in rad or m, that the limits of a drawing may be wrong by; degrees
 that were called radians lie farther off."""
@@ -54,7 +54,7 @@ class PathColumns:
     """None only where forces are not asked for."""
     moment: WrenchColumns | None
     robot: Robot | None = None
-    """Whose joints they are; None: not known."""
+    """Robot to which the joints belong; None: not known."""
 
     @property
     def by_pose(self) -> bool:

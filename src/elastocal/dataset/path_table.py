@@ -1,10 +1,9 @@
 """Rows of joints or poses with a wrench (``PATH.csv``, ``ROWS.csv``): the one reader and writer.
 
-Every command that takes such rows reads them here, in SI units, so that one rule says what cannot
-be meant: a number that is none, a joint far outside its limits, an angle of more than a turn, a
-force that no robot feels. Rows are read in blocks, so that a path of any length fits into memory;
-what is not read is carried through untouched, in its place. No number is written that is not
-finite.
+Every command that takes such rows reads them here, in SI units, so that one rule decides which
+numbers are refused: not finite, a joint far outside its limits, an angle of more than a turn, an
+impossible force. Rows are read in blocks, so that a path of any length fits into memory; other
+columns are carried through unchanged. Only finite numbers are written.
 """
 
 import sys
@@ -30,7 +29,7 @@ from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.tables import Column, TableError, TableLayout, TableRows, new_table, opened_table
 
 _TURN = 2.0 * np.pi * (1.0 + 1e-6)
-"""In rad; controllers write orientations within half a turn, some within a whole one."""
+"""In rad; controllers write orientations within half a turn, some within a full one."""
 _UNIT_NORM = 2e-3
 """Largest distance of the norm of a quaternion from 1: three digits may have been written."""
 _BLOCK = 20_000
@@ -66,7 +65,7 @@ class PathRows:
     """Programmed poses, shape (row, 4, 4), in m; None in a path of joints. Of an orientation
     without a position the latter is 0."""
     force: FloatArray | None
-    """As the file has it, shape (row, 3), in N; `wrench_in_base` turns it."""
+    """Force as in the file, shape (row, 3), in N; `wrench_in_base` rotates it."""
     moment: FloatArray | None
     """The same in N·m."""
 
@@ -258,7 +257,7 @@ class PathTable:
 def new_rows(
     out: Path, table: PathTable, added: Sequence[str]
 ) -> Iterator[Callable[[PathRows, FloatArray, Sequence[tuple[Column, FloatArray]]], None]]:
-    """Yield what writes rows of a table with further columns, in the way the table is written.
+    """Yield a writer of rows of a table with further columns, in the table's own format.
 
     It takes rows, the numbers of the added columns, shape (row, added), and columns that are
     replaced with their numbers in SI units. The file takes its place when the block ends without

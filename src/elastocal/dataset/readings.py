@@ -24,7 +24,7 @@ _NO_NUMBERS = ("pose", "load_case", "sequence", "campaign", "conditioned", "also
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Presses:
-    """Presses that gave no usable reading but belong to the way that the torques took."""
+    """Presses without a usable reading that belong to the history of the torques."""
 
     pose: IntArray
     """Label of the pose of each, shape (press,)."""
@@ -94,8 +94,8 @@ class Readings:
     campaign: StringArray | None = None
     """Campaign of each reading, shape (reading,); None: there are none."""
     also_pressed: Presses | None = None
-    """Presses that gave no usable reading, such as one that slipped; None: none is known. Those of
-    any pose: `take` keeps all of them, so friction still remembers."""
+    """Presses without a usable reading, such as one that slipped; None: not recorded. `take` keeps
+    those of all poses, since friction remembers them."""
 
     def __post_init__(self) -> None:
         self._own("pose", np.array(self.pose, dtype=np.int64), (len(self.pose),))
@@ -159,7 +159,7 @@ class Readings:
         )
 
     def set_aside(self, index: ArrayLike) -> "Readings":
-        """Return the readings without some that were pressed all the same: friction remembers.
+        """Return the readings without some whose presses remain in the history of friction.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class Readings:
 def without(readings: Readings, excluded: str | Sequence[str]) -> Readings:
     """Return the readings without those named ``POSE`` or ``POSE:LOAD_CASE``.
 
-    They were pressed all the same, and friction remembers: see `Readings.set_aside`.
+    Their presses remain in the history of friction: see `Readings.set_aside`.
 
     Parameters
     ----------

@@ -1,14 +1,13 @@
 """The time stamps of a device, translated to the clock of the rig.
 
-A sample arrives after it was taken, never before, so
+A sample never arrives before it was taken, so
 
     arrival - stamp = offset + drift (stamp - first stamp) + latency,    latency >= 0.
 
-The least of that over a window of time holds hardly any latency. The drift is the median of the
-slopes between the least ones (P. K. Sen, J. Am. Stat. Assoc. 63, 1968): a window in which
-everything came late tilts it not. The line then is the highest one that no sample lies below: a
-translated time is never ahead of the arrival. What is left in the offset is the shortest way from
-the device to here.
+The minimum over a window of time has hardly any latency. The drift is the median of the slopes
+between these minima (P. K. Sen, J. Am. Stat. Assoc. 63, 1968), so that a window in which everything
+came late does not tilt it. The line then is the highest one that no sample lies below: a translated
+time is never later than the arrival. The offset contains the shortest latency from the device.
 """
 
 from collections import deque
@@ -26,9 +25,9 @@ _LEAST_WINDOWS = 5
 MOST_DRIFT = 500e-6
 """Largest drift that is taken for one: quartz clocks are within 100 ppm."""
 _NO_CLOCK = 0.02
-"""Beyond this the stamps are no seconds at all."""
+"""Rate beyond which the stamps are no seconds."""
 _MOST_AHEAD = 1.0
-"""A stamp that is so far ahead of its arrival, in s, is of another time."""
+"""Largest lead of a stamp over its arrival, in s; beyond it the stamp belongs to another time."""
 
 
 class DeviceClock:
@@ -49,7 +48,8 @@ class DeviceClock:
         self.offset = 0.0
         """Rig time less stamp at the first stamp, in s."""
         self.drift = 0.0
-        """How much faster the rig's clock runs, without dimension; within `MOST_DRIFT`."""
+        """Rate of the rig's clock relative to the device's, minus 1, dimensionless; within
+        `MOST_DRIFT`."""
 
     def against_the_pc(self) -> tuple[float, float | None] | tuple[None, None]:
         """Return the device's time less the rig's, in s, and how much faster its clock runs.
@@ -63,7 +63,7 @@ class DeviceClock:
         return -(self.offset + self.drift * passed), drift
 
     def rig_time(self, stamp: float, arrival: float) -> float:
-        """Return when a sample was taken by the rig's clock, in s; later than those before it.
+        """Return the time of a sample by the rig's clock, in s; later than those before it.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ Value = int | float | str
 _LARGEST_SCALE = 100.0
 """Largest factor on the instruments' errors."""
 _LARGEST_SPREAD = 1.0
-"""Standard deviation of the logarithm of a stiffness: a factor of 2.7 either way."""
+"""Standard deviation of the logarithm of a stiffness: a factor of 2.7 in either direction."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,8 @@ class Condition:
     force_noise: float = 1.0
     """Factor on noise, drift and cross-talk of the force sensor in the cell file."""
     truth: float = 0.2
-    """How much arms of one make differ: standard deviation of the logarithm of every stiffness
-    about the cell file's. The default, some 20 %, is an assumption."""
+    """Variation among arms of one type: standard deviation of the logarithm of every stiffness
+    about that of the cell file. The default, some 20 %, is an assumption."""
 
     def value(self, factor: str) -> Value:
         """Return the value of a factor by its name in `FACTORS`."""

@@ -43,7 +43,7 @@ class StudyPoses:
 
     pool: StudyPool
     candidates: Candidates
-    """Those of ``pool.training``."""
+    """Candidates of ``pool.training``."""
 
 
 @brief_repr
@@ -52,7 +52,7 @@ class PoseChoice:
     """Calibration poses of a condition."""
 
     order: IndexArray | None
-    """In the order of choice; None: every sample draws its own."""
+    """Poses in the order of choice; None: every sample draws its own."""
     pool: IndexArray
     """Poses that samples draw from."""
     count: int
@@ -106,8 +106,8 @@ def choose_poses(
 ) -> tuple[PoseChoice, ...]:
     """Return the calibration poses of every condition.
 
-    What a technique knows is the same for every arm, so it chooses once, as a plan does. Only
-    ``random`` chooses anew for every sample: one draw would say nothing about it.
+    A technique has the same information for every arm, so it chooses once, as a plan does. Only
+    ``random`` chooses again for every sample, since one draw would not characterise it.
 
     Raises
     ------

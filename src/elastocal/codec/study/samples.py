@@ -1,12 +1,13 @@
 """Samples of a study, arms calibrated under every condition, and the folder that keeps them.
 
-Here is the estimator's part of a sample: fit, then predict where it has not measured.
+This module does the estimator's part of a sample: it fits, then predicts at poses that were not
+measured.
 
 The folder holds the design of the study first, then finished samples in parts, each written whole
-or not. A part is named after its samples. Its contents depend on nothing else but the design, so
-a part that two processes write is the same; a study that is killed goes on with what is missing. A
-part carries a digest over the design and its samples: one of another study, or one that was edited,
-is refused.
+or not. A part is named after its samples. Its contents depend on the design alone, so a part that
+two processes write is the same; a study that was killed continues with the missing parts. A part
+carries a digest over the design and its samples: a part of another study, or an edited one, is
+refused.
 """
 
 import json
@@ -95,7 +96,7 @@ class SampleResult:
 
     number: int
     outcomes: tuple[ConditionResult, ...]
-    """In the order of the conditions."""
+    """Outcomes in the order of the conditions."""
 
 
 Simulate = Callable[[Sample], SampleResult]
@@ -116,7 +117,7 @@ class Verification:
     """True deflection of the tool in base, shape (reading, 3), in m."""
 
     def judge(self, model: ElasticModel, compliance: FloatArray) -> ConditionResult:
-        """Return how well a calibrated model predicts the deflections."""
+        """Return the accuracy of a calibrated model on the deflections."""
         predicted = model.deflection(compliance, self.q, self.force)
         error = np.linalg.norm(predicted - self.deflection, axis=1)
         size = np.linalg.norm(self.deflection, axis=1)
@@ -166,9 +167,9 @@ class SpringLabel:
 @brief_repr
 @record(DESIGN_SCHEMA)
 class StudyDesign:
-    """All that the numbers of a study depend on, but for the number of samples.
+    """Design of a study: all that its numbers depend on except the number of samples.
 
-    Two stretches of a study belong together only when this is the same.
+    Parts of a study belong together only if their design is the same.
     """
 
     cell: str
@@ -183,10 +184,10 @@ class StudyDesign:
     verification: int
     """Verification poses."""
     load_cases: tuple[str, ...]
-    """Those of the cell; verification takes all of them."""
+    """Load cases of the cell; verification uses all of them."""
     conditions: tuple[Condition, ...]
     springs: dict[str, tuple[SpringLabel, ...]]
-    """By layout, in the order of the compliances."""
+    """Springs by layout, in the order of the compliances."""
     versions: dict[str, str]
     """Versions of the packages that make the numbers."""
 

@@ -100,7 +100,7 @@ def check_samples(samples: int) -> None:
 
 
 def one_after_the_other(batches: Iterable[Work]) -> Iterator[list[SampleResult]]:
-    """Do the batches here and now."""
+    """Run the batches one after another in this process."""
     return (work() for work in batches)
 
 

@@ -20,7 +20,7 @@ STUDY_SCHEMA = "elastocal.study/1"
 _SUMMARY, _TABLE, _COMPLIANCES = "study.json", "study.csv", "compliance.csv"
 """Names of the files in a study's folder."""
 _RELIABLE = 0.9
-"""Share of the arms that a condition has to bring to the target before it is recommended."""
+"""Share of the arms that a condition must bring to the target to be recommended."""
 
 _FACTOR_COLUMNS = tuple(
     f"{key}[{factor.unit}]" if factor.unit else key for key, factor in FACTORS.items()

@@ -34,7 +34,7 @@ from elastocal.units import parse_quantity
 Section = tuple[float, float, float, float, float]
 """b0, b1, b2, a1, a2; a0 is 1."""
 _MEDIANS = (1, 3, 5)
-"""Lengths of the median; 1 is none."""
+"""Lengths of the median filter; 1 is no filter."""
 _LARGEST_ORDER = 8
 """Highest order of the low-pass: with more, sections lose digits and the delay is too long."""
 _LONGEST_LEAD = 0.1
@@ -100,7 +100,7 @@ class FilterChain:
         return readings * self.sample
 
     def gain(self, frequency: ArrayLike) -> FloatArray:
-        """Return how much of an oscillation the sections let through; above 1 with a lead only."""
+        """Return the gain of an oscillation through the sections; above 1 only with a lead."""
         z = np.exp(-2j * np.pi * np.asarray(frequency, dtype=float) * self.sample)
         passed = np.ones(z.shape)
         for b0, b1, b2, a1, a2 in self.sections:
@@ -147,7 +147,7 @@ class FilterSettings(StrictModel):
         return self.model_copy(update={"median": 1, "notches": (), "low_pass": None, "lead": None})
 
     def chain(self, cycle: float) -> FilterChain:
-        """Return the filters; made anew at every call.
+        """Return the filters; new objects at every call.
 
         Parameters
         ----------

@@ -1,17 +1,17 @@
-"""Mistakes in static postures: frames, signs and units read otherwise, and what fits no tool.
+"""Mistakes in static postures: wrong frames, signs and units, and data that fit no tool.
 
-The same idea as the verdict on a dataset's conventions: a reading that explains the data far
-better than what the file says is what was measured. What no reading explains is refused, too: a
-spoilt posture, a rotation that is not as mounted, a wrong unit.
+The idea is that of the check of a dataset's conventions: if another interpretation explains the
+data far better than the stated one, it is what was measured. Data that no interpretation explains
+are refused as well: a spoilt posture, a rotation that differs from the mounting, a wrong unit.
 
-Static postures with a mistake undone: what one tool on the sensor as mounted then explains.
+A mistake is undone and one tool is fitted on the sensor as mounted.
 
-What a mistake did can be undone without knowing whether it was made. Each reading of the numbers
-is fitted by linear least squares in mass and bias, ``F = m u + b`` and ``M = h x u + b_m`` with
-gravity ``u`` in the sensor's frame; the plainest of those that leave nearly the least is named,
-where it leaves far less than the numbers as stated.
+Every candidate mistake is undone in turn. Each interpretation of the numbers is fitted by linear
+least squares in mass and bias, ``F = m u + b`` and ``M = h x u + b_m`` with gravity ``u`` in the
+sensor's frame; the plainest of those that leave nearly the least is named, where it leaves far less
+than the numbers as stated.
 
-What a person should look at before a tool is believed: no mistake that is certain.
+Doubtful points that are not certain mistakes are returned as warnings.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,17 +30,17 @@ from elastocal.parallel import one_blas_thread
 from elastocal.robot import nearest_rotation, xyzabc_from_T
 
 _LEAST_SPREAD = np.radians(15.0)
-"""Least spread of the postures that tells a weight, in rad."""
+"""Least angular spread of the postures that determines a weight, in rad."""
 _LEAST_LEVER, _LEVER_RATIO = 0.02, 5.0
 """Distance of a centre of mass from its sensor in m, and how far it may be from the stated one."""
 _MUCH_LEFT, _LEAST_LEFT = 0.05, 3.0
-"""What may be left of a force component, or drift, over the weight, and in N."""
+"""Largest residual of a force component, or drift, relative to the weight, and in N."""
 _LEAST_MASS, _MOST_MASS = 0.6, 1.15
-"""Part of the stated mass that a sensor may feel: its own lower half is none of it."""
+"""Part of the stated mass that a sensor may feel: its own lower half does not count."""
 _FORCE_UNITS = {"kgf": 9.80665, "lbf": 4.4482216, "kN": 1e3, "N, not kgf": 1 / 9.80665}
 """Forces that are taken for newtons, with their size in N."""
 _NEAR = 0.1
-"""How near a ratio of masses must be to that of two units."""
+"""Largest deviation of a ratio of masses from that of two units."""
 
 
 def tool_doubts(
@@ -145,7 +145,7 @@ _FITTED_BY_CROSS_TALK = 4
 _FAR_BETTER = 0.3
 """Part of it that undoing a mistake leaves at most."""
 _TIE = 1.3
-"""Readings that leave nearly the same are not told apart."""
+"""Interpretations with nearly equal residuals are not distinguished."""
 _ROUNDING = 1e-6
 """Part of what is left as stated that is rounding."""
 _LEAST_OVER = 8
@@ -153,11 +153,11 @@ _LEAST_OVER = 8
 _LEAST_PART = 2
 """Postures on either side of a change in time."""
 _LEAST_TURN = np.radians(3.0)
-"""A base or sensor turned by less is mounted as people mount them."""
+"""A rotation of base or sensor below this angle is a usual mounting error."""
 _DEAD, _SAME = 0.1, 0.03
 """Gains of an axis below which it is dead, and nearer to 1 than which it is right."""
 SENSOR_TURNED = "the sensor is not turned as stated"
-"""How the mistake of a rotation begins, of which a caller may know more."""
+"""Start of the text of a mistaken rotation, which a caller may explain further."""
 _AXES = "xyz"
 _ORDERS = ("zyx", "XYZ", "ZYZ", "ZXZ", "YZX")
 """Senses of three angles beside KUKA's ZYX, as SciPy writes them."""
@@ -178,7 +178,7 @@ class _Reading:
 def force_mistake(
     postures: StaticPostures, R_flange_sensor: FloatArray, lever: float
 ) -> str | None:
-    """Return the mistake without which one tool explains the forces; None where there is none.
+    """Return the mistake whose correction lets one tool explain the forces; None if there is none.
 
     Parameters
     ----------
@@ -225,10 +225,10 @@ def moment_mistake(
 
 
 def _floors(u: FloatArray, own: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """Return what must be left to look for mistakes, and for those that cross-talk imitates.
+    """Return the residuals above which mistakes are sought, in general and beside cross-talk.
 
     Cross-talk is an affine law of gravity of twelve numbers, which four directions always fit: then
-    only what is beyond any cross-talk is a mistake, of whatever kind.
+    only a residual beyond any cross-talk shows a mistake.
 
     Parameters
     ----------
@@ -423,14 +423,14 @@ _HEAVIEST = 5000.0
 """In kg; robots carry up to 2300 kg."""
 _FREE = ToolModel(rotation=True)
 _QUATERNIONS = (("x y z w", "w x y z", [1, 2, 3, 0]), ("w x y z", "x y z w", [3, 0, 1, 2]))
-"""Orders of a quaternion: as the columns are named, as the numbers are, where these then stand."""
+"""Orders of a quaternion: of the column names, of the numbers, and of the numbers in words."""
 _UNITS = ("N", "N*m")
 _POOR = 0.1
 """Part of what turns with the posture that may be left: noise, cross-talk leave a few percent."""
 _NOISE = np.array([5.0, 0.5])
-"""In N and N·m: noise of a sensor where too few postures tell it."""
+"""Noise of a sensor in N and N·m, used where too few postures determine it."""
 _ABOVE_NOISE = 3.0
-"""What is left, in what the best affine law of gravity leaves, that is more than noise."""
+"""Residual over that of the best affine law of gravity above which it is more than noise."""
 _MUCH_BETTER = 0.2
 """Share of what is left, from which on another reading is believed."""
 _TRIED = 10
@@ -587,7 +587,7 @@ def _turning(postures: StaticPostures) -> FloatArray:
 def _refuse_other_order(
     postures: StaticPostures, free: ToolFit, R_nominal: FloatArray | None
 ) -> None:
-    """Refuse quaternions whose numbers stand in the other order of the two in use."""
+    """Refuse quaternions whose numbers are in the other of the two usual orders."""
     if not postures.quaternions:
         return
     stated = _rms(tool_residual(postures, free)[0])
@@ -650,7 +650,7 @@ def _refuse_other_forces(
         )
     turned = next(iter(others))
     as_mounted = np.eye(3) if R_nominal is None else R_nominal
-    # With gravity turning in one plane both signs fit; where the sensor sits tells them apart.
+    # With gravity turning in one plane both signs fit; the position of the sensor decides.
     fits_both = left[turned] <= 1.5 * stated + _WRONGLY_READ * _rms(postures.force)
     weighs = _weight(postures, fit) > _WRONGLY_READ * _rms(postures.force)
     if (fit.mass < 0.0 and weighs and "mass" not in fit.undetermined) or (

@@ -18,7 +18,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, Robot
 
 LEAST_POSTURES = 3
-"""Postures; with fewer nothing is left to tell whether the numbers fit."""
+"""Fewest postures; with fewer, nothing is left to test the fit."""
 _QUATERNION = 4
 """Columns of an orientation as a quaternion."""
 

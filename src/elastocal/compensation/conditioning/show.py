@@ -20,7 +20,7 @@ _DETERMINED = 0.75
 
 
 def show_tool(found: ToolResult) -> Iterator[Block]:
-    """Yield everything that a person asks of a tool.
+    """Yield the blocks of a tool.
 
     Parameters
     ----------

@@ -42,11 +42,11 @@ class ToolResult(Result):
     undetermined: tuple[str, ...]
     postures: int
     force_scatter: float | None
-    """What is left of a component, in N."""
+    """Residual of a component, in N."""
     moment_scatter: float | None
     source: str
     rotation_known: bool = False
-    """Whether the rotation was taken as mounted; files of before searched for it."""
+    """Whether the rotation was taken from the mounting; older files estimated it."""
     response: _Rows | None = None
     """Corrected reading per gravity, sensor frame, shape (6, 3); none: that of mass and centre."""
     matrix: _Rows | None = None
@@ -65,7 +65,7 @@ class ToolResult(Result):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a tool, or a place of a sensor, that is none.
+        """Refuse a tool or a sensor position that is not finite or not plausible.
 
         Raises
         ------

@@ -1,17 +1,17 @@
-"""Which unknowns static postures carry, which postures to set aside, what widens an interval.
+"""Choice of unknowns for static postures, exclusion of blunders, and widening of intervals.
 
 * **Blunders.** Whatever tool, rotation, sign and matrix: the readings are affine in gravity as the
   flange sees it, ``y_i = G u_i + b``. The best of many affine laws through few postures (least
-  median of squares, Rousseeuw 1984) tells which postures go together; one whose reading the law of
-  the others does not foresee, by a t test over all components, is set aside and named.
+  median of squares, Rousseeuw 1984) shows which postures agree; one whose reading the law of the
+  others does not predict, by a t test over all components, is set aside and named.
 * **Choice.** Drift, matrix and, where asked for, the sensor's rotation are freed one after the
-  other, each only if it foretells left-out postures better by a paired interval that counts the
+  other, each only if it predicts left-out postures better by a paired interval that counts the
   overlap of the training sets (Nadeau and Bengio 2003). A rotation must also be larger than its
   interval beside a matrix with its prior: cross-talk looks like a rotation.
 * **Cross-talk.** Where the matrix is not freed, the intervals are still those beside it.
-* **Order.** Residuals that resemble their neighbours' are no independent readings. Where shuffling
-  the postures shows that, intervals grow by ``sqrt((1 + r) / (1 - r))``; and where a half of the
-  postures, first or last, disagrees with all of them, they reach to what it says.
+* **Order.** Correlated residuals of neighbouring postures are not independent readings. Where a
+  permutation test shows this, intervals grow by ``sqrt((1 + r) / (1 - r))``; where the first or
+  last half of the postures disagrees with the whole, they are extended to its estimate.
 """
 
 from collections.abc import Sequence
@@ -69,7 +69,7 @@ class PostureSetAside:
 
     @property
     def text(self) -> str:
-        """Which posture, and how far it is off."""
+        """The posture and its residual, in words."""
         return (
             f"posture {self.posture} does not fit the others: {self.force:.3g} N and"
             f" {self.moment:.3g} N*m from what they foretell"
@@ -219,7 +219,7 @@ def _majority(A: FloatArray, y: FloatArray) -> BoolArray:
 
 
 def _foretold(A: FloatArray, y: FloatArray, kept: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return how far each posture is from what the others kept foretell, and its probability."""
+    """Return the residual of each posture against the others' prediction, and its probability."""
     off, chance = np.zeros_like(y), np.ones(len(A))
     floor = _SMALL * (1 + np.abs(y).max())
     for row in range(len(A)):
@@ -297,7 +297,7 @@ def _beside(model: ToolModel, step: ToolModel) -> ToolModel:
 def _mounted_rotation(
     postures: StaticPostures, R_nominal: FloatArray | None, richest: ToolModel
 ) -> tuple[bool, str]:
-    """Return whether the sensor sits as mounted, as far as its cross-talk tells, and its turn."""
+    """Return whether the rotation agrees with the mounting within cross-talk, and the angle."""
     nominal = np.eye(3) if R_nominal is None else R_nominal
     fit = fit_tool(postures, nominal, replace(richest, rotation=True))
     angles = rotation_off(nominal, fit.R_flange_sensor)

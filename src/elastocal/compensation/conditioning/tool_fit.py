@@ -6,16 +6,16 @@ With gravity ``u_i`` in the flange's axes, the rotation ``R`` of the sensor in t
     y_i = (1 + X) [mass R^T u_i; h x R^T u_i] + [b; b_m] + s_i d,        s_i from -1/2 to 1/2.
 
 Mass, ``h`` and the biases are always free. The rotation ``R`` is known from the drawing, unless
-asked for; drift ``d`` and matrix ``X`` (gains, cross-talk) are added where unseen postures say so
-(`elastocal.compensation.conditioning.tool_choice`). ``X`` has a prior: every entry is normal about
-0, with the sensor's cross-talk as its deviation, in units of its ranges. Without one it would take
-all: a rotation by a small angle is a matrix, too, and no static posture tells the two apart, nor
-mass from gain. A weight excites three directions of the six of a wrench (``[1; [c]x]``): 18 of the
-36 entries' combinations at most.
+asked for; drift ``d`` and matrix ``X`` (gains, cross-talk) are added where left-out postures
+support them (`elastocal.compensation.conditioning.tool_choice`). ``X`` has a prior: every entry is
+normal about 0, with the sensor's cross-talk as its deviation, in units of its ranges. Without one
+it would absorb everything: a rotation by a small angle is a matrix, too, and static postures
+distinguish neither the two, nor mass from gain. A weight excites three directions of the six of a
+wrench (``[1; [c]x]``): 18 of the 36 entries' combinations at most.
 
-Gauss-Newton from the best rotation between forces and gravity (Kabsch 1976), singular directions
-left where they started; force and moment weighed by their own scatter. The intervals are those of
-the last linear step with the prior as further rows, by Student's t.
+Gauss-Newton from the best rotation between forces and gravity (Kabsch 1976), with singular
+directions kept at their start; force and moment are weighted by their own scatter. The intervals
+are those of the last linear step with the prior as further rows, by Student's t.
 """
 
 from dataclasses import dataclass, field, replace
@@ -51,7 +51,7 @@ _LOADING = 1e-3
 _STEPS = 30
 _DONE = 1e-11
 _NO_MASS = 1e-9
-"""In kg; what divides by the mass divides by no less."""
+"""Smallest mass by which a number is divided, in kg."""
 _ROUNDING = 1e-9
 """Least scatter, as a share of the readings' size: what is exact is not weighed endlessly."""
 _WIDE_MASS = 0.2
@@ -67,7 +67,7 @@ _WIDE_BIAS = 0.2
 @brief_repr
 @dataclass(frozen=True)
 class ToolModel:
-    """What is free beside mass, centre of mass and biases."""
+    """Unknowns that are free beside mass, centre of mass and biases."""
 
     rotation: bool = False
     """The rotation of the sensor in the flange."""
@@ -99,7 +99,7 @@ class ToolModel:
 
     @property
     def name(self) -> str:
-        """What is free, in words."""
+        """The free unknowns, in words."""
         parts = ("rotation", self.rotation), ("drift", self.drift), ("matrix", self.has_matrix)
         return " + ".join(["tool and bias", *(part for part, free in parts if free)])
 
@@ -174,8 +174,8 @@ class ToolFit:
     """Half the 95 % interval of each of `TOOL_UNKNOWNS`: kg, rad, N, m, N·m; NaN where not
     determined, 0 for a rotation that was taken as known."""
     undetermined: tuple[str, ...]
-    """Those of `TOOL_UNKNOWNS` that the postures do not determine; their values are where the fit
-    began."""
+    """Members of `TOOL_UNKNOWNS` that the postures do not determine; they keep their initial
+    values."""
     count: int
     """Postures."""
     force_scatter: float
@@ -183,7 +183,7 @@ class ToolFit:
     moment_scatter: float
     """The same of the moment, in N·m."""
     model: ToolModel = field(default_factory=ToolModel)
-    """What was free."""
+    """Free unknowns."""
     drift: FloatArray = field(default_factory=lambda: np.zeros(6))
     """Change of the biases from the first posture to the last, shape (6,), in N and N·m."""
     matrix: FloatArray = field(default_factory=lambda: np.eye(6))
@@ -219,7 +219,8 @@ def fit_tool(
     R = _rotation_between(postures, nominal) if model.rotation else nominal
     size = np.array([np.abs(part).max() for part in (postures.force, postures.moment)])
     least = _ROUNDING * np.where(size > 0.0, size, 1.0)
-    # Without the matrix first: the prior is worth what the scatter says, which is not known yet.
+    # First without the matrix: the weight of the prior depends on the scatter, which is not known
+    # yet.
     start = ToolModel(model.rotation, model.drift) if model.has_matrix else model
     found = _WeighedFit(postures, start, np.zeros(_ALL), R, np.ones(2))
     for stage in (start, start, model, model):
@@ -294,9 +295,8 @@ class _WeighedFit:
     def decomposed(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
         """Return the singular value decomposition ``u s vt`` of the weighed derivatives.
 
-        Below the postures' rows stand those of the prior. Before it the columns of the free
-        unknowns are divided by their ``scale``; the last array tells the directions that are
-        determined.
+        Rows of the prior follow those of the postures. Columns of the free unknowns are divided by
+        their ``scale`` first; the last array marks the determined directions.
         """
         free = self.model.free
         J = tool_derivatives(self.postures, self.values, self.R, self.model)
@@ -315,7 +315,7 @@ class _WeighedFit:
         return np.where(over > 0.5, np.sqrt(squares / np.maximum(over, 0.5)), np.nan)
 
     def left_over(self) -> FloatArray:
-        """Return how many force and moment components are left over, by their leverage."""
+        """Return the residual degrees of freedom of force and moment, by their leverage."""
         u, _, _, _, kept = self.decomposed
         rows = 6 * len(self.postures)
         taken = (u[:rows, kept] ** 2).sum(axis=1).reshape(-1, 2, 3).sum(axis=(0, 2))

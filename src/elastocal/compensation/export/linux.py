@@ -1,7 +1,7 @@
 """The C program for a real-time Linux: RSI and Net F/T around the exported compensator.
 
-What it is told, addresses and limits, is one generated header; all else is C as it stands in
-``templates/linux``.
+Addresses and limits are in one generated header; the rest is the C of ``templates/linux``,
+unchanged.
 """
 
 import ipaddress
@@ -37,7 +37,7 @@ class LinuxTarget:
     rsi: tuple[str, int]
     """Own address and port, to which the controller sends."""
     controller: str
-    """Address of it; nobody else is answered."""
+    """Address of the controller; other senders are not answered."""
     sentype: str
     timeout: int
     """Cycles without an answer after which the controller stops."""
@@ -46,16 +46,16 @@ class LinuxTarget:
     external: int
     """Joints of the model that are external axes; they come first."""
     scale: tuple[float, ...]
-    """From the controller's mm and deg to each joint, in m and rad."""
+    """Factors from the controller's mm and deg to each joint, in m and rad."""
     correction: float
     """Largest, in m."""
     rate: float
     """In m/s."""
     delay: float
-    """From a correction to its motion, at most, in s."""
+    """Largest time from a correction to its motion, in s."""
 
     def __post_init__(self) -> None:
-        """Refuse an address that is none: it stands in C as a text.
+        """Refuse an invalid address, since it becomes a text in C.
 
         Raises
         ------

@@ -71,7 +71,7 @@ _FUNCTIONS = {
     "max": "({0} < {1}) ? {1} : {0}",
     "quotient": "{} / {}",
 }
-"""As C for what statements call: comparisons compile to one instruction, without a branch."""
+"""C functions for those in statements: comparisons compile to one instruction, without a branch."""
 _RAW = "N, N m; raw, as the sensor gives them | sensor"
 _AT_TCP = (
     "N, N m; **on** the robot, bias and tool weight removed, about the tool centre point | tcp"
@@ -399,7 +399,7 @@ class _Remembering:
         force, moment, _ = given
         borne, after = self._loaded(q, *given)
 
-        # Each element by itself moves the deflection by what it may bear besides.
+        # Each friction element alone moves the deflection by the torque that it may bear.
         limit, axes = self.model.friction.limit, self._axes
         low, high = np.reshape(after[len(limit) : len(limit) + 2 * len(axes)], (2, -1))
         spanned = dict(zip(axes, high - low, strict=True))
@@ -409,7 +409,7 @@ class _Remembering:
         return (*_floats(found), *_floats(2.0 * unknown), *after)
 
     def _turned(self, q: Sequence[float], borne: FloatArray) -> FloatArray:
-        """Return the sizes of what each friction element by itself moves an unloaded tcp, added."""
+        """Return the sum of the norms by which friction elements alone move an unloaded tcp."""
         model, moved = self.model, np.zeros(3)
         J = model.spring_jacobian(q).translation
         counts = [(len(s.axes), len(s.friction_limits), len(s.parameters)) for s in model.springs]
@@ -500,7 +500,7 @@ def _load_cases(numbers: Design, model: ModelFunctions) -> list[_LoadCase]:
 
 
 def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
-    """Return a course that passes through every way of the step.
+    """Return a course that passes through every branch of the step.
 
     Loads that make a deflection within the deadband, a middle one and more than the limit;
     readings that fail until the correction fades; readings beyond the range, a good one, one from
@@ -546,7 +546,7 @@ def _without_numbers(good: Reading) -> list[tuple[int, Reading]]:
 
 
 def _free_motion(numbers: Design, pressed: tuple[Reading, Reading]) -> list[tuple[int, Reading]]:
-    """Return presses before, within and after a way through the air."""
+    """Return presses before, within and after a motion in the air."""
     if not numbers.light_loads:
         return []
     first, large = pressed

@@ -16,7 +16,7 @@ from elastocal.elastic.springs import Expression, Function, Input, Number, Produ
 from elastocal.robot import ChainJoint, Robot, SerialChain
 
 Angles = list[tuple[int, Value]]
-"""By the number of a parameter, the angle that one unit of it makes."""
+"""Angles by the number of a parameter, each for one unit of it."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class LoadedAxis:
     torque: Value
     """Torque of the load about the axis, or force along it."""
     weight: Value
-    """Torque of the arm's own weight, likewise; zero where no law asks for it."""
+    """Torque of the arm's own weight, shape as above; zero where no law needs it."""
 
 
 class Memory:
-    """What friction remembers, as numbers from one call to the next.
+    """State of the friction elements from one call to the next, as numbers.
 
     For each element ``u``, the torque that it bears less the whole torque; then, for each axis
     with friction, the lowest and the highest torque since the arm was free, and the torque of the
@@ -98,11 +98,12 @@ class Laws:
             yield number, list(zip(self._parameters[s], row, strict=True))
 
     def unknown_angles(self, number: int) -> Angles:
-        """Return by how much friction from before may have turned an axis beside `angles`.
+        """Return the possible rotation of an axis by earlier friction, beyond `angles`.
 
-        An element slides at ``+-r`` and may have borne anything within when the arm was free; 0 is
-        taken. Torques that span ``R`` bring all histories to within ``2 r - R`` of one another,
-        and never farther apart than they began: ``min(r, 2 r - R)``, none beyond ``R = 2 r``.
+        An element slides at ``+-r``; its torque when the arm was free may be anything within, and 0
+        is assumed. Torques that span ``R`` bring all histories to within ``2 r - R`` of one
+        another, and never farther apart than they began: ``min(r, 2 r - R)``, none beyond ``R = 2
+        r``.
         """
         s = self._spring_of[number]
         if not self._elements[s]:
@@ -513,7 +514,7 @@ def rest(model: ElasticModel) -> Routine:
 def _unknown(
     program: Program, laws: Laws, jacobian: dict[int, Vector], compliance: Sequence[float]
 ) -> Vector:
-    """Return how far friction from before may move each component at most."""
+    """Return the largest possible effect of earlier friction on each component."""
     bounds: list[list[Value]] = [[], [], []]
     for number, J in jacobian.items():
         terms = [
@@ -540,7 +541,7 @@ class _Place:
     label: str
     """Tells the names of its statements from those of other points: 2, 2_2, 2_3."""
     lever: Vector
-    """From it to the tool centre point."""
+    """Lever arm from it to the tool centre point."""
     moment: Vector
     """Moment of the load about the point."""
     weight: tuple[Vector, Vector]
@@ -601,7 +602,7 @@ def _places(program: Program, model: ElasticModel, laws: Laws) -> Iterator[_Plac
 
 
 def _points(model: ElasticModel, axes: Sequence[SpringAxis]) -> list[tuple[_Point, list[int]]]:
-    """Return where axes pass, from base to tip, with the axes of each place.
+    """Return the points of the axes, from base to tip, with the axes through each.
 
     A revolute spring about its joint's own axis is the same before and behind the motion.
     """

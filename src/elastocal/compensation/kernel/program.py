@@ -39,7 +39,7 @@ Matrix = tuple[Vector, Vector, Vector]
 """Rows."""
 Product = tuple[Value, ...]
 Naming = Callable[[str], str]
-"""From the name of a value to how it is written, in C or in Python."""
+"""Function from the name of a value to its spelling in C or Python."""
 
 
 @brief_repr

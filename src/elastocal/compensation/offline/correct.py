@@ -1,18 +1,19 @@
-"""The true inverse of a deflection: which pose to command so that the loaded tcp is the programmed.
+"""Inverse of a deflection: the pose to command so that the loaded tcp is where it was programmed.
 
 With programmed tcp position ``p``, orientation ``R`` and force ``f``, find ``q`` with
 
     p(q) + C(q) f = p,    R(q) = R,    C(q) = J diag(c) J^T      (paper Eq. 10)
 
-by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)]``. What is left
-out of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
-three digits. The first step alone is what is usually done; its residual is reported.
+by Newton steps of the rigid arm: ``J_arm dq = [p - p(q) - C(q) f; log(R R(q)^T)]``. The omitted
+part of the derivative, ``d(C f)/dq``, is a deflection per metre, some 1e-3, so that each step gains
+three digits. Usual practice takes the first step alone; its residual is reported.
 
-Where the arm is known as it was built (`elastocal.geometry`), ``p(q)`` is where its tool then
-stands without force, under weight and payload; ``R(q)`` stays the controller's: errors of a mrad
-move no tcp.
+Where the geometric errors of the arm are known (`elastocal.geometry`), ``p(q)`` is the position of
+its tool without process force, under weight and payload; ``R(q)`` stays the controller's, since
+errors of a mrad do not move the tcp.
 
-Rows follow in time: gears with friction remember; a row without load is air, which frees them.
+Rows follow one another in time, and gears with friction keep a memory; a row without load is in the
+air and clears it.
 """
 
 from collections.abc import Callable
@@ -44,7 +45,8 @@ _DAMPING = 1e-6
 _SMALL_TURN = 1.0
 """Largest step of a joint (rad or m) that still is one of a correction."""
 Unloaded = Callable[[FloatArray], FloatArray]
-"""Where the tool truly stands without process force, in base, shape (row, 3), in m, by joints."""
+"""True tcp position without process force, as a function of joints, in base, shape (row, 3), in
+m."""
 
 
 @brief_repr
@@ -63,8 +65,8 @@ class PathCorrection:
     high: FloatArray
     """Upper ends, shape (row, 3), in m."""
     uncorrected: FloatArray
-    """How far the tool is predicted from where it is programmed, shape (row, 3), in m: deflection,
-    and where the arm as built is known, its errors too."""
+    """Predicted deviation of the tool from its programmed position, shape (row, 3), in m: the
+    deflection and, where they are known, the geometric errors of the arm."""
     first_order: FloatArray
     """Distance that one step would leave, predicted, shape (row,), in m."""
     residual: FloatArray
@@ -72,13 +74,13 @@ class PathCorrection:
     pulled: BoolArray
     """Whether the force draws the tool out, along +z of the tcp, as no surface can, (row,)."""
     memory: FloatArray
-    """What friction remembers after the last row, shape (element,), in N·m."""
+    """State of the friction memory after the last row, shape (element,), in N·m."""
     covered: CoveredRows | None = None
     """Rows that were calibrated; none where the model does not know where that was."""
 
     @property
     def doubt(self) -> PredictionDoubt | None:
-        """How sure the predictions are; None where no row has a load."""
+        """Uncertainty of the predictions; None where no row has a load."""
         loaded = self.deflection.any(axis=1)
         return PredictionDoubt.of(
             *(each[loaded] for each in (self.deflection, self.low, self.high))
@@ -189,13 +191,13 @@ class _Load:
     force: FloatArray
     moment: FloatArray | None
     memory: FloatArray | None
-    """What friction remembers of the rows before the first."""
+    """Friction memory of the rows before the first."""
     unloaded: Unloaded | None = None
-    """Where the arm as built stands."""
+    """True tcp position without process force."""
     borne: FloatArray | None = None
-    """What each friction element bears in each row, in N·m."""
+    """Torque of each friction element in each row, in N·m."""
     after: FloatArray = field(default_factory=lambda: np.zeros(0))
-    """What friction remembers after the last row."""
+    """Friction memory after the last row."""
 
     @property
     def remembers(self) -> bool:
@@ -226,7 +228,7 @@ class _Load:
             return model.deflection(c, q, self.force[rows], moment, borne)
 
     def misplaced(self, q: FloatArray, T_base_tcp: FloatArray) -> FloatArray:
-        """Return how far the unloaded tool stands from where joints should bring it, (row, 3)."""
+        """Return the deviation of the unloaded tool from nominal at some joints, (row, 3)."""
         if self.unloaded is None:
             return np.zeros((len(q), 3))
         return np.asarray(self.unloaded(q) - T_base_tcp[:, :3, 3])
@@ -253,7 +255,7 @@ def _check_size(shift: FloatArray, deflection: FloatArray, largest: float, where
 
 
 def _draws_out(T_base_tcp: FloatArray, force: FloatArray) -> BoolArray:
-    """Return where a force draws the tool out, along +z of the tcp, shape (row,)."""
+    """Return where a force pulls the tool out, along +z of the tcp, shape (row,)."""
     along = np.einsum("ri,ri->r", T_base_tcp[:, :3, 2], force)
     return np.asarray(along > 0.5 * np.linalg.norm(force, axis=1))
 
@@ -291,7 +293,7 @@ def _by_solver(
     row: int,
     where: RowName,
 ) -> FloatArray:
-    """Return one row by exact inverse kinematics: beside a singularity Newton steps go astray."""
+    """Return one row by exact inverse kinematics, since Newton steps diverge near a singularity."""
     robot, q, wanted = solver.robot, q_start, T.copy()
     for _ in range(_STEPS):
         options = solver.solve(wanted, q_start[: robot.external_axes])

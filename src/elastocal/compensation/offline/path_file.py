@@ -1,4 +1,4 @@
-"""``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else as it stood."""
+"""``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else unchanged."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -52,7 +52,7 @@ class CorrectionSettings:
     largest: float = LARGEST_DEFLECTION
     """Largest correction, whatever it is made of, in m."""
     unloaded: Unloaded | None = None
-    """Where the arm as built stands; by default where its controller believes."""
+    """True tcp position without process force; by default the nominal one."""
     controller: Robot | None = None
     """The arm as its controller knows it, which paths are written for; by default the model's."""
 

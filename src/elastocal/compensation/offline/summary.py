@@ -77,9 +77,9 @@ class CorrectionSummary:
     start: tuple[float, ...] = ()
     """Joints that were found for the first row of a path of poses, in rad or m."""
     coverage: ProductionCoverage | None = None
-    """How much of the rows was calibrated; none where the model does not know where that was."""
+    """Share of the rows that the calibration covers; None where the model does not state it."""
     doubt: PredictionDoubt | None = None
-    """How sure the predictions are; none where no row has a load."""
+    """Uncertainty of the predictions; None where no row has a load."""
 
     def plus(
         self, correction: PathCorrection, shift: FloatArray, labels: list[str], jumps: list[int]

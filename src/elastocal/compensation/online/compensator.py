@@ -48,7 +48,7 @@ class Conditioner:
         """
         # Judged before anything is computed: one NaN in a filter's memory would stay for ever.
         problem = self._problem(state, reading)
-        # A clock that was set anew costs one reading, not all that follow.
+        # A clock that was reset costs one reading, not all that follow.
         time = reading.time if math.isfinite(reading.time) else state.time
         if problem:
             # `fresh` stays: an earlier reading of this cycle may still be corrected by.
@@ -61,9 +61,8 @@ class Conditioner:
             middle = len(recent) // 2
             wrench = tuple([sorted(values)[middle] for values in zip(*recent, strict=True)])
             window = recent[: self._previous]
-        # Second-order sections in the transposed direct form II, one after the other, the six
-        # components side by side. Products and sums stand in the order of the C export, so that
-        # both round alike.
+        # Second-order sections in the transposed direct form II, in series, the six components in
+        # parallel. Products and sums are in the order of the C export, so that both round alike.
         x = list(wrench)
         memory = []
         for (b0, b1, b2, a1, a2), (z1, z2) in zip(self._sections, state.memory, strict=True):
@@ -214,8 +213,8 @@ class Compensator:
         q : sequence of float
             Joint positions, in rad or m.
         """
-        # Both ways out come before the model: it is not to be asked at joints that are none, nor
-        # with a wrench that no reading of this cycle stands for.
+        # Both early returns precede the model: it must not be evaluated at invalid joints, nor with
+        # a wrench that no reading of this cycle supports.
         if not _are_joints(q):
             return self._without_reading(state, state.problem | Status.INVALID.value)
         if not state.fresh:
@@ -320,7 +319,8 @@ class Compensator:
             )
         status = (Status.FADED if faded else Status.HELD).value | problem
         answer = Correction(correction, state.deflection, state.half_width, status)
-        # What acted while nobody measured is not known: friction is as unknown as at the start.
+        # The load while nothing was measured is not known, so friction is as unknown as at the
+        # start.
         unloaded = self._free if faded else state.unloaded
         return State(
             state.time,
@@ -389,7 +389,7 @@ def _scaled(values: Sequence[float], share: float) -> tuple[float, ...]:
 
 
 def _towards(here: Triple, target: Triple, largest: float) -> tuple[Triple, int]:
-    """Return the point on the way to a target that is no farther than a step, and whether late."""
+    """Return the point at most a step towards a target, and whether the target is farther."""
     x, y, z = here
     dx, dy, dz = target[0] - x, target[1] - y, target[2] - z
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)

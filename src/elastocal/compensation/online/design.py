@@ -52,13 +52,14 @@ class Design:
     spread: FloatArray
     """``L`` with ``L L^T`` the covariance of the draws times 1.96², shape (spring, direction)."""
     sensor_matrix: FloatArray
-    """From readings without bias to the wrench about the sensor's origin, in tcp axes, (6, 6)."""
+    """Matrix from readings without bias to the wrench about the sensor's origin, in tcp axes, (6,
+    6)."""
     weight_response: FloatArray
     """Wrench of the tool's weight per gravity, in tcp axes, shape (6, 3), in kg and kg·m."""
     gravity: FloatArray
     """In base, shape (3,), in m/s²."""
     sensor_origin: FloatArray
-    """In the tcp frame, shape (3,), in m."""
+    """Origin of the sensor in the tcp frame, shape (3,), in m."""
     frame: FloatArray
     """R_base_frame of the correction, shape (3, 3); the identity where it is the tcp's."""
 
@@ -114,10 +115,10 @@ class Design:
 
     @property
     def deadband_slope(self) -> float:
-        """1 / deadband, in 1/m: from the deadband to twice it the share corrected goes to 1.
+        """1 / deadband, in 1/m: from the deadband to twice its size the corrected share rises to 1.
 
-        Without a deadband it goes there within a nanometre: what is none but for the rounding of a
-        processor then has the same flag on each.
+        Without a deadband it rises within a nanometre, so that a deflection that is zero up to
+        rounding has the same flag on every processor.
         """
         return 1.0 / max(self.settings.deadband, _NOTHING)
 
@@ -206,7 +207,7 @@ def _require_same_sensor(calibrated: CalibratedModel, load: SensorLoad) -> None:
 
 
 def _check_compliances(calibrated: CalibratedModel) -> None:
-    """Refuse a model that no arm is like: a spring that pushes back corrects the wrong way."""
+    """Refuse an impossible model: a negative compliance corrects in the wrong direction."""
     parameters = calibrated.model.parameters
     try:
         require_possible(parameters, calibrated.compliance[None], "compliance")

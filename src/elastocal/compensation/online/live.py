@@ -38,7 +38,7 @@ N and N·m."""
 
 
 class LivePhase(Enum):
-    """What the loop is doing."""
+    """State of the loop."""
 
     WAITING = "waiting for the controller"
     TARING = "taking the sensor's bias in the air"
@@ -60,7 +60,7 @@ class LiveSample(NamedTuple):
 
 
 class LiveCycle(NamedTuple):
-    """What one cycle has read and answered, for the log."""
+    """Readings and answer of one cycle, for the log."""
 
     time: float
     """In s of the clock."""
@@ -95,7 +95,7 @@ class LiveCounts:
     refused: int
     """Cycles with a wrench that the sensor calls bad, or refuses."""
     restarts: int
-    """Times that the correction began anew from zero, the first among them."""
+    """Number of times that the correction began from zero, the first included."""
     largest_correction: float
     """In m."""
     largest_step: float

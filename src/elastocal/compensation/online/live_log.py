@@ -1,7 +1,7 @@
 """The log of a live compensation: an MCAP file that a thread writes, so that the loop never waits.
 
 The loop puts a cycle into a queue and goes on. Where the thread cannot follow, because the disk is
-slow or full, cycles are dropped and counted: a hole in the log costs nothing, a late answer does.
+slow or full, cycles are dropped and counted: a gap in the log does no harm, a late answer does.
 """
 
 import json
@@ -36,7 +36,7 @@ _CHUNK = 256 * 1024
 _HEAD = 4096
 """Bytes at the beginning of a file that name its schema."""
 _PATIENCE = 30.0
-"""For what still waits at the end, in s."""
+"""Time to wait at the end for queued cycles, in s."""
 _AXES, _NUMBER = ("x", "y", "z"), {"type": "number"}
 
 
@@ -111,7 +111,7 @@ class LiveLog:
         channel = writer.register_channel("/compensation", "json", number)
         ending = False
         while not (ending and not self._waiting):
-            # Little by little: the loop's thread has to come in between.
+            # In small pieces, so that the loop's thread can run in between.
             for _ in range(min(_AT_ONCE, len(self._waiting))):
                 cycle = self._waiting.popleft()
                 time = max(0, round(1e9 * cycle.time))
@@ -124,7 +124,7 @@ class LiveLog:
 @brief_repr
 @dataclass(frozen=True)
 class LiveLogFacts:
-    """What a log says of itself, without reading its cycles."""
+    """Metadata of a log, read without its cycles."""
 
     cell: str
     robot: str
@@ -132,7 +132,7 @@ class LiveLogFacts:
     joints: tuple[str, ...]
     cycles: int
     seconds: float
-    """From its first cycle to its last."""
+    """Time from its first cycle to its last."""
 
 
 def is_live_log(path: Path) -> bool:

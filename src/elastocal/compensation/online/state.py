@@ -17,11 +17,11 @@ class Status(IntFlag):
     HELD = 1
     """No usable reading in this cycle: the last correction is held."""
     FADED = 2
-    """None for longer than the hold: the correction fades to zero, or has."""
+    """No reading for longer than the hold: the correction fades to zero, or has faded."""
     LIMITED = 4
     """The deflection asks for more than the largest correction."""
     RATE = 8
-    """The correction is still on its way."""
+    """The correction is still approaching its target."""
     DEADBAND = 16
     """The deflection is so small that it is not corrected, or not fully."""
     UNCERTAIN = 32
@@ -75,7 +75,7 @@ class State(NamedTuple):
     half_width: float
     """Half its 95 % interval, in m."""
     friction: tuple[float, ...] = ()
-    """What friction remembers, in the order of the kernel's memory; empty: nothing."""
+    """State of the friction memory, in the order of the kernel; empty: none."""
     unloaded: int = 0
     """Corrections in a row without a load, at most as many as wear the memory off."""
 

@@ -95,7 +95,7 @@ class Process(ABC):
 
 
 def at_load(course: Course, load: float) -> Course:
-    """Return a course under a share of its force; below 0 with the lateral force turned round.
+    """Return a course under a share of its force; below 0 with the lateral force reversed.
 
     The part of the force along the surface's normal keeps its sign, since a roller or cutter that
     presses cannot pull: -1 is the same pressure with the force aside and against the feed turned.
@@ -163,7 +163,7 @@ def swing(time: FloatArray, rng: Generator) -> FloatArray:
 
 
 def engaged(time: FloatArray, rise: float) -> FloatArray:
-    """Return how much of the force acts, from 0 over 1 to 0, shape (row,).
+    """Return the acting share of the force along the course, from 0 over 1 to 0, shape (row,).
 
     Parameters
     ----------

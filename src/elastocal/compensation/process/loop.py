@@ -1,14 +1,15 @@
 """The closed loop, cycle by cycle: readings, correction, delay of the controller, deviation.
 
-The truth costs milliseconds, so it is asked at the rows of the course only (every 20 or 40 ms, in
-which the forces change by a few percent) and taken as linear in between; readings, correction and
-deviation go at their own rates. A row is asked with the correction of the row before: the robot
-stands at most 0.1 mm elsewhere, by which its compliance changes less than one part in 10^4. The
-corrector is the online compensator, or one that knows the deflection but is late. A force may
-react to where the tool is; the truth then is at rest with it at every row, correction included.
+The simulated truth takes milliseconds, so it is evaluated at the rows of the course only (every 20
+or 40 ms, in which the forces change by a few percent) and interpolated linearly; readings,
+correction and deviation have their own rates. A row is evaluated with the correction of the row
+before: this shifts the robot by at most 0.1 mm, which changes its compliance by less than one part
+in 10^4. The corrector is the online compensator, or one that knows the deflection but is delayed. A
+force may react to where the tool is; the truth then is at rest with it at every row, correction
+included.
 
-Runs know nothing of one another, so they go side by side, row by row: to ask the truth for fifty
-robots at once takes a tenth of the time. A shorter run waits at its last row for the others.
+Runs are independent, so they are computed together, row by row: evaluating fifty robots at once
+takes a tenth of the time. A shorter run waits at its last row for the others.
 """
 
 from collections import deque
@@ -85,7 +86,7 @@ class PerfectCorrector:
     """Knows the deflection exactly, and says so late: what a perfect model would reach."""
 
     def __init__(self, cycles: int, lead: float = 0.0) -> None:
-        """Be late by so many cycles, then go ahead along the slope by as many as ``lead`` says."""
+        """Delay by so many cycles, then extrapolate by as many as ``lead`` states."""
         self._cycles, self._lead = cycles, lead
         self.start()
 
@@ -134,7 +135,7 @@ class TrueCell(Protocol):
         path_base: FloatArray | None = None,
         outward_base: FloatArray | None = None,
     ) -> LoadedRobot:
-        """Go on to joints and a force on the robot, programmed for the path in the air (..., 3).
+        """Move to joints and a force on the robot, programmed for the path in the air (..., 3).
 
         Away from that path, along the surface's normal (..., 3), the force is another.
         """
@@ -271,7 +272,7 @@ class _Rows:
 
 
 def air_shifts(cell: TrueCell, course: Course) -> FloatArray:
-    """Return where the tool is on the programmed path in the air, shape (row, 3), in m."""
+    """Return the shift of the tool from the programmed path in the air, shape (row, 3), in m."""
     cell.lift(course.name, course.q[0])
     return cell.free_shift(course.q)
 
@@ -380,7 +381,7 @@ def _readings(
 
 
 def _between(here: FloatArray, there: FloatArray, part: FloatArray) -> FloatArray:
-    """Return the values at parts of the way from a row to the next, shape (part, …)."""
+    """Return the values interpolated from a row to the next, shape (part, …)."""
     return here + part * (there - here)
 
 

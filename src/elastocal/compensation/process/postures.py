@@ -1,14 +1,13 @@
 """The processes by name, and joints for their courses.
 
 The tool is turned by one angle for all courses; the rail stands still along each of them. Before a
-calibration the posture is the one farthest from limits (`with_postures`); a calibrated model says
-which one is stiffest (`stiffest_posture`, paper section 4.3.1).
+calibration the posture is the one farthest from limits (`with_postures`); a calibrated model
+determines the stiffest one (`stiffest_posture`, paper section 4.3.1).
 
 Fibre placement courses across a tooling (paper section 4.2).
 
 Forces: the compaction of 1100 N along the tool and amplitudes up to 280 N aside are the paper's
-load cases for this process (4.2); how much of them acts, and how fast the head goes, is
-assumed here.
+load cases for this process (4.2); the acting share, and the speed of the head, are assumed here.
 
 Rings of a dome that is roughed from the top of a block (paper section 4.3, Fig. 13).
 
@@ -140,7 +139,7 @@ def _hits(surface: Surface, where: tuple[float, float, float, float]) -> FloatAr
 
 
 def _within(rows: FloatArray, border: float) -> FloatArray:
-    """Return the rows that are so far from both ends, in m; none when there are none."""
+    """Return the rows farther than this from both ends, in m; none if the course is too short."""
     if len(rows) < 2:
         return rows[:0]
     length = arc_length(rows[:, :3])
@@ -165,7 +164,7 @@ class Roughing(Process):
     disk: float = 0.05
     """Radius of the disk on top that is not machined (Fig. 13), in m."""
     height: float = 0.06
-    """From the lowest ring to the top of the dome, in m."""
+    """Height from the lowest ring to the top of the dome, in m."""
     speed: float = 0.07
     """In m/s."""
     step: float = 0.02
@@ -472,7 +471,7 @@ class _Stations:
 
 
 def _calibrated_nearby(calibrated: CalibratedModel) -> tuple[PostureConstraint, ...]:
-    """Return the constraint of a calibrated posture near by: elsewhere nobody knows how stiff."""
+    """Return the constraint that a calibrated posture is near: elsewhere it is unknown."""
     domain = calibrated.domain
     if domain is None:
         return ()

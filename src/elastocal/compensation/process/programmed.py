@@ -1,9 +1,9 @@
 """The programmed path of a process, as a file: courses written, and a user's own courses read.
 
 It is the table that ``elastocal compensate`` reads: joints or tcp poses, forces on the robot in
-base or in the tcp frame. Two columns more make a process of it: ``course``, a name for each stretch
-of path under force (without it the file is one course), and ``time[s]``, which begins anew with
-every course if it likes (without it the tool goes at one speed).
+base or in the tcp frame. Two more columns make it a process: ``course``, a name for each section of
+path under force (without it the file is one course), and ``time[s]``, which may begin again with
+every course (without it the tool moves at constant speed).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,7 +43,7 @@ LATERAL, NORMAL = "lateral", "normal"
 @brief_repr
 @dataclass(frozen=True)
 class PathTiming:
-    """How a path file becomes courses in time."""
+    """Options that turn a path file into courses in time."""
 
     speed: float | None = None
     """Speed of the tool along the path, in m/s; None: the file's column ``time[s]`` says it."""
@@ -144,7 +144,7 @@ class _Stretch:
     name: str
     rows: PathRows
     time: FloatArray | None
-    """As the file has it, shape (row,), in s; None: it has none."""
+    """Time as in the file, shape (row,), in s; None: not given."""
 
 
 def _runs(rows: PathRows) -> Iterator[tuple[str, slice]]:

@@ -41,11 +41,12 @@ TABLE = "table.json"
 DEVIATIONS = "deviations.csv"
 PROGRAMMED_PATH = "path.csv"
 _OLD_HEADER = ("seed", "course", "time[s]", "x[mm]", "y[mm]", "z[mm]", "before[mm]", "after[mm]")
-"""Columns of ``deviations.csv`` before it told the 3-D deviation."""
+"""Columns of older ``deviations.csv``, without the 3-D deviation."""
 _HEADER = (*_OLD_HEADER, "before_3d[mm]", "after_3d[mm]")
 """Columns of ``deviations.csv``; the place is the programmed tool centre point in base."""
 _ALIKE = 1e-8
-"""Deviations are written to the nanometre; figures that differ by more, in m, are of others."""
+"""Deviations are written to the nanometre; figures that differ by more than this, in m, belong to
+other data."""
 
 
 @record()
@@ -77,26 +78,27 @@ class SimulateProcessResult(Result):
     tool: str = ""
     """The tool that the models are for, in words; empty in files before it was written."""
     direction: str = ""
-    """The component that ``lines`` count, in a word; likewise."""
+    """Component that ``lines`` describe, in a word."""
     spatial: tuple[DeviationComparison, ...] = ()
-    """As ``lines``, of the 3-D deviation (the length of the shift); likewise."""
+    """As ``lines``, for the 3-D deviation (the length of the shift)."""
     loads: tuple[LoadLines, ...] = ()
     """The same process at other shares of its load, where that was asked for."""
     posture: PostureGain | None = None
-    """Where the stiffest posture was taken; none: the courses as they are programmed."""
+    """Course for which the stiffest posture was chosen; None: postures as programmed."""
     means: tuple[SeedMeans, ...] = ()
-    """Each measure at each load over the seeds; of a single seed without interval."""
+    """Means of each measure at each load over the seeds; without interval for a single seed."""
     path: str = ""
     """File of a user's own process; empty: one of the built-in ones."""
     path_sha256: str = ""
     preset: str = ""
-    """How hard the truth of the cell is; see `elastocal.sim.truth`."""
+    """Preset of the cell's truth; see `elastocal.sim.truth`."""
     process_stiffness: float = 0.0
-    """How the force reacts to a shift along the surface's normal, in N/m; 0: forces are given."""
+    r"""Change of the force by a shift along the surface's normal, in N/m; 0: forces are given."""
     notes: tuple[str, ...] = ()
-    """Sentences that a person must know."""
+    """Notes for the user."""
     coverage: ProductionCoverage | None = None
-    """How much of the process the first model's calibration covers; none where it is not known."""
+    """Share of the process that the first model's calibration covers; None where it is not
+    known."""
 
     def __post_init__(self) -> None:
         """Refuse a table of nothing."""
@@ -114,7 +116,7 @@ class SimulateProcessResult(Result):
         )
 
     def show(self) -> Iterator[Block]:
-        """Yield the table beside the paper's, the error budget, and what a person must know."""
+        """Yield the table beside the paper's, the error budget and the notes."""
         from elastocal.compensation.process.show import show_process
 
         return show_process(self)
@@ -260,7 +262,7 @@ def _write_deviations(path: Path, courses: Sequence[CourseDeviation]) -> None:
 
 
 def _read_deviations(path: Path) -> tuple[CourseDeviation, ...]:
-    """Return the courses of a ``deviations.csv``; refuse what is not as written, by line."""
+    """Return the courses of a ``deviations.csv``; refuse a changed file, naming the line."""
     try:
         with opened_table(path) as table:
             header, rows = table.layout.header, table.rows()

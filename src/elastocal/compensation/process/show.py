@@ -1,6 +1,6 @@
 """Show a simulated process as blocks for every shell: the paper's Table 1 beside the paper's.
 
-Published figures stand beside those of the same measure, and say what they hold.
+Published figures are shown beside those of the same measure, with a note on what they contain.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ class PublishedCase:
     after: tuple[float, float, float]
     reduction: tuple[float, float, float]
     measures: Phrase
-    """What its figures hold, in a sentence."""
+    """What its figures measure, in a sentence."""
 
 
 PAPER = {
@@ -64,7 +64,7 @@ _HEADS = ("", *phrases("Mean", "Max", "St. dev."))
 
 
 def show_process(found: SimulateProcessResult) -> Iterator[Block]:
-    """Yield what a person asks of a simulated process.
+    """Yield the blocks of a simulated process.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def show_deviations(found: SimulateProcessResult) -> Iterator[Block]:
 
 
 def show_notes(found: SimulateProcessResult) -> Bullets:
-    """Return how hard the truth was, and notes; how much was covered has a place of its own."""
+    """Return the preset of the truth and the notes; coverage is shown elsewhere."""
     covered = "" if found.coverage is None else found.coverage.sentence()
     return Bullets((*_truth(found), *(note for note in found.notes if note != covered)), "sub")
 
@@ -119,7 +119,7 @@ def _deviation_table(table: SimulateProcessResult, paper: PublishedCase | None) 
         text = phrase("in the programmed posture")
         others += [(deviation, text, table.posture.lines[-1])]
         others += [(spatial, text, table.posture.spatial[-1])]
-    # The paper's rows are of the same component and load as those above them.
+    # The paper's rows have the same component and load as those above them.
     rows = [row for line in own for row in _rows(*line)]
     if paper is not None:
         rows += [

@@ -131,7 +131,7 @@ class SeedMeans:
 @brief_repr
 @record()
 class PostureGain:
-    """What the posture that the model finds stiffest does, against the programmed one."""
+    """Effect of the stiffest posture by the model, compared with the programmed one."""
 
     spin: float
     """Turn of the tool about its axis from the programmed orientation, in rad."""

@@ -1,4 +1,4 @@
-"""A controller's program corrected: new numbers at its points, all else as it stood."""
+"""A controller's program corrected: new numbers at its points, everything else unchanged."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -52,14 +52,14 @@ class ProgramCorrection:
     """A program that was corrected."""
 
     program: ControllerProgram
-    """As it was read."""
+    """Program as it was read."""
     summary: CorrectionSummary
     files: tuple[Path, ...]
     """The files that were written, the main one first."""
     assumed: tuple[str, ...]
     """Motions whose posture nothing in the program says: the last known is taken."""
     notes: tuple[str, ...]
-    """Further sentences that a person must know."""
+    """Further notes for the user."""
 
 
 def compensate_program(
@@ -190,7 +190,7 @@ def _corrected(
     T_of_row = np.tile(np.eye(4), (len(table.values), 1, 1))
     T_of_row[rows] = T
     force, moment = table.values.wrench_in_base(T_of_row)
-    # A point by axes means its joints as they stand; the turn of a frame is the controller's.
+    # A point given by axes is taken by its joints; the rotation of a frame is the controller's.
     frames = not any(point.by_axes for point in points)
     found = correct_rows(
         follower.solver,
@@ -276,7 +276,7 @@ class _PostureFollower:
         return np.asarray(q[0], dtype=float)
 
     def _external(self, move: Move, point: ProgramPoint, previous: FloatArray | None) -> FloatArray:
-        """Return the external axes: those of the point, else where they stood before."""
+        """Return the external axes of the point, or those of the point before."""
         robot = self.solver.robot
         external = point.external_joints(robot.revolute[: robot.external_axes])
         if external is None:

@@ -72,7 +72,7 @@ class _KrlPoint:
     """A declared position."""
 
     name: str
-    """As declared; KRL does not tell capitals from small letters."""
+    """Name as declared; KRL ignores case."""
     kind: str
     line: int
     """Index of its line in the file, from 0."""
@@ -163,9 +163,9 @@ def _read_points(lines: Sequence[str]) -> dict[str, _KrlPoint]:
 
 
 def _read_axes(text: str, number: int) -> _KrlPoint | None:
-    """Return axis positions that stand in a motion itself, ``{A1 0.0, …}``; None if it is not such.
+    """Return axis positions written in a motion itself, ``{A1 0.0, …}``; None if there are none.
 
-    The line counts from 0.
+    Lines count from 0.
     """
     match = _LITERAL_AXES.match(text)
     if match is None:
@@ -174,7 +174,7 @@ def _read_axes(text: str, number: int) -> _KrlPoint | None:
 
 
 def _replaced(line: str, point: _KrlPoint, values: Mapping[str, float]) -> str:
-    """Return a declaration with new numbers (mm or deg), all else as it stood."""
+    """Return a declaration with new numbers (mm or deg), everything else unchanged."""
     # From the end of the line, so that the places before it stay where they were.
     for name in sorted(values, key=lambda name: -point.components[name].start):
         old = point.components[name]
@@ -258,7 +258,7 @@ class KrlProgram:
 
 
 def read_krl(src: Path) -> KrlProgram:
-    """Return the program of a ``.src`` file and the ``.dat`` file beside it.
+    """Return the interpretation of frame, tool, files and name; see the protocol.
 
     Raises
     ------
@@ -281,7 +281,7 @@ def read_krl(src: Path) -> KrlProgram:
 
 
 def _dat_of(src: Path) -> Path:
-    """Return the ``.dat`` file beside a ``.src`` file; Windows does not tell capitals."""
+    """Return the ``.dat`` file beside a ``.src`` file; Windows ignores case."""
     for suffix in (".dat", ".DAT", ".Dat"):
         if (path := Path(src).with_suffix(suffix)).is_file():
             return path

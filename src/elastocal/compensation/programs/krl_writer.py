@@ -98,7 +98,7 @@ class KrlWriter(ProgramWriter):
 
     def mover(self, program: RobotProgram) -> Mover:  # noqa: ARG002 - of the protocol
         """Return the writer of a move; see `ProgramWriter.mover`."""
-        # A block says its speeds anew: a person may begin in the middle of a program.
+        # Each block sets its speeds, since a person may start in the middle of a program.
         speed: float | None = None
 
         def lines(move: AxisMove | StraightMove) -> Iterator[str]:

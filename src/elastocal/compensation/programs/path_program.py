@@ -22,7 +22,7 @@ from elastocal.robot import Robot
 from elastocal.robot.inverse import RowName, inverse_for, joints_along_path
 
 BEFORE_PATH = 0.05
-"""How far before the first row the program stops, back along the tool, in m."""
+"""Distance before the first row at which the program stops, back along the tool, in m."""
 MOST_ROWS = 20_000
 """Most rows of one program."""
 _LARGEST_TURN = np.pi / 2.0

@@ -1,7 +1,7 @@
 """The program of a plan: every pose in visiting order, stopping before it touches the surface.
 
-Approach poses are reached by axis values, which choose the posture; everything near the surface is
-straight. The program stops before it touches and on the surface, so that a person or a force
+Approach poses are reached by axis values, which choose the posture; all motion near the surface is
+straight. The program stops before contact and on the surface, so that a person or a force
 controller decides.
 """
 
@@ -31,7 +31,8 @@ from elastocal.robot.inverse import InverseKinematics, inverse_for, joints_along
 from elastocal.templating import plain
 
 _SAME_PLACE = 1e-4
-"""How far, in m, the two descriptions of one pose may be apart before a program is refused."""
+"""Largest distance, in m, between the two descriptions of one pose; beyond it a program is
+refused."""
 _SAME_TURN = 1e-4
 """The same for the orientation, in rad."""
 

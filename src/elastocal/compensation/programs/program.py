@@ -69,11 +69,11 @@ class Move:
     name: str | None
     """The point, in capitals; None: values or an expression."""
     axes: ProgramPoint | None = None
-    """Axis values that stand in the motion itself."""
+    """Axis values written in the motion itself."""
 
     @property
     def label(self) -> str:
-        """The motion for a person."""
+        """Description of the motion for people."""
         return f"line {self.line}, {self.order} {self.name}"
 
 
@@ -120,7 +120,7 @@ class ControllerProgram(Protocol):
         """Words for refusals."""
 
     def write(self, out: Path, corrected: Mapping[str, CorrectedPoint]) -> tuple[Path, ...]:
-        """Write the program with some points corrected, all else as it stood; return the files.
+        """Write the program with corrected points, else unchanged; return the files.
 
         Parameters
         ----------

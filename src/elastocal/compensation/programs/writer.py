@@ -56,17 +56,17 @@ class StraightMove:
 
 @dataclass(frozen=True)
 class Remark:
-    """A sentence for whoever reads the program."""
+    """Comment for the reader of the program."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Stop:
-    """The robot stands until a person lets it go on."""
+    """Wait of the robot until a person lets it continue."""
 
     reason: str
-    """What is done meanwhile."""
+    """Reason of the wait."""
 
 
 Step = AxisMove | StraightMove | Remark | Stop
@@ -133,7 +133,7 @@ class ProgramWords:
     straight_move: str
     stop: str
     start: str
-    """What a person presses to go on."""
+    """Button that a person presses to continue."""
     slow_mode: str
     """The mode in which a program is tried."""
     posture: str
@@ -155,7 +155,7 @@ class ProgramWriter(ABC):
     most_external: ClassVar[int]
     """Number of external axes that a target can name."""
     comment: ClassVar[str]
-    """What stands before each line of a comment."""
+    """Prefix of each line of a comment."""
     width: ClassVar[int]
     """Width of a comment, in characters."""
     words: ClassVar[ProgramWords]
@@ -211,7 +211,7 @@ class ProgramWriter(ABC):
         """Return a frame, shape (4, 4) in m, as the language writes it."""
 
     def axis_speed_text(self, robot: Robot, percent: int) -> str:  # noqa: ARG002 - of some languages
-        """Return how fast axes move, in words that follow on the name of the motion."""
+        """Return the speed of the axes, in words that follow the name of the motion."""
         return f"at {percent} percent"
 
     def slowest(self) -> float:
@@ -310,7 +310,7 @@ class ProgramWriter(ABC):
         return files
 
     def head(self, program: RobotProgram) -> list[str]:
-        """Return the lines that stand first: what has to hold on the controller."""
+        """Return the first lines, which state the conditions on the controller."""
         robot, external = program.robot, program.robot.external_axes
         parent, T_parent_tcp = program.tool()
         rendered = (

@@ -1,12 +1,13 @@
 """Connections to Leica trackers, a thread each, and the driver.
 
-What is said to a Leica tracker: set up once, then watched; a broken beam is found again.
+Commands to a Leica tracker: it is set up once and then monitored; after a break of the beam the
+marker is searched.
 
 The order of commands is that of public programs: units, initialise, settings, mode, reflector,
 find, start. Commands are sent one after another, each when the one before it is answered. The
-answer to `look` while the beam is broken is FindReflector, then StartMeasurement: whether a
-tracker goes on by itself after a break is not stated anywhere, and one that does answers that it
-is busy.
+answer to `look` while the beam is broken is FindReflector, then StartMeasurement: it is not
+documented whether a tracker continues by itself after a break; one that does answers that it is
+busy.
 
 Verified against the simulator (`elastocal.sim.wire`) and the public layout, not hardware.
 """
@@ -76,7 +77,7 @@ _QUALITIES = {
     3: "the prism is not measured well (prism error): clean or turn the reflector",
     4: "the trigger is violated",
 }
-"""What keeps a point from being used; 1, fast, does not."""
+"""Qualities that exclude a point; 1, fast, does not."""
 _CLOSING = 998
 _RESTARTED = {
     850: "its sensor was connected anew",
@@ -92,7 +93,8 @@ _CHANGED = {
     16: "transformation",
     17: "mode of measurement",
 }
-"""What another program may change while we measure: numbers before and after do not agree."""
+"""Settings that another program may change during a measurement, which makes earlier and later
+numbers inconsistent."""
 _LOST = {25: "the tracker is not ready", 99: "the 6D probe is not seen"}
 _FROZEN_ROTATION = 1 << 5
 _ROTATION_ERROR = 1 << 1
@@ -103,7 +105,7 @@ _Port = Annotated[int, Field(ge=1, le=65535)]
 
 
 class EmsconStation(StrictModel):
-    """Where one tracker is."""
+    """Address of one tracker."""
 
     address: str = LOOPBACK
     port: _Port = _PORT
@@ -132,7 +134,7 @@ class EmsconSettings(DeviceSettings):
     distance: PositiveLength = 3.0
     """Roughly, where the reflector is looked for before the first point, in m."""
     patience: PositiveTime = 120.0
-    """How long a command may take, and a connection be gone, in s."""
+    """Largest time for a command, or without a connection, in s."""
     silence: PositiveTime = 0.2
     """Without a point for longer the beam counts as broken, in s."""
 
@@ -176,7 +178,7 @@ class Dialogue:
         self._reflectors: list[Reflector] = []
 
     def look(self) -> None:
-        """Find the marker again, if it is lost and nothing is under way."""
+        """Find the marker again if it is lost and no search is under way."""
         seen = self._clock.now() - self._pointed <= self._settings.silence
         if self.ready and not seen and not self._steps and self._waiting is None:
             self._steps.extend(_search(self._settings, self._distance))
@@ -241,7 +243,7 @@ class Dialogue:
             raise DeviceError(f"{text}: it was started anew, its frame may be another one")
         if not step.may_fail or status in _FATAL:
             raise DeviceError(text)
-        # A tracker that went on measuring by itself says that it is busy.
+        # A tracker that has continued to measure reports that it is busy.
         if step.code is not Code.START_MEASUREMENT or status not in (_BUSY, _IN_USE):
             self._steps.clear()
             self._lost(text)
@@ -373,7 +375,7 @@ class _Station(StationLink):
         self._fresh = True
 
     def look(self) -> None:
-        """Let the marker be found again."""
+        """Start a search for the marker."""
         self._to_look.set()
 
     def hear(self) -> bool:
@@ -425,7 +427,7 @@ class EmsconDriver:
         """
         settings = of_kind(wanted["metrology"], EmsconSettings, "settings")
         if context.watches:
-            # A head that turns for a minute is nothing that somebody expects who only looks.
+            # A person who only watches does not expect a head that turns for a minute.
             settings = settings.model_copy(update={"initialize": False, "bird_bath": False})
         places = _places(require_trackers(cell), settings)
         feeds = {
@@ -448,7 +450,7 @@ class EmsconDriver:
 def _places(
     trackers: tuple[Tracker, ...], settings: EmsconSettings
 ) -> list[tuple[Tracker, EmsconStation]]:
-    """Return where the controller of each station is."""
+    """Return the address of each station's controller."""
     known = {tracker.name: tracker for tracker in trackers}
     for name in settings.stations:
         require_station(name, tuple(known))

@@ -1,8 +1,8 @@
 """The packets of emScon TPI 3: little-endian, 4-byte alignment, each with its size in front.
 
-Clean-room: sizes, offsets and numbers are those that public programs and the published layout
-agree on (see docs/references.md); no line of a vendor's header is here. Every packet is
-``int32 size, int32 type`` and what the type says.
+Clean-room: sizes, offsets and numbers are those on which public programs and the published layout
+agree (see docs/references.md); no line of a vendor's header is here. Every packet is ``int32 size,
+int32 type`` and what the type says.
 """
 
 import struct
@@ -17,7 +17,7 @@ from elastocal.errors import DeviceError
 from elastocal.results import brief_repr
 
 LARGEST_PACKET = 65536
-"""In bytes; a larger size is no size."""
+"""In bytes; a larger size is invalid."""
 _HEAD = 8
 _COMMAND, _ERROR, _MULTI, _PROBE, _STATUS_CHANGE, _MULTI_2 = 0, 1, 3, 5, 8, 10
 
@@ -97,15 +97,15 @@ class Reflector(Answer):
     """One of the reflectors that the tracker knows; each comes in an answer of its own."""
 
     total: int
-    """How many answers come."""
+    """Number of answers that follow."""
     number: int
-    """By which it is set."""
+    """Number by which the parameter is set."""
     name: str
 
 
 @dataclass(frozen=True)
 class Complaint:
-    """An error that nobody has asked for, such as a broken beam."""
+    """Error that was not an answer, such as a broken beam."""
 
     command: int
     status: int
@@ -165,7 +165,7 @@ def command(code: Code, *values: float, form: str = "") -> bytes:
 
 
 class PacketReader:
-    """Turns the bytes of a connection into packets; keeps no more than one packet."""
+    """Reader of packets from the bytes of a connection; keeps no more than one packet."""
 
     def __init__(self) -> None:
         self._rest = b""

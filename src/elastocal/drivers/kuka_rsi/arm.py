@@ -1,19 +1,19 @@
 """A KUKA arm over RSI; see `elastocal.cell.RobotArm` for the contract.
 
-Two threads meet here: that of the link, which wants an answer at once, and the caller's, whose
-commands only note what is to be done. Joint moves are the controller's (``PTP``); approach, hold,
-release and retract are relative corrections from here, so that the tool keeps its orientation. The
-PC is no safety function: what bounds the motion in the end are POSCORR, POSCORRMON, axis limits and
+Two threads meet here: that of the link, which needs an answer at once, and the caller's, whose
+commands only record the request. Joint moves are the controller's (``PTP``); approach, hold,
+release and retract are relative corrections from the PC, so that the tool keeps its orientation.
+The PC is no safety function: the motion is bounded by POSCORR, POSCORRMON, axis limits and
 SafeOperation of the controller.
 
-How the controller takes the place where the arm stands for the programmed one.
+The module also adopts the present position as the programmed one.
 
-Checks of what an arm is told, before anything is begun.
+It checks commands before a motion begins.
 
-What one connection to a controller knows of contact and place.
+It records what one connection knows of contact and position.
 
-Nothing is known at its beginning: the program may have been started where the tool presses, and
-then the place where the correction is zero is the surface.
+Nothing is known at its beginning: if the program was started while the tool pressed, the position
+of zero correction is on the surface.
 """
 
 import math
@@ -69,9 +69,9 @@ ADOPTS = 5.0
 
 
 def adopt(cycle: Cycle, number: int) -> Motion:
-    """Yield the steps by which the controller takes the present place for the programmed one.
+    """Yield the steps by which the controller takes the present position as programmed.
 
-    It sends nothing while RSI is off. A program that does not know the order stands by.
+    It sends nothing while RSI is off. A program that does not know the order stays idle.
 
     Parameters
     ----------
@@ -142,9 +142,10 @@ OUT = (ProgramState.ABSENT, ProgramState.ENDED)
 
 
 def require_ready(cycle: Cycle, silent: float, mode: str) -> None:
-    """Refuse to enable an arm while anything stands against it.
+    """Refuse to enable an arm while a condition forbids it.
 
-    Without a force it may be enabled: a tool must come off the surface without one.
+    A missing force does not forbid it, since the tool must be able to leave the surface without
+    one.
 
     Parameters
     ----------
@@ -158,7 +159,7 @@ def require_ready(cycle: Cycle, silent: float, mode: str) -> None:
     Raises
     ------
     DeviceError
-        With what stands against it.
+        With the condition that forbids it.
     """
     why = None
     if mode != "contact":
@@ -173,12 +174,12 @@ def require_ready(cycle: Cycle, silent: float, mode: str) -> None:
 
 @dataclass(frozen=True)
 class StraightMoveRules:
-    """What straight moves keep to."""
+    """Limits of straight moves."""
 
     bounds: Bounds
     law: ForceLaw
     delay: float
-    """From force to standstill, in s."""
+    """Time from force to standstill, in s."""
 
     def require_room(self, command: str, end: FloatArray, speed: float) -> None:
         """Refuse a move that leaves what corrections may do.
@@ -225,7 +226,7 @@ class StraightMoveRules:
         )
 
     def require_gentle(self, speed: float, contact_force: float) -> None:
-        """Refuse a guarded move that would press too hard before it stands."""
+        """Refuse a guarded move that would press too hard before it stops."""
         if math.isinf(contact_force):
             return
         stiffness, room = self.law.stiffness, self.bounds.force - contact_force
@@ -243,7 +244,7 @@ class StraightMoveRules:
 _LET_GO = 0.3
 """Part of the contact force below which the tool has left the surface at the end of a retract."""
 _SAME_ZERO = 1e-4
-"""How far the programmed place may be from where the last ``PTP`` ended, in m."""
+"""Largest distance of the programmed position from the end of the last ``PTP``, in m."""
 
 
 class ContactMemory:
@@ -251,7 +252,7 @@ class ContactMemory:
 
     def __init__(self) -> None:
         self.guard: ContactGuard | None = None
-        """What felt the contact that has not been left yet."""
+        """Guard that detected the present contact."""
         self.touched_at: FloatArray = np.zeros(3)
         """Correction there, base, shape (3,), in m."""
         self._is_free = False
@@ -349,7 +350,7 @@ class KukaArm:
     def __init__(
         self, cell: Cell, settings: RsiSettings, clock: Clock, feed: WrenchFeed | None
     ) -> None:
-        """Take an arm, drives off; `step` has to be called with each message of the controller.
+        """Take an arm with its drives off; call `step` with each message of the controller.
 
         Raises
         ------
@@ -404,7 +405,7 @@ class KukaArm:
             )
 
     def enable(self) -> None:
-        """Release the arm for motion; it then is idle. Refused unarmed, or while a fault stands."""
+        """Enable motion; the arm is then idle. Refused unarmed, or while a fault persists."""
         self.arming.require(self._cell)
         self._require_link()
         with self._lock:
@@ -418,7 +419,7 @@ class KukaArm:
                 self.guard.restart(cycle.offset)
 
     def disable(self) -> None:
-        """Take the release back; the arm stands."""
+        """Disable motion; the arm stands still."""
         with self._lock:
             self._drop(MotionState.DISARMED)
 
@@ -457,7 +458,7 @@ class KukaArm:
             if self._contact.is_zero_free(cycle):
                 limits = (self._settings.collision_force, self.bounds.force)
                 guard = ContactGuard(self._sensed(), None, *limits)
-                # As slow as an approach in which contact is expected: it is a short way.
+                # As slow as an approach in which contact is expected, since the distance is short.
                 speed = min(self.bounds.speed, self._cell.file.procedure.contact_speed)
                 back = partial(motions.take_back, guard=guard, speed=speed, pace=self._pace)
                 self._start(_Task(MotionState.MOVING, back))
@@ -524,7 +525,7 @@ class KukaArm:
             self._start(_Task(MotionState.RETRACTING, motion, lambda _: left()))
 
     def excite(self, places: FloatArray) -> AnswerRecorder:
-        """Start to follow places, shape (cycle, 3), base, in m, from where the tool stands.
+        """Start to follow positions, shape (cycle, 3), base, in m, from the tool's present one.
 
         Returns
         -------
@@ -619,7 +620,7 @@ class KukaArm:
             self._watch.restart()
 
     def _drop(self, state: MotionState) -> None:
-        """Stand where the arm is."""
+        """Stop where the arm is."""
         self._task = self._running = None
         self._state = state
 

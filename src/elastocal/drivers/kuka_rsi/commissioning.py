@@ -1,15 +1,14 @@
 """The delay from command to motion: an excitation, its estimate, and the record that is kept.
 
-The arm stands in free space and follows a chirp of some tenths of a millimetre; what it was told is
-compared with what RIst less RSol shows. The answer is modelled as gain, dead time and a first-order
-lag,
+The arm stands in free space and follows a chirp of some tenths of a millimetre; the command is
+compared with RIst minus RSol. The response is modelled as gain, dead time and a first-order lag,
 
     y(t) = a x_lagged(t - T) + b,   tau dx_lagged/dt = x - x_lagged,
 
 and fitted by least squares (L. Ljung, "System Identification", 2nd ed., Prentice Hall 1999, chapter
 7). The delay of the loop is ``T + tau``: at the frequencies of force control a lag is a delay. It
 counts from the message whose answer holds the command to the message that shows the motion, so it
-is what the PC sees, transport included. A tracker would show the elasticity of the arm on top.
+includes the transport to and from the PC. A tracker would also show the elasticity of the arm.
 """
 
 from dataclasses import dataclass
@@ -31,12 +30,12 @@ _LONGEST = 0.5
 _LONGEST_DELAY = 1.0
 """Longest delay from command to motion that is taken for one, in s."""
 _LEAST_GAIN, _MOST_UNEXPLAINED = 0.5, 0.2
-"""Gain and unexplained part of the motion at which an answer is none."""
+"""Least gain and largest unexplained part of the motion at which a response is accepted."""
 
 
 @record()
 class DelayEstimate:
-    """How an arm has answered one chirp."""
+    """Response of an arm to one chirp."""
 
     dead_time: float
     """In s."""
@@ -56,7 +55,7 @@ class DelayEstimate:
 @brief_repr
 @record("elastocal.commissioning/1")
 class CommissioningRecord:
-    """What was measured when a cell was put into service; runs and sign-off sheets refer to it."""
+    """Measurements from the commissioning of a cell; runs and sign-off sheets refer to it."""
 
     cell: str
     robot: str
@@ -114,7 +113,7 @@ class AnswerRecorder:
         self._offsets = [start]
 
     def hear(self, offset: FloatArray) -> None:
-        """Take the correction that is in effect a cycle after the next place was told."""
+        """Record the correction in effect in the cycle after a position was sent."""
         self._offsets.append(offset)
 
     def excitation(self) -> Excitation | None:

@@ -1,4 +1,4 @@
-"""What an RSI context holds: objects, their parameters and wires; made from the channels, checked.
+"""RSI contexts: objects, their parameters and wires, made from the channels and checked.
 
 Names, type ids, parameter numbers and ports are facts of public files: ros-industrial/
 kuka_experimental (``ros_rsi.rsi``), kroshu/kuka-external-control-sdk (``rsi_joint_pos.rsi``, and
@@ -7,7 +7,7 @@ KSS 8.3). ``.rsi.xml`` counts ports and parameters from 1, ``.rsix`` from 0; a p
 ``IsRuntime`` where the catalogue says that it cannot be set at run time, and only there. Not tried
 on a controller.
 
-Reads RSI contexts in all their forms, and holds them against what a cell needs.
+Contexts of all three file forms are read and compared with what a cell needs.
 """
 
 import math
@@ -55,7 +55,7 @@ _INPUTS = {
 }
 _OUTPUTS = {"POSCORR": ("Stat", *_AXES), "POSCORRMON": _AXES, "SEN_PINT": ("Out1",)}
 _OPTIONAL = ("ETHERNET", "POSCORR")
-"""Whose inputs need no wire."""
+"""Objects whose inputs need no wire."""
 _SIGNALS = {"STOP.In1": "Bool", "POSCORR.Stat": "Int"}
 """Type of a port where it is not a number."""
 _LEAST, _MOST = "-2147483648", "2147483647"
@@ -67,9 +67,10 @@ class ContextParameter:
 
     name: str
     value: str
-    """As RSIVisual shows it: a choice by its name."""
+    """Value as RSIVisual shows it: a choice by its name."""
     number: int
-    """In ``.rsi.xml``, from 1; choices and what cannot be set at run time count for themselves."""
+    """Number in ``.rsi.xml``, from 1; choices and parameters that cannot be set at run time are
+    counted separately."""
     kind: str = "System.Double"
     smallest: str = _LEAST
     largest: str = _MOST
@@ -83,7 +84,7 @@ class ContextParameter:
 
     @property
     def code(self) -> str:
-        """What the controller reads: a choice by its number."""
+        """Value that the controller reads: a choice by its number."""
         return str(self.choices.index(self.value)) if self.choices else self.value
 
 
@@ -125,7 +126,7 @@ class ContextObject:
 
     @property
     def name(self) -> str:
-        """In ``.rsi`` and ``.rsi.xml``."""
+        """Name in ``.rsi`` and ``.rsi.xml``."""
         return f"{self.kind}{self.number}"
 
     @property
@@ -142,7 +143,7 @@ class ContextObject:
 @brief_repr
 @dataclass(frozen=True)
 class ContextEntry:
-    """What a file says of one object; all numbers from 1."""
+    """Content of a file about one object; all numbers from 1."""
 
     type_id: int
     parameters: Mapping[str, tuple[int, str]]

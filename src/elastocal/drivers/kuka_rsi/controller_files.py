@@ -3,7 +3,7 @@
 All are made from the same limits and channels. Nothing here was tried on a controller; the programs
 say so.
 
-Where the objects of an RSI context stand in the picture that RSIVisual shows of it.
+It also places the objects of an RSI context in the diagram of RSIVisual.
 
 Sizes are those of public ``.rsi.diagram`` files, in inches; ids follow from names, so that the
 same cell gives the same file.
@@ -37,7 +37,7 @@ _WIDTH, _GAP, _EDGE = 1.5, 0.25, 0.5
 _PORT_LENGTH, _PORT_HEIGHT, _PORT_STEP = 0.4, 0.075, 0.4
 _LIST_TOP, _LIST_BASE, _LIST_ROW = 0.51, 0.249388, 0.192301
 _COLUMNS = {"SEN_PINT": 0.5, "ETHERNET": 3.875, "POSCORRMON": 11.0}
-"""Left edge by kind; all others stand right of the ETHERNET object."""
+"""Left edge by kind; all other objects are to the right of the ETHERNET object."""
 _SINKS = 7.625
 
 
@@ -88,7 +88,7 @@ class DrawnObject:
 
     @property
     def list_bounds(self) -> str:
-        """Those of the list of parameters."""
+        """Bounds of the list of parameters."""
         top = self.top + _LIST_TOP
         return _numbers(self.left + 0.015, top, _WIDTH - 0.03, self._list_height)
 
@@ -182,7 +182,7 @@ FORMS = {"rsi": ("rsi", "rsi.xml", "rsi.diagram"), "rsix": ("rsix",)}
 
 @dataclass(frozen=True)
 class ControllerSet:
-    """What the templates of one mode are filled with."""
+    """Values that the templates of one mode are filled with."""
 
     mode: str
     name: str
@@ -190,7 +190,7 @@ class ControllerSet:
     bounds: Bounds
     context: RsiContext
     loads: str
-    """What ``RSI_CREATE`` is called with."""
+    """Argument of ``RSI_CREATE``."""
     ipo: str
     """``#IPO_FAST`` or ``#IPO``."""
 

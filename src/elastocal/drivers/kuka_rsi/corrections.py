@@ -1,21 +1,21 @@
-"""The last look at every correction before it is sent: speed, size, and whether it is followed.
+"""Final limits on every correction before it is sent: speed, size, and whether it is followed.
 
-And the arm whose programmed path is corrected, which needs nothing else of this package.
+The module also holds the arm whose programmed path is corrected.
 
-Which correction a controller holds: seen from its messages, since answers get lost.
+The correction that a controller has taken is inferred from its messages, since answers may be lost.
 
 An absolute correction stays at the controller where no answer comes (``HOLDON`` 1), so that the
-next answer moves the arm by its distance from the last answer that was *taken*. The messages tell
+next answer moves the arm by its distance from the last answer that was *taken*. The messages show
 which one that was:
 
 * ``Delay D`` has grown, or messages are missing: the last answer was not taken, or may not have
   been. The one before it is sent again: it is within a step of whatever is held. The correction
-  goes on when two messages in a row tell that answers arrive.
-* IPOC has jumped, or nothing came for longer than ``Timeout``: the program may have been started
-  anew, without correction. RIst less RSol shows what is in effect. Where it is nearer to what was
-  sent within the delay of the motion, by a factor of two, the correction goes on; where it is
-  nearer to zero, it begins at zero; in between there is no answer, and the controller holds what it
-  has, or stops by its ``Timeout``.
+  continues when two consecutive messages show that answers arrive.
+* IPOC has jumped, or nothing came for longer than ``Timeout``: the program may have been restarted,
+  without correction. RIst minus RSol shows what is in effect. Where it is nearer to what was sent
+  within the delay of the motion, by a factor of two, the correction continues; where it is nearer
+  to zero, it begins at zero; in between there is no answer, and the controller holds what it has,
+  or stops by its ``Timeout``.
 """
 
 import math
@@ -44,7 +44,7 @@ from elastocal.results import brief_repr
 
 _NONE: Shift = (0.0, 0.0, 0.0)
 _CLEARLY = 2.0
-"""How much farther the other correction must be for one to be in effect."""
+"""Factor by which the other correction must be farther to decide which one is in effect."""
 
 _ROUNDED = 1.0 + 1e-9
 """A correction of one step may be longer by a rounding."""
@@ -56,7 +56,7 @@ class Effect(NamedTuple):
     shift: Shift
     """In m; the next answer is within a step of it."""
     begins: bool
-    """Whether the program begins without correction: it is new, or was started anew."""
+    """Whether the program begins without correction: it is new, or was restarted."""
     advances: bool
     """Whether the answer may be another one than `shift`."""
 
@@ -81,7 +81,8 @@ class HeldCorrection:
         self._came, self._delay = math.inf, 0
         self._taken = False
         self._stopped: bool | None = None
-        """Whether the controller has stopped, as far as its silence tells; None: no question."""
+        """Whether the controller has stopped, as inferred from its silence; None: not in
+        question."""
         self._answered = False
 
     def look(self, message: RobMessage, arrival: Arrival, now: float) -> Effect | None:
@@ -112,7 +113,7 @@ class HeldCorrection:
         if not taken:
             self._last, self._taken = self._before, False
             return Effect(self._last, begins=False, advances=False)
-        # A controller might tell of an answer a cycle later: one message more is waited for.
+        # A controller might report an answer a cycle later, so one more message is awaited.
         advances, self._taken = self._taken, True
         return Effect(self._last, begins=False, advances=advances)
 
@@ -129,7 +130,7 @@ class HeldCorrection:
             self._require_none(offset)
             begins = True
         elif offset is None:
-            # A program cannot be started anew within its own Timeout.
+            # A program cannot be restarted within its own Timeout.
             begins = stopped
         else:
             near = min(math.dist(offset, each) for each in (*self._recent, held))
@@ -170,13 +171,13 @@ def offset_of(message: RobMessage) -> Shift | None:
 
 
 _STRAYS = 1e-3
-"""How far RIst less RSol may be from every place that was commanded of late, in m."""
+"""Largest distance of RIst minus RSol from every recently commanded position, in m."""
 _PATIENCE = 5
-"""Cycles in a row for which it has to be, before the correction counts as not followed."""
+"""Consecutive cycles beyond that distance after which the correction counts as not followed."""
 _MEMORY = 0.1
 """Time beyond twice the delay for which commanded places are remembered, in s."""
 _STILL = 1e-6
-"""Change of the commanded place that is none, in m."""
+"""Change of the commanded position that counts as none, in m."""
 
 
 class CorrectionGuard:
@@ -200,7 +201,7 @@ class CorrectionGuard:
         """Cycles in which the arm was short of every place that was commanded of late."""
 
     def restart(self, offset: FloatArray) -> None:
-        """Begin at the correction that is in effect, base, shape (3,), in m; the arm stands."""
+        """Restart at the correction in effect, base, shape (3,), in m; the arm stands still."""
         self._recent.clear()
         self._recent.append(offset)
         self._astray = 0
@@ -282,9 +283,9 @@ class CorrectionSource(Protocol):
 class PathCorrections:
     """Handler of a link that corrects a programmed path: absolute corrections, superposed on LIN.
 
-    What the source wants is clamped to the largest correction, and approached at the fastest speed
-    from what the controller holds; what is not finite counts as that. Fading when readings fail is
-    the source's part: see `elastocal.compensation.online`.
+    The requested correction is clamped to the largest one and approached from the present one at
+    the largest speed; a request that is not finite leaves the present one. Fading when readings
+    fail is the task of the source: see `elastocal.compensation.online`.
     """
 
     source: CorrectionSource
@@ -292,16 +293,16 @@ class PathCorrections:
     cycle: float
     sentype: str = "elastocal"
     timeout: int = 10
-    """Timeout of the controller's ETHERNET object: whoever was silent for more cycles may have
-    stopped, and begin anew without correction."""
+    """Timeout of the controller's ETHERNET object: after more silent cycles it may have stopped and
+    restart without correction."""
     delay: float = LATE_DELAY
-    """From a correction to its motion, at most, in s."""
+    """Largest time from a correction to its motion, in s."""
     clamped: int = 0
     """Cycles in which the source wanted more than the largest correction."""
     held: int = 0
-    """Cycles in which it wanted what is not finite."""
+    """Cycles in which the requested correction was not finite."""
     withheld: int = 0
-    """Cycles without an answer, because nothing told which correction is in effect."""
+    """Cycles without an answer because the correction in effect was unknown."""
     largest_step: float = 0.0
     """Largest change from one answer to the next, in m; from zero where a program begins."""
 

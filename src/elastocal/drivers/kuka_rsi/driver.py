@@ -1,6 +1,6 @@
 """The driver of KUKA arms, as `elastocal run` finds it by its name ``kuka_rsi``.
 
-An arm that is only listened to: what `elastocal watch` shows of it.
+It also holds the arm that is only monitored, for `elastocal watch`.
 
 RSI has to be answered, or the controller stops by its ``Timeout``. In mode ``contact`` the answer
 is the one of an arm that is not enabled: no movement, order HOLD. In mode ``compensation`` none is
@@ -110,7 +110,7 @@ class KukaListener:
         try:
             self._stamps.rig_time(1e-3 * ipoc, now)
         except DeviceError:
-            # A program that begins anew, a count that begins from zero, or one of messages.
+            # A program that restarts, or a counter that restarts from zero or one.
             self._stamps = DeviceClock(self._link.source)
 
     def _reading(self) -> DeviceReading:
@@ -167,7 +167,7 @@ class KukaListener:
 
 
 _TO_THE_LOOP = 1.0
-"""From RSI_ON to the loop of the controller's program, at most, in s of the wall."""
+"""Largest time from RSI_ON to the loop of the controller's program, in s of wall time."""
 _LIMITS = ("largest_correction", "correction_speed")
 """Keys without which no path is corrected."""
 
@@ -218,7 +218,7 @@ class KukaRsiDriver:
     real: bool = True
 
     def settings(self, kind: str) -> type[DeviceSettings]:  # noqa: ARG002 - there is one kind
-        """Return the model of what stands under an arm."""
+        """Return the settings model of an arm."""
         return RsiSettings
 
     def connect(

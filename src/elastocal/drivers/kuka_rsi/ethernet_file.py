@@ -1,4 +1,4 @@
-"""The file that tells a controller's ETHERNET object what to send and to expect: made, and checked.
+"""Configuration file of a controller's ETHERNET object: generated and checked.
 
 Channels of the controller's own (``DEF_RIst``) are known by their names, all others by the number
 of the input or output of the object that they are wired to in the RSI context; with a point in the
@@ -75,7 +75,7 @@ class ContextPort:
     """Index of the KRL variable that the object reads or writes; such an object is for it alone."""
 
     def __str__(self) -> str:
-        """Return how the sheet names it."""
+        """Return its name on the sheet."""
         return (
             f"{self.kind}.{self.port}" if self.variable is None else f"{self.kind} {self.variable}"
         )
@@ -98,7 +98,7 @@ class EthernetChannel:
 @brief_repr
 @dataclass(frozen=True)
 class EthernetFile:
-    """What the ETHERNET object of one RSI context sends and receives."""
+    """Configuration of the ETHERNET object of one RSI context: what it sends and receives."""
 
     mode: str
     address: str

@@ -30,9 +30,10 @@ _PRODUCT = 0.25
 _FILTER = 0.01
 """Time constant of the force that is controlled, in s."""
 _HESITATE = 0.03
-"""Age of the newest force at which the arm stands still, in s."""
+"""Age of the newest force at which the arm stops, in s."""
 SILENT = 1.0
-"""Age at which it gives up, in s: whoever supervises it has had time to take it off the surface."""
+"""Age of the newest force at which force control ends with a fault, in s; by then the supervisor
+has had time to retract the arm."""
 _TARE_SAMPLES = 10
 _TARE_TIME = 0.2
 """Samples and time over which the zero of the force is taken, in s."""
@@ -156,7 +157,7 @@ class ForceReader:
             self._sums, self._count = self._sums + sample.force, self._count + 1
 
     def begin_zero(self, now: float) -> None:
-        """Begin to average the zero; the tool stands free meanwhile."""
+        """Start averaging the zero, while the tool is free."""
         self._sums, self._count, self._since = np.zeros(3), 0, now
 
     def is_zeroed(self, now: float) -> bool:
@@ -188,7 +189,7 @@ class ForceReader:
         return self._failure is not None or not self._now - self._good <= _HESITATE
 
     def problem(self, patience: float = SILENT) -> str | None:
-        """Return why there is no force to be trusted for a time in s; None if there is one."""
+        """Return why the force has been unreliable for a time in s; None if it is reliable."""
         if self._failure is not None:
             return self._failure
         if self._now - self._good <= patience:

@@ -1,14 +1,14 @@
-"""The link to a controller: a thread that answers each datagram at once, and counts what is wrong.
+"""The link to a controller: a thread that answers each datagram at once, and counts errors.
 
-The controller asks each 4 ms (12 ms in its mode ``#IPO``); an answer that is late, or has another
-IPOC, is none, and after some of those in a row the controller stops (``Timeout`` of its ETHERNET
-object). So the newest datagram alone is answered, to the place that it came from; whatever takes
-time happens elsewhere. A stock kernel keeps this most of the time, not always: soft real time. What
-bounds the motion are the controller's own limits, not this thread.
+The controller asks each 4 ms (12 ms in its mode ``#IPO``); a late answer, or one with another IPOC,
+does not count, and after several in a row the controller stops (``Timeout`` of its ETHERNET
+object). So only the newest datagram is answered, to its sender; slow work is done in other threads.
+A stock kernel meets the deadline most of the time, not always: soft real time. The motion is
+bounded by the controller's own limits, not by this thread.
 
-State of the arm in one cycle, and what is to be done until the next.
+The module also holds the state of the arm in one cycle and the request until the next.
 
-What a link to a controller has counted: messages, refusals, and times of its answers.
+It counts messages, refusals and the times of answers.
 """
 
 import contextlib
@@ -46,11 +46,11 @@ from elastocal.records import record
 from elastocal.results import brief_repr
 
 EXACT = 2e-5
-"""How near to its goal a straight move has to end, in m."""
+"""Largest distance of a straight move's end from its goal, in m."""
 AMISS = 1e-3
-"""How far from it the arm may be left, in m; more, and the controller did not follow."""
+"""Distance from the goal beyond which the controller did not follow, in m."""
 ANSWERS = 3.0
-"""Time in which the program on the controller does as it is told, and a sensor speaks, in s."""
+"""Time within which the program on the controller obeys, and a sensor delivers, in s."""
 
 
 def _zero() -> FloatArray:
@@ -79,7 +79,7 @@ class Cycle:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What is to be done until the next cycle."""
+    """Request until the next cycle."""
 
     shift: FloatArray = field(default_factory=_zero)
     """Movement of the tool, base, shape (3,), in m."""
@@ -93,12 +93,12 @@ Phase = Generator[Step, Cycle, Cycle]
 
 @dataclass(frozen=True)
 class Pace:
-    """How straight moves go."""
+    """Limits of straight moves in time."""
 
     cycle: float
     """In s."""
     delay: float
-    """From command to motion, in s."""
+    """Delay from command to motion, in s."""
     acceleration: float
     """In m/s²."""
 
@@ -114,7 +114,7 @@ def guided(cycle: Cycle) -> Phase:
 
 
 def does_not_answer(what: str, cycle: Cycle) -> DeviceError:
-    """Return the error of a program that does not do as it is told."""
+    """Return the error of a program that does not obey."""
     known = [state.name.lower() for state in ProgramState if state == cycle.state]
     return DeviceError(
         f"the program on the controller does not begin {what}: it is"
@@ -148,7 +148,7 @@ class LinkStatistics:
     controller_delay: int | None
     """Largest Delay D that the controller has reported; None when it does not send it."""
     answer_median: float
-    """From datagram in to datagram out, in s; NaN before the first."""
+    """Median time from datagram in to datagram out, in s; NaN before the first."""
     answer_p99: float
     answer_longest: float
     jitter: float
@@ -262,7 +262,7 @@ def _kind(reason: str) -> str:
 
 
 _PATIENCE = 0.1
-"""How long the thread waits for a datagram before it looks whether it is to end, in s."""
+"""Time that the thread waits for a datagram before it checks whether to end, in s."""
 _LATE = 0.875
 """Part of the cycle after which an answer is likely to miss it: 3.5 ms of 4 ms."""
 _SESSION = 0.5
@@ -270,10 +270,10 @@ _SESSION = 0.5
 _STAMP, _STAMPED = 35, struct.Struct("@qq")
 """SO_TIMESTAMPNS of Linux, which the module `socket` does not name, and what it gives."""
 _OLDEST = 1.0
-"""A stamp of the kernel that is older, in s, is none: the clock of the wall was set meanwhile."""
+"""Age of a kernel stamp, in s, above which it is ignored: the wall clock was set meanwhile."""
 _NAME = "kuka_rsi: "
 _SURPRISES = (ElastocalError, ArithmeticError, LookupError, TypeError, ValueError, OSError)
-"""What a handler may raise; it costs an answer, and not the thread that answers."""
+"""Exceptions of a handler that cost one answer but do not end the thread."""
 _Arrived = tuple[bytes, tuple[str, int], float]
 """A datagram, its sender, and how long it had waited, in s."""
 _MOST_BACKLOG = 64
@@ -289,14 +289,14 @@ class Handler(Protocol):
 
 @dataclass(frozen=True)
 class LinkAddress:
-    """Where a link listens, and to whom."""
+    """Address on which a link listens, and its controller."""
 
     address: str
     """Own address; the socket is bound to it alone."""
     port: int
     """0: the system chooses one."""
     robot: str
-    """Address of the controller; its port is its own choice, anew at each start."""
+    """Address of the controller; its port is its own choice at each start."""
     cycle: float
     """In s."""
     answers: bool = True
@@ -341,7 +341,7 @@ class RsiLink:
         self.port = place.port
         """The port that it listens at."""
         self.source = f"kuka_rsi {place.robot}"
-        """The controller, for people."""
+        """Name of the controller for people."""
 
     def start(self) -> None:
         """Bind the port and answer from now on.
@@ -415,7 +415,7 @@ class RsiLink:
             As it came.
         sender : tuple of (str, int)
             Address and port that it came from. The port is the controller's own choice at each
-            start: another one counts as somebody else's until the one before falls silent.
+            start: another one counts as another sender until the previous one falls silent.
         """
         came = self._timer()
         data = self._answer(datagram, sender, came)
