@@ -1,8 +1,8 @@
 """The error tree: one base class, one line a message.
 
-Every message names the offending thing, its value and what is allowed, so that the command
-line can print it as it stands. Each error is also the builtin that a caller would expect
-(`ValueError`, `OSError`), so that library users need not import this module to catch one.
+Every message names the offending thing, its value and what is allowed, so that the command line can
+print it unchanged. Each error is also the builtin that a caller would expect (`ValueError`,
+`OSError`), so that library users need not import this module to catch one.
 """
 
 import difflib

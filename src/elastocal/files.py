@@ -1,14 +1,14 @@
-"""Files: written whole or not at all, and known by their content.
+"""Files: written atomically, and identified by their content.
 
-A file that is being written lives beside its target under a temporary name and takes the
-target's name only after it has reached the disk, so that neither a crash nor Ctrl-C leaves
-half a file. It is locked as long as its writer lives: what a killed one leaves is known by that,
-and `remove_leftovers` removes it.
+A file that is being written lives beside its target under a temporary name and takes the target's
+name only after it has reached the disk, so that neither a crash nor Ctrl-C leaves half a file. It
+is locked while its writer lives, so that the leftovers of a killed writer are recognised;
+`remove_leftovers` removes them.
 
-What is read and written here is held to the rule of the command at work, `elastocal.outputs`.
+Reading and writing obey the rule of the current command, `elastocal.outputs`.
 
-What a file may ask for is bounded (`Limit`): a few hundred bytes of other people's can ask for more
-memory, or time, than there is.
+The memory and time that a file may need are bounded (`Limit`), since a few hundred bytes of a
+foreign file can request more than there is.
 """
 
 import contextlib
@@ -30,9 +30,9 @@ from elastocal.outputs import current_rule
 
 _STANDARD_INPUT = Path("/dev/stdin")
 _DESCRIPTORS = (Path("/dev/fd"), Path("/proc/self/fd"))
-"""Where a shell puts what it pipes into a command by name (``<(...)``)."""
+"""Folder where a shell places what it pipes into a command by name (``<(...)``)."""
 _UNDER_WAY = ".elastocal-"
-"""In the names of what is being written, behind a dot and the name that it will have."""
+"""Part of the name of a file that is being written, after a dot and its final name."""
 _NO_FILE = "it is a folder or a device, not a file"
 _LONGEST_NAME = 200
 """Letters of a name that are kept there: file systems take 255 bytes."""
@@ -47,7 +47,7 @@ class Limit:
     default: int
     """The bound when it is not set."""
     unit: str
-    """What is counted."""
+    """Name of the counted quantity."""
 
     @property
     def most(self) -> int:
@@ -274,7 +274,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Write ``data`` to ``path`` atomically, as `json_text`; what cannot be is refused likewise."""
+    """Write ``data`` to ``path`` atomically, as `json_text`, with the same refusals."""
     write_text(path, json_text(data))
 
 
@@ -345,11 +345,11 @@ def read_bytes(path: Path, most: Limit | None = None) -> bytes:
 
 
 def require_file(path: Path) -> None:
-    """Refuse a pipe, a socket or a device: reading it may wait for ever, or never end.
+    """Refuse a pipe, a socket or a device: reading it may block, or never end.
 
-    What is a file is an input of the command at work from here on.
+    A file becomes an input of the current command.
 
-    What is not there, and a folder, are left to whoever opens it; standard input may be read.
+    A missing file and a folder are left to the caller that opens them; standard input may be read.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Findings: what is judged, warned of or refused, as data; sentences are made of it.
+"""Findings: judgements, warnings and refusals as data, from which sentences are formed.
 
 A feature declares each kind of finding once, near the code that judges: its name, the English
-sentence, how grave it is, and the advice that follows. A file holds the kind and its values, with
-the sentence beside them for people who read the file. Nothing is decided by the words.
+sentence, its grade, and the advice. A file holds the kind and its values, with the sentence for
+people who read the file. No decision depends on the words.
 
 >>> MOVED = Kind("doc.moved", "pose {pose} moved by {by} mm", advice="Fix pose {pose}.",
 ...              shown={"by": as_number(".2f", 1e3)})
@@ -23,12 +23,12 @@ from elastocal.wording import Phrase, counted, phrase
 
 
 class Grade(Enum):
-    """How grave a finding is."""
+    """Severity of a finding."""
 
     NOTE = "note"
     """Worth knowing; it keeps no light from being green."""
     WARNING = "warning"
-    """It keeps the light of the report from being green."""
+    """The light of the report is not green."""
     REFUSAL = "refusal"
     """The work cannot go on, or nothing that rests on it can be relied on."""
 
@@ -42,12 +42,12 @@ class Kind:
     template: str
     """English sentence, with names of values in braces."""
     advice: str | Callable[[Mapping[str, Any]], str] = ""
-    """What to do about it, with the same values; empty where the sentence says it. A function makes
-    it of the values where one sentence does not do."""
+    """Remedy, with the same values; empty where the sentence states it. A function forms it from
+    the values where one sentence is not enough."""
     grade: Grade | None = Grade.WARNING
-    """How grave it is; None: as the finding among its values."""
+    """Severity; None: that of the finding among its values."""
     shown: Mapping[str, Callable[[Any], object]] = field(default_factory=dict)
-    """How values are shown that are neither texts, whole numbers nor lists of them."""
+    """Formats of values that are neither texts, whole numbers nor lists of them."""
 
     def __post_init__(self) -> None:
         """Register the kind."""
@@ -71,11 +71,11 @@ class Finding(Phrase):
     """Something that was judged: its kind and its values. It is its English sentence."""
 
     kind: str
-    """Name of its kind; empty for a sentence from a file of before there were kinds."""
+    """Name of its kind; empty for a sentence from a file older than kinds."""
     values: Mapping[str, Any]
     """JSON-ready data, numbers in SI units; findings may be among them."""
     advice: str
-    """What to do about it: its own advice, or that of a finding among its values."""
+    """Remedy: its own advice, or that of a finding among its values."""
 
     def __new__(cls, kind: str, values: Mapping[str, Any], text: str | None = None) -> "Finding":
         """Return a finding.
@@ -116,7 +116,7 @@ class Finding(Phrase):
 
     @property
     def grade(self) -> Grade:
-        """How grave it is."""
+        """Severity of the finding."""
         known = KINDS.get(self.kind)
         if known is not None and known.grade is not None:
             return known.grade
@@ -163,7 +163,7 @@ class Finding(Phrase):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, *_: object) -> Any:
-        """Return how records read it."""
+        """Return the schema by which records read it."""
         from pydantic_core import core_schema
 
         return core_schema.no_info_plain_validator_function(cls.read)
@@ -173,10 +173,10 @@ MORE_ALIKE = Kind("findings.more-alike", "{first} (and {more} more of this kind)
 
 
 def group_alike(found: Iterable[str], most: int = 3) -> list[str]:
-    """Return findings without endless repetition: many of one kind are one, with their number.
+    """Return findings without repetition: several of one kind become one, with their number.
 
-    Whoever shows findings to a person shows them so; files and ``--json`` hold them all. A text
-    that is no finding is alike to itself only.
+    Findings are shown to people in this form; files and ``--json`` hold all of them. A text that is
+    no finding equals only itself.
 
     >>> ODD = Kind("doc.odd", "pose {pose} is odd")
     >>> group_alike([ODD(pose=n) for n in range(9)])

@@ -19,7 +19,7 @@ _PUBLIC = "/tmp" if POSIX else os.environ.get("PROGRAMDATA", "C:/ProgramData")
 SHARED = Path(_PUBLIC, "elastocal-locks")
 """Folder of the locks that all users of this machine share; TMPDIR may be another for each."""
 _OPEN_TO_ALL = 0o1777
-"""Mode of that folder: whoever may write there removes no file of others."""
+"""Mode of that folder: every user may write, none may remove files of others."""
 _MOST_TEXT = 400
 """Bytes that are read of what a holder has written about itself."""
 _FAR = 0x7FFF_FFFE
@@ -56,9 +56,9 @@ def lock_file(handle: int) -> None:
 
 
 def show_life(place: Path) -> Callable[[], None]:
-    """Mark a temporary file or folder as one that a living process writes; return what ends that.
+    """Mark a temporary file or folder as in use by this process; return a function that ends it.
 
-    Where a file system knows no locks, nobody can tell it from one at work, and it is left alone.
+    On a file system without locks, unfinished files cannot be recognised and are left in place.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def show_life(place: Path) -> Callable[[], None]:
 
 @contextlib.contextmanager
 def taken_over(place: Path) -> Iterator[bool]:
-    """Yield whether nobody writes a temporary file or folder any more; nobody does meanwhile.
+    """Yield whether a temporary file or folder has no writer, and keep it so meanwhile.
 
     Raises
     ------
@@ -98,23 +98,23 @@ def taken_over(place: Path) -> Iterator[bool]:
 
 
 def claim(name: str, holder: str) -> Callable[[], None]:
-    """Take a lock that all users of this machine share; return what gives it back.
+    """Take a lock that all users of this machine share; return a function that releases it.
 
-    It ends with this process, however that ends. Its file may stay, and is nobody's then.
+    It ends with this process in any case. Its file may remain, without a holder.
 
     Parameters
     ----------
     name : str
-        What is locked.
+        Name of the lock.
     holder : str
-        What others read who are refused, in one line.
+        Description of the holder for those who are refused, in one line.
 
     Raises
     ------
     BlockingIOError
-        If it is taken; its ``strerror`` is what the holder says of itself.
+        If it is taken; its ``strerror`` is the holder's description.
     OSError
-        If nothing can be locked here.
+        If locks are not available here.
     """
     known = hashlib.sha256(name.encode()).hexdigest()[:16]
     place = _shared_folder() / f"{re.sub(r'[^A-Za-z0-9.]+', '-', name)[:60]}-{known}"
@@ -134,7 +134,7 @@ def claim(name: str, holder: str) -> Callable[[], None]:
         if not POSIX or _is_there(place, handle):
             break
         os.close(handle)
-    with contextlib.suppress(OSError):  # the text is for people; the lock holds without it
+    with contextlib.suppress(OSError):  # The text is for people; the lock holds without it.
         os.ftruncate(handle, 0)
         os.write(handle, holder.encode()[:_MOST_TEXT])
 
@@ -148,7 +148,7 @@ def claim(name: str, holder: str) -> Callable[[], None]:
 
 
 def _shared_folder() -> Path:
-    """Return the folder of shared locks: everybody writes there, nobody removes others' files."""
+    """Return the folder of shared locks: every user may write, none may remove others' files."""
     SHARED.mkdir(exist_ok=True)
     found = SHARED.lstat()
     if not stat.S_ISDIR(found.st_mode):

@@ -1,9 +1,9 @@
 """Points of tracker stations, from the thread of a line to `elastocal.cell.Metrology`.
 
-A thread puts in what its line says: points, a beam that breaks or is found, a fault. The
-supervision cycle takes out what has come, at once. Between them stand the checks that any
-instrument needs: its clock (`elastocal.drivers.device_clock`), the unit of its lengths by the range
-of the station in the cell file, a bound on what is kept.
+A thread enters the events of its line: points, a beam that breaks or is found, a fault. The
+supervision cycle takes them out without waiting. In between are the checks that any instrument
+needs: its clock (`elastocal.drivers.device_clock`), the unit of its lengths by the range of the
+station in the cell file, a bound on what is kept.
 
 The connection to a station: a thread that keeps it up, and fills the feeds of its stations.
 """
@@ -39,12 +39,12 @@ NEWEST = 500
 _OUTSIDE = 10
 """Points one after another outside the station's range: no blunder, but another unit or frame."""
 _ROUGHLY = 2.0
-"""How many times beyond its range a marker may be: the range is a planner's figure."""
+"""Factor by which a marker may be beyond the range, which is a planner's figure."""
 _UNITS = ("m", "mm", "um", "in")
 
 
 class StationFeed:
-    """What one station says; filled by a thread, emptied by the supervision cycle.
+    """Events of one station, entered by a thread and taken by the supervision cycle.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class StationFeed:
     clock : Clock
         Clock of the rig.
     silence : float
-        A station that has said nothing for longer counts as one whose beam is broken, in s.
+        Silence after which the beam of a station counts as broken, in s.
     unit : str
         Unit in which the device states lengths, for messages.
     own_frame : bool
@@ -86,7 +86,7 @@ class StationFeed:
 
     @property
     def counts(self) -> LineCounts:
-        """What was counted so far."""
+        """Counts so far."""
         device = f"{self.source}: {self.tracker.name}"
         return LineCounts(device=device, received=self._points, breaks=self._breaks)
 
@@ -103,7 +103,7 @@ class StationFeed:
         position, sigma : ndarray, shape (3,)
             In m; sigma NaN where it is not known.
         stamp : float, optional
-            By the device's clock, in s; without it the point is of now.
+            By the device's clock, in s; by default the present time.
         """
         now = self._clock.now()
         with self._lock:
@@ -129,7 +129,7 @@ class StationFeed:
             self._fault = self._fault or f"{self.source}: {why}"
 
     def forget(self) -> None:
-        """Drop what has come and nobody has taken."""
+        """Drop all events that were not taken."""
         with self._lock:
             self._rows.clear()
 
@@ -305,7 +305,7 @@ def require_trackers(cell: Cell) -> tuple[Tracker, ...]:
 _RECEIVED = 65536
 """Bytes that are read at once."""
 WAKE = 0.05
-"""How often a thread looks whether it is to end, in s of the wall."""
+"""Interval at which a thread checks whether to end, in s of wall time."""
 _AGAIN = 1.0
 """Until a line that is only watched is connected again after a refusal, in s of the wall."""
 
@@ -337,7 +337,7 @@ class StationLink(threading.Thread, ABC):
 
     @abstractmethod
     def hear(self) -> bool:
-        """Connect and take what comes until the connection ends; False: nobody has come yet.
+        """Connect and receive until the connection ends; False: there was no connection yet.
 
         Raises
         ------

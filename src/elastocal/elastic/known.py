@@ -1,8 +1,8 @@
-"""What is known of springs before the data: bounds, and stiffnesses of data sheets.
+"""Prior knowledge of springs: bounds, and stiffnesses from data sheets.
 
-People write both as stiffness or as compliance, with units; here they are compliances. Makers of
-gears state up to three stiffnesses: ``K1`` up to the torque ``T1``, ``K2`` from there to ``T2``,
-``K3`` beyond. Each is the mean compliance of the gear between two torques, which is linear in its
+Files give both as stiffness or compliance, with units; here they are compliances. Makers of gears
+state up to three stiffnesses: ``K1`` up to the torque ``T1``, ``K2`` from there to ``T2``, ``K3``
+beyond. Each is the mean compliance of the gear between two torques, which is linear in its
 parameters.
 """
 
@@ -25,13 +25,13 @@ _DIMENSIONS = {
     "rotational compliance": (True, False),
     "translational compliance": (False, False),
 }
-"""Whether a quantity is of a torsional spring, and whether it is a stiffness."""
+"""Whether a quantity is torsional, and whether it is a stiffness."""
 
 
 @brief_repr
 @record()
 class KnownSpring:
-    """What is known of a spring, as compliances in rad/(N·m) or m/N."""
+    """Prior knowledge of a spring, as compliances in rad/(N·m) or m/N."""
 
     name: str
     low: float | None = None

@@ -1,4 +1,4 @@
-"""Spring layouts: which springs a robot is given, by name or as a YAML file lists them.
+"""Spring layouts: the springs of a robot, by a name or from a YAML file.
 
 A new named layout is a function ``(robot) -> springs`` here, an entry in `LAYOUTS`, a line in the
 changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
@@ -14,12 +14,12 @@ changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
       - {joint: joint_a4, kind: gear, K1: "0.3 MN*m/rad", uncertainty: "30 %"}
       - {joint: joint_a5, kind: gear, settings: {knees: [100, 300, 900]}}   # fields of the kind
 
-Where the virtual springs of a joint sit: its Hartenberg-Denavit origin (paper Eq. 2).
+The virtual springs of a joint are at its Hartenberg-Denavit origin (paper Eq. 2).
 
 The origin of a joint is where the common normal with the axis before it meets its own axis (J.
-Angeles, *Fundamentals of Robotic Mechanical Systems*, 2014, section 4.2). It belongs to the two
-axes, not to the frame that somebody drew: sliding a URDF's joint frame along its own axis, or
-turning it about it, moves nothing. Special cases:
+Angeles, *Fundamentals of Robotic Mechanical Systems*, 2014, section 4.2). It depends on the two
+axes only, not on the frame of a URDF: sliding a joint frame along its axis, or turning it about the
+axis, changes nothing. Special cases:
 
 * parallel axes have many common normals: the one through the previous origin counts. Axes are
   taken as parallel up to `PARALLEL`, beyond which a calibrated arm's nearly parallel axes would
@@ -79,8 +79,8 @@ class JointOrigin:
     offset: _Triple
     """The origin in the joint's proximal frame, in m."""
     far: _Triple
-    """Where the common normal with the next axis, or for the last joint the one through the tip,
-    meets the axis, likewise; the origin again where axes are parallel."""
+    """Point on the axis where the common normal with the next axis, or for the last joint the one
+    through the tip, meets it, in m; the origin again where axes are parallel."""
     directions: dict[str, _Triple]
     """Unit vectors orthogonal to the joint axis by name: the common normal, and the direction
     orthogonal to it. Named after the frame's coordinate axes where they are those, else
@@ -216,7 +216,7 @@ _SCHEMA = "elastocal.springs/1"
 _APART = 1e-3
 """Distance in m from which two places on an axis are two."""
 _MOTIONS = ("revolute", "prismatic")
-"""What a hinge may do; other kinds of springs are asked for by their word."""
+"""Motions of a hinge; other kinds of springs are requested by name."""
 
 
 def actuated(robot: Robot) -> tuple[Spring, ...]:
@@ -248,8 +248,8 @@ def bearing_ends(robot: Robot) -> tuple[Spring, ...]:
 def links(robot: Robot) -> tuple[Spring, ...]:
     """Return the layout of both bearing ends with links that bend.
 
-    A beam that bends does so all along its length, which springs at its ends express badly: their
-    lever to the tcp is another. Two hinges in the middle of each link stand for it.
+    A beam bends along its whole length, which springs at its ends describe badly, since their lever
+    arms to the tcp differ. Two hinges in the middle of each link represent the bending.
     """
     bends = (
         Hinge(f"{link.joint}.bend-{name}", link.joint, axis, distal=True, offset=link.middle)
@@ -296,11 +296,10 @@ def bearing_joint(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
 def tensor(robot: Robot) -> tuple[Spring, ...]:
     """Return a symmetric compliance tensor at every joint that turns, at its origin.
 
-    What 18 springs of any directions can express and more: bearings that tilt about axes which
-    are not the frame's; origins are the Hartenberg-Denavit ones. Joints that slide have a linear
-    spring, first, and no tensor: it would stand still while the arm goes by, and what one position
-    on a rail says of it is wrong at another. A carriage that tilts is in the tensor of the joint
-    that it carries.
+    It describes more than 18 springs of any directions can: bearings that tilt about axes other
+    than those of the frame. Origins are the Hartenberg-Denavit ones. Prismatic joints have a linear
+    spring, first, and no tensor: its compliance would depend on the position along the rail. A
+    carriage that tilts is in the tensor of the joint that it carries.
     """
     pairs = list(zip(robot.chain.joints, joint_origins(robot.chain), strict=True))
     sliding = tuple(axial(joint) for joint, _ in pairs if not joint.revolute)
@@ -406,7 +405,7 @@ def _springs_of(robot: Robot, file: "SpringFile") -> list[tuple[Spring, "SpringE
         if spring in listed:
             raise SpringError(f"spring {spring.name!r} is listed twice")
         listed[spring] = entry
-    # An entry that tells what is known of an included spring is no second spring.
+    # An entry that states prior knowledge of an included spring is no second spring.
     told = {spring: entry for spring, entry in listed.items() if entry.knows}
     found = [(spring, told.get(spring)) for spring in included]
     return found + [(s, entry) for s, entry in listed.items() if s not in included or s not in told]
@@ -432,7 +431,7 @@ _Kind = Annotated[
 
 
 class SpringEntry(Knowledge):
-    """One spring as a person writes it."""
+    """Entry of a spring file."""
 
     joint: str
     axis: Literal["axial", "x", "y", "z"] | tuple[float, float, float] = "axial"

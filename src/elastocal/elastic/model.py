@@ -9,24 +9,24 @@ and, with compliances ``c`` of linear springs, the deflection
 
     deflection = J diag(c) tau = O c,    O = J diag(tau).  (Eq. 10, 11, 14)
 
-Every kind of spring is linear in its parameters, so that ``O c = deflection`` holds for all; what
-a column of ``O`` is, the spring knows (`elastocal.elastic.springs`).
+Every kind of spring is linear in its parameters, so that ``O c = deflection`` holds for all; the
+spring defines its columns of ``O`` (`elastocal.elastic.springs`).
 
-The deflection is against the unloaded arm at the *same* joints, which gravity has bent already.
-Against the arm without weight it is ``(O + S) c`` with the sag ``S c``; a displacement between a
-reference and a loaded reading, millimetres apart, holds ``S(q) - S(q_0)`` besides ``O``.
+The deflection is relative to the unloaded arm at the *same* joints, already bent by gravity.
+Relative to the weightless arm it is ``(O + S) c`` with the sag ``S c``; a displacement between a
+reference and a loaded reading, millimetres apart, contains ``S(q) - S(q_0)`` in addition to ``O``.
 
 Springs of one law, evaluated together, and the chain that their axes are inserted into.
 
-Friction memory: what torque friction bears depends on the way the torque took.
+Friction memory: the torque that friction carries depends on the history of the torque.
 
 A stop operator (the building block of Prandtl-Ishlinskii hysteresis) follows the changes of a
 torque until it slides at its limit:
 
     s_k = clip(s_{k-1} + tau_k - tau_{k-1}, -r, r).
 
-A free motion of the joint wears the memory off: after it the state is near zero, as far as is
-known. A press that changes the torque by more than ``2 r`` wipes out whatever came before.
+A free motion of the joint clears the memory: after it the state is assumed near zero. A press that
+changes the torque by more than ``2 r`` erases all earlier history.
 """
 
 from collections.abc import Hashable, Iterator, Sequence
@@ -181,7 +181,7 @@ class FrictionElements:
         return np.clip(torque[..., self.axis], -self.limit, self.limit)
 
     def path(self, torque: FloatArray, start: FloatArray | None = None) -> FloatArray:
-        """Return the states along a way.
+        """Return the states along a torque history.
 
         Parameters
         ----------
@@ -247,7 +247,7 @@ class FrictionElements:
 @brief_repr
 @dataclass(frozen=True)
 class CartesianCompliance:
-    """How a pose yields to a wrench at the tool centre point, in base axes."""
+    """Response of a pose to a wrench at the tool centre point, in base axes."""
 
     translation: FloatArray
     """Displacement per force, shape (..., 3, 3), in m/N; symmetric."""
@@ -422,7 +422,7 @@ class ElasticModel:
             J = [observed[..., axis] for axis in group.axes]
             places += group.parameters
             columns += group.law.columns(J, group.load(torque, weight, friction))
-        # Springs of one law and one parameter, as hinges are, stand side by side already.
+        # Springs of one law and one parameter, such as hinges, are adjacent already.
         return columns[0] if len(columns) == 1 else assembled(columns, places)
 
     def deflection(

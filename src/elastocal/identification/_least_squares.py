@@ -65,7 +65,8 @@ def minimise(
         A = s[:, None] * Vt
         bounded_above = not np.all(np.isposinf(upper))
         x = _boxed(A, y, lower, upper) if bounded_above else _bounded_below(A, y, lower)
-    # What turns no spring is decided by no rounding: it stands at zero, or at the bound beside it.
+    # Directions that turn no spring are not left to rounding: they are set to zero, or to the
+    # nearest bound.
     seen = np.linalg.norm(s[:determined, None] * Vt[:determined], axis=0)
     return np.where(seen > RANK_TOLERANCE * s[0], x, np.clip(0.0, lower, upper))
 
@@ -99,9 +100,9 @@ def kkt_violation(
 ) -> float:
     """Return how far a solution is from satisfying the optimality conditions.
 
-    The largest gradient component that a bound does not excuse, relative to the gradient at
-    zero (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23). Directions that
-    the data do not determine are left out: there `minimise` asks for the least norm.
+    The largest gradient component that a bound does not excuse, relative to the gradient at zero
+    (Lawson and Hanson, *Solving Least Squares Problems*, 1974, chapter 23). Directions that the
+    data do not determine are left out, since `minimise` gives them the least norm.
     """
     determined = rank(s)
     s, Vt, y = s[:determined], Vt[:determined], y[:determined]

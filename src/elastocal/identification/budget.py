@@ -1,18 +1,18 @@
-"""What each term of a model is worth, and what the error that is left is made of.
+"""Error budget: the contribution of each term of a model, and the parts of the remaining error.
 
 Ablation: each term that the model has is taken out, each that it lacks is added; the model is
 refitted without each pose in turn and predicts the readings there. With mean squares ``m`` of the
-errors at left-out poses, a term is worth
+errors at left-out poses, the contribution of a term is
 
     sign(m_without - m_with) sqrt(|m_without - m_with|),
 
 since independent errors add up in quadrature. The interval is that of the paired difference over
-pose blocks, which counts that refits share nearly all their poses, as the ladder's does
+pose blocks, which allows for refits that share nearly all their poses, as in the ladder
 (`elastocal.identification.paired`).
 
-What is left at unseen poses is parted in quadrature too: noise of the instruments, as stated or
-as repeated readings scatter; the fit, which another choice of poses would change (jackknife over
-poses); and the rest, which no term here explains.
+The remaining error at left-out poses is split in quadrature, too: noise of the instruments, as
+stated or as repeated readings scatter; the fit, which another choice of poses would change
+(jackknife over poses); and the rest, which no term here explains.
 """
 
 from dataclasses import dataclass, replace
@@ -47,7 +47,7 @@ _FEWEST_REPEATS = 9
 _TURN = 1e-2
 """Standard deviation of the prior on a turn of the tracker, in rad: no registration is worse."""
 _READING = 1e-5
-"""What that prior is weighed against, in m: a reading of a tracker."""
+"""Standard deviation against which that prior is weighted, in m: a reading of a tracker."""
 
 
 @record()
@@ -55,37 +55,38 @@ class ErrorPart:
     """A part of the error at left-out poses: root of a mean square of norms, in m."""
 
     error: float | None
-    """None where it is not known."""
+    """None where it is unknown."""
     low: float | None
     """Lower end of its 95 % interval; none where it has none."""
     high: float | None
     """Upper end."""
     source: str
-    """How it was come by, or why it is not known."""
+    """Origin of the value, or the reason why it is unknown."""
 
 
 @record()
 class TermWorth:
-    """A term of the model, and what it takes from the error at left-out poses."""
+    """Term of the model and its contribution to the error at left-out poses."""
 
     term: TermName
     taken: bool
-    """Whether the model has it; else it was added to see what it would be worth."""
+    """Whether the model has the term; otherwise it was added to measure its contribution."""
     error: float | None
-    """Root mean square error at left-out poses with the term taken out, or added, in m; none where
-    the readings do not let it be judged."""
+    """Root mean square error at left-out poses with the term removed, or added, in m; None where
+    the readings do not allow the comparison."""
     worth: float | None
-    """What the term takes from the error, in quadrature, in m; negative where it adds to it."""
+    """Reduction of the error by the term, in quadrature, in m; negative where it increases the
+    error."""
     low: float | None
     """Lower end of its 95 % interval."""
     high: float | None
     """Upper end."""
     reason: str | None = None
-    """Why it is not judged."""
+    """Reason why it is not judged."""
 
     @property
     def label(self) -> str:
-        """The term as people read it."""
+        """Name of the term in tables."""
         return _LABELS[self.term]
 
     @property
@@ -95,14 +96,14 @@ class TermWorth:
 
     @property
     def resolved(self) -> bool:
-        """Whether the poses tell its worth from zero."""
+        """Whether its contribution differs significantly from zero."""
         return self.low is not None and self.high is not None and self.low * self.high > 0.0
 
 
 @brief_repr
 @record()
 class ErrorBudget:
-    """The error at left-out poses, its parts, and the worth of each term (`error_budget`)."""
+    """Error at left-out poses, its parts, and the contribution of each term (`error_budget`)."""
 
     deflection: float
     """Root mean square of the measured deflections, in m."""
@@ -111,16 +112,16 @@ class ErrorBudget:
     noise: ErrorPart
     """Noise of the instruments, in a reading."""
     fit: ErrorPart
-    """What another choice of poses would change."""
+    """Part due to the choice of poses."""
     rest: ErrorPart
-    """What is neither: no term here explains it."""
+    """Remainder, which no term here explains."""
     terms: tuple[TermWorth, ...]
     readings: int
     poses: int
 
     @property
     def parts(self) -> tuple[tuple[str, ErrorPart], ...]:
-        """The error and its parts, as people read them."""
+        """The error and its parts, with their names in tables."""
         return (
             (phrase("all, at left-out poses"), self.total),
             (phrase("noise of a reading"), self.noise),
@@ -145,8 +146,8 @@ def error_budget(
     readings : Readings
         Measurements, joints in the robot's order.
     options : FitOptions, optional
-        Bounds, weights, loss, free frames. What is known of single springs (a prior, a bound for
-        each) speaks of one model and has no part in it, as in the ladder.
+        Bounds, weights, loss, free frames. Priors and bounds of single springs apply to one model
+        only and are not used, as in the ladder.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
 
@@ -156,7 +157,7 @@ def error_budget(
         If there are too few poses.
     """
     options = _for_any_model(options or FitOptions())
-    # Sought once, not for every model.
+    # Searched once, not for every model.
     sought = reference_joints(model.robot, readings)
     readings = replace(readings, reference_joint_position=sought)
     problem = build(model, readings, options, marker_offset)
@@ -185,7 +186,7 @@ def error_budget(
 
 
 def _for_any_model(options: FitOptions) -> FitOptions:
-    """Return the options without what speaks of single parameters."""
+    """Return the options without those for single parameters."""
     lower = 0.0 if np.ndim(options.lower) else options.lower
     upper = np.inf if np.ndim(options.upper) else options.upper
     return replace(options, prior=None, lower=lower, upper=upper)
@@ -200,7 +201,7 @@ class _Ablation:
     options: FitOptions
     marker_offset: ArrayLike | None
     weight: FloatArray
-    """That the loss gave each reading, shape (reading,)."""
+    """Weights of the readings by the loss, shape (reading,)."""
     squares: FloatArray
     """Mean square errors of the chosen model at left-out pose blocks, shape (block,), in m^2."""
 
@@ -228,7 +229,7 @@ class _Ablation:
         }[term]
 
     def _refusal(self, term: TermName) -> str | None:
-        """Return why the readings do not let a term be judged."""
+        """Return the reason why the readings do not allow a term to be judged."""
         if term in ("bearings", "gears", "friction") and not any(
             map(self._is_axial, self.model.springs)
         ):
@@ -326,7 +327,7 @@ def _with_interval(squares: FloatArray) -> tuple[float, float, float]:
 
 
 def _part(square: float, low: float | None, high: float | None, source: str) -> ErrorPart:
-    """Return a part of the error from its mean square; what is below zero is none."""
+    """Return a part of the error from its mean square, zero if that is negative."""
     low, high = (None if x is None else float(np.sqrt(max(x, 0.0))) for x in (low, high))
     return ErrorPart(float(np.sqrt(max(square, 0.0))), low, high, source)
 

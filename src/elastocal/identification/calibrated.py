@@ -1,8 +1,8 @@
-"""The calibrated model: what the compensation and every prediction work with.
+"""The calibrated model, on which the compensation and every prediction are based.
 
-Another tool than the one calibrated with is a `ToolChange`: the springs belong to the arm, so that
-a longer cutter changes no compliance; it changes the lever arms of the force, and where the
-deflection is looked at.
+Another tool than that of the calibration is a `ToolChange`: the springs belong to the arm, so a
+longer cutter changes no compliance; it changes the lever arms of the force and the point of the
+deflection.
 """
 
 from collections.abc import Sequence
@@ -38,14 +38,14 @@ _LINK = "tool_tcp"
 
 @record()
 class ToolChange:
-    """The tool that a model is for, where it is another one than it was calibrated with."""
+    """The tool of a model, if it differs from the one of the calibration."""
 
     calibrated_tcp: str
     """Link at the tool centre point that the model was calibrated with."""
     pose: tuple[float, float, float, float, float, float]
     """New tcp in that link's frame: x, y, z in m, a, b, c in rad (Z-Y'-X'')."""
     mass: float | None = None
-    """Mass of the tool in kg; none: that of the calibrated tool."""
+    """Mass of the tool in kg; None: that of the calibrated tool."""
     centre: tuple[float, float, float] | None = None
     """Centre of that mass in the new tcp's frame, in m."""
 
@@ -161,7 +161,7 @@ class Prediction(Result):
     """Upper ends of that, shape (row, 3), in m."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return how far the tool yields, and how sure that is."""
+        """Return the predicted deflection and its uncertainty."""
         size = np.linalg.norm(self.deflection, axis=1)
         fit, measured = (
             f"±{um(float(np.mean(high - low)) / 2)} mean along an axis"
@@ -191,18 +191,18 @@ class CalibratedModel:
     """Bootstrap draws, shape (draw, spring)."""
     observability: Observability
     provenance: str = ""
-    """Where the data came from."""
+    """Origin of the data."""
     misfit: Misfit = UNKNOWN_MISFIT
-    """What 95 % of the errors along an axis stayed below at left-out poses."""
+    """Bound on 95 % of the errors along an axis at left-out poses."""
     tool: ToolChange | None = None
-    """The tool that the model is for; none: the one that it was calibrated with."""
+    """Tool of the model; None: that of the calibration."""
     domain: CalibrationDomain | None = None
-    """Poses and loads of the calibration; none: not known, as in files of elastocal 0.1.0."""
+    """Poses and loads of the calibration; None: unknown, as in files of elastocal 0.1.0."""
     unexplained: float = float("nan")
     """Mean error at left-out poses over the mean deflection; NaN: not known."""
     on_production: PredictionDoubt | None = None
-    """How sure it is on the production that it was calibrated for; none: none was named, or it was
-    another tool's."""
+    """Uncertainty on the production that it was calibrated for; None: no production was named, or
+    it belonged to another tool."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):
@@ -239,7 +239,7 @@ class CalibratedModel:
         moment: FloatArray | None = None,
         course: Sequence[str] = (),
     ) -> ProductionCoverage | None:
-        """Return how much of some rows of production was calibrated; see `CoveredRows.figures`.
+        """Return the coverage of some rows of production; see `CoveredRows.figures`.
 
         None where the model does not know where it was calibrated.
         """
@@ -249,14 +249,14 @@ class CalibratedModel:
     def doubt(
         self, q: FloatArray, force: FloatArray, moment: FloatArray | None = None
     ) -> PredictionDoubt | None:
-        """Return how sure predictions along some rows are, from some of them; None without a load.
+        """Return the uncertainty of predictions along some rows; None without a load.
 
         Parameters
         ----------
         q : ndarray, shape (row, joint)
             In rad or m.
         force, moment : ndarray, shape (row, 3)
-            On the robot at the tcp in base, in N and N·m; rows without a load say nothing.
+            On the robot at the tcp in base, in N and N·m; rows without a load are ignored.
         """
         few = ProductionRows(q, force, moment).few()
         if not len(few):

@@ -1,7 +1,7 @@
 """From a dataset to a calibrated model: build, solve, certify (paper Eq. 15-19).
 
-What a spring file knows beforehand goes in as bounds and a prior (`with_knowledge`). The calibrated
-model is what the compensation and every prediction work with.
+Prior knowledge in a spring file enters as bounds and a prior (`with_knowledge`). The compensation
+and every prediction use the calibrated model.
 """
 
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 
 _PART_OF_DATA = 1e-2
-"""Least part of the measured deflection that has to move when springs go to their bounds."""
+"""Least part of the measured deflection that must change when springs go to their bounds."""
 
 
 SAME_CONFIGURATION = Kind(
@@ -97,11 +97,11 @@ NOT_SETTLED = Kind(
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A calibrated model with everything that says how far to trust it."""
+    """A calibrated model with all evidence of its quality."""
 
     calibrated: CalibratedModel
     readings: Readings
-    """The readings that were offered, in the order of the arrays below."""
+    """The readings that were passed in, in the order of the arrays below."""
     used: BoolArray
     """Whether each reading entered the fit, shape (reading,), bool."""
     residual: FloatArray
@@ -231,7 +231,7 @@ def _widening(
     ladder: Sequence[Climbed],
     unexplained: float,
 ) -> float:
-    """Return how far draws are stretched: for few poses, and for doubt about or in the model."""
+    """Return the factor that widens draws: for few poses, and for model uncertainty."""
     by = widening_factor(problem, compliance, draws, held_out.compliance)
     stretched = compliance + by * (draws - compliance)
     open_to_choice = [each for each in ladder if np.isfinite(each.apart)]
@@ -319,11 +319,11 @@ def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> 
 
 
 def _require_data_decide(problem: Problem, compliance: FloatArray) -> None:
-    """Refuse a fit that the data had no part in: that the bounds alone would have made.
+    """Refuse a fit to which the data contribute nothing: the bounds alone determine it.
 
-    A spring that hardly deflects the arm may stand between its bounds by a rounding, so that it
-    does not help to ask whether every spring ends at a bound. What counts is whether the data are
-    explained the worse when each spring goes to the bound that is nearest to it.
+    A spring that hardly deflects the arm may lie between its bounds by rounding, so a test whether
+    every spring ends at a bound does not suffice. The test is whether the data are explained worse
+    when each spring moves to its nearest bound.
     """
     n = problem.springs
     lower, upper = problem.lower[n], problem.upper[n]

@@ -1,6 +1,6 @@
-"""The verdict on signs, frames and joints: whether the data are of this robot, as they say.
+"""Check of signs, frames and joints: whether the data belong to this robot as stated.
 
-A force with the wrong sign, in the wrong frame, or joints counted the other way round still make
+A force with the wrong sign, in the wrong frame, or joints counted in the wrong direction still give
 a solvable system; only the fit is worse. So the usual mistakes are undone one by one, and if the
 data are explained far better without one of them, the fit is refused with that message
 (docs/decisions/0006-conventions-verdict.md).
@@ -31,12 +31,13 @@ from elastocal.robot import JointReading, Robot, other_joint_readings
 POOR_FIT = 0.35
 """Part of the median deflection that may stay unexplained without a warning."""
 _LEFT_BY_UNDOING = 0.6
-"""A mistake is named when undoing it leaves at most this part of what was unexplained. Model
-errors and noise stay whichever way correct data are read, so that for correct data every
-mistake leaves more, not less."""
+"""A mistake is named when undoing it leaves at most this part of the unexplained deflection. Model
+errors and noise remain for correct data, so that undoing a mistake that was not made leaves more,
+not less."""
 _FITS_WELL = 0.2
-"""Part that a mistake's undoing may leave unexplained to be named: it has to fit well itself.
-Springs that the model lacks can make a wrong reading of good data fit less badly, never well."""
+"""Largest unexplained part of a mistake's undoing for it to be named: the corrected data must fit
+well. Springs missing in the model may let a wrong interpretation of good data fit less badly, but
+never well."""
 _ROUND_OFF = 1e-8
 """Unexplained part below which data are exact and comparing remainders compares round-off."""
 _POOR_WITH_FEW_EQUATIONS = 0.5
@@ -49,7 +50,7 @@ _TCP_WRONG = 0.05
 """Median distance between recorded and computed tcp position that geometry errors and
 deflection cannot explain, in m."""
 _TCP_OFF = 0.005
-"""The same distance above which it is worth a warning, in m."""
+"""Distance above which a warning is given, in m."""
 
 
 def check_conventions(
@@ -85,7 +86,8 @@ def check_conventions(
     stated = _unexplained(problem.reweighted(robust.reading_weight))
     found = []
     for mistake in _mistakes_of(model.robot):
-        # A mistake in the joints is one in those of the reference, which are sought anew.
+        # A mistake in the joints also affects those of the reference, which are therefore solved
+        # again.
         undone = mistake.undo(model.robot, replace(readings, reference_joint_position=None))
         blocks = displacement_blocks(model, undone, marker_offset)
         # The weights of the stated reading keep a blunder out of every other one, too.
@@ -113,7 +115,7 @@ _Undo = Callable[[Robot, Readings], Readings]
 
 @dataclass(frozen=True)
 class ForceMistake:
-    """A way of reading the data that differs from the conventions."""
+    """An interpretation of the data that differs from the conventions."""
 
     message: str
     undo: _Undo
@@ -259,7 +261,7 @@ def _positions(robot: Robot, readings: Readings) -> list[Finding]:
 
 
 def _cause(robot: Robot, readings: Readings, recorded: FloatArray, median: float) -> str:
-    """Return why recorded positions are elsewhere than those of the joints, as far as is known."""
+    """Return the likely reason why recorded positions differ from those of the joints."""
 
     def left(read: Callable[[FloatArray], FloatArray]) -> float:
         place = robot.forward(read(readings.joint_position))[:, :3, 3]

@@ -1,4 +1,4 @@
-"""What the readings show: a displacement between a reference and a loaded state of the arm.
+"""Displacements in the readings: between a reference and a loaded state of the arm.
 
 Both displacements of a reading count from a reference that was read some millimetres away, so
 their difference is not the deflection at the loaded joints alone: the arm's own weight bends it
@@ -7,8 +7,8 @@ differently at the two. With the sag ``S c`` (`ElasticModel.sag_blocks`) a readi
     d = (O(q, f) + S(q) - S(q_0) - O(q_0, f_0)) c
 
 at loaded joints ``q`` and reference joints ``q_0``, the last term where the reference itself was
-loaded. Friction remembers: its elements are run over what the arm felt at the pose, in order in
-time, from a state that a free motion has worn off.
+loaded. Friction has a memory: its elements are evaluated over the loads at the pose, in time order,
+starting from the state that a free motion leaves.
 """
 
 from collections.abc import Iterator
@@ -64,10 +64,10 @@ def displacement_blocks(
 
 
 def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
-    """Return where the zero of both displacements was read, shape (reading, joint), in rad or m.
+    """Return the joints of the zero of both displacements, shape (reading, joint), in rad or m.
 
-    As recorded; else where the controller displacement began, the orientation being kept, the
-    external axes standing still.
+    They are those recorded; otherwise those where the controller displacement began, with constant
+    orientation and external axes at rest.
     """
     if readings.reference_joint_position is not None:
         return readings.reference_joint_position

@@ -1,7 +1,7 @@
-"""Where a calibration was made: its postures and loads, as the model file holds them.
+"""Domain of a calibration: its postures and loads, as the model file holds them.
 
-Which rows lie within them is for `elastocal.identification.production` to say. Presses held by
-friction never point as far aside as a cutter's force; but deflections of small forces add up. So a
+`elastocal.identification.production` decides which rows lie within it. Presses held by friction
+never point as far sideways as a cutter's force, but deflections of small forces superpose. So a
 force, in the tool's frame, is within the calibrated loads when the tool was pushed as hard in its
 directions, one by one:
 
@@ -79,7 +79,7 @@ class CalibrationDomain:
 
     @classmethod
     def of(cls, robot: Robot, readings: Readings, block: IndexArray) -> "CalibrationDomain":
-        """Return where readings were taken.
+        """Return the domain of readings.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class CalibratedLoads:
 
     @classmethod
     def of_domain(cls, robot: Robot, domain: CalibrationDomain) -> "CalibratedLoads":
-        """Return those of a calibration."""
+        """Return the loads of a domain."""
         q, pose = domain.joint_position, domain.reading_pose
         torque = np.maximum(domain.torque_high, -domain.torque_low)
         return cls._of(q, force_in_tcp(robot, q[pose], domain.force), pose, torque)
@@ -129,7 +129,7 @@ class CalibratedLoads:
     def of_forces(
         cls, robot: Robot, q: FloatArray, force_tcp: FloatArray, pose: IndexArray
     ) -> "CalibratedLoads":
-        """Return those of readings.
+        """Return the loads of readings.
 
         Parameters
         ----------
@@ -160,7 +160,8 @@ class CalibratedLoads:
         largest[:, :4] *= beyond[:, None]
         size = np.linalg.norm(force_tcp, axis=1, keepdims=True)
         units = (force_tcp / np.maximum(size, _LEAST))[size[:, 0] > _LEAST]
-        # Readings of one load case at all poses point almost the same way: one of them will do.
+        # Readings of one load case at all poses have nearly the same direction: one of them is
+        # enough.
         _, first = np.unique(np.round(units, 1), axis=0, return_index=True)
         return cls(q, largest, units[first], torque)
 

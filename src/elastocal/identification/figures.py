@@ -28,12 +28,12 @@ from elastocal.results import brief_repr
 from elastocal.wording import um
 
 _DUST = 1e-6
-"""Part of a sensible value within which a spring stands at its bound: rounding leaves less."""
+"""Part of a sensible value within which a spring counts as at its bound: rounding leaves less."""
 
 
 @record()
 class SpringSummary:
-    """A characteristic of a spring: how well it is known, and whether it is known by itself."""
+    """A figure of a spring, its uncertainty, and whether it is separately observable."""
 
     name: str
     kind: str
@@ -45,7 +45,7 @@ class SpringSummary:
     high: float
     """Upper end of the 95 % interval."""
     observable: bool
-    """Whether the data determine it by itself."""
+    """Whether the data determine it separately."""
     group: int | None = None
     """Number of the first unobservable combination that leaves it open."""
     at_bound: bool = False
@@ -53,7 +53,7 @@ class SpringSummary:
     too_weak: bool = False
     """Whether the deflection that a sensible value of it makes stays below the noise."""
     prior: bool = False
-    """Whether a stiffness known beforehand had a part in it (`CalibrationSummary.known`)."""
+    """Whether a stiffness known beforehand contributes to it (`CalibrationSummary.known`)."""
 
 
 @brief_repr
@@ -88,10 +88,10 @@ class HeldOutSummary:
     misfit: float | None = None
     """Share of `HeldOut.misfit`; none where there are too few errors for it."""
     misfit_floor: float | None = None
-    """Floor of it, in m; none likewise, and in calibrations of before."""
+    """Floor of the misfit, in m; None without a misfit and in older calibrations."""
     split: str = "leave-poses-out"
     p95: float | None = None
-    """What 95 % of them stay below; none in calibrations of before."""
+    """95th percentile of the errors; None in older calibrations."""
 
 
 @record()
@@ -112,11 +112,12 @@ class RungSummary:
     held_out: float
     """Mean error at left-out poses, in m."""
     difference: DifferenceSummary
-    """What it is judged by: its error at left-out poses and left-out low load, against the best."""
+    """Difference of the score by which it is judged from the best: its error at left-out poses and
+    left-out low load."""
     parameters: int
     chosen: bool
     production_error: float | None = None
-    """Error that is expected on production, in m; none where production is not known, or where the
+    """Error that is expected on production, in m; None where production is unknown, or where the
     left-out poses show another rung to be better."""
     backed: bool = True
     """Whether it is sure enough of production to correct by; also where that is not known."""
@@ -173,24 +174,24 @@ class CalibrationSummary:
     warnings: tuple[Finding, ...]
     """Sentences alone in files of version 1."""
     settings: FitSettings | None = None
-    """With these a report makes the calibration again."""
+    """Settings with which a report repeats the calibration."""
     comparison: ComparisonSummary | None = None
     ladder: tuple[RungSummary, ...] = ()
     """The simplest model first; empty in calibrations before the ladder."""
     frames: tuple[FrameSummary, ...] = ()
     """Frames that were estimated with the springs."""
     coverage: Coverage | None = None
-    """Measured coverage of the intervals of a prediction; none in calibrations of before."""
+    """Measured coverage of the intervals of a prediction; None in older calibrations."""
     production: ProductionCoverage | None = None
-    """How much of production the calibration covers; none where no path was named."""
+    """Share of production that the calibration covers; None where no path was named."""
     doubt: PredictionDoubt | None = None
-    """How sure the predictions on production are; likewise."""
+    """Uncertainty of the predictions on production; None where no path was named."""
     spring_count: int | None = None
     """Number of springs; none in calibrations before springs of several parameters."""
     known: tuple[KnownSpring, ...] = ()
-    """What the spring file knew of springs beforehand."""
+    """Prior knowledge of springs from the spring file."""
     budget: ErrorBudget | None = None
-    """What the error at left-out poses is made of, where it was asked for."""
+    """Parts of the error at left-out poses, if requested."""
     check: LoadCheck | None = None
     """The error at load cases that are kept out of every fit, where there are any."""
 
@@ -257,7 +258,7 @@ def spring_summaries(
     known : sequence of KnownSpring, optional
         What was known of springs before the fit.
     """
-    # That a spring is of no more than its drive's size is no stiffness known of it.
+    # The prior that a spring is no softer than its drive is not a known stiffness.
     expected = {each.name for each in known if each.compliance}
     seen, natural = calibrated.observability, [p.lower for p in calibrated.model.parameters]
     options = settings.options() if settings else FitOptions()
@@ -277,7 +278,8 @@ def spring_summaries(
             value = float(calibrated.compliance[own] @ weights)
             low, high = map(float, interval(calibrated.draws[:, own] @ weights))
             if reach is not None:
-                # Draws at a bound agree with one another; the noise tells how little that means.
+                # Draws at a bound agree with one another, so the noise decides whether the value
+                # means anything.
                 low = min(low, max(value - reach, _least(spring, weights)))
                 high = max(high, value + reach)
             rows.append(
@@ -350,7 +352,7 @@ def rung_summary(rung: Climbed) -> RungSummary:
 
 
 def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
-    """Return in words which model readings carry, and no more than they say.
+    """Return in words which model the readings support, and with what significance.
 
     Parameters
     ----------

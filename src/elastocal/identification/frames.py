@@ -1,7 +1,8 @@
-"""Frames that are not known: a tracker set up anew, a marker mounted anew.
+"""Unknown frames: the tracker was set up again, or the marker was mounted again.
 
 In session ``k`` a tracker that is off by a small rotation ``w_k`` about a mean point ``x_m`` and a
-translation ``t_k``, looking at a marker that sits ``e_k`` beside where the tcp frame has it, reads
+translation ``t_k``, measuring a marker that is ``e_k`` away from its nominal place in the tcp
+frame, reads
 
     y = x + t_k + w_k x (x - x_m) + R e_k,
 
@@ -19,12 +20,12 @@ numbers of a session
   registration nor a bad lever arm shows in displacements (the estimate comes out as zero, at the
   price of nine numbers);
 * all nine survive, as differences, where the reference was read in *another* session: the robot
-  empty on Monday, with a payload on Tuesday. Then ``t`` and ``e`` are told apart only by poses of
-  different orientation, ``w`` only by points that are spread, and neither from springs that
+  empty on Monday, with a payload on Tuesday. Then ``t`` and ``e`` are distinguished only by poses
+  of different orientation, ``w`` only by points that are spread, and neither from springs that
   deflect all poses alike.
 
-They are columns of the observation system beside the springs', without bounds. What poses do not
-determine of them is kept at zero by a prior too weak to pull on what they do.
+They are columns of the observation system beside those of the springs, without bounds. A prior
+keeps undetermined combinations at zero; it is too weak to affect the determined ones.
 """
 
 from collections.abc import Iterator, Sequence
@@ -52,7 +53,7 @@ _SIZE = 1e-4
 _WIDE = 1e-2
 """Standard deviation of the prior, in m or rad: no registration is worse."""
 _NOISE = 1e-5
-"""What the prior is weighed against, in m: a reading of a tracker."""
+"""Standard deviation against which the prior is weighted, in m: a reading of a tracker."""
 
 
 @brief_repr
@@ -83,7 +84,7 @@ class FrameColumns:
 @brief_repr
 @record()
 class FrameSummary:
-    """What the readings of a session say about its frame, against that of their references."""
+    """Estimated frame of a session relative to that of its references."""
 
     name: str
     """Load case, campaign, or both."""

@@ -1,11 +1,12 @@
-"""What is known of springs before the data, and what the drives say of all others.
+"""Prior knowledge of springs from a file, and of all others from the drives.
 
-A spring file states stiffnesses and bounds. An arm says something by itself: a bearing, a housing
-or a link that yields more than the drive beside it would be a defect. Where poses and loads hardly
-turn a spring, a fit with bounds alone gives it whatever the noise asks for, and where production
-turns it the arm would bend by millimetres. So a compliance is expected to be of the size of the
-compliance of its joint's drive or below: a normal prior about zero of that width, for all springs
-alike. What the data determine it leaves alone. See docs/decisions/0066-ladder.md.
+A spring file states stiffnesses and bounds. The arm itself gives a prior: a bearing, a housing or a
+link that is softer than the adjacent drive would be a defect. Where poses and loads hardly turn a
+spring, a fit with bounds alone gives it a compliance that depends on the noise, and where
+production turns it the predicted deflection would be wrong by millimetres. So a compliance is
+expected to be at most of the size of the compliance of its joint's drive: a normal prior about zero
+of that width, for all springs alike. It hardly changes what the data determine. See
+docs/decisions/0066-ladder.md.
 """
 
 from collections.abc import Sequence
@@ -32,12 +33,12 @@ _SURE = 2.0
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class DriveCompliances:
-    """How compliant the drive of each joint is, which no other spring of an arm exceeds by far."""
+    """Compliance of the drive of each joint, which no other spring of an arm exceeds by far."""
 
     joints: tuple[str, ...]
     softness: FloatArray
-    """Compliance of the drive over what is usual for its kind, that of the softest where the
-    readings do not tell or the joint slides, shape (joint,)."""
+    """Compliance of the drive over the usual one for its kind; that of the softest where the
+    readings do not determine it or the joint slides, shape (joint,)."""
 
     @classmethod
     def of(
@@ -47,7 +48,7 @@ class DriveCompliances:
         options: FitOptions,
         marker_offset: ArrayLike | None = None,
     ) -> "DriveCompliances | None":
-        """Return those that a spring at each joint alone finds; None where readings tell of none.
+        """Return those estimated by a spring at each joint alone; None where none is determined.
 
         Parameters
         ----------
@@ -131,7 +132,7 @@ def with_knowledge(
         return bounded
     problem = build(model, readings, bounded, marker_offset)
     residual = np.linalg.norm(problem.residuals(solve(problem, "huber").compliance), axis=1)
-    # Readings without any noise leave a prior no part, but not none at all.
+    # Readings without any noise reduce the weight of a prior, but not to zero.
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
     noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
     return replace(bounded, prior=Prior(mean, sigma, noise, rows))

@@ -1,12 +1,12 @@
-"""A ladder of spring models, from few springs to gears that remember, and how high to climb.
+"""A ladder of spring models, from few springs to gears with friction, and the choice of one.
 
-More springs always fit better; whether they predict better is seen at poses that a refit has not
-seen, and at a low load that it has not seen, where there is one. (A refit without the full load, or
-without a pose that stands alone, would have to extrapolate, which no rung is asked to.) The rung
-with the lowest such error is taken, of those that do not have more parameters than the readings
-hold numbers. Where production is known, it decides between rungs that are
-not worse by more than one standard error of their paired difference
-(`elastocal.identification.paired`, `elastocal.identification.prediction_doubt`).
+More springs always fit better; whether they predict better is measured at poses left out of a refit
+and, if there is one, at a low load left out of it. (A refit without the full load, or without an
+isolated pose, would have to extrapolate, which no rung is required to do.) The rung with the lowest
+such error is chosen, among those with no more parameters than the readings hold numbers. Where
+production is known, it decides between rungs that are not worse by more than one standard error of
+their paired difference (`elastocal.identification.paired`,
+`elastocal.identification.prediction_doubt`).
 """
 
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ from elastocal.robot import Robot
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Climbed:
-    """A rung that was tried."""
+    """A rung that was fitted and judged."""
 
     name: str
     model: ElasticModel
@@ -59,7 +59,7 @@ class Climbed:
     score: FloatArray
     """Mean error of each pose block, its low load left out too, shape (block,), in m."""
     predicted: FloatArray
-    """What it predicts of each reading at left-out poses, shape (reading, 3), in m."""
+    """Its predictions of the readings at left-out poses, shape (reading, 3), in m."""
     difference: float = 0.0
     """Mean score minus that of the best rung, in m."""
     low: float = 0.0
@@ -72,15 +72,15 @@ class Climbed:
     counted: BoolArray | None = None
     """Pose blocks whose score decides, shape (block,); none: all. See `poses_in_company`."""
     apart: float = float("nan")
-    """Root mean square distance of its predictions at left-out poses from those of the chosen
-    rung, in m; NaN where it was not to choose from."""
+    """Root mean square distance of its predictions at left-out poses from those of the chosen rung,
+    in m; NaN where it could not be chosen."""
     known: tuple[KnownSpring, ...] = ()
     """Prior knowledge of its springs that its fits used."""
     forecast: ProductionForecast | None = None
-    """What it predicts on production, where that is known."""
+    """Its predictions on production, where that is known."""
     production_error: float = float("nan")
-    """Error that is expected on production, in m; NaN where it was not to be known, as for rungs
-    that left-out poses show to be worse."""
+    """Error that is expected on production, in m; NaN where it is not estimated, as for rungs that
+    left-out poses show to be worse."""
 
     @property
     def is_carried(self) -> bool:
@@ -89,7 +89,7 @@ class Climbed:
 
     @property
     def is_backed(self) -> bool:
-        """Whether it is as sure of production as a correction has to be; also where none is known.
+        """Whether it is certain enough for a correction on production; also where none is known.
 
         See `PredictionDoubt.is_small`.
         """
@@ -99,7 +99,7 @@ class Climbed:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """A model chosen for readings, and the ladder that it stands on."""
+    """A model chosen for readings, and the ladder from which it was chosen."""
 
     model: ElasticModel
     ladder: tuple[Climbed, ...]
@@ -139,10 +139,10 @@ def choose_model(
     readings : Readings
         Measurements, joints in the robot's order.
     springs : str
-        ``auto``: the rung that the readings carry; ``gears``: gears, with friction memory where
-        they carry it; the name of a layout; a spring file.
+        ``auto``: the rung that the readings support; ``gears``: gears, with friction memory where
+        they support it; the name of a layout; a spring file.
     options : FitOptions
-        Bounds, weights; a prior speaks of one model and has no part in the choice.
+        Bounds, weights; a prior applies to one model and is not used in the choice.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
     beside : sequence of str
@@ -181,7 +181,7 @@ def usable_for_choice(
     robot, readings, options, marker_offset
         As for `choose_model`.
     """
-    # Sought once, not for every rung.
+    # Searched once, not for every rung.
     readings = replace(readings, reference_joint_position=reference_joints(robot, readings))
     if not options.set_blunders_aside:
         return readings
@@ -199,7 +199,7 @@ def climb(
     marker_offset: ArrayLike | None = None,
     production: ProductionRows | None = None,
 ) -> Choice:
-    """Return the allowed rung that errs least at left-out poses, or on production.
+    """Return the allowed rung with the least error at left-out poses, or on production.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def climb(
     readings : Readings
         Without blunders.
     rungs : sequence of Rung
-        What to try, the simplest first.
+        Rungs to fit, the simplest first.
     allowed : sequence of str
         Names of the rungs to choose from; the others are shown beside them.
     options : FitOptions
@@ -249,17 +249,17 @@ def climb(
 
 
 def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
-    """Return the allowed rung that errs least at left-out poses.
+    """Return the allowed rung with the least error at left-out poses.
 
-    Of rungs with more parameters than the readings hold numbers none is taken while there is a
-    smaller one: a few left-out poses find one of them the best by chance. Where production is
-    known, a rung that is not sure of it is not taken while there is one that is; and of those
-    within one standard error of the best the one is taken that is expected to err least there.
+    A rung with more parameters than the readings hold numbers is chosen only if there is no smaller
+    one, since with few left-out poses one of them may be best by chance. Where production is known,
+    a rung with large uncertainty there is chosen only if all have it; and of those within one
+    standard error of the best, the one with the least expected error there is chosen.
 
     Parameters
     ----------
     tried : sequence of Climbed
-        Tried on the same readings, the simplest first.
+        Fitted to the same readings, the simplest first.
     allowed : sequence of str
         Names of the rungs to choose from; the others are judged beside them.
 
@@ -317,8 +317,8 @@ def try_rung(name: str, model: ElasticModel, problem: Problem, low: BoolArray) -
     model : ElasticModel
         Its model.
     problem : Problem
-        What it is judged by; rows of some poses, cut from a problem of all, know of friction what
-        all readings at these poses did.
+        Problem by which it is judged; rows of some poses, taken from a problem of all, contain the
+        friction history of all readings at these poses.
     low : ndarray of bool, shape (reading,)
         Readings that are also left out together.
     """

@@ -33,7 +33,7 @@ class LoadCheck:
     noise: float | None
     """Root mean square of the norms of the noise in them; none where it is not known."""
     source: str
-    """How the noise was come by, or why it is not known."""
+    """Origin of the noise, or the reason why it is unknown."""
 
 
 def check_loads(

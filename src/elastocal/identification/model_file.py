@@ -37,7 +37,7 @@ class RobotRecord:
     base: str
     tcp: str
     gravity: tuple[float, float, float] | None = None
-    """Acceleration in base, in m/s²; none: the base stands upright."""
+    """Acceleration in base, in m/s²; None: the base is upright."""
 
 
 @record("elastocal.model/1", eq=False, sealed=True)
@@ -52,12 +52,12 @@ class CalibrateResult(Result):
     """Bootstrap draws, shape (draw, parameter)."""
     observability: Observability
     provenance: str
-    """Where the data came from."""
+    """Origin of the data."""
     misfit: float | None = None
     """Share of `CalibratedModel.misfit`; none where it is not known, as in files of elastocal
     0.1.0."""
     misfit_floor: float = 0.0
-    """Floor of it, in m; 0 in files of before."""
+    """Floor of the misfit, in m; 0 in older files."""
     calibration: CalibrationSummary | None = None
     """The figures of the calibration; none for a model that was made otherwise."""
     tool: ToolChange | None = None
@@ -68,8 +68,8 @@ class CalibrateResult(Result):
     """SHA-256 of what each dataset says (`elastocal.dataset.content_sha256`), by its file; empty
     in files before it was written."""
     needs: dict[str, str] = field(default_factory=dict)
-    """Distributions that its springs are of, beside elastocal, with the versions that made it; what
-    reads it asks for them first (`elastocal.plugins.require_distributions`)."""
+    """Distributions besides elastocal that define its springs, with the versions that made it;
+    readers require them first (`elastocal.plugins.require_distributions`)."""
 
     def show(self) -> Iterable[Block]:
         """Return the main facts of a calibration; of a model made otherwise, its own."""

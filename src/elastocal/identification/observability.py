@@ -1,9 +1,9 @@
-"""Certify: what the data can tell about each spring.
+"""Certify: which springs the data determine.
 
-With forces only and positions only, springs that share an origin add up to one symmetric tensor
-and consecutive wrist frames share axes, so some springs can never be told apart, however many
-poses are taken. Predictions need only the combinations that are observable; tables must say
-which springs are not (docs/explanation/observability.md).
+With forces only and positions only, springs that share an origin add up to one symmetric tensor and
+consecutive wrist frames share axes, so some springs are never separately observable, however many
+poses are taken. Predictions need only the combinations that are observable; tables must say which
+springs are not (docs/explanation/observability.md).
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,7 +27,7 @@ _NOTICEABLE = 1e-2
 """Smaller parts of a combination are not named: the data leave such a spring open by less than a
 hundredth of a sensible value. In rich models nearly every spring has a trace in one of them."""
 _DUST = 1e-6
-"""Part of a sensible value below which a spring counts as not yielding at all."""
+"""Part of a sensible value below which a spring counts as rigid."""
 _IN_CONE = 1e-6
 """Largest distance of a unit vector from a cone that it counts to."""
 _MODEST = 1e-9
@@ -39,7 +39,7 @@ _TWICE = 2.0
 _MUCH_MORE = 2.0
 """Times that forces at another tool must load a combination more than at the calibrated one."""
 _PROBES, _PROBE_SEED = 60, 0
-"""Number and seed of the configurations that show what could be observed at all."""
+"""Number and seed of random configurations that determine the attainable rank."""
 
 
 _CANCELS = 1e-6
@@ -63,13 +63,13 @@ class FaintParameter:
 @brief_repr
 @record()
 class Observability:
-    """Rank, conditioning, and the springs that cannot be told apart."""
+    """Rank, conditioning, and the springs that are not separately observable."""
 
     rank: int
     condition: float
     """Condition number of the column-scaled system over the observable directions."""
     observable: tuple[bool, ...]
-    """Whether each spring is determined by itself."""
+    """Whether each spring is separately determined."""
     unobservable: tuple[tuple[Term, ...], ...]
     """Combinations of compliances that the data do not see, in a sparse basis, without parts too
     small to matter: adding any multiple of one of them changes no deflection that was measured.
@@ -97,7 +97,7 @@ class Observability:
         return None
 
     def faint_reach(self, weights: Mapping[str, float]) -> float | None:
-        """Return how far noise leaves a sum of parameters open, where all of them are too weak.
+        """Return the range that noise leaves to a sum of parameters that are all too weak.
 
         Parameters
         ----------
@@ -141,8 +141,8 @@ def observability(
     springs : sequence of Spring
         In column order.
     problem, compliance : Problem, ndarray of shape (parameter,), optional
-        What was fitted, and the estimate: combinations that its bounds leave no room to move are
-        in no group, since the fit is the only one. By default bounds have no say.
+        What was fitted, and the estimate: combinations that its bounds fix are in no group, since
+        the fit is unique. By default bounds are ignored.
     """
     parameters = [parameter for spring in springs for parameter in spring.parameters]
     determined = rank(system.s)
@@ -216,7 +216,7 @@ def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None)
     """Return the rank that any number of poses and forces would reach.
 
     Below it, poses or load cases are missing and predictions elsewhere are not covered; at it,
-    what is not observable never matters for a deflection under a force.
+    unobservable combinations have no effect on a deflection under a force.
 
     Parameters
     ----------
@@ -331,7 +331,7 @@ def _is_held(inward: FloatArray, row: int) -> bool:
 
 
 def _readable(unseen: FloatArray, parameters: Sequence[Parameter]) -> tuple[tuple[Term, ...], ...]:
-    """Return by name what orthonormal directions, in sensible sizes, are of the compliances."""
+    """Return, by name, the compliances that orthonormal directions in sensible sizes contain."""
     joints = list(dict.fromkeys(parameter.joint for parameter in parameters))
     basis = sparse_basis(unseen, [joints.index(each.joint) for each in parameters])
     basis = np.where(np.abs(basis) < _NOTICEABLE, 0.0, basis) * relative_sizes(parameters)

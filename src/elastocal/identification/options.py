@@ -44,7 +44,7 @@ class Prior:
     """Standard deviation of one component of a deflection that the prior is weighed against,
     in m."""
     rows: ArrayLike | None = None
-    """Sums of compliances that mean and sigma are of, shape (sum, spring); none: each alone."""
+    """Sums of compliances to which mean and sigma refer, shape (sum, spring); None: single ones."""
 
 
 @brief_repr
@@ -57,7 +57,7 @@ class FitOptions:
     parameter's kind of spring says: zero for compliances, since on few poses an unbounded fit of
     18 springs is worse than one of 6."""
     upper: ArrayLike = np.inf
-    """Upper bound, likewise."""
+    """Upper bound, of the same shape and unit."""
     weights: Weights = "none"
     """``sigma``: weigh by the measured standard deviations of the dataset."""
     loss: str = "linear"
@@ -69,7 +69,7 @@ class FitOptions:
     trust_conventions: bool = False
     """Fit also data that would fit far better with a sign or frame read otherwise."""
     free_frame: FreeFrame = "none"
-    """Whose frames of tracker and marker are estimated with the springs; see
+    """Sessions whose frames of tracker and marker are estimated with the springs; see
     `elastocal.identification.frames`."""
     draws: int = 200
     """Number of pose-block bootstrap draws."""
@@ -116,7 +116,8 @@ def bounds(
     """
     zero = np.ndim(options.lower) == 0 and options.lower == 0.0
     try:
-        # What couples two axes is no larger, either way, than the larger compliance about one.
+        # The coupling of two axes is in either sense at most the larger compliance about one of
+        # them.
         least = np.maximum(natural, -np.asarray(options.upper, dtype=float))
         wanted = (least if zero else options.lower, options.upper)
         lower, upper = (

@@ -1,19 +1,19 @@
-"""Held-out errors of models, compared pairwise: the one judgement of `calibrate` and `codec`.
+"""Pairwise comparison of models by held-out errors, shared by `calibrate` and `codec`.
 
 Sets of held-out poses are all drawn from the same N poses, and the refits share nearly all the
-others, so that the spread of their errors, taken for that of independent ones, is too small. C.
-Nadeau and Y. Bengio ("Inference for the generalization error", Machine Learning 52, 2003, section
-3) give the mean over J sets whose figures are correlated by ``rho`` the variance
-``(1 / J + rho / (1 - rho)) S^2``, and take for ``rho`` what two sets are expected to share:
-``n_2 / (n_1 + n_2)`` for random ones. COVER sets share more, so what they share is counted. Few
-sets, and those of a leave-one-out, share less, even nothing, but their training sets are then
-nearly the same poses; so ``rho`` is never taken below that of random sets. How often this claims
-a difference that is none: docs/decisions/0069-one-judgement.md.
+others, so that a standard error that treats them as independent is too small. C. Nadeau and Y.
+Bengio ("Inference for the generalization error", Machine Learning 52, 2003, section 3) give the
+mean over J sets whose figures are correlated by ``rho`` the variance ``(1 / J + rho / (1 - rho))
+S^2``, and take for ``rho`` the expected overlap of two sets: ``n_2 / (n_1 + n_2)`` for random ones.
+COVER sets overlap more, so their overlap is counted. Few sets, and those of a leave-one-out,
+overlap less or not at all, but their training sets are then nearly the same poses; so ``rho`` is
+never taken below that of random sets. The rate of false differences is in
+docs/decisions/0069-one-judgement.md.
 
 Models that are not worse than the best by more than one standard error of their paired difference
 are near it (L. Breiman, J. Friedman, R. Olshen, C. Stone, *Classification and Regression Trees*,
-1984, section 3.4.3, who take the simplest of them). Springs take the best itself, geometry the
-simplest near it: why, and why not by a 95 % interval, is in docs/decisions/0066-ladder.md.
+1984, section 3.4.3, who take the simplest of them). For springs the best itself is chosen, for
+geometry the simplest near it; docs/decisions/0066-ladder.md gives the reasons.
 """
 
 from dataclasses import dataclass
@@ -73,7 +73,7 @@ class Overlap:
 
     @property
     def known(self) -> bool:
-        """Whether the sets show any spread: several, and not all the same."""
+        """Whether the sets show any spread: several sets, not all equal."""
         return self.sets > 1 and self.shared < _ALL
 
     @property
@@ -147,7 +147,7 @@ class Judgement:
 
 
 def judge_models(errors: FloatArray, allowed: BoolArray, overlap: Overlap) -> Judgement:
-    """Return which of some models predict best, and which nearly as well.
+    """Return which models predict best, and which nearly as well.
 
     Parameters
     ----------

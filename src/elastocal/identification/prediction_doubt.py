@@ -1,11 +1,10 @@
-"""How sure predictions on production are, and which of some models is expected to err least there.
+"""Uncertainty of predictions on production, and the model with the least expected error there.
 
-What production asks of a model need not be what its readings decide: rungs that left-out poses do
-not tell apart may predict otherwise where production runs, or not know what they predict. Along
-production each model has a variance, seen when poses are left out, and a bias. Of the richest the
-bias is taken for nil; what another predicts differs from it by its own bias and by chance, and the
-mean square of chance is the difference of the variances (J. A. Hausman, "Specification tests in
-econometrics", Econometrica 46, 1978), so that
+Rungs with equal errors at left-out poses may differ where production runs, or be uncertain there.
+Along production each model has a variance, estimated by leaving poses out, and a bias. The bias of
+the richest model is assumed zero; the prediction of another differs from it by its own bias and by
+chance, and the mean square of chance is the difference of the variances (J. A. Hausman,
+"Specification tests in econometrics", Econometrica 46, 1978), so that
 
     error² = max(0, |p - p_richest|² - (v_richest - v)) + v,
 
@@ -30,10 +29,10 @@ from elastocal.results import brief_repr
 from elastocal.wording import phrase
 
 DOUBT_ROWS = 100
-"""Rows by which predictions along a path are judged."""
+"""Number of rows by which predictions along a path are judged."""
 _LARGEST_DOUBT = 0.5
-"""Half-width of the 95 % interval, as a share of what is predicted, beyond which a correction may
-do more harm than good."""
+"""Half-width of the 95 % interval, as a share of the prediction, beyond which a correction may do
+more harm than good."""
 
 
 @brief_repr
@@ -71,7 +70,7 @@ DOUBTFUL = Kind(
 
 @record()
 class PredictionDoubt:
-    """How sure the predictions along a path are; the one rule by which commands warn."""
+    """Uncertainty of the predictions along a path; the common rule for warnings of all commands."""
 
     deflection: float
     """Mean predicted deflection, in m."""
@@ -84,14 +83,14 @@ class PredictionDoubt:
     def of(
         cls, deflection: FloatArray, low: FloatArray, high: FloatArray
     ) -> "PredictionDoubt | None":
-        """Return it of predictions and their intervals, each (row, 3), in m; None of no rows."""
+        """Return it for predictions and their intervals, each (row, 3), in m; None without rows."""
         if not len(deflection):
             return None
         size, width = (np.linalg.norm(each, axis=1).mean() for each in (deflection, high - low))
         return cls(float(size), float(width) / 2.0, len(deflection))
 
     def plus(self, other: "PredictionDoubt | None") -> "PredictionDoubt":
-        """Return it of these rows and others."""
+        """Return the combination of these rows and others."""
         if other is None:
             return self
         rows = self.rows + other.rows
@@ -120,21 +119,21 @@ class PredictionDoubt:
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """What a person has to know before a correction by it; nothing where it is small."""
+        """Warnings before a correction by this prediction; empty where the uncertainty is small."""
         return () if self.is_small else (DOUBTFUL(figures=self.figures),)
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class ProductionForecast:
-    """What a fit predicts along production, and how much that changes with the poses."""
+    """Prediction of a fit along production, and its variation with the poses."""
 
     deflection: FloatArray
     """Shape (row, 3), in m."""
     variance: float
-    """Mean square by which the poses move a prediction (jackknife), in m²."""
+    """Mean square change of a prediction by the choice of poses (jackknife), in m²."""
     folds: int
-    """Refits that it is from."""
+    """Number of refits behind it."""
 
     @classmethod
     def of(
@@ -150,7 +149,7 @@ class ProductionForecast:
 
     @property
     def doubt(self) -> PredictionDoubt:
-        """How sure it is."""
+        """Uncertainty of the prediction."""
         student = float(stdtrit(self.folds - 1, 0.5 * (1.0 + CONFIDENCE)))
         size = float(np.linalg.norm(self.deflection, axis=1).mean())
         half_width = student * float(np.sqrt(self.variance))
@@ -158,7 +157,7 @@ class ProductionForecast:
 
 
 def expected_errors(forecasts: Sequence[ProductionForecast]) -> FloatArray:
-    """Return how far each of some models is expected to err on production, shape (model,), in m.
+    """Return the expected error of each of some models on production, shape (model,), in m.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Build: the observation system ``O c = d`` of a dataset (paper Eq. 14-18).
 
-Readings at one pose share what the model gets wrong there, so they form a block that is resampled
-and left out together. A configuration that was measured twice under two labels is still one block;
-treated as two it would be held out against itself.
+Readings at one pose share the model error there, so they form a block that is resampled and left
+out together. A configuration that was measured twice under two labels is still one block; as two
+blocks it would be tested against itself.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ class Problem:
     """Sensible size of each parameter over that of the first, shape (parameter,): what makes a
     column in m per rad/(N·m) comparable with one in m per m/N."""
     frames: tuple[str, ...] = ()
-    """Sessions whose frames are free: their columns stand behind those of the springs
+    """Sessions whose frames are free; their columns follow those of the springs
     (`elastocal.identification.frames`)."""
 
     def __len__(self) -> int:

@@ -1,12 +1,12 @@
-"""Which rows a calibration covers: the one rule, a number, and what lies outside by name.
+"""Coverage of production by a calibration: the rule, the share, and what lies outside.
 
-Intervals speak of postures and forces like those of the calibration. Elsewhere the arm does what
-springs cannot express, and nothing in the data says how much.
+Intervals hold for postures and forces like those of the calibration. Elsewhere the arm may deviate
+from the springs by an unknown amount.
 
 A row of production is covered when some calibrated posture is near it, within `JOINT_REACH` in each
 joint but the last of the wrist (A1 to A5 of a six-axis arm) and `RAIL_REACH` of every linear axis,
-and its load is within what was pressed there (`CalibratedLoads`). Every command that says where a
-model holds says it by this.
+and its load is within the calibrated loads there (`CalibratedLoads`). Every command that states
+where a model holds uses this rule.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,20 +27,20 @@ JOINT_REACH = float(np.radians(30.0))
 RAIL_REACH = 0.4
 """The same of a sliding joint, in m."""
 _MOST_ALONE = 0.25
-"""Part of the poses that may stand alone without counting; where more do, none has neighbours to
-speak of, and all count."""
+"""Largest share of isolated poses that is disregarded; where more are isolated, none has
+neighbours, and all count."""
 _OF_PRODUCTION = phrase("of production")
 ENOUGH = 0.95
-"""Share of production that a calibration has to cover."""
+"""Share of production that a calibration must cover."""
 _ARM = 6
-"""Joints of an arm from which on the last one only turns the tool."""
+"""Number of joints of an arm from which on the last one only turns the tool."""
 _CHUNK = 2000
 
 
 @brief_repr
 @record()
 class ProductionCoverage:
-    """How much of production a calibration covers."""
+    """Share of production that a calibration covers."""
 
     rows: int
     """Rows of production."""
@@ -49,9 +49,9 @@ class ProductionCoverage:
     joints: float
     """Share with a calibrated posture within `JOINT_REACH` in every joint but the last."""
     rail: float | None
-    """Share with such a posture within `RAIL_REACH` of every linear axis; None: there is none."""
+    """Share with such a posture within `RAIL_REACH` of every linear axis; None: no linear axis."""
     load: float
-    """Share whose force is within what was pressed at those postures."""
+    """Share whose force is within the calibrated loads at those postures."""
     farthest: float
     """Largest distance of a row from its nearest posture in any of those joints, in rad."""
     farthest_joint: str
@@ -59,14 +59,14 @@ class ProductionCoverage:
     farthest_rail: float | None
     """Largest distance of a row from its nearest posture in a linear axis, in m."""
     level: float | None
-    """Largest level of a force; None where one points where nothing was pushed."""
+    """Largest level of a force; None where a force points in a direction without calibrated
+    load."""
     direction: float
-    """Largest angle of a force from the nearest calibrated one, in rad; it says how far from the
-    presses production pushes, and refuses nothing."""
+    """Largest angle of a force from the nearest calibrated one, in rad; for information only."""
     courses: tuple[str, ...]
     """Courses with rows that are not covered."""
     first: str = ""
-    """The first row that is not covered; empty where there is none or rows have no names."""
+    """First row that is not covered; empty where there is none or rows have no names."""
 
     def plus(self, other: "ProductionCoverage") -> "ProductionCoverage":
         """Return the coverage of these rows and others."""
@@ -100,7 +100,7 @@ class ProductionCoverage:
         return self.covered >= ENOUGH
 
     def sentence(self, of: str = _OF_PRODUCTION) -> str:
-        """Return the figures in a line, with what lies outside by name.
+        """Return the figures in a line, naming what lies outside.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class ProductionCoverage:
         return sentences(parts, "; ")
 
     def _outside(self) -> Iterator[Phrase]:
-        """Yield what lies outside, and how far."""
+        """Yield descriptions of what lies outside, with distances."""
         if self.joints < 1.0:
             yield phrase(
                 "{joint} up to {angle} deg away ({share} of rows)",
@@ -173,7 +173,7 @@ class ProductionCoverage:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class CoveredRows:
-    """Rows, how far each is from the calibrated postures and loads, and so which are covered."""
+    """Rows with their distances from the calibrated postures and loads."""
 
     robot: Robot
     near_joints: BoolArray
@@ -189,7 +189,7 @@ class CoveredRows:
 
     @property
     def within_load(self) -> BoolArray:
-        """Whether the load is within what was pressed, shape (row,)."""
+        """Whether the load is within the calibrated loads, shape (row,)."""
         return np.asarray(self.level <= LEVEL_REACH)
 
     @property
@@ -200,7 +200,7 @@ class CoveredRows:
     def figures(
         self, course: Sequence[str] = (), name: Callable[[int], str] | None = None
     ) -> ProductionCoverage:
-        """Return how much of the rows is covered.
+        """Return the share of the rows that is covered.
 
         Parameters
         ----------
@@ -243,7 +243,7 @@ def covered_rows(
     robot : Robot
         The robot that is calibrated, with its tool.
     calibrated : CalibratedLoads
-        Where it is, and how hard was pushed there.
+        Its postures and loads.
     q : ndarray, shape (row, joint)
         Postures of production, in rad or m.
     force, moment : ndarray, shape (row, 3)
@@ -265,7 +265,7 @@ def covered_rows(
 def _covered_piece(
     robot: Robot, calibrated: CalibratedLoads, q: FloatArray, force: FloatArray
 ) -> CoveredRows:
-    """Return some rows with their distances; each is held against every posture at once."""
+    """Return some rows with their distances; each is compared with every posture at once."""
     turning, sliding = _judged(robot)
     angle, slide = (
         _distances(robot, joints, q, calibrated.joint_position) for joints in (turning, sliding)
@@ -274,7 +274,7 @@ def _covered_piece(
     is_near = apart <= 1.0
     nearest = calibrated.joint_position[apart.argmin(axis=1)]
     force_tcp = force_in_tcp(robot, q, force)
-    # Where no posture is near, those of all tell whether the load alone is at fault.
+    # Where no posture is near, all of them decide whether the load alone is outside.
     usable = is_near | ~is_near.any(axis=1, keepdims=True)
     size = np.linalg.norm(force_tcp, axis=1)
     cosine = (force_tcp @ calibrated.direction.T).max(axis=1, initial=-1.0)
@@ -312,12 +312,12 @@ def near_postures(
 
 
 def poses_in_company(robot: Robot, q: FloatArray, pose: IndexArray) -> BoolArray:
-    """Return the poses by which models are compared, those not far from all others, shape (pose,).
+    """Return the poses by which models are compared: those near others, shape (pose,).
 
     Two poses within twice the reach of coverage cover all that lies between them. A pose farther
-    from every other, such as one that only weighs the tool, is no part of what the others cover:
-    what a model makes of it when it is left out is an extrapolation, and its large error would hide
-    the differences at all others.
+    from every other, such as one that only weighs the tool, is outside the domain of the others:
+    its prediction when left out is an extrapolation, whose large error would hide the differences
+    at all others.
 
     Parameters
     ----------
@@ -333,10 +333,10 @@ def poses_in_company(robot: Robot, q: FloatArray, pose: IndexArray) -> BoolArray
 
 
 def _nearest_others(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return how far the nearest other posture is, in parts of the reach, shape (pose,).
+    """Return the distance of the nearest other posture, relative to the reach, shape (pose,).
 
-    Of all joints the largest distance counts, whole turns aside. By a tree: ten thousand poses have
-    a hundred million distances.
+    The largest distance over the joints counts, modulo whole turns. A tree is used because ten
+    thousand poses have a hundred million distances.
     """
     judged, reach = np.concatenate(_judged(robot)), posture_reach(robot)
     places, turns = q[:, judged] / reach[judged], np.array(robot.revolute)[judged]
@@ -349,7 +349,7 @@ def _nearest_others(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def posture_reach(robot: Robot) -> FloatArray:
-    """Return how far a covered row may be from a posture in each joint, shape (joint,).
+    """Return the largest distance of a covered row from a posture per joint, shape (joint,).
 
     In rad or m; infinite for the joint that only turns the tool.
     """
@@ -360,7 +360,7 @@ def posture_reach(robot: Robot) -> FloatArray:
 
 
 def _judged(robot: Robot) -> tuple[IndexArray, IndexArray]:
-    """Return the turning joints that are judged, and the sliding ones."""
+    """Return the turning joints that are judged, and the prismatic ones."""
     revolute = np.array(robot.revolute)
     turning = np.flatnonzero(revolute)
     arm = len(revolute) - robot.external_axes
@@ -368,7 +368,7 @@ def _judged(robot: Robot) -> tuple[IndexArray, IndexArray]:
 
 
 def _distances(robot: Robot, joints: IndexArray, q: FloatArray, poses: FloatArray) -> FloatArray:
-    """Return distances in parts of the reach, the largest of some joints, shape (row, pose)."""
+    """Return distances relative to the reach, the largest of some joints, shape (row, pose)."""
     apart, reach = np.zeros((len(q), len(poses))), posture_reach(robot)
     # One joint at a time: rows by poses by joints are too many numbers at once.
     for joint in joints:

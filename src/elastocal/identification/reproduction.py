@@ -1,8 +1,8 @@
-"""Reproduction: a calibration made once more, as no figure is believed that cannot be made again.
+"""Reproduction: a calibration is repeated to confirm its figures.
 
-From the dataset and the settings that stand in the model file, the fit is repeated. When it gives
-the compliances and the held-out errors of the model file, model and data belong together, and the
-errors of single readings are known, from which intervals follow.
+The fit is repeated from the dataset and the settings in the model file. If it gives the compliances
+and the held-out errors of the file, model and data belong together, and the errors of single
+readings give the intervals.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _DRAWS = 1000
 _MOST_ALONE = 3
 """Number of largest errors at one pose from which on that is said."""
 _SAME = 1e-4
-"""Relative difference below which two results are of one computation, be it on other machines."""
+"""Relative difference below which two results are equal, also on different machines."""
 
 
 @brief_repr
@@ -60,7 +60,7 @@ class UnseenErrors:
         return int(np.count_nonzero(~(self.error <= tolerance)))
 
     def at_one_pose(self) -> Phrase | None:
-        """Return that the largest errors are all at one pose; None where fewer than three are."""
+        """Return whether the largest errors are all at one pose; None below three of them."""
         order = np.argsort(-self.error, kind="stable")
         pose = int(self.pose[order[0]])
         others = np.flatnonzero(self.pose[order] != pose)

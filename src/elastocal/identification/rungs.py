@@ -22,16 +22,16 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 AUTO = "auto"
-"""Asks for the rung that the readings carry."""
+"""Name that requests the rung that the readings support."""
 _KNEES = (0.3, 1.0, 3.0)
 """Knees of the gears, in typical load torques of the joint: one below, at and above it."""
 _KNEES_OF_PLAYS = (0.5, 2.0)
 """Knees of gears with friction, whose elements are knees as well."""
 _SLIPS = (0.15, 0.3, 0.6, 1.5)
-"""Limits of the friction elements, likewise: from what barely matters to gears that stick."""
+"""Limits of the friction elements, from hardly relevant to gears that stick."""
 _FINE_SLIPS = (0.05, *_SLIPS)
-"""With one that slides under a light press already, as friction does that is small beside the loads
-of production: a harmonic drive's, or a strong gear's."""
+"""The same with one that slides under a light press already, as friction does that is small
+compared with the loads of production: that of a harmonic drive, or of a strong gear."""
 _SLIDES = 0.6
 """Part of the joint's largest load torque up to which a friction element is fitted. One that slid
 little or never has a column near zero, and a compliance that says nothing of the arm: where
@@ -39,9 +39,9 @@ production loads the joint a little more it would bend by millimetres."""
 _LOADED = 0.01
 """Part of the largest typical torque below which a joint counts as never loaded."""
 _LOW_LEVEL = 0.6
-"""A load case is of low load below this part of the largest force at its pose."""
+"""Part of the largest force at its pose below which a load case is of low load."""
 NO_LEVELS = f"no load case has less than {_LOW_LEVEL:.0%} of the largest force at its pose"
-"""Why a rung that needs load cases of low load cannot be tried."""
+"""Reason why a rung that needs load cases of low load cannot be fitted."""
 
 
 @brief_repr
@@ -118,13 +118,13 @@ RUNGS: dict[str, Rung] = {
 
 
 def allowed_rungs(springs: str) -> tuple[str, ...]:
-    """Return the names of the rungs that a user's word for springs leaves to choose from."""
+    """Return the names of the rungs that the option for springs leaves to choose from."""
     gears = tuple(name for name in RUNGS if name.startswith("gears"))
     return {AUTO: tuple(RUNGS), "gears": gears}.get(springs, (springs,))
 
 
 def rung_of(robot: Robot, name: str) -> Rung:
-    """Return a rung, or a layout beside the ladder as one.
+    """Return a rung, or a layout outside the ladder as one.
 
     Raises
     ------
@@ -138,13 +138,13 @@ def rung_of(robot: Robot, name: str) -> Rung:
 
 
 def has_levels(readings: Readings) -> bool:
-    """Return whether load cases of low load stand beside those of full load."""
+    """Return whether there are load cases of low load beside those of full load."""
     # The largest force at a pose is never low beside itself.
     return bool(np.any(low_loads(readings)))
 
 
 def low_loads(readings: Readings) -> BoolArray:
-    """Return whether each reading is of low load beside others at its pose, shape (reading,)."""
+    """Return whether each reading is of low load among those at its pose, shape (reading,)."""
     force = np.linalg.norm(readings.force, axis=1)
     labels, pose = np.unique(readings.pose, return_inverse=True)
     largest = np.zeros(len(labels))

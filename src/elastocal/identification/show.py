@@ -31,7 +31,7 @@ from elastocal.wording import (
 )
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
-"""The unit of most springs stands in the heads; other springs name their own."""
+"""Unit of most springs, shown in the heads; other springs name their own."""
 _MOST_SAID = 10.0
 """Half an interval by its value, from which on its size says nothing more."""
 _MOST_SUSPICIOUS = 10
@@ -40,7 +40,7 @@ _WELL, _FAIRLY = 0.2, 0.5
 
 
 def show_calibration(figures: CalibrationSummary) -> Iterator[Block]:
-    """Yield everything that a person asks of a calibration.
+    """Yield the blocks of a calibration.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def spring_table(springs: Sequence[SpringSummary]) -> Table:
     )
     rows, above = list[Row](), ""
     for spring in springs:
-        # What a gear amounts to at its torque stands under its first row, without the name again.
+        # The total of a gear at its torque follows its first row, without repeating the name.
         further = bool(above) and spring.name.startswith(f"{above} ")
         name = f" {spring.name.removeprefix(above)}" if further else spring.name
         above = above if further else spring.name
@@ -210,7 +210,7 @@ def _stiffness(value: float, unit: Unit) -> str:
 
 
 def _known(value: float, low: float, high: float, spring: SpringSummary) -> Cell:
-    """Return how well a spring is known by itself, for values as they are shown."""
+    """Return how well a spring is determined separately, for values in shown units."""
     grade: Grade = "fair"
     text = _at_bound(value, low, high)
     if not (low <= value <= high or spring.at_bound):
@@ -240,7 +240,7 @@ def show_unseen(
     ranks: tuple[int, int, int],
     condition: float,
 ) -> Iterator[Block]:
-    """Yield what the readings do not tell apart.
+    """Yield the combinations that the readings do not determine.
 
     Parameters
     ----------

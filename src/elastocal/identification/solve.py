@@ -1,12 +1,12 @@
 """Solve: reduce once by QR, then a small bounded problem (paper Eq. 19); and refit on other poses.
 
-A problem is refitted on many choices of its poses in two ways. Through Gram blocks: each pose
-block contributes ``[O d]^T [O d]``; a refit needs only their weighted sum. Squaring costs half the
-digits, which leaves eight: enough for intervals and held-out errors, while the fit itself goes
-through QR.
+A problem is refitted on many choices of its poses in two ways. With Gram blocks, each pose block
+contributes ``[O d]^T [O d]``, and a refit needs only their weighted sum. Squaring halves the number
+of correct digits to eight, which suffices for intervals and held-out errors; the fit itself uses
+QR.
 
-Through triangles: each pose block is reduced once to the triangle of its rows ``[O d]``; the
-triangle of a choice is that of its poses' triangles, stacked (G. H. Golub, C. F. Van Loan, *Matrix
+With triangles, each pose block is reduced once to the triangle of its rows ``[O d]``; the triangle
+of a choice is that of its poses' triangles, stacked (G. H. Golub, C. F. Van Loan, *Matrix
 Computations*, 2013, section 6.5). Nothing is squared, so that a refit equals `solve` on the same
 readings to round-off.
 """

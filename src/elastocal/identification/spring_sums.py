@@ -78,11 +78,11 @@ def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArr
 
 
 def _eliminated(null_space: FloatArray) -> Iterator[FloatArray]:
-    """Yield the basis that is one at one of ``k`` springs each and zero at the others of them.
+    """Yield the basis whose vectors are 1 at one of ``k`` springs and 0 at the others.
 
-    The springs are taken in the order of how much of them is in the null space and not in the
-    vectors of those before, the first of equal ones: by its projector, which is the same for every
-    basis, so that no rounding chooses.
+    The springs are taken in the order of their part in the null space outside the vectors of those
+    before, the first of equal ones. The projector is the same for every basis, so that rounding
+    does not influence the choice.
     """
     projector, pivots = null_space @ null_space.T, list[int]()
     for _ in range(null_space.shape[1]):
@@ -125,7 +125,7 @@ def _independent(candidates: Sequence[FloatArray], k: int) -> list[FloatArray]:
 
 
 def describe(group: Sequence[Term]) -> str:
-    """Return an unobservable combination as a person would write it.
+    """Return an unobservable combination in words.
 
     >>> describe([Term("a4.y", 1.0), Term("a4.z", 1.0), Term("a5.axial", -1.0)])
     '(a4.y + a4.z) - a5.axial'

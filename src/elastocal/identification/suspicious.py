@@ -36,7 +36,7 @@ _MOST_LEVERAGE = 0.99
 @brief_repr
 @dataclass(frozen=True)
 class Screening:
-    """How each reading looks to a robust fit."""
+    """Assessment of each reading by a robust fit."""
 
     score: FloatArray
     """Leverage-corrected residual norm in robust standard deviations, shape (reading,)."""
@@ -56,7 +56,7 @@ class Screening:
 
 
 def screen(problem: Problem) -> Screening:
-    """Return how the readings of a problem look to a robust fit."""
+    """Return the assessment of the readings of a problem by a robust fit."""
     robust = solve(problem, "cauchy")
     weighted = problem.reweighted(robust.reading_weight)
     h = leverage(weighted, robust)
@@ -69,7 +69,7 @@ def screen(problem: Problem) -> Screening:
     blunder = (score > BLUNDER_SCORE) & (residual > _BLUNDER_SIZE * typical)
     if blunder.mean() > _MOST_BLUNDERS:
         blunder = np.zeros_like(blunder)
-    # The scale is a median itself, about half as good as a variance of all that is left over.
+    # The scale is a median itself, with about twice the variance of an estimate from all residuals.
     freedom = 0.5 * max(problem.d.size - rank(robust.factored.s), 2)
     threshold = float(np.sqrt(3.0 * fdtri(3, freedom, 1.0 - _FALSE_ALARM / len(problem))))
     return Screening(score, residual, h, threshold, blunder)

@@ -1,4 +1,4 @@
-"""Logs of other people's instruments: read, brought to one clock, and made a dataset of."""
+"""Logs of foreign instruments: read, synchronised, and converted to a dataset."""
 
 import lazy_loader
 

@@ -1,7 +1,8 @@
-"""Frames of the map held against what the logs tell of them.
+"""Comparison of the frames of the map with the logs.
 
-The tool frame that a controller states must be that of its joints. The weight of the tool turns in
-the sensor as the arm turns it: it tells how the sensor is turned on the flange.
+The tool frame that a controller states must be that of its joints. The direction of the tool's
+weight in the sensor changes with the arm's orientation, which shows the sensor's rotation on the
+flange.
 """
 
 import numpy as np
@@ -19,24 +20,26 @@ _LARGEST_GAP = (20e-3, np.radians(2.0))
 """Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
 that is not calibrated is off by some millimetres, another frame by more."""
 _PARTS = 10
-"""Parts of a log, each of which must agree: a column may freeze half way."""
+"""Parts of a log, each of which must agree, since a column may freeze midway."""
 ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
 _WRONG_UNIT = 1e3
-"""How much larger than all in a cell a number may be: up to there the arm contradicts its unit."""
+"""Factor by which a number may exceed the sizes in a cell; up to it, the unit is questioned by the
+arm."""
 _UNIT_NORM = 1e-2
 """Distance of a quaternion's norm from 1: four columns of few digits are nearer."""
 _PULL = 0.5
 """Part of a load along z of the tcp from which on it is a press, or a pull."""
 _LEAST_WEIGHT = 5.0
-"""Change of the unloaded force between poses, RMS in N, from which on it tells something."""
+"""Smallest change of the unloaded force between poses that is usable, RMS in N."""
 _LEAST_TURN = np.radians(3.0)
-"""A sensor turned by less is mounted as people mount them."""
+"""Rotation of a sensor that is a usual mounting error."""
 _MOST_LEFT = 0.2
 """Part of the change that another turn may leave and still be believed."""
 _BETTER, _TELLS = 0.5, 0.02
-"""How much less one sense of the forces must leave than the other, and what that one leaves."""
+"""Ratio of the residuals of both senses of the forces, and the residual, at which a sense is
+decided."""
 _LEAST_SPREAD = 0.05
-"""Second spread of the directions of gravity in the sensor, against which a turn is told."""
+"""Second spread of the directions of gravity in the sensor from which a rotation is determined."""
 
 
 def vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> FloatArray:
@@ -141,7 +144,7 @@ def _stated_turns(table: LogTable, pose: ToolPose) -> FloatArray:
 
 
 def _rotations(pose: ToolPose, stated: FloatArray, R_joints: FloatArray) -> FloatArray:
-    """Return how the tool is turned, shape (row, 3, 3): as stated, else as the joints say."""
+    """Return the orientation of the tool, shape (row, 3, 3): as stated, else by the joints."""
     if not len(stated) or (pose.angles is None and pose.quaternion is None):
         return R_joints
     if pose.angles is not None:
@@ -152,11 +155,11 @@ def _rotations(pose: ToolPose, stated: FloatArray, R_joints: FloatArray) -> Floa
 def sensor_doubts(
     postures: StaticPostures | None, loads: FloatArray, site: Site
 ) -> tuple[str, ...]:
-    """Return why the sensor cannot be as the map says, by the sense of the loads and the weight.
+    """Return why the sensor contradicts the map, by the sense of the loads and the weight.
 
-    Unloaded, its force is a constant and the weight of the tool. Without the means over the poses,
-    it is that of gravity in the sensor times the tool's mass, turned by as much as the sensor is
-    turned otherwise than the map says (Kabsch, Acta Crystallographica A32, 1976).
+    Unloaded, its force is a constant plus the weight of the tool. With the means over the poses
+    subtracted, it is gravity in the sensor times the tool's mass, rotated by the error of the
+    sensor's rotation in the map (Kabsch, Acta Crystallographica A32, 1976).
 
     Parameters
     ----------
@@ -185,9 +188,9 @@ def sensor_doubts(
 def _turned_sensor(
     postures: StaticPostures | None, sense: float, site: Site
 ) -> tuple[float, tuple[str, ...]]:
-    """Return the part of the weight's change that the best turn leaves, and that turn in words.
+    """Return the part of the weight's change that the best rotation leaves, and its description.
 
-    The part is infinite where weight and poses do not tell it.
+    The part is infinite where weight and poses do not determine it.
     """
     if postures is None:
         return np.inf, ()

@@ -1,15 +1,15 @@
-"""Bring the clocks of several logs together by what all of them feel: that the cell moves.
+"""Synchronisation of the clocks of several logs by the motion of the cell, which all record.
 
 Each log is reduced to its *activity*, the logarithm of the speed at which its values change. The
-marker travels when the arm does. A force changes when the arm yields to it, at a few mm/s at most;
-beside a force, all faster motion of the arm is left out. The offset is where the activities
-correlate most. A press is much like the next one, so that a force may fit several offsets: then it
-is the one at which the tool's weight alone explains what is felt on the way between the poses.
-Stretches of the recording, each correlated for itself, then say how the offset drifts:
+marker moves when the arm does. A force changes when the arm yields to it, at a few mm/s at most;
+for a force, faster motion of the arm is left out. The offset is where the activities correlate
+most. Presses resemble one another, so a force may fit several offsets: then the one is taken at
+which the tool's weight alone explains the force between the poses. Sections of the recording, each
+correlated separately, show how the offset drifts:
 
     t = t_log + offset + drift (t_log - t_first).
 
-Where the logs hold a handshake, its words say which times belong together, and nothing is fitted.
+If the logs contain a handshake, its words identify simultaneous times, and nothing is fitted.
 """
 
 import math
@@ -35,9 +35,9 @@ _SMOOTH = 5
 _BLUR = 15
 """The same of an activity: about 0.3 s."""
 _PRESSING = 2e-3
-"""Speed in m/s above which an arm travels; below, it stands or yields to a force."""
+"""Speed in m/s above which an arm travels; below, it is at rest or yields to a force."""
 _SLOWEST = 1e-5
-"""Speed in m/s below which an arm that may yield stands."""
+"""Speed in m/s below which an arm that may yield is at rest."""
 _CLOSE, _APART, _MOST_CANDIDATES = 0.15, 1.0, 40
 """Correlation below the best that is still a candidate, least distance of candidates in s, and
 their greatest number."""
@@ -54,13 +54,13 @@ _LEAST_CORRELATION = 0.5
 _STRETCH = 60.0
 """Length of a stretch that gives an offset of its own, in s."""
 _SEARCHED = 0.6
-"""How far from the common offset that of a stretch is looked for, in s."""
+"""Largest deviation of the offset of a section from the common one, in s."""
 _LEAST_STRETCHES = 5
 """Stretches from which on a drift is estimated."""
 _HOUR, _DAY = 3600.0, 86400.0
 """In s."""
 _OTHER_UNIT = 200.0
-"""How much longer than another a log is whose time is in another unit."""
+"""Ratio of the durations of two logs that shows different units of time."""
 _LONGEST = 1_000_000
 """Samples of the longest activity; longer recordings are looked at in larger steps."""
 
@@ -68,7 +68,7 @@ _LONGEST = 1_000_000
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class _Activity:
-    """How fast a log changes, on a grid of equal steps."""
+    """Rate of change of a log, on a grid of equal steps."""
 
     start: float
     step: float
@@ -80,16 +80,16 @@ class _Activity:
 
 @record()
 class ClockFit:
-    """How the clock of a log stands to that of the joints."""
+    """Offset and drift of the clock of a log relative to that of the joints."""
 
     clock: str
     reference: str
     offset: float
-    """What is added to its first time, in s."""
+    """Offset to be added to its first time, in s."""
     offset_sigma: float | None
     """Standard deviation, in s; None where the logs hold a handshake."""
     drift: float
-    """Change of the offset a second; 0 where the recording is too short to tell."""
+    """Change of the offset per second; 0 where the recording is too short to estimate it."""
     drift_sigma: float | None
     """None where no drift was estimated."""
     correlation: float
@@ -103,7 +103,7 @@ class ClockFit:
 
     @property
     def sentence(self) -> str:
-        """What a person wants to know of it."""
+        """Description of the clock, in words."""
         if self.offset_sigma is None:
             return f"{self.clock}: by the handshake"
         drift = "" if self.drift_sigma is None else f", drift {1e6 * self.drift:+.0f} ppm"
@@ -112,7 +112,7 @@ class ClockFit:
         zero = -self.offset
         if not (zero > _DAY or (zero > _HOUR and abs(zero - self.first) < _HOUR)):
             return f"{self.clock}: {self.offset:+.3f} s {known} to {self.reference} {seen}"
-        # Dates and times of day beside seconds: a difference of years says nothing to a person.
+        # For dates and times of day beside seconds, the difference of years is not shown.
         date, clock = datetime.fromtimestamp(zero, UTC).isoformat(" ", "milliseconds")[:23].split()
         moment = clock if zero < _DAY else f"{date} {clock}"
         return f"{self.clock}: its {moment} is 0 s of {self.reference}, {known} {seen}"
@@ -121,7 +121,7 @@ class ClockFit:
 def align(
     logs: Sequence[LogStreams], lever: FloatArray
 ) -> tuple[tuple[LogStreams, ...], tuple[ClockFit, ...]]:
-    """Return the logs by the clock of the joints, and how each clock stood to it.
+    """Return the logs in the time of the joints, and the fit of each clock.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def align(
 
 
 def _fit_or_unit(log: LogStreams, reference: LogStreams, lever: FloatArray) -> ClockFit:
-    """Return the fit of a clock; refuse one that cannot be told by the unit that may be why."""
+    """Return the fit of a clock; a refusal names the unit that may be the reason."""
     try:
         return fit_clock(log, reference, lever)
     except LogError as error:
@@ -170,7 +170,7 @@ def _fit_or_unit(log: LogStreams, reference: LogStreams, lever: FloatArray) -> C
 
 
 def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> ClockFit:
-    """Return how the clock of a log stands to that of the joints, by what both feel.
+    """Return the fit of the clock of a log to that of the joints, by their common activity.
 
     Raises
     ------
@@ -288,10 +288,10 @@ def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArr
 
 
 def weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float:
-    """Return how badly the tool's weight explains the force while the arm travels, in N.
+    """Return the residual of the force while the arm travels, explained by weight alone, in N.
 
-    ``F = A R_base_tcp^T g + b`` with any ``A``, so that the sensor may sit as it likes; the median
-    of what is left.
+    The model is ``F = A R_base_tcp^T g + b`` with any ``A``, so that the sensor may have any
+    rotation; the median residual is returned.
     """
     arm, wrench = reference.arm, log.wrench
     arm = present(arm, "arm")
@@ -301,7 +301,7 @@ def weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float
     own = time[speed > _TRAVELLING] - shift
     own = own[(own > wrench.time[0]) & (own < wrench.time[-1])]
     after = np.searchsorted(wrench.time, own)
-    # Across a gap the next sample is of another posture.
+    # Across a gap the next sample belongs to another posture.
     near = wrench.time[after] - own <= _LONGEST_GAP
     own, after = own[near], after[near]
     if len(own) < _LEAST_TRAVELLED:
@@ -358,7 +358,7 @@ def _by_handshake(log: LogStreams, reference: LogStreams) -> tuple[FloatArray, C
 
 
 def _ends(theirs: tuple[float, float], ours: tuple[float, float]) -> tuple[float, float]:
-    """Return where the ends of our span of a word belong: a single row in the middle of theirs."""
+    """Return the matching times of a word's ends; a single row is the middle of theirs."""
     middle = 0.5 * (theirs[0] + theirs[1])
     return (middle, middle) if ours[0] == ours[1] else theirs
 
@@ -369,7 +369,7 @@ def handshake_spans(log: LogStreams) -> dict[str, tuple[float, float]]:
     Raises
     ------
     LogError
-        If a word stands in two places.
+        If a word occurs in two places.
     """
     spans: dict[str, tuple[float, float]] = {}
     row = 0

@@ -1,4 +1,4 @@
-"""A first map of logs, by the names and sizes of their columns; a person then corrects it."""
+"""First map of logs, guessed from the names and sizes of their columns, for a person to correct."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -42,7 +42,8 @@ _SURELY_DEGREES = 7.0
 _SURELY_MM = 20.0
 """A place or rail beyond this many units is not in m."""
 _SURELY_PLACED = 0.2
-"""A place below this many units says nothing: the instruments stand farther away in any unit."""
+"""A coordinate below this many units decides nothing: the instruments are farther away in any
+unit."""
 _SURELY_NEWTONS = 20.0
 """A press of more than this many units is not in kN."""
 _LARGEST_FORCE = 100e3
@@ -54,16 +55,16 @@ _LONGEST_LEVER = 5.0
 @brief_repr
 @dataclass(frozen=True)
 class GuessedColumns:
-    """What some columns of a log were taken for, and why."""
+    """Guessed meaning of some columns of a log, with the reasons."""
 
     key: str
     """Key of the map."""
     columns: tuple[str, ...]
     unit: str | None
-    """``?`` where a person must say; None for dates and words."""
+    """``?`` where a person must state it; None for dates and words."""
     why: str
     counts: float = 1.0
-    """How many of its numbers are one unit."""
+    """Number of counts in one unit."""
 
     @property
     def yaml(self) -> str:
@@ -83,14 +84,14 @@ class GuessedColumns:
 @brief_repr
 @dataclass(frozen=True)
 class GuessedLog:
-    """What a log, or a topic of it, was taken for."""
+    """Guessed meaning of a log or of a topic of it."""
 
     log: str
     topic: str | None
     columns: tuple[GuessedColumns, ...] = ()
 
     def answered(self, ask: Callable[[str], str]) -> "GuessedLog":
-        """Return the same with the units that a person says; an empty answer leaves one open."""
+        """Return the same with the units that a person gave; an empty answer leaves one open."""
 
         def said(each: GuessedColumns) -> GuessedColumns:
             if each.unit != UNKNOWN:
@@ -145,7 +146,7 @@ def guess_logs(files: Sequence[Path]) -> tuple[GuessedLog, ...]:
 
 
 _ORDER = ("time", "handshake")
-"""What says when, not what."""
+"""Kinds of columns that state a time, not a quantity."""
 
 
 def guess_log(log: str, topic: str | None, table: LogTable) -> GuessedLog:
@@ -301,7 +302,7 @@ tcp: {xyz: ["0 mm", "0 mm", "0 mm"]}      # in the flange, z out of the tool
 sensor: {xyz: ["0 mm", "0 mm", "0 mm"]}   # measuring frame in the flange
 marker: ["0 mm", "0 mm", "0 mm"]          # in the tcp, roughly
 """
-"""What no log says of the cell."""
+"""Entries about the cell that no log contains."""
 
 
 def _bare(name: str) -> str:

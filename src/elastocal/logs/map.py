@@ -1,4 +1,4 @@
-"""The map: what the columns of foreign logs are, as a person writes it.
+"""The map: the meaning of the columns of foreign logs, written by a person.
 
 Example::
 
@@ -52,7 +52,7 @@ from elastocal.units import factor
 
 SCHEMA = "elastocal.log-map/1"
 UNKNOWN = "?"
-"""Unit that a person still has to write: `elastocal import --guess` could not tell it."""
+"""Unit that a person must still write: `elastocal import --guess` could not determine it."""
 
 _ColumnName = Annotated[str, BeforeValidator(lambda name: str(name) if name is not True else name)]
 """A name of the header, or the number of a column from 1."""
@@ -85,7 +85,7 @@ class Vector(StrictModel):
     columns: _Three
     unit: str
     counts: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
-    """How many of the log's numbers are one unit, as a sensor's box states them."""
+    """Counts of the log in one unit, as the box of a sensor states them."""
 
     def check(self, dimension: str) -> None:
         """Refuse another unit than of this dimension."""
@@ -100,9 +100,9 @@ class Joints(StrictModel):
     names: tuple[str, ...] = ()
     """Joint of each column; by default the robot's next ones of such a unit."""
     signs: tuple[Literal[-1, 1], ...] = ()
-    """-1 where the controller counts the other way round."""
+    """-1 where the controller counts in the opposite direction."""
     offsets: tuple[Angle | Length, ...] = ()
-    """What is added after the sign, with its unit."""
+    """Offset that is added after the sign, with its unit."""
 
     @model_validator(mode="after")
     def _matching(self) -> "Joints":
@@ -170,7 +170,7 @@ class LogEntry(StrictModel):
     frame: Literal["sensor", "tcp", "base"] = "sensor"
     """Frame of force and moment."""
     acts_on: Literal["robot", "environment"] = "robot"
-    """Whose force it is."""
+    """Body on which the force acts."""
     station: str = "tracker"
     """Name of the tracker station."""
     markers: tuple[MarkerColumns, ...] = ()
@@ -236,13 +236,13 @@ class LogMap(StrictModel):
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Site:
-    """What the logs were taken from."""
+    """Robot and instruments from which the logs were taken."""
 
     robot: Robot
     urdf: str
     """With the tool's mass."""
     gravity: tuple[float, float, float] | None
-    """In base, in m/s²; None: the base stands upright."""
+    """In base, in m/s²; None: the base is upright."""
     sensor: SensorLoad
     T_flange_sensor: FloatArray
     """Measuring frame of the sensor, shape (4, 4), in m."""

@@ -1,14 +1,15 @@
 """From logs of three instruments to one dataset: one clock, plateaus, readings, registration.
 
-What an own run knows from its journal is found here in the logs: when everything stood
-(`elastocal.logs.plateaus`), by one clock (`elastocal.logs.clocks`). From there on both go the same
-way, `elastocal.procedure.derive`: means, tare and tool weight, registration of the stations.
+What a run of elastocal records in its journal is found here in the logs: the times at which
+everything was at rest (`elastocal.logs.plateaus`), in one time base (`elastocal.logs.clocks`). From
+there both use `elastocal.procedure.derive`: means, tare and tool weight, registration of the
+stations.
 
-What logs contradict in their map before readings are made of them.
+Contradictions between logs and map are found before readings are formed.
 
-A column that stands still, a stream that is interrupted, clocks that are not one, a sensor that
-does not feel the weight of the tool turn, a marker that does not go where the arm carries it: each
-is named, and a reading or a registration that then fails says it first.
+A constant column, an interrupted stream, inconsistent clocks, a sensor that does not show the
+changing direction of the tool's weight, a marker that does not follow the arm: each is named, first
+of all if a reading or a registration then fails.
 """
 
 from collections import Counter
@@ -67,7 +68,7 @@ from elastocal.wording import counted, listed
 
 _T = TypeVar("_T")
 _STILL = 0.25
-"""Part of a log in which a column must stand still to be named."""
+"""Part of a log in which a column must be constant to be named."""
 _MOVES = np.radians(2.0)
 """Range of a joint that moves."""
 _GAP, _USUAL = 5.0, 10.0
@@ -96,7 +97,7 @@ def stream_doubts(
     logs : sequence of LogStreams
         One of them with joints.
     clocks : sequence of ClockFit
-        How their clocks stood to that of the joints.
+        Fits of their clocks to that of the joints.
     lever : ndarray, shape (3,)
         Roughly the marker in the tcp frame, in m.
     """
@@ -110,7 +111,7 @@ def stream_doubts(
 
 
 def still_columns(logs: Sequence[LogStreams], robot: Robot) -> Iterator[str]:
-    """Yield columns of forces, markers and joints that stand still while the others change."""
+    """Yield columns of forces, markers and joints that are constant while the others change."""
     for log in logs:
         if log.arm is not None:
             yield from _still_joints(log, log.arm, robot)

@@ -1,13 +1,14 @@
 """The two messages of KUKA's Robot Sensor Interface over Ethernet: ``<Rob>`` in, ``<Sen>`` out.
 
 Each interpolation cycle the controller sends one XML datagram with what its ETHERNET object was
-configured to send, and waits for one that echoes its ``IPOC``. Numbers are millimetres and degrees,
-turns A, B, C about z, the new y, the new x, as the pendant shows them; they stay so here.
+configured to send, and waits for one that echoes its ``IPOC``. Numbers are in millimetres and
+degrees, with rotations A, B, C about z, the new y, the new x, as the pendant shows them; this
+module keeps these units.
 
 The reader is tolerant of what differs between controllers (capitals, tags of a site's own, what is
-not sent) and of nothing else: no document type, no entity, no more than 64 KB, no number that is
-none. Sources: ros-industrial/kuka_experimental and kroshu/kuka-external-control-sdk (examples of
-both messages). Verified against simulators and public layouts, not on hardware.
+not sent) and of nothing else: no document type, no entity, at most 64 KB, only finite numbers.
+Sources: ros-industrial/kuka_experimental and kroshu/kuka-external-control-sdk (examples of both
+messages). Verified against simulators and public layouts, not on hardware.
 """
 
 from dataclasses import dataclass, field
@@ -44,8 +45,8 @@ _FAR = 250
 _WRAP = 1 << 32
 """IPOC counts up to here, and from zero again."""
 _IN_A_ROW = 3
-"""Old messages that follow one another after which they are the newer ones: a program was started
-anew whose count is a little lower."""
+"""Number of consecutive old messages after which they count as the newer ones: the program was
+restarted with a slightly lower count."""
 _SHORT = 100
 """Controllers with RSI 2 begin with an empty message that is shorter than this, in bytes."""
 Six = tuple[float, float, float, float, float, float]
@@ -54,19 +55,19 @@ NO_CORRECTION: Six = (0.0,) * 6
 
 
 class ProgramState(IntEnum):
-    """State of the program ``elcal_run``, as it tells in ``Krl.State``."""
+    """State of the program ``elcal_run``, as reported in ``Krl.State``."""
 
     ABSENT = 0
     """Not in its loop."""
     STANDING = 1
     """Waiting; corrections do not act."""
     GUIDED = 2
-    """In ``RSI_MOVECORR``: corrections act."""
+    """In ``RSI_MOVECORR``: corrections take effect."""
     MOVING = 3
-    """On a ``PTP``."""
+    """On a ``PTP`` motion."""
     ARRIVED = 4
     BRAKED = 5
-    """The ``PTP`` was given up on the way."""
+    """The ``PTP`` was aborted on its way."""
     ENDED = 9
 
 
@@ -74,9 +75,9 @@ class Order(IntEnum):
     """Order to the program ``elcal_run``, in ``Cmd.Op``."""
 
     HOLD = 0
-    """Stand; leave ``RSI_MOVECORR``, brake a ``PTP``."""
+    """Stand still; leave ``RSI_MOVECORR``, brake a ``PTP``."""
     GUIDE = 1
-    """Go into ``RSI_MOVECORR``."""
+    """Enter ``RSI_MOVECORR``."""
     MOVE = 2
     """``PTP`` to the axis positions given."""
     ADOPT = 3
@@ -105,7 +106,7 @@ class RobMessage:
     command: int | None = None
     """Krl.N: number of the last ``PTP`` that is over."""
     state: int | None = None
-    """Krl.State: a `ProgramState`, or a number that is none."""
+    """Krl.State: a `ProgramState`, or a number that is not one."""
     decimals: int = 0
     """Most decimals of a number of RIst."""
 
@@ -126,7 +127,7 @@ class MoveTarget:
 
 @dataclass(frozen=True)
 class SenMessage:
-    """What a controller is told in one cycle."""
+    """Values sent to a controller in one cycle."""
 
     correction: Six = NO_CORRECTION
     """RKorr: X, Y, Z in mm, A, B, C in deg; of one cycle (relative) or in all (absolute)."""
@@ -145,14 +146,14 @@ class SenMessage:
 
 
 class Arrival(Enum):
-    """How a message follows the one before it."""
+    """Relation of a message to the one before it."""
 
     FIRST = "first"
     NEXT = "next"
     AFTER_LOSS = "after loss"
     OUT_OF_ORDER = "out of order"
     JUMPED = "jumped"
-    """The controller's time has jumped: its program was started anew."""
+    """The controller's time has jumped: its program was restarted."""
 
 
 class IpocWatch:
@@ -176,7 +177,7 @@ class IpocWatch:
         ipoc : int
             Number of the message.
         anew : bool
-            Whether something else tells that the sender was started anew.
+            Whether the sender is otherwise known to have restarted.
         """
         last = self._last
         if last is None:
@@ -202,7 +203,7 @@ class IpocWatch:
 
 
 def _signed(change: int) -> int:
-    """Return a difference of two counts, the shorter way around."""
+    """Return a difference of two counts, modulo their range, with the smaller size."""
     return (change + _WRAP // 2) % _WRAP - _WRAP // 2
 
 
@@ -276,7 +277,7 @@ def write_sen(message: SenMessage, ipoc: int) -> bytes:
 
 
 def _element(tag: str, names: str | list[str], values: Six) -> str:
-    # Rounded first: "-0.000000" is a number that nobody wants to explain to a controller.
+    # Rounded first, so that "-0.000000" is never sent.
     plain = (round(value, 6) + 0.0 for value in values)
     given = (f'{name}="{value:.6f}"' for name, value in zip(names, plain, strict=True))
     return f"<{tag} {' '.join(given)}/>"
@@ -284,7 +285,7 @@ def _element(tag: str, names: str | list[str], values: Six) -> str:
 
 @dataclass
 class _Elements:
-    """The elements of one document as expat tells them."""
+    """Elements of one document, as expat reports them."""
 
     elements: dict[str, dict[str, str]] = field(default_factory=dict)
     ipoc: list[str] = field(default_factory=list)

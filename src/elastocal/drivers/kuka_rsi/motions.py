@@ -1,9 +1,9 @@
 """Motions of the arm, cycle by cycle: free moves by the controller, straight moves by the PC.
 
-A motion is a generator: it takes the state of each cycle and yields what is to be done until the
-next. It ends when it is done; what goes wrong is a `DeviceError`. Straight moves are corrections;
-they begin and end at standstill, and what the controller has really moved, RIst less RSol, is
-looked at then: an answer that was lost has taken its part of the movement with it.
+A motion is a generator: it takes the state of each cycle and yields the request until the next. It
+ends with the motion; a failure raises `DeviceError`. Straight moves are corrections that begin and
+end at standstill. At their end the true motion, RIst minus RSol, is compared with the goal, since a
+lost answer loses its part of the motion.
 """
 
 import math
@@ -33,10 +33,10 @@ from elastocal.results import brief_repr
 
 _TRIES = 4
 _QUIET = 0.05
-"""Time beyond the delay after which the arm stands, in s."""
+"""Time beyond the delay after which the arm counts as standing, in s."""
 _AT_JOINTS = 2e-3
-"""How far from its target a joint may be after a ``PTP``, in rad or m: RIst and AIPos may be sent
-with one decimal of a degree."""
+"""Largest distance of a joint from its target after a ``PTP``, in rad or m: RIst and AIPos may be
+sent with one decimal of a degree."""
 _RELEASED = 0.02
 """Part of the force that was held from which on a release is over."""
 _LEAST_FORCE = 3.0
@@ -84,18 +84,18 @@ _OVER = (ProgramState.ARRIVED, ProgramState.BRAKED)
 def approach(
     cycle: Cycle, way: FloatArray, speed: float, guard: "ContactGuard", pace: Pace
 ) -> Motion:
-    """Yield the steps of a guarded straight move; `ContactGuard.felt` tells how it ended.
+    """Yield the steps of a guarded straight move; `ContactGuard.felt` states how it ended.
 
     Parameters
     ----------
     cycle : Cycle
         State at the beginning.
     way : ndarray, shape (3,)
-        To go if nothing is felt, base, in m.
+        Motion if there is no contact, base, in m.
     speed : float
         In m/s.
     guard : ContactGuard
-        Feels the contact; its force is zeroed first.
+        Detects the contact; its force is zeroed first.
     pace : Pace
         How.
     """
@@ -105,7 +105,7 @@ def approach(
 
 
 def _zeroed(cycle: Cycle, reader: ForceReader) -> Phase:
-    """Stand until the force counts from the present one."""
+    """Stand still until the force is zeroed."""
     began = cycle.time
     reader.begin_zero(began)
     while not reader.is_zeroed(cycle.time):
@@ -127,7 +127,7 @@ def take_back(cycle: Cycle, guard: "ContactGuard", speed: float, pace: Pace) -> 
     Raises
     ------
     DeviceError
-        If something is felt on the way; the arm stands where it was felt.
+        If a contact is detected; the arm stops there.
     """
     cycle = yield from guided(cycle)
     cycle = yield from _zeroed(cycle, guard.reader)
@@ -141,7 +141,7 @@ def take_back(cycle: Cycle, guard: "ContactGuard", speed: float, pace: Pace) -> 
 
 
 def play(cycle: Cycle, places: FloatArray, heard: Callable[[FloatArray], None]) -> Motion:
-    """Yield the steps through given places, one a cycle, from where the tool stands.
+    """Yield the steps through given positions, one a cycle, from the tool's present one.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class ContactGuard:
     felt: bool = False
 
     def look(self, cycle: Cycle) -> bool:
-        """Return whether the move has to end here.
+        """Return whether the move must end here.
 
         Raises
         ------
@@ -204,7 +204,7 @@ class Press:
     touched: FloatArray
     """Correction where the tool touched, base, shape (3,), in m."""
     travel_limit: float
-    """How far from there it may go, in m."""
+    """Largest distance from there, in m."""
     force_limit: float
     """In N."""
 
@@ -297,13 +297,14 @@ def _shift(
     pace: Pace,
     guard: ContactGuard | None = None,
 ) -> Phase:
-    """Bring the correction to a goal, straight, or to where a guard ends it; stand there."""
+    """Move the correction straight to a goal, or until a guard ends the move; then stop."""
     missing = math.inf
     for _ in range(_TRIES):
         at, now = cycle.offset, 0.0
         while np.any(goal != at):
             if guard is not None and guard.reader.hesitates:
-                # Blind: it stands until the force comes again, or its silence is a fault.
+                # Without a force the arm stands still until the force returns or its silence is a
+                # fault.
                 now, cycle = 0.0, (yield Step())
                 if guard.look(cycle):
                     break

@@ -1,4 +1,4 @@
-"""What stands under a KUKA arm in the cell file, and the bounds that follow from it and the cell.
+"""Settings of a KUKA arm in the cell file, and the bounds that follow from them and the cell.
 
 Example::
 
@@ -53,8 +53,8 @@ _WRONG_PAIRS = {
 _LIMIT_PER_LOAD = 1.3
 """Default force limit over the largest load case, as in `elastocal run`."""
 _LAST_RESORT = 1.2
-"""Force at which the arm stops by itself over that limit: whoever supervises it goes first, and can
-take it off the surface; an arm that has stopped stays there."""
+"""Excess over that limit at which the arm stops by itself. The supervisor acts first and can
+retract the arm, whereas an arm that has stopped stays on the surface."""
 _BELOW = 0.95
 """Largest correction of the PC over POSCORR's limit: the PC's is felt first."""
 _MONITOR = 1.2
@@ -87,7 +87,7 @@ def require_pair(correction: str, hold_on: int) -> None:
 
 
 class RsiSettings(DeviceSettings):
-    """What stands under a KUKA arm in the cell file."""
+    """Settings of a KUKA arm in the cell file."""
 
     mode: Literal["measure", "contact", "compensation"] = "measure"
     """Whether the arm is only listened to (``ONLYSEND``), pressed with, or corrected on a path."""
@@ -114,7 +114,7 @@ class RsiSettings(DeviceSettings):
     """Sense of A1 to A6 against the joints of the robot's description; those of the catalogue have
     the pendant's."""
     delay: Annotated[PositiveTime, Field(le=1.0)] | None = None
-    """From command to motion, in s, where there is no record of it."""
+    """Delay from command to motion, in s, used if there is no commissioning record."""
     commissioning: str | None = None
     """File of `elastocal measure-delay`, relative to the cell file."""
     largest_correction: PositiveLength | None = None
@@ -134,7 +134,7 @@ class RsiSettings(DeviceSettings):
     model_tolerance: PositiveLength = 5e-3
     """Largest distance of RIst from where the robot's description has the tool, in m."""
     wait: Annotated[PositiveTime, Field(le=3600.0)] = 60.0
-    """How long the controller's first message is waited for, in s."""
+    """Largest wait for the controller's first message, in s."""
     timeout: Annotated[int, Field(ge=1, le=100)] = 10
     """``Timeout`` of the ETHERNET object: cycles without a valid answer until the controller
     stops."""

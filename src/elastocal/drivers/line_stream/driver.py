@@ -1,4 +1,4 @@
-"""Stations that speak in lines over TCP: we connect to an adapter, or it connects to us.
+"""Tracker stations that send text lines over TCP, as client or server.
 
 Verified against the simulator (`elastocal.sim.wire`) and clients of a few lines, not hardware.
 
@@ -12,8 +12,8 @@ Example::
     beam broken
     beam locked
 
-A line beginning with ``#`` is a comment, unless what follows is a header. Cells stand between
-commas, semicolons, tabs or blanks; between others than commas a number may have a decimal comma.
+A line beginning with ``#`` is a comment, unless what follows is a header. Cells are separated by
+commas, semicolons, tabs or blanks; except with commas, numbers may have a decimal comma.
 """
 
 import math
@@ -69,7 +69,7 @@ _NO_NUMBER = frozenset({"", "nan", "-", "null"})
 _SEPARATORS = (";", "\t", ",", None)
 """None: blanks."""
 _ABOUT_ONE = 0.02
-"""How far the length of a quaternion may be from 1."""
+"""Largest deviation of the length of a quaternion from 1."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class MarkerPoint:
 
 @dataclass(frozen=True)
 class BeamLine:
-    """The beam of a station, of the only one where none is named."""
+    """State of the beam of a station; of the only station if none is named."""
 
     locked: bool
     station: str | None
@@ -121,7 +121,7 @@ class FrameLine:
 
 @dataclass(frozen=True)
 class AdapterFault:
-    """A fault that the adapter tells in words."""
+    """Fault that the adapter reports in words."""
 
     text: str
 
@@ -174,7 +174,7 @@ def _checked(column: Column) -> Column:
 
 
 class LineReader:
-    """Turns the bytes of a stream into events; keeps no more than one line.
+    """Reader of events from the bytes of a stream; keeps no more than one line.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ class LineReader:
         Raises
         ------
         DeviceError
-            If a line is none of a stream's, or too long.
+            If a line is invalid or too long.
         """
         lines = (self._rest + data).split(b"\n")
         self._rest = lines.pop()
@@ -243,7 +243,7 @@ class LineReader:
                 f"the stream begins with {_shown(text)}, without a header that names columns and"
                 " units, as t[s],x[mm],y[mm],z[mm]; nor does the cell file (key 'columns')"
             )
-        # A comma may be decimal: the number of cells tells which mark stands between them.
+        # A comma may be decimal: the number of cells shows which character separates them.
         count = len(self._columns)
         cells = next((c for c in map(text.split, _SEPARATORS) if len(c) == count), _cells(text))
         if len(cells) != count:
@@ -324,7 +324,7 @@ _Port = Annotated[int, Field(ge=0, le=65535)]
 
 
 class StationLine(StrictModel):
-    """Where one station is, where each has a line of its own."""
+    """Address of one station that has a line of its own."""
 
     address: str = LOOPBACK
     port: _Port
@@ -340,7 +340,7 @@ class LineStreamSettings(DeviceSettings):
     port: _Port = 0
     """Port of the one line that all stations share."""
     peer: str = LOOPBACK
-    """As server: the only address that may connect."""
+    """In server mode, the only address that may connect."""
     stations: dict[Name, StationLine] = Field(default_factory=dict)
     """A line for each station, in place of ``port``."""
     columns: tuple[str, ...] = ()
@@ -352,7 +352,7 @@ class LineStreamSettings(DeviceSettings):
     silence: PositiveTime = 0.2
     """Without a line for longer the beam counts as broken, in s."""
     patience: PositiveTime = 10.0
-    """How long a connection may be gone before that is a fault, in s."""
+    """Largest time without a connection before a fault, in s."""
     own_frame: bool = True
     """Whether points are in the station's own frame: their distance is then checked against the
     range of the station, so that mm taken for m are found."""
@@ -369,12 +369,12 @@ class LineStreamSettings(DeviceSettings):
 
     @property
     def addresses(self) -> list["_Address"]:
-        """Where the lines are, each with its station."""
+        """Addresses of the lines, each with its station."""
         each = [_Address(line.address, line.port, name) for name, line in self.stations.items()]
         return each or [_Address(self.address, self.port, None)]
 
     def device_places(self) -> tuple[DevicePlace, ...]:
-        """Return where the adapters are; as server, each is known by the port that it comes to."""
+        """Return the addresses of the adapters; in server mode, the ports that they connect to."""
         if self.role == "server":
             return tuple(DevicePlace(self.peer, line.port) for line in self.addresses)
         return super().device_places()
@@ -392,12 +392,12 @@ class LineStreamSettings(DeviceSettings):
 
 @dataclass(frozen=True)
 class _Address:
-    """Where a line is, and whose."""
+    """Address of a line and its station."""
 
     host: str
     port: int
     station: str | None
-    """None: all stations are on it."""
+    """None: all stations use it."""
 
 
 class _Line(StationLink):
@@ -427,11 +427,11 @@ class _Line(StationLink):
 
     @property
     def station(self) -> str | None:
-        """Whose line it is; None: all stations are on it."""
+        """Station of the line; None: all stations use it."""
         return self._address.station
 
     def look(self, station: str) -> None:
-        """Let the adapter be told which station is to find the marker."""
+        """Tell the adapter which station is to find the marker."""
         self._looked = station
         self._to_look.set()
 
@@ -451,7 +451,7 @@ class _Line(StationLink):
         return True
 
     def _connect(self) -> socket.socket | None:
-        """Return a connection; None when nobody has come yet."""
+        """Return a connection; None while there is none."""
         if self._listener is None:
             place = (self._address.host, self._address.port)
             return socket.create_connection(place, timeout=1.0)
@@ -465,7 +465,7 @@ class _Line(StationLink):
         return connection
 
     def _receive(self, connection: socket.socket) -> None:
-        """Take what comes until the connection ends, or says nothing for too long."""
+        """Receive until the connection ends, or is silent for too long."""
         connection.settimeout(WAKE)
         reader, first = LineReader(self._settings.parsed_columns), True
         heard = self.clock.now()

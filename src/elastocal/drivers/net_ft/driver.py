@@ -1,8 +1,8 @@
 """The line to a Net F/T box, and the driver that cell files name ``net_ft``.
 
-RDT serves one client: whoever asks last has the stream, and nobody is told. So a stream that ends
-is followed by a question to the box: where its page answers, somebody else has the stream. It is
-not taken back: two programs that take it from one another would both see half of it.
+RDT serves one client: the last request gets the stream, and the previous client is not informed. So
+when a stream ends, the box is queried: if its page answers, another client has the stream. It is
+not taken back, since two programs that take it from each other would both receive half of it.
 
 The stream of a Net F/T box as a force sensor: numbering, loss, stall, status.
 """
@@ -65,9 +65,9 @@ _MOST_STATES = 16
 _MOST_MALFORMED = 10
 """Datagrams in a row that are no records."""
 _FOLLOWS = 1e-3
-"""How fast the way from the box to here may grow, in s a second: beyond is a slower quartz."""
+"""Largest growth of the latency from the box, in s per second: a faster growth is a slow quartz."""
 _LONGEST_WAY = 0.05
-"""In s: a sample is never taken for older."""
+"""Largest latency, in s: a sample is never dated earlier."""
 _SILENT = 0.5
 """Age of the newest record from which on none comes any more, in s."""
 _WRAP = 1 << 32
@@ -77,11 +77,10 @@ _BACK = 1 << 31
 class NetFtSensor:
     """Samples of one box; see `elastocal.cell.devices.ForceSensor` and `elastocal.cell.WrenchFeed`.
 
-    Datagrams come in by `received`, from whatever thread. What is wrong with the stream is raised
-    at the next `read`, and ever after: forces that nobody can trust end a run. `newest` refuses
-    only a stream that cannot be trusted again (`fail`: the box was started anew, or its counts mean
-    something else); a bad status is a bad sample, and nonsense and repetitions are none
-    (`leave_hole`).
+    Datagrams arrive by `received`, from any thread. A fault of the stream is raised at the next
+    `read` and at all later ones, since unreliable forces end a run. `newest` refuses only a stream
+    with a permanent fault (`fail`: the box was restarted, or its counts have another unit); a bad
+    status is a bad sample, and invalid or repeated datagrams are missing samples (`leave_hole`).
 
     Parameters
     ----------
@@ -137,15 +136,15 @@ class NetFtSensor:
             self._take(record, now)
 
     def fail(self, why: str) -> None:
-        """Refuse every further `read` and `newest`; the first reason stands."""
+        """Refuse every further `read` and `newest`; the first reason is kept."""
         with self._lock:
             self._failure = self._failure or why
 
     def leave_hole(self, why: str) -> None:
         """Refuse the next `read`: samples are missing in the stream, or bad.
 
-        `newest` goes on. Its time says how old it is; where the stream comes again by itself, who
-        corrects a process goes on, whereas the readings of a procedure end with the refusal.
+        `newest` continues, with the age of its sample. If the stream returns, the correction of a
+        process goes on, whereas the readings of a procedure end with the refusal.
         """
         with self._lock:
             self.hole = self.hole or why
@@ -203,7 +202,7 @@ class NetFtSensor:
         return True
 
     def _time_of(self, now: float) -> float:
-        """Return when a record was measured; records that wait for one another come in bunches."""
+        """Return the time of a record; records that were delayed together arrive in bursts."""
         since = self._count / self.rate
         if self._offset < np.inf:
             self._offset += _FOLLOWS * (now - self._arrived)
@@ -244,8 +243,8 @@ class NetFtSensor:
         Raises
         ------
         DeviceError
-            If the stream cannot be trusted: why. A hole in it is told once, and what was measured
-            before its end is forgotten.
+            If the stream is unreliable, with the reason. A gap is reported once, and samples from
+            before its end are dropped.
         """
         self._require()
         with self._lock:
@@ -315,9 +314,9 @@ class NetFtSensor:
 
 
 _SILENCE = 0.25
-"""A stream that says nothing for so long, in s of the wall, has ended."""
+"""Silence of a stream, in s of wall time, after which it has ended."""
 _PATIENCE = 1.0
-"""For page and calibration, in s of the wall."""
+"""Time to wait for page and calibration, in s of wall time."""
 _REQUESTS = 4
 """Times that a stream is asked for before the box counts as deaf."""
 _CALIBRATION_BYTES = 24
@@ -332,7 +331,7 @@ _Port = Annotated[int, Field(ge=1, le=65535)]
 
 
 class NetFtSettings(DeviceSettings):
-    """What stands under a sensor whose driver is ``net_ft``."""
+    """Settings of a sensor whose driver is ``net_ft``."""
 
     address: str = LOOPBACK
     """Address of the box; ATI ships 192.168.1.1."""
@@ -414,7 +413,7 @@ class BoxLine:
     def reading(self) -> DeviceReading:
         """Return the readings of the box.
 
-        A stream that another client has taken is not taken back; it may come again by itself.
+        A stream that another client has taken is not taken back; it may return by itself.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What a Net F/T box is sent and sends: RDT requests and records, status, configuration.
+"""Messages of a Net F/T box: RDT requests and records, status, configuration.
 
 Layouts: ATI manual 9620-05-NET FT, as the public programs pynetft, netft_utils, ati_netft_ros2 and
 NetFT agree on them. Everything is big-endian.
@@ -37,13 +37,13 @@ _FORCES = {
     **{"klb": 1e3 * _POUND, "klbf": 1e3 * _POUND, "kg": _KILOGRAM, "kgf": _KILOGRAM},
     **{"g": 1e-3 * _KILOGRAM, "gf": 1e-3 * _KILOGRAM},
 }
-"""In N, by unit without hyphens and capitals."""
+"""Factors to N, by unit without hyphens and capitals."""
 _TORQUES = {
     **{"nm": 1.0, "nmm": 1e-3, "knm": 1e3, "kgcm": 1e-2 * _KILOGRAM, "kgfcm": 1e-2 * _KILOGRAM},
     **{"lbin": _POUND * _INCH, "lbfin": _POUND * _INCH, "inlb": _POUND * _INCH},
     **{"lbft": _POUND * _FOOT, "lbfft": _POUND * _FOOT, "ftlb": _POUND * _FOOT},
 }
-"""In N·m, likewise."""
+"""Factors to N·m, by unit without hyphens and capitals."""
 _FORCE_CODES = ("", "lb", "N", "klb", "kN", "kg", "g")
 _TORQUE_CODES = ("", "lb-in", "lb-ft", "N-m", "N-mm", "kg-cm", "kN-m")
 
@@ -202,7 +202,7 @@ def _plain(unit: str) -> str:
 @brief_repr
 @dataclass(frozen=True)
 class BoxConfiguration:
-    """What the configuration page says."""
+    """Content of the configuration page."""
 
     product: str
     calibration: str

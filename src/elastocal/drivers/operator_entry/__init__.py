@@ -1,4 +1,4 @@
-"""Metrology by a person: reads the instrument and types the point, for small jobs."""
+"""Metrology by a person, who reads the instrument and types the point; for small jobs."""
 
 import lazy_loader
 

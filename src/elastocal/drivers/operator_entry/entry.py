@@ -1,8 +1,8 @@
-"""A person reads the instrument and types the point, for small jobs.
+"""Metrology by a person, who reads the instrument and types the point.
 
-The procedure asks for a reading when the arm stands (`elastocal.cell.AskedMetrology`). From then
-on the beam counts as broken, until a line with a point has come: typed at the terminal, or appended
-to a file that is watched. The point then stands until the next is asked for.
+The procedure requests a reading when the arm stands still (`elastocal.cell.AskedMetrology`). From
+then on the beam counts as broken, until a line with a point arrives: typed at the terminal, or
+appended to a watched file. The point then remains until the next request.
 """
 
 import math
@@ -34,7 +34,7 @@ LEAST_BEAM_TIMEOUT = 30.0
 _LONGEST_ENTRY = 200
 """Characters of a line."""
 _LOOK = 0.1
-"""How often the file is looked at, in s of the wall."""
+"""Interval at which the file is read, in s of wall time."""
 
 
 class OperatorEntrySettings(DeviceSettings):
@@ -48,7 +48,7 @@ class OperatorEntrySettings(DeviceSettings):
     """File to which readings are appended, a line each; by default they are typed at the terminal.
     Relative to the cell file."""
     within: PositiveTime = 600.0
-    """How long a person may take, in s."""
+    """Largest time for a person to answer, in s."""
 
 
 class OperatorEntry:
@@ -63,9 +63,9 @@ class OperatorEntry:
     clock : Clock
         Clock of the rig.
     lines : iterator of str
-        What is typed; may wait, is read by a thread of its own from the first question on.
+        Typed lines; reading may block and is done in a separate thread from the first question on.
     tell : callable
-        Shows a person a line.
+        Shows a line to the person.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class OperatorEntry:
             self._station = station
 
     def ask(self, what: str) -> None:
-        """Ask a person for a reading of the marker, which stands still; until then it is unseen.
+        """Ask a person for a reading of the marker; until it is given the marker counts as unseen.
 
         Parameters
         ----------
@@ -122,12 +122,12 @@ class OperatorEntry:
             self._thread.start()
 
     def read(self) -> PointBlock:
-        """Return the reading again, once a call, as long as it stands; at once.
+        """Return the reading, once a call, while it remains valid; never waits.
 
         Raises
         ------
         DeviceError
-            If nobody types any more, or too late.
+            If input has ended, or comes too late.
         """
         now = self._clock.now()
         with self._lock:
@@ -178,7 +178,7 @@ class OperatorEntry:
         self._tell((refusal and f"{line[:60]!a}: {refusal}; type it again") or "taken")
 
     def _parsed(self, line: str) -> tuple[tuple[float, float, float], str]:
-        """Return a point in m, and why it is none."""
+        """Return a point in m, or the reason why the text is invalid."""
         nothing = (math.nan, math.nan, math.nan)
         if len(line) > _LONGEST_ENTRY:
             return nothing, f"more than {_LONGEST_ENTRY} characters"
@@ -231,7 +231,7 @@ def _to_person(text: str, stream: TextIO | None = None) -> None:
 
 
 class OperatorEntryDriver:
-    """Makes metrology of what a person types; see `elastocal.cell.Driver`."""
+    """Makes metrology from typed points; see `elastocal.cell.Driver`."""
 
     kinds = frozenset({"metrology"})
     real = False
@@ -248,7 +248,7 @@ class OperatorEntryDriver:
         Raises
         ------
         DeviceError
-            If the procedure leaves a person no time.
+            If the procedure leaves too little time to answer.
         """
         settings = of_kind(wanted["metrology"], OperatorEntrySettings, "settings")
         given = cell.file.procedure.beam_timeout

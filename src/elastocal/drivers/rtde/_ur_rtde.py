@@ -1,4 +1,4 @@
-"""What is used of the package ``ur-rtde``, and how it is found."""
+"""The part of the package ``ur-rtde`` that is used, and how it is found."""
 
 import importlib
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from elastocal.errors import DeviceError
 
 
 class UrReceive(Protocol):
-    """What is used of ``rtde_receive.RTDEReceiveInterface``."""
+    """Members of ``rtde_receive.RTDEReceiveInterface`` that are used."""
 
     def isConnected(self) -> bool: ...
     def getTimestamp(self) -> float: ...
@@ -22,13 +22,13 @@ class UrReceive(Protocol):
 
 
 class AsyncProgress(Protocol):
-    """How far an asynchronous motion is."""
+    """Progress of an asynchronous motion."""
 
     def isAsyncOperationRunning(self) -> bool: ...
 
 
 class UrControl(Protocol):
-    """What is used of ``rtde_control.RTDEControlInterface``; nothing of it blocks for long."""
+    """Members of ``rtde_control.RTDEControlInterface`` that are used; none blocks for long."""
 
     def isProgramRunning(self) -> bool: ...
     def reuploadScript(self) -> bool: ...
@@ -62,7 +62,7 @@ def open_receive(address: str, rate: float) -> UrReceive:
     Raises
     ------
     DeviceError
-        If the package is not there, or nobody answers.
+        If the package is missing, or the controller does not answer.
     """
     module = _package("rtde_receive")
     try:
@@ -77,7 +77,7 @@ def open_control(address: str, rate: float) -> UrControl:
     Raises
     ------
     DeviceError
-        If the package is not there, nobody answers, or the program does not start.
+        If the package is missing, the controller does not answer, or the program does not start.
     """
     module = _package("rtde_control")
     interface = module.RTDEControlInterface

@@ -34,14 +34,14 @@ from elastocal.drivers.rtde.line import UrLine, UrSample, UrSensor, pose_of_T
 from elastocal.errors import DeviceError
 
 _ZEROED = 0.05
-"""How long after the order the sensor may still show its old zero, in s."""
+"""Time after the order in which the sensor may still show its old zero, in s."""
 _FELT = 0.8
 """Part of the contact force at which the approach has ended."""
 
 
 @dataclass(frozen=True)
 class Guard:
-    """Where a guarded move ends."""
+    """Conditions that end a guarded move."""
 
     direction: FloatArray
     distance: float
@@ -49,7 +49,7 @@ class Guard:
     start: UrSample
 
     def gone(self, now: UrSample) -> float:
-        """Return how far the tool has come, in m."""
+        """Return the distance that the tool has moved, in m."""
         return float((now.T_base_tcp[:3, 3] - self.start.T_base_tcp[:3, 3]) @ self.direction)
 
     def felt(self, now: UrSample) -> bool:
@@ -95,7 +95,7 @@ _FORCE_MODE_SPEED = 0.008
 _IN_FRAME = 2
 """Type of force mode: the task frame is not changed."""
 _SIDEWAYS, _TURN = 0.01, 0.05
-"""How far other axes may yield in force mode, in m and rad."""
+"""Largest motion of the other axes in force mode, in m and rad."""
 _PRESS_SPEED = 0.02
 """Fastest motion along a force that is held, in m/s."""
 _SETTLED = 5
@@ -109,7 +109,7 @@ _Step = Callable[[UrSample], Motion | None]
 
 @dataclass(frozen=True)
 class _Order:
-    """A command on its way to the thread."""
+    """Command on its way to the thread."""
 
     begin: Callable[[UrSample], _Step]
     motion: Motion
@@ -145,7 +145,7 @@ class UrArm:
         self._lock = threading.RLock()
         self._motion = Motion.DISARMED
         self._touched: bool | None = None
-        """None: nothing has been felt or left since the connection."""
+        """None: no contact was detected or left since the connection."""
         self._forced = False
         self._fault: str | None = None
         self._order: _Order | None = None
@@ -229,7 +229,7 @@ class UrArm:
         self._give("move_joints", _Order(begin, Motion.MOVING), _STANDING)
 
     def adopt_position(self) -> None:
-        """Do nothing: the controller has no corrections on top of the programmed place."""
+        """Do nothing: the controller has no corrections on top of the programmed position."""
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
@@ -433,15 +433,16 @@ class UrArm:
 
 
 _PORT = 30004
-"""By which a controller is known, of those that it answers at."""
+"""Port by which a controller is identified, of those that it answers on."""
 _CONTROL_RATE = 500.0
 """Rate of the commanding half, in Hz; controllers of version 5 take it."""
 _FAR_OFF = 0.02
-"""How far the controller's tcp may be from the model's, in m: nominal against calibrated arms."""
+"""Largest distance of the controller's tcp from the model's, in m: nominal and calibrated arms
+differ."""
 
 
 class RtdeSettings(DeviceSettings):
-    """What stands under an arm or a sensor whose driver is ``rtde``."""
+    """Settings of an arm or a sensor whose driver is ``rtde``."""
 
     address: str = LOOPBACK
     """Address of the controller, which has its ports fixed: 30004, 30003, 29999."""
@@ -449,7 +450,7 @@ class RtdeSettings(DeviceSettings):
     """Samples a second."""
 
     def device_places(self) -> tuple[DevicePlace, ...]:
-        """Return where the controller is."""
+        """Return the address of the controller."""
         return (DevicePlace(self.address, _PORT),)
 
 

@@ -79,7 +79,7 @@ class UrLine:
         self._thread = threading.Thread(target=self._hear, daemon=True)
 
     def start(self) -> None:
-        """Hear from now on; return when the first sample is there.
+        """Start to receive; return when the first sample has arrived.
 
         Raises
         ------
@@ -91,7 +91,7 @@ class UrLine:
         self.sample()
 
     def close(self) -> None:
-        """Hear no more."""
+        """Stop receiving."""
         self._closed.set()
         if self._thread.is_alive():
             self._thread.join(2.0)

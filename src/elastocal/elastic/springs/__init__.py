@@ -1,4 +1,4 @@
-"""Springs: where a robot is soft, one file a kind.
+"""Springs: the elastic elements of a robot, one file a kind.
 
 A kind is a subclass of `Spring` with its place in the chain, its parameters, its law (the angle
 that a torque makes) and the tangent of that. Identification, prediction, tables, model files, the

@@ -88,7 +88,7 @@ class Function(Expression):
 
 
 Quantity = TypeVar("Quantity", FloatArray, Expression)
-"""What a law works on: numbers, or the names of numbers to come."""
+"""Argument of a law: numbers, or the names of numbers in generated code."""
 
 
 @overload

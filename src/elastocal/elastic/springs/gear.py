@@ -34,25 +34,25 @@ class Gear(OneAxisSpring):
         theta = c_0 t + sum_k c_k (T_k atan((w + t) / T_k) - T_k atan(w / T_k)) - sum_j f_j s_j.
 
     Every ``c >= 0``, so the angle grows with the torque and the gear stiffens with its size: the
-    compliance falls from ``sum c`` without any torque to ``c_0`` far beyond every knee ``T_k``,
-    and never below. Harmonic drives and RV gears stiffen like that; makers state it as three
-    stiffnesses K1, K2, K3. Which of K1/K2/K3 a torque meets depends on the *total* torque, so a
-    gear that gravity preloads is stiffer.
+    compliance falls from ``sum c`` without any torque to ``c_0`` far beyond every knee ``T_k``, and
+    never below. Harmonic drives and RV gears stiffen in this way; makers state three stiffnesses
+    K1, K2, K3. The *total* torque decides which of them applies, so a gear that gravity preloads is
+    stiffer.
 
-    The ``s_j`` are torques that friction bears, each a stop operator of the torque's history: it
+    The ``s_j`` are torques carried by friction, each a stop operator of the torque's history: it
     follows the torque's changes until it slides at ``+-r_j``. Their sum is a Prandtl-Ishlinskii
-    operator (A. Visintin, *Differential Models of Hysteresis*, 1994, ch. III; in robot gears:
-    M. Ruderman, F. Hoffmann, T. Bertram, "Modeling and identification of elastic robot joints
-    with hysteresis and backlash", IEEE Trans. Industrial Electronics 56, 2009). Lost motion is
-    twice ``sum f_j r_j``.
+    operator (A. Visintin, *Differential Models of Hysteresis*, 1994, ch. III; in robot gears: M.
+    Ruderman, F. Hoffmann, T. Bertram, "Modeling and identification of elastic robot joints with
+    hysteresis and backlash", IEEE Trans. Industrial Electronics 56, 2009). Lost motion is twice
+    ``sum f_j r_j``.
 
-    With `plays`, friction stands beside each elasticity and not behind all of them:
+    With `plays`, friction acts in parallel to each elasticity and not in series with all of them:
 
         theta = c_0 t + sum_k c_k (T_k atan((w + t - s_1) / T_k) - T_k atan(w / T_k))
                 + sum_j f_j (t - s_j).
 
-    ``t - s_j`` is the play operator, so that every term grows with the torque whatever the
-    history, and what turns the teeth is the torque that friction leaves over.
+    ``t - s_j`` is the play operator, so that every term grows with the torque for any history, and
+    the teeth are turned by the torque that friction does not carry.
     """
 
     knees: tuple[float, ...] = (300.0, 1000.0, 3000.0)
@@ -60,7 +60,7 @@ class Gear(OneAxisSpring):
     slips: tuple[float, ...] = ()
     """``r_j``: torques at which friction elements slide, in N·m; empty: no friction."""
     plays: bool = False
-    """Whether friction holds back each elasticity by itself; files of before do not say so."""
+    """Whether friction acts on each elasticity separately; older files do not state it."""
     kind: Literal["gear"] = "gear"
 
     def __post_init__(self) -> None:

@@ -26,14 +26,14 @@ _ALIGNED = 1.0 - 1e-9
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of a parameter: in files, and as people read it."""
+    """Unit of a parameter, in files and in tables."""
 
     si: str
-    """As files state it, e.g. ``rad/(N*m)``."""
+    """Spelling in files, e.g. ``rad/(N*m)``."""
     shown: str
-    """As tables and figures show it, e.g. ``µrad/(N·m)``."""
+    """Spelling in tables and figures, e.g. ``µrad/(N·m)``."""
     factor: float = 1.0
-    """From SI to what is shown."""
+    """Factor from SI to `shown`."""
     stiffness: str = ""
     """Unit of one over a shown value, e.g. ``MN·m/rad``; empty where that is no stiffness."""
 
@@ -80,7 +80,7 @@ def require_possible(parameters: Sequence[Parameter], rows: FloatArray, what: st
 @brief_repr
 @dataclass(frozen=True)
 class Characteristic:
-    """A number that people state of a spring, as a data sheet would: a sum of its parameters."""
+    """Figure of a spring, as in a data sheet: a sum of its parameters."""
 
     name: str
     """Begins with the spring's name; equal to it for its compliance without load."""
@@ -136,21 +136,22 @@ class SpringAxis:
 @brief_repr
 @dataclass(frozen=True)
 class SpringLoad(Generic[Quantity]):
-    """The load on a spring; everything that a law may depend on stands here."""
+    """Load on a spring; it holds all arguments of a law."""
 
     torque: tuple[Quantity, ...]
     """Torque of the load about each axis of the spring, in N·m; force along it, in N, where it
     slides."""
     weight: tuple[Quantity, ...] = ()
-    """Torque of the arm's own weight about each axis, likewise; empty: the arm is weightless."""
+    """Torque of the arm's own weight about each axis, of the same shape; empty: the arm is
+    weightless."""
     friction: tuple[Quantity, ...] = ()
     """Torque that each friction element of the spring bears, in N·m; empty: none bears any."""
 
 
 Angles = tuple[tuple[Quantity, ...], ...]
-"""By axis, by parameter."""
+"""Angles by axis, by parameter."""
 Tangents = tuple[tuple[tuple[FloatArray | float, ...], ...], ...]
-"""By axis, by torque, by parameter."""
+"""Tangents by axis, by torque, by parameter."""
 
 
 @brief_repr
@@ -204,7 +205,7 @@ class Spring(ABC):
 
     @property
     def characteristics(self) -> tuple[Characteristic, ...]:
-        """What tables show of the spring; by default its parameters."""
+        """Figures of the spring in tables; by default its parameters."""
         unit_vectors = np.eye(len(self.parameters)).tolist()
         return tuple(
             Characteristic(parameter.name, tuple(weights), parameter.unit)
@@ -306,7 +307,7 @@ def as_axis(vector: ArrayLike) -> tuple[float, float, float]:
 
 
 def coordinate_axis(unit: ArrayLike) -> str | None:
-    """Return the name of the coordinate axis along which a unit vector points, either way.
+    """Return the name of the coordinate axis along which a unit vector points, in either sense.
 
     None where it points along none of them.
 

@@ -1,9 +1,9 @@
-"""Joints that do not move the tcp as the controller says.
+"""Check that the joints move the tcp as the controller states.
 
-Joints and controller displacement are two accounts of one motion: forward kinematics between the
-joints of the reference and those under load has to give the controller displacement. Where it does
-not, the usual mistakes in joints and displacements are undone one by one; the one that restores
-the agreement is named. No spring has a part in that.
+Joints and controller displacement describe the same motion: forward kinematics between the joints
+of the reference and those under load must give the controller displacement. Where it does not, the
+usual mistakes in joints and displacements are undone one by one; the one that restores the
+agreement is named. Springs are not involved.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,7 +23,7 @@ AXES = ("x", "y", "z")
 MM = as_number(".2f", 1e3)
 """Shows a length, in m, in mm."""
 _DEAD = 5e-3
-"""Part of the motion below which a controller displacement is none."""
+"""Part of the motion below which a controller displacement counts as zero."""
 _CLOSE = 0.01
 """Part of its motion below which controller and joints agree on where the tcp is."""
 _LEFT = 0.3
@@ -33,9 +33,9 @@ _ALIKE = 1.2
 _ALONG = 0.95
 """Cosine from which on an axis lies along another."""
 _LEAST_ZERO = 1.0
-"""Angle in deg by which the zero of a joint has to be off to be worth naming."""
+"""Smallest error of a joint's zero that is reported, in deg."""
 _FINE = 1e-5
-"""Difference in m that is no more than a reading of a tracker."""
+"""Difference in m that a reading of a tracker explains."""
 _APART = 0.1
 """Part of the motion from which they contradict each other without a known cause."""
 _COARSE = 1.5e-4
@@ -115,9 +115,9 @@ def _likeliest(
 
 
 def _moved(robot: Robot, readings: Readings, offset: FloatArray) -> FloatArray | None:
-    """Return how far the marker moved by the joints; None where they cannot say it.
+    """Return the marker's motion by the joints; None where they do not determine it.
 
-    Against the reference; without one, against the mean of the readings at the pose.
+    It is relative to the reference; without one, to the mean of the readings at the pose.
     """
     here = _marker(robot, readings.joint_position, offset)
     if readings.reference_joint_position is not None:
@@ -143,7 +143,7 @@ def _marker(robot: Robot, q: FloatArray, offset: FloatArray) -> FloatArray:
 
 
 def _apart(robot: Robot, readings: Readings, offset: FloatArray) -> float:
-    """Return how far apart joints and controller are on where the marker moved, in m."""
+    """Return the distance between the marker's motion by the joints and by the controller, in m."""
     moved = _moved(robot, readings, offset)
     told = _counted(readings.controller_displacement, readings)
     return np.inf if moved is None else median_norm(moved - told)
@@ -172,7 +172,7 @@ class JointMistake:
 
     message: str
     read: JointRead
-    """From joints as recorded, shape (row, joint), to those of the URDF."""
+    """Function from recorded joints, shape (row, joint), to those of the URDF."""
 
 
 def _motion_mistakes(

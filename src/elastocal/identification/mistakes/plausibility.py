@@ -1,11 +1,11 @@
-"""What readings show without a fit: contradictions, dead, repeated and rounded columns.
+"""Checks of readings without a fit: contradictions; constant, repeated and rounded columns.
 
-Sizes of forces and deflections against the arm's own rule of thumb.
+Forces and deflections are compared with a rule of thumb for the arm.
 
-A gear winds up by some 2 mrad under the torque that its joint may use. That torque is the URDF's;
-else the weight of the arm or its reach says it. A fit may be softer or stiffer than the rule by a
-factor of two or three, and a campaign may press lightly; a wrong unit of the force does both at
-once (docs/decisions/0105-mistakes-undone.md).
+A gear winds up by some 2 mrad under the permissible torque of its joint. That torque is the URDF's;
+otherwise it follows from the weight of the arm or its reach. A fit may be softer or stiffer than
+the rule by a factor of two or three, and the loads of a campaign may be small; a wrong unit of the
+force causes both at once (docs/decisions/0105-mistakes-undone.md).
 """
 
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ _SHARE, _SHARE_SPREAD = np.log(0.2), np.log(2.2)
 _TOO_MUCH = 1.5
 """Share of its torques that no arm carries."""
 _LIKELIER = 3.5
-"""By how much twice the logarithm of the likelihood has to rise for a unit to be suspected."""
+"""Increase of twice the log-likelihood from which a wrong unit is suspected."""
 _FORCE_UNITS = (
     ("lbf", np.log(4.4482216)),
     ("kgf (daN)", np.log(9.80665)),
@@ -67,7 +67,7 @@ UNIT_OF_DISPLACEMENT = Kind(
 def find_wrong_units(
     robot: Robot, readings: Readings, marker_offset: ArrayLike | None = None
 ) -> Iterator[Finding]:
-    """Yield units in which forces or displacements would be of the size that they have on arms.
+    """Yield units in which forces or displacements would have the usual size of arms.
 
     Parameters
     ----------

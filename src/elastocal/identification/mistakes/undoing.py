@@ -1,15 +1,16 @@
-"""Mistakes that a fit shows: readings are fitted as they may have been meant, and errors compared.
+"""Mistakes found by fitting: other interpretations of the readings are fitted and compared.
 
-Forces, marker displacements and the order of rows may be read otherwise than stated; each reading
-is fitted with the same springs (`bearing`). Of sound readings every other one leaves more
-unexplained, because model error and noise stay whichever way they are read. So a mistake is named
-where undoing it leaves clearly less, at poses left out as well, with a paired difference that is
-far beyond its standard error.
+Forces, marker displacements and the order of rows may be interpreted otherwise than stated; each
+interpretation is fitted with the same springs (`bearing`). For correct readings any other
+interpretation leaves more unexplained, because model error and noise remain. So a mistake is named
+where undoing it leaves clearly less, also at left-out poses, with a paired difference far beyond
+its standard error.
 
-Rows of springs are linear in the force. With the rows of three unit forces at each reading, a force
-that is turned, exchanged or scaled costs a product, not a new model. What is a number, such as a
-constant in the force or a drift, is estimated beside the springs, linearised about their fit and
-repeated. Thresholds are measured on sound campaigns (docs/decisions/0105-mistakes-undone.md).
+Rows of springs are linear in the force. With the rows of three unit forces at each reading, a
+rotated, exchanged or scaled force needs a product, not a new model. Unknown numbers, such as a
+constant in the force or a drift, are estimated together with the springs, linearised about their
+fit and iterated. Thresholds are measured on correct campaigns
+(docs/decisions/0105-mistakes-undone.md).
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,7 +44,7 @@ _PARALLEL = 0.02
 
 @dataclass(frozen=True)
 class OtherReading:
-    """A way of reading the data, with the mistake that it undoes."""
+    """An interpretation of the data, with the mistake that it undoes."""
 
     message: str
     blocks: FloatArray
@@ -55,7 +56,7 @@ class OtherReading:
     certain: bool = False
     """Whether data are refused for it where nothing else explains them as well."""
     louder: float = 1.0
-    """By how much the noise of the marker is made smaller."""
+    """Factor by which the noise of the marker is reduced."""
     estimated: bool = False
     """Whether numbers were estimated for it, which explain part of what the springs miss."""
 
@@ -191,7 +192,7 @@ _ROUNDS = 4
 _CONSTANT_ROUNDS = 10
 """A constant as large as half the force takes more rounds to settle than a gain."""
 _SMALLEST = 0.05
-"""Part of the median force below which a constant is not worth naming."""
+"""Part of the median force below which a constant is not reported."""
 _LEAST_GAIN = 0.05
 _FARTHEST = 2.0
 """Distance in m between two places of a marker that is still believed."""
@@ -237,9 +238,9 @@ def _turned_markers(rows: Rows) -> Iterator[OtherReading]:
 
 
 def _turns(name: str, any_angle: bool) -> list[tuple[str, FloatArray]]:
-    """Return matrices that undo exchanged, reversed and turned axes, with what was done.
+    """Return matrices that undo exchanged, reversed and rotated axes, with their descriptions.
 
-    All 47 ways to read three columns as other axes, with or without their signs, are among them.
+    They include all 47 ways to interpret three columns as other axes, with or without their signs.
     """
     whole, found = name.replace("_{axis}", ""), []
     for axis, letter in enumerate(AXES):
@@ -538,9 +539,9 @@ def _any_marker_frame(rows: Rows) -> Iterator[OtherReading]:
 _TRIMMED = 0.9
 """Part of the readings, those with the smallest residuals, that rank readings of the data."""
 _FEWEST = 6
-"""With fewer poses another reading may fit better by chance."""
+"""Fewest poses; with fewer, another interpretation may fit better by chance."""
 _FEWEST_ESTIMATED = 8
-"""With fewer poses an estimated number explains what the springs miss of a sound arm."""
+"""Fewest poses for estimated numbers, which otherwise absorb the model error of a correct arm."""
 _FEWEST_PARTED = 12
 _PARTS = (0.33, 0.5, 0.67)
 _LEFT_APART = 0.55
@@ -548,11 +549,11 @@ _LEFT_APART = 0.55
 _TRIED = 5
 """Readings that are judged at left-out poses, the best first."""
 _SURE = ((0.75, 2e-3), (1.0, 1e-4))
-"""Part that is left of the error, and likelihood that the gain is chance below which it counts.
-Estimated numbers explain part of what springs miss, in sound data too: the less they explain, the
-surer it has to be. Without estimated numbers the first holds for every gain."""
+"""Remaining part of the error, and the likelihood below which the gain is not chance. Estimated
+numbers explain part of the model error, in correct data too: the less they explain, the smaller
+this likelihood has to be. Without estimated numbers the first pair holds for every gain."""
 _MATTERS = 0.03
-"""Part of the deflections that an estimated number has to move to be worth a word."""
+"""Part of the deflections that an estimated number must change to be reported."""
 _CERTAIN = 0.5
 _FITS_WELL = 0.2
 _EQUAL = 1.1
@@ -658,7 +659,7 @@ def _judged(
 
 
 def _change(stated: Problem, undone: Problem) -> float:
-    """Return how far the springs of the other reading move the deflections, over their size."""
+    """Return the relative change of the deflections by the springs of the other interpretation."""
     before, after = fitted(stated), fitted(undone)
     moved = np.linalg.norm(stated.O @ (after - before), axis=1).mean()
     return float(moved / max(np.linalg.norm(stated.O @ before, axis=1).mean(), 1e-12))
@@ -682,7 +683,7 @@ def _left(problem: Problem, before: FloatArray, after: FloatArray) -> tuple[floa
 
 
 def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
-    """Return that readings change on the way, where springs of both parts differ."""
+    """Return a finding that readings change midway, where the springs of both parts differ."""
     blocks, first = np.unique(stated.block, return_index=True)
     if len(blocks) < _FEWEST_PARTED:
         return None

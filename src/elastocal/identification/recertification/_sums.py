@@ -1,13 +1,13 @@
 """Springs, and sums of springs, that two calibrations both determine.
 
-A calibration does not tell all springs apart: adding any multiple of one of its unobservable
+A calibration does not determine all springs: adding any multiple of one of its unobservable
 combinations ``v`` changes no deflection that was measured. A weighted sum ``w . c`` is determined
-when ``w . v = 0`` for every such ``v``. So compared are the springs that stand in no ``v`` of
-either model, and a sparse basis of the sums that both models determine.
+when ``w . v = 0`` for every such ``v``. So the comparison covers the springs that occur in no ``v``
+of either model, and a sparse basis of the sums that both models determine.
 
 The knees of gears are scaled to the loads of their campaign: parameters of two campaigns cannot be
-held against one another one by one. What can is the mean compliance between the smallest and the
-largest total torque, ``a`` and ``b``, that the gear met in both,
+compared one by one. The comparison uses the mean compliance between the smallest and the largest
+total torque, ``a`` and ``b``, that the gear met in both,
 
     (theta(b) - theta(a)) / (b - a),
 
@@ -35,7 +35,7 @@ class SharedNumber:
     """A number that both models have: a parameter, or what a gear amounts to."""
 
     name: str
-    """That of the parameter, or of the gear."""
+    """Name of the parameter, or of the gear."""
     spring: str
     """Name of its spring."""
     joint: str
@@ -158,8 +158,8 @@ def comparable_sums(
     Returns
     -------
     tuple of tuple of Term
-        Single numbers with weight 1, and sums of several; in the order of the springs. Springs
-        of one model only stand in none.
+        Single numbers with weight 1, and sums of several; in the order of the springs. Springs of
+        one model only are in none.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def comparable_sums(
 
 
 def sum_text(terms: Sequence[Term]) -> str:
-    """Return a sum as a person would write it.
+    """Return a sum in words.
 
     >>> sum_text([Term("a4.axial", 1.0), Term("a5.x", 1.0)])
     'a4.axial + a5.x'

@@ -1,7 +1,7 @@
-"""The rows that matter, and the arm at them: perhaps with another tool, weight or mounting.
+"""The rows of a comparison, and their arm, which may have another tool, weight or mounting.
 
-Springs belong to the arm. So two models are held against one another on one arm as it stands, with
-one tool and one weight: what a tool changes is no change of the robot.
+Springs belong to the arm. So two models are compared on the same arm, with the same tool and
+weight, since a change of the tool is no change of the robot.
 """
 
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ class ComparedRows:
     """The readings that the rows are: what matters then is the displacement that each shows,
     against its reference and after what the arm felt before."""
     arm: Robot | None = None
-    """The robot as it stands there, with its tool, weight and mounting; None: the new model's."""
+    """Robot of these rows, with its tool, weight and mounting; None: that of the new model."""
 
     @classmethod
     def of(cls, readings: Readings, arm: Robot | None = None) -> "ComparedRows":
@@ -64,7 +64,7 @@ class ComparedRows:
         return model.friction.visits(at.weight, load, np.asarray(self.visit))[0]
 
     def taken(self, number: IndexArray) -> "ComparedRows":
-        """Return some of the rows, of which friction has to be known already."""
+        """Return some of the rows; their friction state must be known."""
         moment = None if self.moment is None else self.moment[number]
         return ComparedRows(self.q[number], self.force[number], moment)
 
@@ -101,7 +101,7 @@ def check_same_robot(old: Robot, new: Robot, names: tuple[str, str]) -> None:
 def model_on(calibrated: CalibratedModel, arm: Robot) -> CalibratedModel:
     """Return a model on an arm that is the same robot, with its tool, weight and mounting.
 
-    A model that was calibrated on such an arm comes back as it is.
+    A model that was calibrated on such an arm is returned unchanged.
     """
     robot = calibrated.model.robot
     if tool_gap(robot, arm).closed and not _weighs_otherwise(robot, arm):

@@ -1,12 +1,12 @@
-"""Compare two calibrations of one cell: what changed, and whether it matters (recertification).
+"""Comparison of two calibrations of one cell: changes and their significance (recertification).
 
-The verdict is given in words: pass, fail or undecided, what would decide, and caveats.
+The verdict is pass, fail or undecided, with the missing evidence and caveats in words.
 
-Changes between two calibrations: springs, and deflections along rows of joints and forces.
+Changes concern springs, and deflections along rows of joints and forces.
 
-The draws of the two models say how far each estimate may be from its truth; the campaigns are
-independent, so a draw of the one goes with any draw of the other. Draws with the same number are
-never paired: calibrations made with the same seed resample the same poses, and on the same plan
+The draws of the two models describe the uncertainty of each estimate; the campaigns are
+independent, so a draw of one may be combined with any draw of the other. Draws with the same number
+are never paired: calibrations made with the same seed resample the same poses, and on the same plan
 such a pair would agree too well.
 
 **Springs.** With a 5 % test of each of 14 springs, about every fourth pair of campaigns of an
@@ -14,20 +14,20 @@ unchanged cell would name one. So the interval that decides holds for all of the
 ``difference ± t se`` with one ``t``, the 95th percentile over pairs of draws of the largest
 ``|noise| / se`` (Efron and Tibshirani 1993; the single-step maxT of Westfall and Young,
 *Resampling-Based Multiple Testing*, 1993). Unlike Bonferroni's it needs no percentile far out in
-the tail, which 200 draws do not have, and it knows that the errors of springs go together.
+the tail, which 200 draws do not have, and it allows for correlated errors of springs.
 
-**Deflections.** With ``delta`` the difference of two predictions at a row and ``noise`` how far it
-may be from the true difference ``Delta``, the triangle inequality gives, whatever ``Delta``,
+**Deflections.** With ``delta`` the difference of two predictions at a row and ``noise`` its error
+against the true difference ``Delta``, the triangle inequality gives for any ``Delta``
 
     |delta| - |noise|  <=  |Delta|  <=  |delta| + e . noise,    e = Delta / |Delta|.
 
-The largest change is bounded from below by all rows at once, since the row is looked for. From
+The lower bound of the largest change must hold for all rows at once, since the row is unknown. From
 above each row needs only its own bound: the true largest change is at some row, and is missed only
 if that row's own bound is (intersection-union test; Berger, Technometrics 24, 1982).
 
-Draws say what other poses *of the same kind* would have given. Of campaigns at other poses or
-under other loads, what springs cannot express does not drop out, so that the misfit of both models
-is added to ``noise`` then, as independent errors add up.
+Draws describe the variation over other poses *of the same kind*. Between campaigns at other poses
+or under other loads the model error does not cancel, so the misfit of both models is then added to
+``noise`` in quadrature.
 """
 
 import math
@@ -121,7 +121,7 @@ class Spread:
         )
 
     def noise(self, old_rows: FloatArray, new_rows: FloatArray) -> FloatArray:
-        """Return how linear functions of the compliances differ by chance.
+        """Return the random part of the difference of linear functions of the compliances.
 
         Parameters
         ----------
@@ -232,7 +232,7 @@ def compare_rows(
     *,
     alike: bool = True,
 ) -> RowComparison:
-    """Return how the deflection changed at every row, on average and at most.
+    """Return the change of the deflection at every row, on average and at most.
 
     Parameters
     ----------
@@ -400,7 +400,7 @@ def _around(value: float, half: float) -> Estimate:
 
 
 _MOST = 20
-"""Beyond this many times the poses nobody measures."""
+"""Number of poses, as a multiple, beyond which no campaign is proposed."""
 _PLAN = re.compile(r"\bplan ([0-9a-f]{12,})\b")
 _LIKE = 1.25
 """Mean measured deflections further apart than by this factor come from other loads."""
@@ -418,7 +418,7 @@ def _judge(
     limit : float, optional
         Largest accepted change, in m.
     ground : CommonGround, optional
-        Rows that both campaigns cover, where that is known.
+        Rows that both campaigns cover, if known.
     """
     if limit is None:
         return None, "no limit was given"
@@ -626,8 +626,8 @@ def recertify(
     moment : array_like, shape (row, 3), optional
         Moment on the robot about the tcp in base, in N·m.
     rows : ComparedRows, optional
-        In place of ``q``, ``force`` and ``moment``: rows with what friction remembers, the readings
-        of a dataset, or those of an arm that stands otherwise than at the new calibration.
+        In place of ``q``, ``force`` and ``moment``: rows with a friction memory, the readings of a
+        dataset, or those of an arm mounted differently from the new calibration.
     limit : float, optional
         Largest change of predicted deflection that is accepted at these rows, in m.
     names : tuple of str
@@ -696,7 +696,7 @@ def recertify(
 def _judged_springs(
     old: CalibratedModel, new: CalibratedModel, spread: Spread, ground: CommonGround | None
 ) -> tuple[SpringChange, ...]:
-    """Return the changes of springs, of which none moved where the campaigns do not tell."""
+    """Return the changes of springs; none counts as changed where the campaigns cannot show it."""
     springs = compare_springs(old, new, spread)
     if ground is not None and not ground.springs_judged:
         return tuple(replace(each, moved=False) for each in springs)
@@ -706,7 +706,7 @@ def _judged_springs(
 def _compared_springs(
     old: CalibratedModel, new: CalibratedModel, changes: tuple[SpringChange, ...]
 ) -> set[str]:
-    """Return the names of the springs that stand in a comparison."""
+    """Return the names of the springs in a comparison."""
     terms = {term.spring for change in changes for term in change.terms}
     return {each.spring for each in shared_numbers(old, new) if each.name in terms}
 
@@ -741,5 +741,5 @@ def _read(path: Path) -> tuple[CalibratedModel, CalibrationSummary | None]:
     try:
         return found.calibrated, found.calibration
     except (SpringError, RobotError) as error:
-        # Of two files, a refusal has to say which.
+        # With two files, a refusal must name the one concerned.
         raise type(error)(f"{path}: {error}") from error

@@ -57,8 +57,7 @@ class SpringChange:
     """One spring, or one combination of springs, that both calibrations determine."""
 
     name: str
-    """Name of the spring, or the combination as a person would write it:
-    ``joint_a4.axial + joint_a5.x``."""
+    """Name of the spring or the combination, such as ``joint_a4.axial + joint_a5.x``."""
     terms: tuple[Term, ...]
     """The sum that is compared, ``sum(weight * compliance)``; one term for a single spring."""
     unit: str
@@ -68,7 +67,7 @@ class SpringChange:
     new: Estimate
     """Value of the new calibration, in `unit`."""
     difference: Estimate
-    """New minus old, with the 95 % interval that this difference has by itself, in `unit`."""
+    """New minus old, with the 95 % interval of this difference alone, in `unit`."""
     together: Estimate
     """The same difference with the interval that holds for *all* compared springs at once with
     95 % (at least as wide), in `unit`. It decides `moved`."""
@@ -99,7 +98,7 @@ _Triple = tuple[float, float, float]
 @brief_repr
 @record()
 class CommonGround:
-    """How far two campaigns cover the same poses and loads; see `CoveredRows`."""
+    """Common coverage of poses and loads by two campaigns; see `CoveredRows`."""
 
     old_covered: float
     """Share of the old campaign's readings that the new one covers."""
@@ -147,7 +146,7 @@ class LargestChange:
     force: _Triple
     """On the robot at the tcp in base, in N."""
     moment: _Triple | None
-    """On the robot about the tcp in base, in N·m; None: none."""
+    """On the robot at the tcp in base, in N·m; None if not given."""
     tcp_position: _Triple
     """In base, in m."""
     old: _Triple
@@ -192,7 +191,7 @@ class CompareSummary:
     moved: tuple[str, ...]
     """Names of the springs and combinations that changed, the most certain first."""
     not_compared: tuple[str, ...]
-    """Common springs that stand in no comparison: not determined by both, alone or in a sum."""
+    """Common springs without comparison: not determined by both, alone or in a sum."""
     only_old: tuple[str, ...]
     """Springs that only the old model has."""
     only_new: tuple[str, ...]
@@ -208,14 +207,14 @@ class CompareSummary:
     notes: tuple[str, ...]
     """Caveats that belong to the figures, a sentence each."""
     ground: CommonGround | None = None
-    """None where a model does not know where it was calibrated."""
+    """None where a model does not state its domain."""
     calibrated: DeflectionChange | None = None
     """Over the readings of the new calibration that the old one covers, where no rows were given;
     None with rows, or where a model does not know where it was calibrated."""
 
     @property
     def springs_judged(self) -> bool:
-        """Whether springs were held against one another; see `CommonGround`."""
+        """Whether springs were compared; see `CommonGround`."""
         return self.ground is None or self.ground.springs_judged
 
     @property
@@ -234,7 +233,7 @@ class CompareSummary:
 
     @property
     def moved_sentence(self) -> Phrase:
-        """Which springs changed, the most certain first; or why none is said to have.
+        """Sentence on the springs that changed, the most certain first, or why none is named.
 
         Springs of different models only *differ*.
         """
@@ -310,7 +309,7 @@ class RowComparison:
         return int(self.size.argmax())
 
     def summary(self) -> "DeflectionChange":
-        """Return how the deflection changed, as files hold it."""
+        """Return the change of the deflection, as files hold it."""
         row = self.where
         where = LargestChange(
             row=int(self.number[row]),

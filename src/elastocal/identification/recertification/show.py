@@ -18,7 +18,7 @@ from elastocal.identification.recertification.result import (
 from elastocal.wording import Phrase, mm, phrase, phrases, point, sentences
 
 _USUAL_UNIT = unit_of("rad/(N*m)")
-"""The unit of most springs stands in the heads; other springs name their own."""
+"""Unit of most springs, shown in the heads; other springs name their own."""
 
 
 def show_comparison(found: CompareSummary, rows: RowComparison | None = None) -> Iterator[Block]:
