@@ -1,12 +1,12 @@
 """Files of triangles: STL, OBJ and PLY, of any author, as trimesh reads them.
 
-A damaged STL is refused here, since readers say of it what helps nobody. A binary STL has a header
-of 80 bytes, the number of its triangles as 4 bytes, and 50 bytes for each triangle; a text STL
-begins with ``solid`` and has ``endfacet`` after each triangle.
+A damaged STL is refused here, since the messages of readers do not help the user. A binary STL has
+a header of 80 bytes, the number of its triangles as 4 bytes, and 50 bytes for each triangle; a text
+STL begins with ``solid`` and has ``endfacet`` after each triangle.
 
-Of a mesh only numbers and keywords count, which are ASCII. Names and comments may have any
-encoding, which nothing states: letters beyond ASCII are dropped before trimesh would guess it, for
-which it needs a package that elastocal does without.
+Only numbers and keywords of a mesh matter, which are ASCII. Names and comments may have any
+encoding, which the file does not state: other letters are dropped, since trimesh would guess the
+encoding with a package that elastocal does not require.
 """
 
 import io
@@ -28,11 +28,11 @@ _ASCII = bytes(byte if byte < 128 else ord("?") for byte in range(256))
 _PLY_HEAD = re.compile(rb"\A.*?\bend_header\r?\n", re.S)
 _PLY_TEXT = re.compile(rb"[\r\n]format\s+ascii\b")
 _INCHES = re.compile(rb"\binch(?:es)?\b|\bunits?\W{0,3}in\b", re.I)
-"""How files say it in their head or comments; none of the formats has a place for it."""
+"""Spellings of inches in heads or comments; none of the formats has a field for the unit."""
 
 
 def load_triangles(path: Path) -> trimesh.Trimesh:
-    """Return the triangles of a mesh file, in its own unit, as they stand there.
+    """Return the triangles of a mesh file, in its own unit, unchanged.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
     if suffix == ".stl":
         size = _check_stl(data, f"mesh {path}")
         is_text = size is None
-        # What stands behind the last triangle, to fill a block or as a signature, is no part of it.
+        # Data after the last triangle, such as padding or a signature, are ignored.
         data = data if is_text else data[:80].translate(_ASCII) + data[80:size]
     if suffix == ".ply":
         head = _PLY_HEAD.match(data)
@@ -77,7 +77,7 @@ def load_triangles(path: Path) -> trimesh.Trimesh:
 
 
 def says_inches(path: Path) -> bool:
-    """Return whether the head of a mesh file speaks of inches.
+    """Return whether the head of a mesh file mentions inches.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def _bytes_of(path: Path) -> bytes:
 
 
 def _check_stl(data: bytes, what: str) -> int | None:
-    """Return the size of a binary STL, None of a text; refuse what is none, or its beginning only.
+    """Return the size of a binary STL, None for a text; refuse invalid or truncated files.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def _check_stl(data: bytes, what: str) -> int | None:
     if len(data) >= _HEAD and len(data) == promised:
         return promised
     start = data[:_LOOKED_AT]
-    # A short one may have in its beginning what stands behind its end: a zero, a mark of DOS.
+    # A truncated file may begin with what usually follows the end: a zero, a mark of DOS.
     if start.lstrip()[:5].lower() == b"solid" and (_is_text(start) or _END.search(start)):
         begun, ended = len(_BEGIN.findall(data)), len(_END.findall(data))
         if begun > ended:

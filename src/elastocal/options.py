@@ -1,7 +1,7 @@
-"""Settings as a person gives them on a command line: what stands at a field, read from its source.
+"""Settings on a command line: the metadata of each field, read from its source.
 
-A class of settings says each option once: the field's name, type, default and docstring, and by
-``Annotated[..., Option(...)]`` what a command line has otherwise. `settings_fields` reads that from
+A class of settings defines each option once: by the field's name, type, default and docstring, and
+by ``Annotated[..., Option(...)]`` where the command line differs. `settings_fields` reads that from
 the source, so that help imports no numerical library.
 """
 
@@ -17,30 +17,32 @@ from typing import Annotated, Any, get_args
 
 @dataclass(frozen=True)
 class Option:
-    """How an option differs from its field; written with literals only."""
+    """Differences of an option from its field; written with literals only."""
 
     name: str = ""
-    """In place of the field's name, such as ``--limit``; ``--on/--off`` for both of a switch."""
+    """Name in place of the field's, such as ``--limit``; ``--on/--off`` for both states of a
+    switch."""
     argument: bool = False
     """Whether it is given by its place."""
     required: bool = False
-    """Whether a command line has to give it, though settings in Python need not."""
+    """Whether the command line requires it, although settings in Python do not."""
     metavar: str = ""
-    """What help shows for the value."""
+    """Placeholder for the value in help."""
     choices: str = ""
     """Key of `CHOICES`, which help lists and a shell completes; or ``robot``: the catalogue's."""
     file: bool = False
     """Whether a file may be given in place of a choice."""
     read: str = ""
-    """How a text becomes the value: ``point``, ``direction``, ``numbers``, ``statements``, ``list``
-    (with commas), ``ratio``, ``tolerance``, or a dimension, such as ``length``, of a quantity above
-    zero. Without the option the default of the settings counts, which ``default`` shows in help."""
+    """Conversion of a text to the value: ``point``, ``direction``, ``numbers``, ``statements``,
+    ``list`` (with commas), ``ratio``, ``tolerance``, or a dimension, such as ``length``, of a
+    positive quantity. Without the option the default of the settings applies, which ``default``
+    shows in help."""
     repeated: bool = False
     """Whether it may be given several times."""
     default: str = ""
-    """What help shows as the default, where the field has another form of it."""
+    """Default shown in help, where the field has another form of it."""
     help: str = ""
-    """In place of the docstring, where a command line has other words for the same."""
+    """Help in place of the docstring, where the command line needs other words."""
     least: float | None = None
     """Smallest number that is taken."""
     most: float | None = None
@@ -55,14 +57,14 @@ class SettingsField:
     kind: str
     """Its type, such as ``tuple[Path, ...]``."""
     default: Any
-    """A literal; `REQUIRED` without any, `OWN` where it is none."""
+    """A literal; `REQUIRED` without a default, `OWN` where the default is no literal."""
     doc: str
     """Its docstring on one line, without markup."""
     option: Option = Option()
 
     @property
     def flag(self) -> str:
-        """What a person types before its value."""
+        """Text to type before its value."""
         return self.option.name or f"--{self.name.replace('_', '-')}"
 
 
@@ -89,7 +91,8 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "target": ("linux",),
     "purpose": ("elasticity", "geometry", "both"),
 }  # fmt: skip
-"""What help lists without importing what knows them; tests/contracts/test_commands.py holds it."""
+"""Choices that help lists without importing their modules; tests/contracts/test_commands.py checks
+them."""
 
 
 ToolFrame = Annotated[
@@ -121,7 +124,7 @@ SHARED: dict[str, tuple[str, Option]] = {
         "Statements": get_args(Statements),
     }.items()
 }
-"""Types of fields that several settings have, by the name that stands at the field."""
+"""Types of fields that several settings share, by the name used at the field."""
 
 
 @cache
@@ -182,7 +185,7 @@ def _text(module: str) -> str:
 
 
 def _defining(module: str, name: str) -> str:
-    """Return the module that a name comes from: a face of a package takes it from another."""
+    """Return the module that defines a name, since a face of a package re-exports it."""
     found = find_spec(module)
     stub = Path(str(found.origin if found else "")).with_suffix(".pyi")
     if stub.name != "__init__.pyi" or not stub.is_file():

@@ -1,12 +1,12 @@
-"""What a command may write: over no input, into no record of a run, over no file of another's.
+"""Rule for outputs: no command overwrites an input, a record of a run, or a foreign file.
 
-One rule for every command. `elastocal.workflows` opens it around the work with the places that
-the settings name, and `elastocal.files`, through which every file is read and written, asks it:
-a file that was read is an input, whichever way its name was found.
+The rule holds for every command. `elastocal.workflows` applies it to the work with the paths that
+the settings name, and `elastocal.files`, through which every file is read and written, checks it:
+every file that was read is an input.
 
-An input is known by its inode and by its name, in which capitals do not count: controllers and
-two of three operating systems take ``A.SRC`` for ``a.src``. Files that are one thing in two, such
-as a program's ``.src`` and ``.dat``, stand for one another.
+An input is identified by its inode and by its name without regard to case: controllers and two of
+three operating systems take ``A.SRC`` for ``a.src``. Files that belong together, such as a
+program's ``.src`` and ``.dat``, are treated as one.
 """
 
 import contextlib
@@ -22,13 +22,13 @@ from elastocal.errors import FileAccessError
 RUN_RECORD = (
     *("journal.jsonl", "cell", "plan", "streams", "dataset.nc", "summary.json", "signature.json"),
 )
-"""What a folder of a run holds as a record of it; the first, the journal, makes it one."""
+"""Files that make up the record of a run in its folder; the first, the journal, identifies it."""
 FIGURE_MARKS = ("<dc:title>elastocal</dc:title>", "Software\0elastocal", "/Creator (elastocal)")
-"""How figures of ours are known: SVG, PNG and PDF."""
+"""Marks that identify figures of elastocal: SVG, PNG and PDF."""
 _TWINS = {".dat": ".src", ".csv": ".nc"}
-"""Suffixes of files that stand for those of the same name with another: program, dataset."""
+"""Suffixes of files that belong to those of the same name with another: program, dataset."""
 _LOOKED_AT = 1 << 20
-"""How many bytes at both ends of a file may hold the mark by which it is known."""
+"""Number of bytes at both ends of a file that are searched for the mark."""
 
 _Key = tuple[int, int] | str
 
@@ -38,13 +38,13 @@ class OutputRule:
     """The rule of one command at work."""
 
     force: bool = False
-    """Replace what somebody else wrote, too."""
+    """Replace foreign files, too."""
     has_force: bool = True
-    """Whether a person can ask for that."""
+    """Whether the user can request that."""
     marks: tuple[str, ...] = ()
     """Texts by one of which a former output of this command is known."""
     folder: Path | None = None
-    """Folder of the outputs; whoever opens it has refused what is another's."""
+    """Folder of the outputs; the caller has refused one with foreign files."""
     record: Path | None = None
     """Folder of a run whose record this command writes."""
     _inputs: dict[_Key, Path] = field(default_factory=dict)
@@ -67,8 +67,8 @@ class OutputRule:
         Raises
         ------
         FileAccessError
-            If it is, or stands for, an input; if it belongs to the record of a run; if somebody
-            else's file is there.
+            If it is an input or belongs to one; if it belongs to the record of a run; if a foreign
+            file is there.
         """
         keys = _keys(path)
         if keys[0] in self._written:

@@ -146,7 +146,7 @@ class ProcessPool:
             pass
 
     def abandon(self) -> None:
-        """Give up what the processes still have to do to get ready."""
+        """Cancel what the processes still have to prepare."""
         self._ready.close()
 
     def _run(
@@ -244,7 +244,7 @@ def _blas() -> "ThreadpoolController":
 
 
 def _work_for(parent: int, function: Callable[[_Task], _Result], task: _Task) -> _Result:
-    """Do a task in a process that ends with its parent, and does not wait minutes for the next."""
+    """Do a task in a process that ends with its parent, without a long wait for the next task."""
     _end_with(parent)
     return function(task)
 
@@ -272,7 +272,7 @@ def _one_thread_each(processes: int) -> Any:
 
 
 def _to_the_end(results: Generator[_Result]) -> Iterator[_Result]:
-    """Yield results; whoever does not want the rest of them hears nothing about it."""
+    """Yield results; a caller may stop early without an error."""
     try:
         for result in results:  # noqa: UP028 - `yield from` would close them with complaints
             yield result
@@ -312,7 +312,7 @@ class GuardedError(ElastocalError, RuntimeError):
 
 
 _PATIENCE = 5
-"""How long a child may wait and be kept waiting, over the time that it may work."""
+"""Time that a child may wait beyond the time that it may work."""
 
 
 def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Result:
@@ -366,12 +366,12 @@ def guarded(work: Callable[[], _Result], seconds: int, megabytes: int) -> _Resul
 def _work_guarded(
     work: Callable[[], object], writing: int, seconds: int, megabytes: int
 ) -> NoReturn:
-    """Do the work and send the result; this is the child."""
+    """Do the work in the child and send the result."""
     import faulthandler
     import gc
     import resource
 
-    faulthandler.disable()  # where somebody has asked for it: what crashes here is told in a line
+    faulthandler.disable()  # If enabled by the user: a crash here is reported in a line instead
     gc.disable()  # looking for garbage would copy all memory of the parent
     try:
         # By default the system ends a process that has used its time, whatever it is doing.
@@ -382,7 +382,7 @@ def _work_guarded(
         nothing = os.open(os.devnull, os.O_RDWR)
         os.dup2(nothing, 1)
         os.dup2(nothing, 2)
-        # No limit that whoever started us has set may be raised.
+        # Limits set by the calling process must not be raised.
         hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
         if hard == resource.RLIM_INFINITY or hard > seconds:
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))

@@ -27,7 +27,7 @@ _BROKEN = (
     ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, OSError,
     RuntimeError, SyntaxError, TypeError, ValueError,
 )  # fmt: skip
-"""What a module of somebody else may raise when it is imported; all of it is told in a line."""
+"""Exceptions that a plug-in's module may raise on import; each is reported in a line."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Kind:
     home: str
     """Registry of those that elastocal has, ``module:name``."""
     expected: str
-    """Class that an object is of, ``module:name``."""
+    """Class of the object, ``module:name``."""
     is_class: bool = False
     """Whether the entry point names a subclass of it, not an object."""
 
@@ -55,8 +55,8 @@ class Command(Generic[_T]):
     run: Callable[[Any], _T]
     """Does the work; what it raises is an `ElastocalError`."""
     show: Callable[[_T], Iterable[Any]]
-    """Returns what a person sees of the result, as `elastocal.blocks`; ``--json`` prints the result
-    itself, a record."""
+    """Function that returns the blocks of the result (`elastocal.blocks`); ``--json`` prints the
+    result itself, a record."""
 
 
 _FUNCTION = "collections.abc:Callable"
@@ -95,7 +95,7 @@ KINDS = {
 
 @cache
 def _entries(group: str, path: tuple[str, ...]) -> Mapping[str, tuple["EntryPoint", ...]]:  # noqa: ARG001
-    """Return the entry points of other distributions by their name; found anew for another path."""
+    """Return the entry points of other distributions by name; again for another path."""
     from importlib.metadata import entry_points  # takes a third of the time of --help
 
     found: dict[str, dict[str, EntryPoint]] = {}
@@ -122,8 +122,8 @@ def require_distributions(needed: object, what: str) -> None:
     Parameters
     ----------
     needed : object
-        What the file says: distributions with the versions that made it. What is no mapping is left
-        to whoever reads the file.
+        What the file says: distributions with the versions that made it. Anything but a mapping is
+        left to the reader of the file.
     what : str
         The file, for messages.
 
@@ -251,7 +251,7 @@ class Registry(Mapping[str, _T], Generic[_T]):
 
     @property
     def own(self) -> Mapping[str, _T | str]:
-        """Those of elastocal, and those that this process has added."""
+        """Names of elastocal, and those that this process has added."""
         found = self._own() if callable(self._own) else self._own
         return {**found, **self._added} if self._added else found
 
@@ -304,7 +304,7 @@ class Registry(Mapping[str, _T], Generic[_T]):
         beside : sequence of str
             Words that the caller takes as well, for the refusal of others.
         more : str
-            What the caller takes besides, in words.
+            What the caller also accepts, in words.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""How results and data show themselves: short in a console, a table in a notebook, a picture."""
+"""Display of results and data: short in a console, a table in a notebook, a figure."""
 
 import dataclasses
 import html
@@ -25,9 +25,9 @@ T = TypeVar("T")
 class Result:
     """Base of the records that workflows return, and of data that a notebook shows.
 
-    Sub-classes are frozen dataclasses; `facts` may be overridden where the fields alone do not
-    say what a person wants to know first. Every figure among them carries its unit, what it counts
-    and, where it is an error, whether it was held out.
+    Sub-classes are frozen dataclasses; `facts` may be overridden where the fields alone do not give
+    the main results. Every figure among them has its unit, its sample count and, for an error,
+    whether it was held out.
     """
 
     def facts(self) -> tuple[tuple[str, str], ...]:
@@ -39,7 +39,7 @@ class Result:
 
     def show(self) -> Iterable[Any]:
         """Return the result for a reader, as `elastocal.blocks`: by default its facts."""
-        # Blocks stand above results in the layers.
+        # Blocks are above results in the layers.
         return (importlib.import_module("elastocal.blocks").Facts(tuple(self._shown())),)
 
     def pictured(self) -> object:
@@ -54,7 +54,7 @@ class Result:
         ReportError
             If there is no picture of this kind of result.
         """
-        # Pictures stand above results in the layers: they are looked up only when asked for.
+        # Figures are above results in the layers: they are imported only when needed.
         return importlib.import_module("elastocal.report").plot_result(self.pictured())
 
     def __repr__(self) -> str:
@@ -67,7 +67,7 @@ class Result:
         return "\n".join([type(self).__name__, *lines[:shown], *rest])
 
     def _shown(self) -> list[tuple[str, str]]:
-        """Return the facts; warnings of one kind are one, where the first of all stands."""
+        """Return the facts; warnings of one kind are merged at the position of the first."""
         facts, shown = self.facts(), list[tuple[str, str]]()
         for label, text in facts:
             if label not in REMARKS:
@@ -97,7 +97,7 @@ def _html_table(caption: str, head: str, rows: Iterable[str]) -> str:
 
 
 def _html_row(cells: Iterable[str], texts: int, tag: str = "td") -> str:
-    """Return a row whose first cell names it; so many of its cells stand to the left."""
+    """Return a row whose first cell names it, with this number of cells aligned to the left."""
     made = []
     for number, cell in enumerate(cells):
         kind, scope = (tag, "") if number else ("th", " scope='row'" if tag == "td" else "")
@@ -107,7 +107,7 @@ def _html_row(cells: Iterable[str], texts: int, tag: str = "td") -> str:
 
 
 def brief_repr(cls: type[T]) -> type[T]:
-    """Let a dataclass of arrays, long texts or many items show itself in a line.
+    """Give a dataclass with arrays, long texts or many items a repr of one line.
 
     >>> @brief_repr
     ... @dataclasses.dataclass

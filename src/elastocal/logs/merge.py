@@ -122,9 +122,9 @@ def still_columns(logs: Sequence[LogStreams], robot: Robot) -> Iterator[str]:
 
 
 def _still_joints(log: LogStreams, arm: ArmStream, robot: Robot) -> Iterator[str]:
-    """Yield joints that hold the same number while each other one moves, and moved before or after.
+    """Yield joints that are constant while each other one moves, but move before or after.
 
-    A rail may stand for many poses, and so may a joint that no plan moves.
+    A rail may rest for many poses, and so may a joint that no plan moves.
     """
     turning = np.flatnonzero(robot.revolute).tolist()
     if not turning or not len(arm.q):
@@ -246,9 +246,9 @@ def postures_at_rest(
 
 
 def sensor_contradictions(postures: StaticPostures, site: Site) -> Iterator[str]:
-    """Yield what the weight of the tool says against axes, units and zero of the sensor.
+    """Yield contradictions between the weight of the tool and axes, units and zero of the sensor.
 
-    How it is turned is told with its angles where readings can be made (`sensor_doubts`).
+    Its rotation is reported with its angles where readings can be formed (`sensor_doubts`).
     """
     fit = fit_tool(postures, site.T_flange_sensor[:3, :3])
     left, change = fit.force_scatter, _change(postures)
@@ -270,7 +270,7 @@ def sensor_contradictions(postures: StaticPostures, site: Site) -> Iterator[str]
 
 
 def sensor_misfit(postures: StaticPostures, site: Site) -> str | None:
-    """Return why readings could not be made of what the sensor says; None: it is no such reason."""
+    """Return why the sensor's data do not allow readings; None: the sensor is not the reason."""
     fit = fit_tool(postures, site.T_flange_sensor[:3, :3])
     left, change = fit.force_scatter, _change(postures)
     if not change > _WEIGHS:
@@ -336,14 +336,14 @@ def _first_of_poses(each_of: Sequence[_T], poses: Sequence[int]) -> list[_T]:
 
 
 def _change(postures: StaticPostures) -> float:
-    """Return how much a force component changes from posture to posture, in N."""
+    """Return the change of a force component from posture to posture, in N."""
     return float((postures.force - postures.force.mean(axis=0)).std())
 
 
 IMPORTED = "elastocal import"
-"""How the provenance of a dataset from logs begins."""
+"""Start of the provenance of a dataset from logs."""
 _WORTH_POSES = 2
-"""Poses that a dataset is worth."""
+"""Number of poses that make a usable dataset."""
 
 
 @brief_repr
@@ -353,7 +353,7 @@ class ImportedLogs:
 
     dataset: Dataset
     streams: Streams
-    """By the clock of the joints."""
+    """Streams in the time of the joints."""
     plateaus: tuple[Plateau, ...]
     """All that were found; those of no use have the pose -1."""
     clocks: tuple[ClockFit, ...]
@@ -380,8 +380,8 @@ def import_streams(
     Raises
     ------
     LogError
-        If a log cannot be read as the map says, the clocks cannot be told, there are no plateaus,
-        no reference or load among them, or the stations cannot be registered.
+        If a log cannot be read as the map says, the clocks cannot be determined, there are no
+        plateaus, no reference or load among them, or the stations cannot be registered.
     DatasetError
         If the numbers look like a unit mistake.
     FileAccessError
@@ -401,7 +401,8 @@ def import_streams(
     standing = _standing(streams, site, by_word)
     poses = [each.pose for each in standing.bare]
     postures = postures_at_rest(standing.readings, poses, site)
-    # The sensor's clock is told by the weight, which joints turn: not asked about the marker.
+    # The sensor's clock follows from the weight, which turns with the joints; the marker is not
+    # needed.
     alone = replace(streams, wrench=stream_rows(streams.wrench, slice(0)))
     spans = [(each.start, each.end) for each in standing.bare]
     if by_word is None:
@@ -432,7 +433,7 @@ def _imported(
     judge_sensor: bool,
     progress: Progress,
 ) -> ImportedLogs:
-    """Return the dataset of what stood."""
+    """Return the dataset of the plateaus."""
     states = [each.tool for each in standing.readings]
     named = name_loads(standing.bare, states, site.sensor, log_map.load_cases)
     plateaus = _with_references(named)
@@ -505,7 +506,7 @@ def _in_sensor(log: LogStreams, arm: ArmStream, site: Site) -> WrenchStream:
 
 @dataclass(frozen=True, eq=False)
 class _Standing:
-    """What stood, before it is known what loaded it."""
+    """Plateaus, before their loads are known."""
 
     bare: list[Plateau]
     readings: list[Reading]
@@ -534,7 +535,7 @@ def _standing(streams: Streams, site: Site, by_word: LogStreams | None) -> _Stan
 
 
 def _with_references(plateaus: Sequence[Plateau]) -> list[Plateau]:
-    """Return plateaus, those of poses without reference or load set aside, poses numbered anew."""
+    """Return plateaus without those of poses that lack reference or load, with renumbered poses."""
     kept: list[int] = []
     for pose in dict.fromkeys(each.pose for each in plateaus if each.pose >= 0):
         loads = [each.load for each in plateaus if each.pose == pose]

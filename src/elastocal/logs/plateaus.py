@@ -1,9 +1,9 @@
-"""Plateaus: when everything stood long enough to be read, and what stood there.
+"""Plateaus: times at which everything was at rest long enough to be read, and the values there.
 
-A cell stands where, for some time, neither the arm nor the force nor the marker goes anywhere;
-with a handshake it is said. Plateaus between which the arm did not leave its place are of one
-pose. The force at a plateau, tool weight and bias taken off, tells whether it is unloaded, and
-which load case it is.
+A cell is at rest where, for some time, neither the arm nor the force nor the marker changes; a
+handshake states it. Plateaus between which the arm did not leave its position belong to one pose.
+The force at a plateau, without tool weight and bias, shows whether it is unloaded, and which load
+case it is.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,19 +25,19 @@ _STEP = 0.02
 _HALF = 0.2
 """Half of the time over which a change is looked for, in s."""
 _SHORTEST = 0.6
-"""Least time for which everything stands, in s."""
+"""Least time for which everything is at rest, in s."""
 _USED = 0.6
 """Part at the end of a plateau that is averaged: what settles has settled by then."""
 _LEFT_OUT = 0.1
 """Time before the end of a plateau that is left out, in s."""
 _STILL_ARM, _STILL_MARKER = 50e-6, 60e-6
-"""Change of the tool's place within 2 `_HALF`, in m, that is still standing."""
+"""Change of the tool's position within 2 `_HALF`, in m, that counts as rest."""
 _STILL_FORCE = 0.01
 """The same of the force, as a share of the largest change in the log."""
 _SIGMAS = 4.0
 """Noise of the averages that is no change."""
 _ONE_PLACE = 15e-3
-"""How far the tool may go between two plateaus of one pose, in m."""
+"""Largest distance of the tool between two plateaus of one pose, in m."""
 _ONE_TURN = np.radians(2.0)
 """And turn, in rad."""
 _UNLOADED = 0.08
@@ -51,7 +51,7 @@ _LARGEST_CHANGE = 99.0
 @brief_repr
 @dataclass(frozen=True)
 class Plateau:
-    """A stretch of time in which everything stood."""
+    """Period in which everything was at rest."""
 
     start: float
     """Start of what is averaged, in s by the clock of the joints."""
@@ -65,7 +65,7 @@ class Plateau:
 
 
 def standing_spans(streams: Streams, lever: FloatArray) -> list[tuple[float, float]]:
-    """Return start and end of every stretch in which arm, force and marker stand, in s.
+    """Return start and end of every period in which arm, force and marker are at rest, in s.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def largest_load(force: FloatArray) -> float:
 
 
 def averaged_part(start: float, end: float) -> tuple[float, float]:
-    """Return the part of a standing span that is averaged, in s."""
+    """Return the part of a period of rest that is averaged, in s."""
     length = end - start
     end = end - min(_LEFT_OUT, 0.1 * length)
     return max(start, end - _USED * length), end

@@ -40,11 +40,11 @@ if TYPE_CHECKING:
 _MOST_MEMORY = Limit("ELASTOCAL_MAX_LOG_MB", 500, "MB of memory")
 _MOST_SECONDS = Limit("ELASTOCAL_MAX_SECONDS", 8, "s of reading")
 _MEMORY_PER_SIZE, _SECONDS_PER_MEGABYTE = 100, 5
-"""What reading an honest file may take beside these, in terms of its size: a packed workbook of
-1 MB has some 100 000 cells, each an object of Python."""
+"""Further memory and time that reading a regular file may take, relative to its size: a packed
+workbook of 1 MB has some 100 000 cells, each a Python object."""
 _MEGABYTE = 1_000_000
 _BEGINS = {".bag": b"#ROSBAG V", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
-"""How files begin; a library may look for the end of the line in gigabytes without any."""
+"""First bytes of files; without this test a library may search gigabytes for the end of a line."""
 _DAMAGE = (
     OSError,
     ValueError,
@@ -61,7 +61,7 @@ _DAMAGE = (
     zlib.error,
     BadZipFile,
 )
-"""What libraries raise for damaged files; to a user all of it means the same."""
+"""Exceptions of libraries for damaged files; for a user all of them mean the same."""
 _Result = TypeVar("_Result")
 
 
@@ -261,7 +261,7 @@ def _field(message: Any, name: str) -> Any:
 
 
 def _stamp(message: Any) -> float | None:
-    """Return the time in the header of a message in s; None where there is none."""
+    """Return the time in the header of a message in s; None if it has none."""
     stamp = _field(_field(message, "header"), "stamp")
     if stamp is None:
         return None
@@ -339,7 +339,7 @@ def _mcap(path: Path) -> Iterator[McapReader]:
 
 
 def _require_rosbags(path: Path) -> None:
-    """Refuse a bag where rosbags is not installed; import it here, or each child does it anew."""
+    """Refuse a bag if rosbags is not installed; import it here, so that no child repeats it."""
     if Path(path).suffix.lower() == ".mcap":
         return  # most of ours need none
     try:
@@ -365,7 +365,7 @@ def _bag(path: Path) -> Iterator["AnyReader"]:
         from rosbags.typesys import Stores, TypesysError, get_typestore
     except ImportError as error:
         raise _absent(path) from error
-    # The database is apsw's, of older versions sqlite3's: none is imported but by rosbags.
+    # The database uses apsw, in older versions sqlite3; only rosbags imports them.
     databases = (sys.modules[name].Error for name in ("apsw", "sqlite3") if name in sys.modules)
     damage = (AnyReaderError, BagOneError, BagTwoError, SerdeError, TypesysError, *databases)
     try:

@@ -1,4 +1,4 @@
-"""From mapped logs to the streams of arm, force sensor and tracker, each still by its own clock."""
+"""From mapped logs to the streams of arm, force sensor and tracker, each by its own clock."""
 
 import fnmatch
 from collections.abc import Iterable, Sequence
@@ -34,7 +34,7 @@ Stream = TypeVar("Stream", ArmStream, WrenchStream, PointStream)
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class LogStreams:
-    """What one entry of the map says; None where its logs do not hold it."""
+    """Content of one entry of the map; None where its logs do not contain it."""
 
     name: str
     clock: str
@@ -170,7 +170,7 @@ def _stream(entry: LogEntry, table: LogTable, robot: Robot) -> LogStreams:
 
 
 def _joined(parts: Sequence[LogStreams]) -> LogStreams:
-    """Return one log of several that follow one another by one clock."""
+    """Return one log from several consecutive ones with one clock."""
     first = parts[0]
 
     def chain(streams: Iterable[Stream | None]) -> Stream | None:

@@ -4,7 +4,7 @@ Text files of any delimiter, with decimal points or commas, with a header (and a
 it, as PolyWorks and data loggers have) or without one (columns are then called by their number,
 from 1); SpatialAnalyzer's point lists (``//`` comments, ``Collection Group Target x y z``). They
 are read line by line and kept packed. Workbooks and recordings of middleware are read by
-`elastocal.logs.recordings`. What a column means is for the map (`elastocal.logs.map`) to say.
+`elastocal.logs.recordings`. The map (`elastocal.logs.map`) states the meaning of the columns.
 """
 
 import codecs
@@ -46,13 +46,13 @@ _CLOCK = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)", re.ASCII)
 _MEGABYTE = 1_000_000
 _OLD_CODE_PAGE = "cp1252"
 _LOOKED_AT = 200
-"""Lines by which the form of a text is told."""
+"""Number of lines from which the form of a text is determined."""
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class LogTable:
-    """A log: its columns as they stand in the file."""
+    """A log: its columns as in the file."""
 
     name: str
     """File, and the topic of a recording, for messages."""
@@ -134,7 +134,7 @@ class LogTable:
 
     def texts(self, name: str) -> tuple[str, ...]:
         """Return the cells of a column as texts without blanks around them, shape (row,)."""
-        # Most words stand in many rows: each is kept once.
+        # Most words occur in many rows: each is kept once.
         known: dict[str, str] = {}
         return tuple(known.setdefault(t, t) for t in map(_as_text, self.column(name)))
 
@@ -204,7 +204,7 @@ def read_text_log(path: Path) -> LogTable:
         body = _Body.read(text.rows(text.lines(), delimiter), width, start)
         if width == body.usual_width and body.start is not None:
             break
-        # Seldom: rows further down are of another width, or none holds a number.
+        # Rarely: later rows have another width, or none holds a number.
         width, start = body.usual_width, 1 if width == body.usual_width else None
     if body.uneven is not None:
         row, count = body.uneven
@@ -212,7 +212,7 @@ def read_text_log(path: Path) -> LogTable:
             f"{path}: row {row + 1} of the data has {count} cells, the others {width}: is the file"
             " cut off, or a text unquoted?"
         )
-    # Lines of another program stand above the header, which stands right above the data.
+    # Lines of another program may precede the header, which is directly above the data.
     header = _header(body.above, width) or _named([""] * width)
     first = chain.from_iterable(islice(column, _LOOKED_AT) for column in body.columns)
     comma = delimiter != "," and any(_DECIMAL_COMMA.fullmatch(cell.strip()) for cell in first)
@@ -274,7 +274,7 @@ class _LogText:
 
     path: Path
     opened: Callable[[], BinaryIO]
-    """Opens its content from the begin."""
+    """Return the delimiter of a text; empty where blanks separate the cells."""
     encoding: str
 
     @classmethod
@@ -290,7 +290,7 @@ class _LogText:
                 return cls(path, opened, _encoding(path, file))
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines that are neither blank nor comments."""
+        """Return whether every comma of a text is within a number between blanks."""
         errors = "replace" if self.encoding == _OLD_CODE_PAGE else "strict"
         try:
             with (
@@ -371,7 +371,7 @@ def _is_data(row: Sequence[str]) -> bool:
 def _header(above: Sequence[Sequence[str]], width: int) -> tuple[str, ...] | None:
     """Return the names of the columns by the rows above the data; None where there are none.
 
-    A row of units may stand between names and data: the names then end in them, as ``X [mm]``.
+    A row of units may be between names and data: the names then end in them, as ``X [mm]``.
     """
     if not above or len(above[-1]) != width:
         return None

@@ -1,7 +1,7 @@
 """From a cell to a plan: requirements, surface, pool, search, visiting order (paper 2.2, 3.1).
 
-What a cell must have before any candidate is made, `elastocal check` and `plan` ask alike; what
-depends on the pose alone is left to the checks of the pool.
+`elastocal check` and `plan` both test the requirements on a cell before any candidate is made;
+requirements on a single pose are left to the checks of the pool.
 """
 
 from collections.abc import Iterator
@@ -75,7 +75,7 @@ _POINTS = 200
 
 
 def require_possible_search(cell: Cell, compare: str | None = None) -> None:
-    """Require a search that can be made, as far as no pool is needed to tell.
+    """Require a possible search, as far as this can be decided without a pool.
 
     Parameters
     ----------
@@ -124,8 +124,8 @@ def require_loads_possible_anywhere(cell: Cell, surface: Surface) -> None:
     ------
     PlanningError
         If friction, or the sensor's range, refuses the load cases wherever they are applied; if
-        torques are limited and the robot has no masses to tell what gravity takes of them; if
-        the contact disk lies whole and flat nowhere on the surface.
+        torques are limited and the robot has no masses, so that the share of gravity is unknown; if
+        the contact disk fits flat nowhere on the surface.
     SurfaceError
         If the region holds no part of the surface.
     """
@@ -188,7 +188,7 @@ def unjudged_limits(cell: Cell) -> list[Finding]:
 _SURFACE, _SEARCH = "surface", "search"
 """Stages under which progress is reported, beside `CANDIDATES` and `VISITING`."""
 _REPLACEMENTS = 10
-"""Times that poses which no way leads to are replaced by others."""
+"""Number of times that poses without a free path are replaced by others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,7 +321,7 @@ def _choose(
     rng: Generator,
     progress: Progress,
 ) -> tuple[Selection, Route]:
-    """Return poses that free ways lead to from HOME, and on to the surface; replace others."""
+    """Return poses with free paths from HOME and on to the surface; replace others."""
     left: IndexArray = np.arange(len(search_pool.candidates))
     for _ in range(_REPLACEMENTS):
         selection = search_pool.choose(cell, left, rng)

@@ -1,4 +1,4 @@
-"""Plan file ``plan.json``: the poses in visiting order, the way between them, and why these.
+"""Plan file ``plan.json``: poses in visiting order, the path between them, and their choice.
 
 A plan belongs to one cell: it carries the cell's fingerprint and its robot whole. All numbers are
 SI; joint positions are in rad (m for prismatic joints) in the order of ``robot.joints``.
@@ -63,7 +63,7 @@ class RobotRecord:
 @brief_repr
 @record()
 class ContactRecord:
-    """How the tool comes to the surface and what it presses with."""
+    """Approach of the tool to the surface and its contact forces."""
 
     approach_distance: float
     near_contact: float
@@ -75,7 +75,7 @@ class ContactRecord:
     """Force on the robot in the tcp frame, in N, in the order in which they are applied; what
     belongs to the reference (`CellFile.presses`) among them."""
     straight_time: float | None = None
-    """How much of each ``contact_time`` the straight ways take, in s; None in plans of earlier
+    """Part of each ``contact_time`` spent on straight motions, in s; None in plans of earlier
     versions, whose times are for ``contact_speed`` there and back."""
 
 
@@ -89,7 +89,7 @@ class PoseRecord:
     candidate: int
     """Number in the pool."""
     joints: Joints
-    """In contact."""
+    """Joint positions in contact."""
     approach_joints: Joints
     """Off the surface by the approach distance, along the normal."""
     tcp_position: Vector
@@ -103,8 +103,8 @@ class PoseRecord:
     contact_time: float
     """Estimated seconds from the approach pose through all load cases and back to it."""
     margins: dict[str, float]
-    """How far each check is from refusing, in the unit of the check; positive is fine. A check
-    that cannot refuse (the edge of a surface that has none) is left out."""
+    """Margin of each check, in its unit; positive is allowed. A check that cannot refuse (the edge
+    of a surface that has none) is left out."""
 
     @property
     def T_base_tcp(self) -> FloatArray:
@@ -132,7 +132,7 @@ class MoveRecord:
 
 @record()
 class SpreadRecord:
-    """How the chosen poses lie in their pool: the numbers behind the paper's Fig. 3."""
+    """Distribution of the chosen poses in their pool: the numbers behind the paper's Fig. 3."""
 
     covering_radius: float
     """Distance of the worst-covered candidate from its nearest chosen pose, in m."""
@@ -147,7 +147,7 @@ class SpreadRecord:
 @brief_repr
 @record()
 class SearchRecord:
-    """How the poses were chosen."""
+    """Search by which the poses were chosen."""
 
     name: str
     metric: str
@@ -216,14 +216,14 @@ class PlanResult(Result):
     robot: RobotRecord
     contact: ContactRecord
     poses: tuple[PoseRecord, ...]
-    """In visiting order."""
+    """Poses in visiting order."""
     moves: tuple[MoveRecord, ...]
-    """From HOME through all poses and back, one more than there are poses."""
+    """Moves from HOME through all poses and back, one more than there are poses."""
     search: SearchRecord
     comparison: ComparisonRecord | None
     pool: PoolRecord
     findings: tuple[Finding, ...]
-    """What a user should know; sentences alone in files of version 1."""
+    """Notes and warnings for the user; sentences alone in files of version 1."""
     production: ProductionRecord | None = None
     """None in a cell that names no process."""
 
@@ -252,7 +252,7 @@ class PlanResult(Result):
 
     @property
     def travel_time(self) -> float:
-        """Estimated seconds on the way between poses."""
+        """Estimated time of the moves between poses, in s."""
         return sum(move.duration for move in self.moves)
 
     @property
@@ -267,18 +267,17 @@ class PlanResult(Result):
 
 @record(_SCHEMA, reads=_OLDER)
 class _WrittenPlan(PlanResult):
-    """A plan as it stands in its file."""
+    """A plan in the form of its file."""
 
     sha256: str = field(kw_only=True)
     """See `_content_hash`."""
 
 
 def _content_hash(plan: PlanResult, schema: str = _SCHEMA) -> str:
-    """Return a SHA-256 over everything that a plan says, by which a change by hand is found.
+    """Return a SHA-256 over the contents of a plan, which reveals changes by hand.
 
-    It is taken over the numbers as they are read: line breaks and the way a number is written do
-    not count, the order of load cases does. A key that earlier versions did not write counts only
-    where it says something.
+    It is computed from the parsed numbers: line breaks and number formats do not count, the order
+    of load cases does. A key that earlier versions did not write counts only where it has a value.
     """
     data = to_data(plan, stored=True) | {"schema": schema}
     if plan.contact.straight_time is None:

@@ -1,25 +1,27 @@
 """From points on the surface to postures of the robot that pass every check.
 
-At each point the tool presses along the inward normal and may be turned freely about it. Every
-turn has up to eight configurations of the arm, one a branch of the inverse kinematics. Branches
-are asked one after the other, the one that serves most points first, so that neighbours share a
-configuration and the arm need not flip between them; so are the positions of the external axes.
+At each point the tool presses along the inward normal and may have any rotation about it. Each
+rotation has up to eight configurations of the arm, one for each branch of the inverse kinematics.
+Branches are tried one after another, the one that serves most points first, so that neighbours
+share a configuration and the arm need not flip between them; likewise the positions of the external
+axes.
 
-Checks are asked cheapest first. What a point alone decides (edge, flatness) is asked before any
-robot is; the quick checks of every posture of a branch; the slow one (collision) only of the best,
-round by round, until a point has a posture or its branch has run out of them.
+Checks run in the order of their cost. Those of the point alone (edge, flatness) precede all
+postures; quick checks are made for every posture of a branch; the slow one (collision) only for the
+best, round by round, until a point has a posture or its branch has no more.
 
-The pool of a cell: points are sampled until as many candidates are valid as were asked for.
+The pool of a cell: points are sampled until the requested number of candidates is valid.
 
-Points are tried in parts, on all cores. Which part a point is in does not depend on the number of
-cores, so neither do the candidates. `CHECKS` and `POINT_CHECKS` list what each must pass.
+Points are processed in parts, on all cores. The parts do not depend on the number of cores, so
+neither do the candidates. `CHECKS` and `POINT_CHECKS` list the checks.
 
-Postures near those of production: where the rail stands, how the tool is turned, which branch.
+Postures are taken near those of production: in the position of the rail, the rotation of the tool,
+and the branch.
 
 A calibration holds where it was made (paper 3.1, 4.1: the "spectrum of action in production"). So
-the pool of a cell that names its process is sought there: at the positions of the external axes at
-which production runs, with the tool turned as at the nearest row, and of all postures that press on
-a point the one whose farthest joint is nearest to some posture of production.
+the pool of a cell that names its process is searched there: at the positions of the external axes
+in production, with the tool rotated as at the nearest row; and of all postures at a point the one
+whose farthest joint is nearest to a posture of production is taken.
 """
 
 import math
@@ -123,19 +125,20 @@ class NearProduction:
         places = []
         for number in np.argsort(-counts, kind="stable")[:_MOST_PLACES]:
             rows = np.flatnonzero(which.reshape(-1) == number)
-            # A row's own place: the middle of several may be one where production never stands.
+            # Position of one row, since the mean of several may be one where production never is.
             stand = external[rows[len(rows) // 2]]
             places.append(ProductionPlace(tuple(stand.tolist()), T[rows, :3, 3], T[rows, :3, 0]))
         return cls(tuple(places), posture_reach(robot), robot.revolute, process.joint_position)
 
     def distance(self, q: FloatArray) -> FloatArray:
-        """Return how far postures are from the nearest of production, shape (posture,).
+        """Return the distance of postures from the nearest of production, shape (posture,).
 
-        The largest part of `reach` that a joint is away: up to 1, the posture covers a row.
+        It is the largest distance of a joint relative to `reach`: up to 1, the posture covers a
+        row.
         """
         judged = np.isfinite(self.reach)
         scale = self.reach[judged]
-        # Angles go round: the tree is told after how much of its unit they come back.
+        # Angles are periodic: the tree is given the period of each coordinate.
         turn = np.where(np.array(self.revolute)[judged], 2.0 * np.pi / scale, 0.0)
 
         def scaled(joints: FloatArray) -> FloatArray:
@@ -185,8 +188,8 @@ class Pool:
     margins: Margins
     """Margins of the postures under every check."""
     refused_by: IndexArray
-    """For each sampled point the number in `refusals` of what left it without a posture, or -1
-    where it has one, shape (point,)."""
+    """Number in `refusals` of the check that left each sampled point without a posture, or -1 where
+    it has one, shape (point,)."""
 
     @property
     def sampled(self) -> int:
@@ -200,7 +203,7 @@ class Pool:
 
     @property
     def refused(self) -> dict[str, int]:
-        """How many points each check left without a posture, `UNREACHABLE` among them.
+        """Number of points that each check left without a posture, `UNREACHABLE` included.
 
         A point is counted once, for the first check that its best posture fails: the one that
         fails fewest.
@@ -217,7 +220,7 @@ class Pool:
 
     @property
     def commonest_refusals(self) -> tuple[str, ...]:
-        """What left points without a posture, the commonest first."""
+        """Checks that left points without a posture, the commonest first."""
         refused = self.refused
         ranked = sorted(refused, key=lambda name: -refused[name])
         return tuple(name for name in ranked if refused[name])
@@ -226,8 +229,8 @@ class Pool:
     def advice(self) -> str:
         """Advice on the two commonest refusals, each with its name; empty when there is none.
 
-        Two, as the commonest is often one that no-one minds (the edge), and as a point that
-        several checks refuse counts for one of them alone.
+        Two are given because the commonest is often harmless (the edge), and because a point that
+        several checks refuse counts for one of them only.
         """
         texts = dict(zip(self.refusals, (REACH_ADVICE, *self.margins.advice), strict=True))
         return sentences(
@@ -237,8 +240,8 @@ class Pool:
     def first(self, count: int) -> "Pool":
         """Return the pool without the postures beyond the first ``count`` ones.
 
-        The points that lose their posture leave the pool with the points behind them, so that
-        the numbers still tell what share of the points was refused.
+        Points that lose their posture are removed with the points after them, so that the numbers
+        still give the share of refused points.
         """
         if len(self.postures) <= count:
             return self
@@ -275,7 +278,7 @@ class Options:
 
 
 class _PoolSearch:
-    """The postures found so far, and the points that wait for one, while a pool is made."""
+    """Postures found so far, and points still without one, during the making of a pool."""
 
     def __init__(self, checks: Checks, points: int) -> None:
         self.checks = checks
@@ -296,7 +299,7 @@ class _PoolSearch:
             self.is_waiting[bad] = False
 
     def ask(self, options: Options, distance: FloatArray | None = None) -> None:
-        """Give every waiting point the best of its options that passes all checks.
+        """Give every open point the best of its options that passes all checks.
 
         The best has the largest margins, or the least ``distance``, shape (option,), where given.
         """
@@ -355,21 +358,21 @@ class _PoolSearch:
 class PostureSolver:
     """Finds the postures that press on points of the surface and pass every check.
 
-    Of each branch the inverse kinematics gives one posture: where joint 4 or 6 may stand a whole
-    turn away as well, within its limits, only the position nearest to zero is tried. A pose whose
-    cables would want the other turn is not found.
+    The inverse kinematics gives one posture for each branch: where joint 4 or 6 may also be a whole
+    turn away within its limits, only the position nearest to zero is tried. A pose whose cables
+    need the other turn is not found.
     """
 
     inverse: InverseKinematics
     """Inverse kinematics of the robot with its tool."""
     checks: Checks
-    """What a posture has to pass."""
+    """Checks of a posture."""
     approach: float
     """Distance of the approach pose from the surface along the normal, in m."""
     spins: int = 8
     """Number of turns of the tool about its axis that are tried."""
     production: NearProduction | None = None
-    """Where production runs: postures near to it come first. None: those with large margins."""
+    """Production postures: those near to them are preferred. None: those with large margins."""
 
     def pool(
         self,
@@ -472,7 +475,7 @@ class PostureSolver:
 
 
 def join_pools(pools: Sequence[Pool]) -> Pool:
-    """Return one pool of several that were made of consecutive parts of the points."""
+    """Return one pool from several for consecutive parts of the points."""
     starts = np.cumsum([0, *(pool.sampled for pool in pools)])
     postures = [
         pool.postures.at(pool.postures.point + start)
@@ -651,7 +654,7 @@ class PoolBuilder:
     cell: Cell
     surface: Surface
     solver: PostureSolver
-    """With the checks of the robot; those of points are made with the points."""
+    """Solver with the checks of the robot; those of points are made with the points."""
 
     @staticmethod
     def of(cell: Cell, surface: Surface) -> "PoolBuilder":
@@ -662,9 +665,9 @@ class PoolBuilder:
         return PoolBuilder(cell, surface, solver)
 
     def rank(self, probes: SurfacePoints) -> tuple[BasePlacement, ...]:
-        """Return where the external axes should carry the arm, judged by some tens of points.
+        """Return positions of the external axes, the best first, judged by some tens of points.
 
-        Where production runs is known they stand as there, and nothing is judged.
+        If production is known, its positions are used without judgement.
         """
         if self.solver.production is not None:
             return tuple(BasePlacement(place.external) for place in self.solver.production.places)
@@ -683,7 +686,7 @@ _PoolsOfParts = Callable[[tuple[BasePlacement, ...], Sequence[SurfacePoints]], I
 
 
 def _processes(jobs: int | None, wanted: int) -> int:
-    """Return the number of processes for some candidates; few are not worth a second one."""
+    """Return the number of processes for some candidates; few do not need a second one."""
     try:
         processes = process_count(jobs)
     except ValueError as error:
@@ -720,8 +723,8 @@ class _Survey:
     served: BoolArray
     """Points with a posture, shape (point,); after the quick checks only, until asked."""
     checks_passed: float
-    """Mean over the points of the most checks that a posture passes; tells placements that serve
-    no point apart, so that what refuses the points at the best of them is what a user hears."""
+    """Mean over the points of the most checks that a posture passes; it separates placements that
+    serve no point, so that the refusals at the best of them are reported."""
     quality: float
     """Mean over the points of the best posture's smallest margin, in units of its median."""
     asked: bool = False

@@ -69,7 +69,7 @@ class PoolData:
         FloatArray,
         Variable(("check", "candidate"), meaning="distance from refusal, in check_units"),
     ]
-    """How far each check is from refusing, shape (check, candidate), in ``check_units``."""
+    """Margin of each check, shape (check, candidate), in ``check_units``."""
     check_names: Annotated[tuple[str, ...], Variable(("check",))]
     check_units: Annotated[tuple[str, ...], Variable(("check",))]
     boundary_distance: Annotated[
@@ -79,9 +79,9 @@ class PoolData:
     pose_id: Annotated[
         IndexArray, Variable(("candidate",), meaning="pose of the plan; -1: not chosen")
     ]
-    """Id of the pose in the plan, shape (candidate,); `NOT_CHOSEN` when it is none."""
+    """Id of the pose in the plan, shape (candidate,); `NOT_CHOSEN` if it was not chosen."""
     point: Annotated[IndexArray, Variable(("candidate",), meaning="number of the sampled point")]
-    """Which sampled point each candidate touches, shape (candidate,)."""
+    """Sampled point that each candidate touches, shape (candidate,)."""
     sampled: Annotated[
         FloatArray, Variable(("point_number", "axis"), "m", "every point that was tried, in base")
     ]
@@ -203,7 +203,7 @@ def _check_shapes(data: PoolData) -> None:
 
 
 def _check_names(data: PoolData) -> None:
-    """Refuse names that the file's flag attribute cannot tell apart."""
+    """Refuse names that the file's flag attribute cannot distinguish."""
     for name in data.refusal_names:
         if len(name.split()) != 1 or data.refusal_names.count(name) > 1:
             raise PlanningError(f"refusal name {name!r} of the pool must be one word, named once")

@@ -1,4 +1,4 @@
-"""Candidates with joints: where the tool touches, and how the robot stands and retreats."""
+"""Candidates with joints: contact point, posture and retreat."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -12,7 +12,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 _STRAIGHT = 2e-5
-"""Distance (m) and angle (rad) from the straight way that are let pass."""
+"""Tolerated distance (m) and angle (rad) from the straight line."""
 _STEPS = 4
 
 
@@ -60,7 +60,7 @@ class Postures(Rows):
     q_approach: FloatArray
     """Joint positions at the approach pose, off along the normal, shape (pose, joint)."""
     point: IndexArray
-    """Which point of the sampled surface each posture touches, shape (pose,)."""
+    """Sampled point of the surface that each posture touches, shape (pose,)."""
 
     def __post_init__(self) -> None:
         for name in ("T_base_tcp", "normal", "q", "q_approach"):
@@ -73,7 +73,7 @@ class Postures(Rows):
         return self.T_base_tcp[:, :3, 3]
 
     def at(self, point: IndexArray) -> "Postures":
-        """Return the same postures with their points numbered anew, shape (pose,)."""
+        """Return the same postures with new numbers of their points, shape (pose,)."""
         return replace(self, point=point)
 
     @staticmethod
@@ -93,7 +93,7 @@ def retreat_joints(robot: Robot, postures: Postures, part: float) -> FloatArray:
 
     The tool keeps its orientation and moves along a straight line; the joints do not. From the
     straight line in joint space, which is some millimetres off, Newton steps of the arm lead back
-    to it, to `_STRAIGHT`.
+    to it, within `_STRAIGHT`.
 
     Parameters
     ----------

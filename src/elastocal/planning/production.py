@@ -1,4 +1,4 @@
-"""What a plan promises for production: coverage, loads, and the error to expect.
+"""Expected quality of a plan for production: coverage, loads, and error.
 
 The standard deviation that ``sigma`` of a measured coordinate leaves in the predicted deflections
 of production is, with the information matrix ``S`` of the chosen poses and ``P`` the mean of
@@ -6,8 +6,8 @@ of production is, with the information matrix ``S`` of the chosen poses and ``P`
 
     noise = sigma sqrt(3 tr(P S^-1)),      expected = hypot(noise, floor),
 
-the root mean square of the deviation's length. What the springs cannot express is not in the noise:
-it is the floor, which `elastocal study` measures on a simulated cell.
+the root mean square of the deviation's length. The model error is not in the noise: it is the
+floor, which `elastocal study` measures on a simulated cell.
 """
 
 import math
@@ -42,7 +42,7 @@ _NOTHING = 1.0
 _MOST_ROWS = 500
 """Rows of production that are looked at when poses are chosen to cover it."""
 _TILT = float(np.sin(np.radians(10.0)))
-"""Spread of the direction of gravity in the tool from which on it tells the tool's weight."""
+"""Spread of the direction of gravity in the tool from which the tool's weight is determined."""
 _TILTED = 2
 """Axes about which the tool must be turned to be weighed."""
 _SHOWN = (3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30)
@@ -57,21 +57,21 @@ class ExpectedError:
 
     poses: int
     noise: float
-    """What the noise of the measurement makes of it, root mean square of the length, in m."""
+    """Error due to the noise of the measurement, root mean square of the length, in m."""
     error: float
-    """With the floor of the model, in m."""
+    """Error with the floor of the model, in m."""
 
 
 @brief_repr
 @record()
 class ProductionRecord:
-    """What a plan promises for production."""
+    """Expected quality of a plan for production."""
 
     file: str
-    """As the cell file names it."""
+    """Path as in the cell file."""
     courses: tuple[str, ...]
     coverage: ProductionCoverage
-    """By the chosen poses."""
+    """Coverage by the chosen poses."""
     poses: int
     """Number of chosen poses."""
     springs: str
@@ -90,7 +90,7 @@ class ProductionRecord:
         return next((each for each in self.expected if each.poses == poses), None)
 
     def some_expected(self) -> tuple[ExpectedError, ...]:
-        """Return the errors for numbers of poses that a person compares, the plan's among them."""
+        """Return the errors for some numbers of poses, the plan's among them."""
         shown = {*_SHOWN, self.poses}
         return tuple(each for each in self.expected if each.poses in shown)
 
@@ -117,7 +117,7 @@ class ProductionRecord:
 
 
 def plan_coverage(cell: Cell, q: FloatArray) -> ProductionCoverage | None:
-    """Return how much of production calibration poses cover; None when the cell names none.
+    """Return the share of production that calibration poses cover; None if the cell names none.
 
     Parameters
     ----------

@@ -196,7 +196,7 @@ def _pairs(
     """Return links and tool against obstacles, and distant links against one another."""
     joint = [body.parentJoint for body in geometry.geometryObjects]
     moving = [*links, *tool]
-    # What stands still may touch the tooling or the floor: that is the cell's business.
+    # Fixed solids may touch the tooling or the floor: that is not checked.
     outside = [(a, b) for a in moving if joint[a] > 0 for b in obstacles]
     inside = [
         (a, b)
@@ -284,7 +284,7 @@ def _tilted_findings(cell: Cell) -> tuple[Finding, ...]:
     urdf, flange, tcp = cell.robot.urdf, cell.file.robot.flange, cell.robot.chain
     if not (tcp.tip_tilt > _TILTED and Robot.from_urdf(urdf, flange).chain.tip_tilt > _TILTED):
         return ()
-    other = tool_link(urdf)  # the flange is none of the candidates: the tcp hangs on it
+    other = tool_link(urdf)  # The flange is no candidate: the tcp depends on it
     advice = "tcp.abc turns it" if other == tcp.tip else f"robot.flange is {other!r}"
     return (TILTED(link=flange, direction=tcp.tip_direction, advice=advice),)
 

@@ -54,7 +54,7 @@ production, the nearest."""
 _MOST_POSES = 40
 """Poses that a wanted accuracy may take, where ``search.poses`` sets no limit."""
 _NEAR = 6
-"""Poses near production that none is given up for to weigh the tool."""
+"""Number of poses near production below which none is replaced to weigh the tool."""
 _TABLE = 30
 """Poses up to which errors are expected, at least."""
 _CHUNK = 5000
@@ -75,7 +75,7 @@ class SearchPool:
     q: FloatArray
     """Postures of the candidates in contact, shape (candidate, joint), in rad or m."""
     springs: str = _SPRINGS
-    """Model whose parameters the observation rows are of."""
+    """Model to whose parameters the observation rows belong."""
     sight: FloatArray | None = None
     """Margin with which each tracker station sees each candidate, shape (station, candidate), in
     rad; none where a single station sees them all."""
@@ -93,7 +93,7 @@ class SearchPool:
             postures.contact,
             rows,
             geodesic_distance(surface, points) if geodesic else None,
-            # Where nobody says where production runs, the whole pool stands for it.
+            # Where production is unknown, the whole pool represents it.
             rows.reshape(-1, rows.shape[2]) if production is None else production,
         )
         edge = distance_to_boundary(surface, points)
@@ -108,7 +108,7 @@ class SearchPool:
         )
 
     def spread(self, chosen: IndexArray) -> SpreadRecord:
-        """Return how chosen candidates lie in the pool, shape (n,)."""
+        """Return the distribution of chosen candidates in the pool, shape (n,)."""
         edge = float(self.boundary_distance[chosen].mean())
         neighbour = float(nearest_neighbour(self.candidates, chosen).mean())
         return SpreadRecord(

@@ -1,4 +1,4 @@
-"""What there is to see of a plan, as blocks that every shell shows."""
+"""Show a plan as blocks for every shell."""
 
 from collections.abc import Iterator
 
@@ -51,7 +51,7 @@ def _covered(production: ProductionRecord) -> tuple[tuple[str, str], ...]:
 
 
 def spreads(plan: PlanResult) -> blocks.Table:
-    """Return how the chosen poses lie in their pool, beside those of another technique."""
+    """Return the distribution of the chosen poses in their pool, beside another technique's."""
     search, other = plan.search, plan.comparison
     rows = [(search.name, search.spread)] + ([(other.name, other.spread)] if other else [])
     return blocks.Table(

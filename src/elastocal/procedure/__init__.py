@@ -1,8 +1,8 @@
 """Procedure 1 (paper 2.2): press at every pose of a plan, record it, derive the dataset.
 
-Data flow one way: `run` drives the devices and writes what `record` keeps on the disk, a journal
-and raw streams; `derive` reads those, with `registration` for the tracker stations, and writes the
-dataset and the summary. A run can so be derived again, by a newer program, at any time.
+Data flow in one direction: `run` drives the devices and, through `record`, writes a journal and raw
+streams; `derive` reads those, with `registration` for the tracker stations, and writes the dataset
+and the summary. So a newer program can derive a run again at any time.
 """
 
 import lazy_loader

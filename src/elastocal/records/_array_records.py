@@ -25,16 +25,16 @@ T = TypeVar("T")
 @brief_repr
 @dataclass(frozen=True)
 class Variable:
-    """How a field lies in a NetCDF file."""
+    """Description of a field in a NetCDF file."""
 
     dims: tuple[str, ...]
     """Name of each dimension."""
     units: str = ""
-    """Unit of the numbers; empty where they have none, or not all the same."""
+    """Unit of the numbers; empty where they have none, or several."""
     meaning: str = ""
-    """What the numbers are, in words (``long_name``)."""
+    """Meaning of the numbers, in words (``long_name``)."""
     flags: str = ""
-    """Field whose texts the numbers count; -1 is none of them (CF section 3.5)."""
+    """Field with the texts that the numbers index; -1 is none of them (CF section 3.5)."""
 
 
 def variables_of(cls: type) -> dict[str, Variable]:

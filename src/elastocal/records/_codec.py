@@ -167,7 +167,7 @@ def read_json(path: Path, cls: type[T], schema: str = "") -> T:
     """
     data = read_json_data(path)
     found = from_data(cls, data, str(path), schema)
-    # After the schema, which tells of a later version more plainly.
+    # After the schema, whose refusal describes a later version better.
     if isinstance(data, dict) and SEAL in data:
         require_seal(data[SEAL], json_sha256(data), str(path))
     return found
@@ -199,7 +199,7 @@ def _unstated(cls: Any, data: Any, what: str, schema: str = "") -> Any:
         check_schema(data.pop("schema", None), schema, what, older)
         if cls.__dict__.get("__sealed__"):
             data.pop(SEAL, None)
-        # First, or what they added would be told to be unknown.
+        # First, since added fields would otherwise be reported as unknown.
         require_distributions(data.get("needs"), what)
     if isinstance(data, dict) and dataclasses.is_dataclass(cls):
         for name, inner in _stating_fields(cls):

@@ -1,7 +1,7 @@
-"""The one reader of JSON: strict and bounded, wherever the JSON stands.
+"""Strict and bounded reader of JSON, used for all JSON.
 
-A key that stands twice is refused: of two readers one takes the first and the other the last, and
-what one has checked is not what the other shows.
+A repeated key is refused: one reader takes the first value and another the last, so that what one
+checks may differ from what the other shows.
 """
 
 import json
@@ -15,12 +15,12 @@ from elastocal.files import Limit
 
 MOST_VALUES = Limit("ELASTOCAL_MAX_JSON_VALUES", 2_000_000, "values")
 _HALF = re.compile(r"\\[uU](?:0000)?[dD][89a-fA-F]")
-"""An escape that may stand for half of a letter, in JSON and in YAML."""
+"""Escape sequence that may encode half of a letter, in JSON and in YAML."""
 _MOST_NESTING = Limit("ELASTOCAL_MAX_NESTING", 64, "levels")
 SEAL = "content_sha256"
 """Key or attribute by which a file states the hash of all else that it says."""
 _SHOWN = 12
-"""Digits of a hash that people compare."""
+"""Number of digits of a hash that people compare."""
 
 
 def parse_json(

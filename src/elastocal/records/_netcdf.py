@@ -41,7 +41,7 @@ _DAMAGE = (
     OverflowError,
     MemoryError,
 )
-"""What h5py and h5netcdf raise for damaged files; to a user all of it means the same."""
+"""Exceptions of h5py and h5netcdf for damaged files; for a user all of them mean the same."""
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 _STORAGE = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Encoding", "coordinates")
 """Attributes that say how values are stored (CF section 2.5.1, 8.1), not what they mean."""
@@ -126,7 +126,7 @@ def read_arrays(path: Path, schema: str = "", older: Sequence[str] = ()) -> Labe
         If the file is missing, unreadable or empty.
     """
     _check_signature(path)
-    # Imported here, or each child would do it anew.
+    # Imported here, so that no child repeats it.
     import h5netcdf  # noqa: F401
 
     try:

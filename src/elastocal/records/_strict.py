@@ -46,7 +46,7 @@ class StrictModel(BaseModel):
 
 _KILOBYTE = 1_000
 _PARSER_ERRORS = (ValueError, TypeError, AttributeError, LookupError, OverflowError, RecursionError)
-"""What PyYAML raises for scalars and keys that it takes for a date, a number, a set."""
+"""Exceptions of PyYAML for scalars and keys that it takes for a date, a number, a set."""
 Model = TypeVar("Model", bound=StrictModel)
 
 
@@ -56,10 +56,10 @@ _MOST_VALUES = Limit("ELASTOCAL_MAX_YAML_VALUES", 20_000, "values in a YAML file
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """The safe loader, but a key that stands twice is an error instead of the last one winning.
+    """Safe loader that refuses repeated keys, of which PyYAML would keep the last.
 
-    The values of a file are counted before they are made: aliases and merge keys make few of
-    them into any number.
+    The values of a file are counted before they are created, since aliases and merge keys can
+    multiply a few of them without limit.
     """
 
     _count = 0
@@ -131,7 +131,7 @@ def read_yaml_data(path: Path) -> Any:
     Raises
     ------
     SchemaError
-        If the file is not YAML, a key stands twice, or it holds more than can be read in seconds.
+        If the file is not YAML, a key is repeated, or it is too large to be read within seconds.
     FileAccessError
         If it cannot be read.
     """

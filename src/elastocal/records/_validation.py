@@ -103,7 +103,7 @@ def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
         # The bound of a quantity is shown in the unit that the quantity is given in.
         reason = f"{reason.rpartition(' ')[0]} {in_its_unit}"
     message = f"{path}: {reason}" if path else reason
-    # A whole section is no value that a person would recognise.
+    # A whole section is not shown as the offending value.
     shown = first["input"] if in_its_unit is None else text
     given = _shown(item.get("given", shown))
     return message if given in reason or len(given) > _LONGEST_SHOWN else f"{message}, got {given}"

@@ -27,7 +27,7 @@ _DECIMAL = re.compile(r"(?<![\w.])([-+−]?\d*)\.(\d+)(?![\w.])")
 _SENTENCE = re.compile(
     r"\b(?:a|an|and|are|as|by|from|has|is|no|not|of|on|that|the|to|was|with)\b(?=.* .* )"
 )
-"""What is no name: a small word of English, and two words after it."""
+"""Mark of a sentence, as opposed to a name: a small word of English and two words after it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Language:
         return template.format(**values) if values else template
 
     def _template(self, text: str) -> str:
-        """Return the template of a text of ours; nothing for names, figures and words of others."""
+        """Return the template of a text of elastocal; None for names, figures and foreign words."""
         return getattr(text, "template", "") or (text if text in self.catalogue else "")
 
 

@@ -17,7 +17,8 @@ from elastocal.results import brief_repr
 _STRAIGHT = 0.02
 """Largest tilt in rad of a tip that is taken to point out of the arm."""
 _NEAR = 1e-4
-"""Distance in m along the last axis below which nothing tells which way is out of the arm."""
+"""Distance in m along the last axis below which the outward direction of the arm is
+undetermined."""
 
 
 @brief_repr
@@ -33,9 +34,9 @@ class ChainJoint:
     placement: FloatArray
     """T_parent_joint: joint frame at zero in the previous joint's frame, shape (4, 4)."""
     lower: float
-    """Lower position limit in rad or m; -inf when there is none."""
+    """Lower position limit in rad or m; -inf if there is none."""
     upper: float
-    """Upper position limit in rad or m; inf when there is none."""
+    """Upper position limit in rad or m; inf if there is none."""
     velocity: float
     """Largest velocity in rad/s or m/s; NaN when not known."""
     effort: float
@@ -61,7 +62,7 @@ class SerialChain:
 
     @property
     def tip_tilt(self) -> float:
-        """Angle in rad between the tip's z axis and the way out of the arm along the last axis.
+        """Angle in rad between the tip's z axis and the outward direction of the last axis.
 
         0 is a tip from which a tool points straight on; π/2 one whose z axis lies across, as that
         of ROS-Industrial's ``flange``, whose x axis points out. NaN if the last joint slides.
@@ -82,7 +83,7 @@ class SerialChain:
 
     @property
     def tip_direction(self) -> str:
-        """Where the tip's z axis points, in words."""
+        """Direction of the tip's z axis, in words."""
         tilt, last = self.tip_tilt, self.joints[-1].name
         if math.isnan(tilt):
             return f"behind {last}, which slides"
@@ -159,7 +160,7 @@ def build_model(chain: SerialChain, inserted: Sequence[InsertedJoint] = ()) -> C
         for virtual in (v for v in here if v.distal):
             parent, behind = _insert(model, parent, virtual, behind)
             column_of[virtual.name] = model.idx_vs[parent]
-        # What stands still needs no inertia tensor, which many URDFs have wrong.
+        # Fixed links need no inertia tensor, which is wrong in many URDFs.
         body = pin.Inertia(joint.mass, joint.centre_of_mass, np.zeros((3, 3)))
         model.appendBodyToJoint(parent, body, behind)
     T_last_tip = behind * pin.SE3(chain.T_last_tip)

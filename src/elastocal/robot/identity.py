@@ -1,4 +1,4 @@
-"""Whether two descriptions are of one robot with one tool: how far apart the same joints lead."""
+"""Comparison of two descriptions of a robot with its tool, by the poses at equal joints."""
 
 from dataclasses import dataclass
 
@@ -60,19 +60,19 @@ def probe_configurations(robot: Robot) -> FloatArray:
 
 
 def link_gap(a: Robot, b: Robot) -> Gap:
-    """Return how far apart the last links of two robots are, at the same joints."""
+    """Return the gap between the last links of two robots, at the same joints."""
     q = probe_configurations(a)
     here, there = (robot.forward(q) @ inverse_transform(robot.chain.T_last_tip) for robot in (a, b))
     return Gap.between(here, there)
 
 
 def tool_gap(a: Robot, b: Robot) -> Gap:
-    """Return how far apart two tool centre points are, behind the last link."""
+    """Return the gap between two tool centre points, behind the last link."""
     return Gap.between(a.chain.T_last_tip, b.chain.T_last_tip)
 
 
 def tcp_gap(a: Robot, b: Robot) -> Gap:
-    """Return how far apart two tool centre points are in base, at the same joints."""
+    """Return the gap between two tool centre points in base, at the same joints."""
     q = probe_configurations(a)
     return Gap.between(a.forward(q), b.forward(q))
 

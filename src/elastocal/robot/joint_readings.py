@@ -1,4 +1,4 @@
-"""Other ways in which controllers count the joints of an arm, that a log is mistaken for ours."""
+"""Other conventions of controllers for the joints of an arm, which logs may contain."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -2,12 +2,12 @@
 
 A check is one small class: a name with a unit, the margin of many candidates at once (positive is
 fine), and `of`, which makes it from the cell. A check that lacks the numbers to judge is None: it
-neither passes nor refuses in silence, the plan has a note.
+is left out, with a note in the plan.
 
 Checks judge calibration poses: in contact and, where a check says so, on the straight way off the
-surface to the approach pose. They do not reach HOME and the via poses between the calibration
-poses: those are looked at for joint limits and collision alone (`elastocal.planning.motion`), not
-for singularity, wrist, torque or sight.
+surface to the approach pose. They do not apply to HOME and the via poses between the calibration
+poses: those are checked for joint limits and collision alone (`elastocal.planning.motion`), not for
+singularity, wrist, torque or sight.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from elastocal.results import brief_repr
 
 
 class Check(Protocol):
-    """One condition that a calibration pose has to meet."""
+    """A condition that a calibration pose must meet."""
 
     @property
     def name(self) -> str:
@@ -40,7 +40,7 @@ class Check(Protocol):
         """Advice to a user when this check refuses most candidates."""
 
     def margin(self, postures: Postures) -> FloatArray:
-        """Return how far each posture is from being refused, shape (pose,); positive is fine."""
+        """Return the distance of each posture from refusal, shape (pose,); positive is allowed."""
 
 
 class PostureCheck(Check, Protocol):
@@ -78,7 +78,7 @@ class PointCheck(Check, Protocol):
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Checks:
-    """All that a pose has to pass, in the order of what it costs to ask."""
+    """All conditions of a pose, in the order of their computing time."""
 
     point: tuple[PointCheck, ...] = ()
     """Asked of the sampled points, before any robot."""

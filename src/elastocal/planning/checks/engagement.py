@@ -58,7 +58,7 @@ class FlatnessCheck(PointCheck):
     """Tolerance of the normals under the disk, less the largest angle between them."""
 
     fit: DiskFit
-    """How a disk lies at each sampled point."""
+    """Fit of a disk at each sampled point."""
     normal_tolerance: float
     """Largest angle between the normal at the centre and under the disk, in rad."""
     name: str = "flatness"

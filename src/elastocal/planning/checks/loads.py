@@ -1,4 +1,4 @@
-"""What every load case asks of a pose (paper section 4.1): ``friction``, ``torque``, ``sensor``.
+"""Checks of every load case at a pose (paper section 4.1): ``friction``, ``torque``, ``sensor``.
 
 The disk sticks; gravity and load stay within the actuators' torques; the load stays within the
 force sensor's ranges, lever arm included.
@@ -95,8 +95,8 @@ class TorqueCheck(PostureCheck):
     def of(cls, cell: Cell, surface: Surface) -> Self | None:
         """Return the check of the actuators; None when the torque of no joint is known.
 
-        Limits of the URDF alone are not judged on an arm without masses, whose own share of the
-        torque nobody knows; those that the cell file states are (`require_loads_possible_anywhere`
+        Limits of the URDF alone are not judged on an arm without masses, since the torque of its
+        weight is unknown; those that the cell file states are (`require_loads_possible_anywhere`
         refuses them).
         """
         if not (cell.robot.has_masses or cell.file.limits.torque.values):
@@ -161,8 +161,8 @@ class TorqueCheck(PostureCheck):
 class SensorCheck(PostureCheck):
     """Smallest part of a sensor range that is left, over axes and load cases.
 
-    The sensor sees the force turned into its frame and, at its lever arm, the moment
-    ``r x f``; both ends of the tool's weight (pointing any way) are added as a safe bound.
+    The sensor measures the force in its own frame and, at its lever arm, the moment ``r x f``; both
+    ends of the tool's weight (pointing any way) are added as a safe bound.
     """
 
     force_tcp: FloatArray

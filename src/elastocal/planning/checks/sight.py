@@ -2,10 +2,10 @@
 
 A station sees the marker when the marker faces it within its acceptance angle, the distance is
 within the tracker's range, and neither a mesh of the cell nor a link or the tool stands between
-them. `MovingSolids` says how a tool does not blind the marker that it carries.
+them. `MovingSolids` describes why a tool does not hide the marker that it carries.
 
-Postures are judged in contact. Unloaded readings are taken some 3 mm off the surface: that moves
-a beam, and the tool with it, by less than the shapes of links and tool are known.
+Postures are judged in contact. Unloaded readings are taken some 3 mm off the surface, which moves
+beam and tool by less than the accuracy of the shapes of links and tool.
 """
 
 from collections.abc import Sequence
@@ -30,9 +30,9 @@ from elastocal.wording import phrase
 MARKER_SEAT_LENGTH = 5e-3
 """Distance from the marker, in m, from which on arm and tool count: a marker sits on something."""
 HOUSING_DEPTH = 1e-3
-"""A tool shape that the marker lies deeper in than this, in m, is taken as its housing. A marker
-less deep, on a face that is drawn a little too high, still sees through `MARKER_SEAT_LENGTH` of
-it: all within 78 deg (arc cosine of 1 mm over 5 mm) of the face's normal."""
+"""A tool shape is taken as the marker's housing if the marker lies deeper in it than this, in m. A
+marker less deep, on a face that is drawn slightly too high, still sees through `MARKER_SEAT_LENGTH`
+of it: everything within 78 deg (arc cosine of 1 mm over 5 mm) of the face's normal."""
 REGISTRATION_POSES = 3
 """Poses that a station must measure to be registered: its rotation needs three points."""
 _FEW = 8
@@ -89,7 +89,7 @@ class MovingSolids:
         object.__setattr__(self, "_holds", (*[False] * links, *holds))
 
     def hide(self, q: FloatArray, beams: Beams) -> BoolArray:
-        """Return whether links or tool stand in the way of each beam.
+        """Return whether links or tool block each beam.
 
         Parameters
         ----------
@@ -122,13 +122,13 @@ class SightCheck(PostureCheck):
     marker_tcp: FloatArray
     """Marker in the tcp frame, shape (3,), in m."""
     axis_tcp: FloatArray
-    """Unit vector that the marker faces, in the tcp frame, shape (3,)."""
+    """Direction that the marker faces, a unit vector in the tcp frame, shape (3,)."""
     acceptance_angle: float
     """Half angle of the cone within which the marker returns the beam, in rad."""
     obstacles: trimesh.Trimesh | None = None
-    """All that stands still and may be in the way, in base."""
+    """Fixed solids that may block a beam, in base."""
     moving: MovingSolids | None = None
-    """Links and tool, which may be in the way too."""
+    """Links and tool, which may also block it."""
     name: str = "sight"
     unit: str = "rad"
     advice: str = phrase("move or add a tracker station, or turn the marker clear of arm and tool")
@@ -197,7 +197,7 @@ class SightCheck(PostureCheck):
         return np.asarray(np.where(possible, margin, unseen), dtype=float)
 
     def _clear(self, q: FloatArray, beams: Beams) -> BoolArray:
-        """Return whether nothing stands in the way of each posture's beam, shape (pose,)."""
+        """Return whether each posture's beam is free, shape (pose,)."""
         clear = np.ones(len(beams), dtype=bool)
         if self.obstacles is not None:
             clear = ~Mesh(self.obstacles).crosses(beams, _OFF_THE_MARKER)
@@ -274,10 +274,10 @@ def station_shortage(station: str, poses: tuple[int, ...]) -> Finding:
 
 
 def unseen_bumps(seen_by: Sequence[str | None]) -> tuple[Finding, ...]:
-    """Return a warning where there are too few poses to check their stations, if there are.
+    """Return a warning if there are too few poses to detect a moved station.
 
-    How large a bump half way is found from 8 and from 30 poses was tried on simulated cells: the
-    page on registration has the table.
+    The size of a detectable move midway, with 8 and with 30 poses, was measured on simulated cells:
+    the page on registration has the table.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Checks ``singularity`` and ``wrist``: the arm keeps away from where it cannot move some way."""
+"""Checks ``singularity`` and ``wrist``: the arm keeps away from singular postures."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Self

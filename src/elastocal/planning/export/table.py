@@ -48,7 +48,7 @@ def pose_lines(plan: PlanResult, seconds: Mapping[int, float] | None = None) -> 
     """Yield a line a pose, in visiting order: words ``key=value``, for programs and for people.
 
     ``pose=0 start[s]=0.0 time[s]=34.8 station=tracker rail[mm]=… joint_a1[deg]=…``: the joints are
-    those in contact, the time is that of the way to the pose and at it.
+    those in contact, the time is that of the motion to the pose and at it.
 
     Parameters
     ----------

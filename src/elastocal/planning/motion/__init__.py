@@ -1,4 +1,4 @@
-"""The order in which poses are visited, the way between them, and how long it takes."""
+"""The visiting order of poses, the path between them, and the durations."""
 
 import lazy_loader
 

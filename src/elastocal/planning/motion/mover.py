@@ -23,9 +23,9 @@ from elastocal.shapes import Body, box_corners
 _LIFTS = (0.1, 0.3)
 """Distances in m beyond the approach pose."""
 _DETOURS = 48
-"""Number of via poses that are spread about a way."""
+"""Number of via poses that are spread about a move."""
 _WIDTH = 0.6
-"""How far they lie from the way's ends, in rad, or in m for a prismatic joint."""
+"""Distance of via poses from the move's ends, in rad, or in m for a prismatic joint."""
 _STEP = 2e-3
 """Distance in m between the places that are looked at; a body that keeps half of it more than the
 clearance at both ends of a step keeps the clearance in between."""
@@ -47,9 +47,8 @@ class AxisMotion:
 
         d / v + t_a          if d >= v t_a,  else  2 sqrt(d t_a / v).
 
-    All joints arrive together, so that the slowest decides. A move by way of another posture
-    stops there; as the duration is concave in each distance, no way is shorter than the straight
-    one.
+    All joints arrive together, so that the slowest decides. A move through another posture stops
+    there; as the duration is concave in each distance, no path is faster than the straight one.
     """
 
     speed: FloatArray
@@ -112,7 +111,7 @@ class Sweep:
 
     @cached_property
     def radii(self) -> FloatArray:
-        """How far things are from each joint's axis at most; see `joint_radii`."""
+        """Largest distances of parts from each joint's axis; see `joint_radii`."""
         return joint_radii(self.scene.robot, self.scene.tool)
 
     def free(self, start: FloatArray, end: FloatArray) -> BoolArray:
@@ -130,7 +129,7 @@ class Sweep:
         """
         travel = end - start
         bound = np.abs(travel) @ self.radii
-        # A look at a few postures first: most moves that are blocked are so for a long way.
+        # A few postures are checked first, since most blocked moves are blocked over a long part.
         move, middle, _ = _cut(bound, np.arange(len(start)), _FIRST_LOOK_PIECE)
         seen = self.scene.keeps(start[move] + middle[:, None] * travel[move], self.clearance)
         blocked = np.zeros(len(start), dtype=bool)
@@ -165,7 +164,7 @@ class Sweep:
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """How long moves take, which are free of collision, and where via poses can be."""
+    """Durations of moves, collision checks of moves, and positions for via poses."""
 
     axes: AxisMotion
     sweep: Sweep
@@ -203,10 +202,10 @@ class Mover:
         return np.array(postures).reshape(-1, len(q_approach))
 
     def detours(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """Return postures spread evenly about a way: the beginning of a Halton sequence (1960).
+        """Return postures spread evenly about a move: the beginning of a Halton sequence (1960).
 
         They fill the box that the two ends span in joint space, widened by `_WIDTH` within the
-        joint limits. Always the same ones, and the same there and back.
+        joint limits. They are always the same, in both directions.
 
         Parameters
         ----------
@@ -247,11 +246,11 @@ def mover_for(cell: Cell, scene: CollisionScene) -> Mover:
 
 
 def clear_retreats(cell: Cell, mover: Mover, postures: Postures) -> BoolArray:
-    """Return whether each posture's way off the surface is free, shape (pose,).
+    """Return whether each posture's retreat from the surface is free, shape (pose,).
 
-    The pool's collision check looks at a few places; this one at every 2 mm, and is asked of the
-    chosen poses only. Below the near-contact pose the tool is not checked against what it presses
-    on; above it, it must keep as much as it is above it, up to the clearance.
+    The pool's collision check tests a few positions; this one tests every 2 mm, for the chosen
+    poses only. Below the near-contact pose the tool is not checked against the pressed surface;
+    above it, its distance must be at least its height, up to the clearance.
 
     Parameters
     ----------

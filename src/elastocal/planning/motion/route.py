@@ -1,7 +1,7 @@
 """The order in which poses are visited, and the free transfers between them.
 
 Approach poses and HOME are the nodes of a roadmap. A transfer leads from one to another, straight
-in joint space or by way of a few via poses; it is looked for when a tour needs it.
+in joint space or through a few via poses; it is searched when a tour needs it.
 
 The shortest closed tour through all nodes: the symmetric travelling salesman problem.
 
@@ -11,7 +11,7 @@ edges ``x_e`` in {0, 1} so that
     sum over e of cost_e x_e  is least,  two chosen edges meet at each node,
     and  sum over e inside S of x_e <= |S| - 1  for each part S of the nodes.
 
-The last are exponentially many; only those are added, in rounds, that the last solution breaks.
+The last are exponentially many; in each round only those are added that the last solution violates.
 """
 
 import itertools
@@ -58,7 +58,7 @@ class Tour:
     """Nodes in visiting order from node 0, shape (node,); of the two directions the one whose
     second node has a lower index than its last."""
     length: float
-    """Sum of the costs, that of the way back to node 0 included."""
+    """Sum of the costs, including the return to node 0."""
     shortest: bool
     """Whether it is proved that no tour is shorter."""
 
@@ -284,16 +284,17 @@ class Route:
     order: IndexArray
     """Poses in visiting order, shape (visited,)."""
     moves: tuple[Move, ...]
-    """From HOME through all poses and back: one more than visited poses; none without poses."""
+    """Moves from HOME through all poses and back: one more than visited poses; none without
+    poses."""
     unreachable: IndexArray
-    """Poses that no free way leads to, in ascending order: they are not visited."""
+    """Poses without a free path, in ascending order: they are not visited."""
     shortest: bool
     """Whether it is proved that no other order of the same poses takes less time, of the transfers
     that were tried."""
 
     @property
     def duration(self) -> float:
-        """Estimated time on the way, in s; without the times at the poses."""
+        """Estimated time of the moves, in s; without the times at the poses."""
         return sum(move.duration for move in self.moves)
 
 
@@ -313,10 +314,10 @@ class _Transfer:
 
 @dataclass(eq=False)
 class _Roadmap:
-    """The transfers between nodes, found when they are asked for and remembered.
+    """Transfers between nodes, computed when needed and kept.
 
     The *stem* of a pose is its free transfer to HOME with at most one via pose: none, the pose
-    lifted off along its normal, a point about the way, or another pose that leads straight to
+    lifted off along its normal, a point beside the move, or another pose that leads straight to
     HOME. A pose without a stem cannot be visited. Two poses with stems always have a transfer:
     through HOME, with at most three via poses.
     """
@@ -349,8 +350,9 @@ class _Roadmap:
     def find(self, start: int, end: int) -> _Transfer:
         """Return the quickest free transfer of those tried between two nodes with stems.
 
-        Tried are straight, then, the quickest first: one end lifted, or both; the mean in joint
-        space of both lifted; a point about the way; and through HOME, which is free in any case.
+        The straight transfer is tried, then, the quickest first: one end lifted, or both; the mean
+        in joint space of both lifted; a point beside the move; and through HOME, which is always
+        free.
         """
         first, last = min(start, end), max(start, end)
         if (first, last) not in self._known:
@@ -363,7 +365,8 @@ class _Roadmap:
             return straight
         through_home = self._through_home(first, last)
         vias = [*self._single_vias(first, last), *self._double_vias(first, last), through_home]
-        # Known to be free from its stems, even if rounding should tell otherwise on the way back.
+        # Free because its stems are, even if rounding gives another result in the opposite
+        # direction.
         return self._first_free(first, last, vias) or self._transfer(first, last, through_home)
 
     def _none(self) -> FloatArray:
@@ -415,21 +418,21 @@ def plan_route(
 ) -> Route:
     """Return the quickest round through the approach poses that is free of collision.
 
-    A tour is found as if all straight moves were free; its moves are checked; a blocked one costs
-    what the way around takes from then on; and so on until all moves of the tour are known. As no
-    way around is quicker than the straight one, the last tour is the shortest of all. Which round
-    is taken depends on nothing but the arguments.
+    A tour is found as if all straight moves were free; its moves are checked; a blocked one then
+    costs the time of its detour; this is repeated until all moves of the tour are known. As no
+    detour is quicker than the straight move, the last tour is the shortest of all. The result
+    depends on the arguments alone.
 
     Parameters
     ----------
     home : array_like, shape (joint,)
         Joint positions of HOME in rad or m.
     postures : Postures
-        The poses; the way leads through their approach postures.
+        The poses; the path leads through their approach postures.
     mover : Mover
-        What moves the robot; see `mover_for`.
+        Durations and collision checks of moves; see `mover_for`.
     progress : callable, optional
-        Hears how many moves of the present tour are known to be free, and how many it has.
+        Called with the number of moves of the present tour known to be free, and their total.
 
     Raises
     ------

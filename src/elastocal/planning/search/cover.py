@@ -33,7 +33,7 @@ class Farthest(NamedTuple):
     pose: int
     """Its number; the lowest where several are equally far."""
     distance: float
-    """From the nearest chosen candidate, in m; 0 when all are chosen."""
+    """Distance from the nearest chosen candidate, in m; 0 when all are chosen."""
 
 
 @brief_repr

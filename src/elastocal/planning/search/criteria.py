@@ -1,4 +1,4 @@
-"""Criteria of the exchange search: numbers that say how much a choice of poses tells.
+"""Criteria of the exchange search: measures of the information in a choice of poses.
 
 They are the observability indices O1 to O5 and the alphabetic criteria D, A, E and I; D ranks
 choices as O1 does, E as O3. A new criterion is a class here, an entry in `CRITERIA`, a changelog
@@ -10,8 +10,8 @@ All candidates are judged at once by low-rank updates, with matrices as small as
     det(S + B^T B) = det S det(I + B S^-1 B^T)                     (determinant lemma)
     (S + B^T B)^-1 = S^-1 - S^-1 B^T (I + B S^-1 B^T)^-1 B S^-1    (Woodbury)
 
-G. H. Golub, C. F. Van Loan, *Matrix Computations*, 2013, section 2.1.4. The small matrices lie
-side by side, poses last, so that each elimination step is one whole-array operation.
+G. H. Golub, C. F. Van Loan, *Matrix Computations*, 2013, section 2.1.4. The small matrices are
+stacked with the poses last, so that each elimination step is one whole-array operation.
 """
 
 from abc import ABC, abstractmethod

@@ -136,7 +136,7 @@ class ExchangeSearch:
         count : int
             Number of poses wanted, from 1 to the size of the pool.
         rng : numpy.random.Generator, optional
-            Draws the starts; one seeded with 0 when there is none.
+            Source of the starts; by default one seeded with 0.
 
         Raises
         ------
@@ -247,7 +247,7 @@ def _greedy_order(
     """Return a choice in an order of growth, and the criterion's value of each prefix.
 
     Each next pose is the one of the choice that raises the criterion most, so that the first
-    poses visited already tell much; shapes (n,) and (n,).
+    visited poses already carry much information; shapes (n,) and (n,).
     """
     inner = information.take(chosen)
     order: list[int] = []

@@ -1,7 +1,7 @@
 """Information of each candidate pose about the observable springs.
 
-The information matrix of a choice of poses is ``S = eps I + sum O_p^T O_p``, with the rows of
-each pose scaled by column and projected on the directions that the pool observes at all.
+The information matrix of a choice of poses is ``S = eps I + sum O_p^T O_p``, with the rows of each
+pose scaled by column and projected on the directions that the pool observes.
 """
 
 from dataclasses import dataclass, replace

@@ -20,7 +20,7 @@ class Metric(Protocol):
     def from_point(self, index: int) -> FloatArray:
         """Return the distance of every candidate from one of them, shape (pose,), in m.
 
-        Infinite where no way leads. `elastocal.planning.surface.GeodesicDistance` is one.
+        Infinite where there is no path. `elastocal.planning.surface.GeodesicDistance` is one.
         """
 
 
@@ -41,7 +41,7 @@ class Candidates:
     """Rows of the observation matrix of all load cases at each pose (paper Eq. 15, 17), shape
     (pose, row, spring), in m per unit of compliance; row is 3 x load cases."""
     distance: Metric | None = None
-    """Metric for COVER; Euclidean between contact points when there is none."""
+    """Metric for COVER; by default Euclidean between contact points."""
     process: FloatArray | None = None
     """Observation rows at the poses and forces of the production, shape (row, spring), in m per
     unit of compliance: what I-optimality wants to predict well."""
@@ -139,7 +139,7 @@ class Selection:
 
 
 class SearchTechnique(Protocol):
-    """A way of choosing calibration poses from a pool (paper section 3.1)."""
+    """A method of choosing calibration poses from a pool (paper section 3.1)."""
 
     @property
     def name(self) -> str:
@@ -162,8 +162,8 @@ class SearchTechnique(Protocol):
             Number of poses wanted, from 1 to the size of the pool. Techniques with a criterion
             of their own for "enough" may stop earlier; they document it.
         rng : numpy.random.Generator, optional
-            Where a technique draws from; one seeded with 0 when there is none. Techniques that
-            draw nothing ignore it.
+            Source of random numbers; by default one seeded with 0. Deterministic techniques ignore
+            it.
 
         Raises
         ------

@@ -54,8 +54,8 @@ def growing_choices(
 ) -> list[IndexArray]:
     """Return the choices of 1 to ``most`` poses, each as the technique orders it.
 
-    Nested techniques search once, and their choices are prefixes. The others search anew for
-    each number; exchanges share the information of the pool.
+    Nested techniques search once, and their choices are prefixes. The others search again for each
+    number; exchanges share the information of the pool.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The tooling surface: read it, spread points over it, tell where a contact disk can lie."""
+"""The tooling surface: reading, sampling of points, and fit of a contact disk."""
 
 import lazy_loader
 

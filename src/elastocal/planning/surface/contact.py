@@ -54,7 +54,7 @@ def contact_frames(position: FloatArray, normal: FloatArray, spin: FloatArray) -
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class DiskFit:
-    """How disks lie on the surface, from 24 probes each; infinite where a disk hangs over."""
+    """Fit of disks on the surface, from 24 probes each; infinite where a disk overhangs."""
 
     angle: FloatArray
     """Largest angle between the disk's axis and the surface's normal under it, shape (point,),
@@ -69,10 +69,10 @@ class DiskFit:
 
 
 def fit_disk(surface: Surface, points: SurfacePoints, radius: float) -> DiskFit:
-    """Return how disks centred at the points, square to their normals, lie on the surface.
+    """Return the fit of disks centred at points, perpendicular to their normals, on the surface.
 
-    Rays are cast along the disk's axis at 16 points of its rim and 8 half-way in. Where a ray
-    meets no surface within one radius before or behind the disk plane, the disk hangs over.
+    Rays are cast along the disk's axis at 16 points of its rim and 8 half-way in. Where a ray meets
+    no surface within one radius before or behind the disk plane, the disk overhangs.
 
     Parameters
     ----------

@@ -19,14 +19,15 @@ _NEAREST = 8
 _PER_DIAGONAL = 60
 """Steiner points on a line as long as the surface's diagonal, by default."""
 _LEAST = 3
-"""Steiner points on an edge, however short: with none, ways zigzag and are up to 8 % too long."""
+"""Steiner points on an edge, however short: without them paths zigzag and are up to 8 % too
+long."""
 
 
 def distance_to_boundary(surface: Surface, points: SurfacePoints) -> FloatArray:
-    """Return how far points are from where their patch of the surface ends.
+    """Return the distance of points from the border of their patch of the surface.
 
-    A patch ends at open edges and at creases: a contact disk may hang over neither. The distance
-    is the straight one, never longer than the way along the surface, so it errs on the safe side.
+    A patch ends at open edges and at creases: a contact disk must overhang neither. The distance is
+    the straight one, never longer than along the surface, hence on the safe side.
 
     The border is cut into short pieces; of the eight whose middles are nearest, the distance is
     exact. Should a ninth be nearer, the error is below half a piece, 1e-4 of the border's length.
@@ -83,14 +84,14 @@ def _nearest(position: FloatArray, pieces: FloatArray) -> FloatArray:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class GeodesicDistance:
-    """Lengths of ways along the surface between points on it; see `geodesic_distance`."""
+    """Lengths of paths along the surface between points on it; see `geodesic_distance`."""
 
     position: FloatArray
     """The points, shape (point, 3), in m."""
     face: IndexArray
-    """The face that each point lies on."""
+    """Face that contains each point."""
     graph: csr_array[np.float64]
-    """Lengths of the straight pieces of way in m; the points come last."""
+    """Lengths of the straight segments in m; the points come last."""
 
     def from_point(self, index: int) -> FloatArray:
         """Return the distance of every point from one of them.
@@ -103,11 +104,11 @@ class GeodesicDistance:
         Returns
         -------
         ndarray, shape (point,)
-            In m; infinite where no way leads.
+            In m; infinite where there is no path.
         """
         first = self.graph.shape[0] - len(self.position)
         distance = dijkstra(self.graph, directed=False, indices=[first + index])[0, first:]
-        # Within a face the straight way is the shortest, and no graph edge is spent on it.
+        # Within a face the straight segment is the shortest, and needs no graph edge.
         same = np.flatnonzero(self.face == self.face[index])
         distance[same] = np.linalg.norm(self.position[same] - self.position[index], axis=1)
         return distance
@@ -116,12 +117,12 @@ class GeodesicDistance:
 def geodesic_distance(
     surface: Surface, points: SurfacePoints, spacing: float | None = None
 ) -> GeodesicDistance:
-    """Return the metric of ways along the surface.
+    """Return the metric of paths along the surface.
 
-    Ways run straight through faces and change direction at points set on the edges at most
-    ``spacing`` apart; Dijkstra finds the shortest. They are real ways, so the distance is never
-    too short. It is too long by at most 4 %, about 1 % in the median (measured on a plane, a
-    sphere and a block, tests/planning/surface/test_geodesic.py).
+    Paths are straight within faces and change direction at points set on the edges at most
+    ``spacing`` apart; Dijkstra finds the shortest. They are real paths, so the distance is never
+    too short. It is too long by at most 4 %, about 1 % in the median (measured on a plane, a sphere
+    and a block, tests/planning/surface/test_geodesic.py).
 
     Source: M. Lanthier, A. Maheshwari, J.-R. Sack, "Approximating shortest paths on weighted
     polyhedral surfaces", Algorithmica 30, 2001 (fixed scheme of Steiner points).
@@ -149,7 +150,7 @@ def geodesic_distance(
     position = np.concatenate([nodes, points.position])
     start, end = _links(at_face, points.face, len(nodes))
     length = np.linalg.norm(position[start] - position[end], axis=1)
-    # Zero would mean no link: a point that lies on a node keeps a way to it.
+    # A zero would mean no link, so a point on a node keeps a small distance to it.
     length = np.maximum(length, np.finfo(float).tiny)
     low, high = np.minimum(start, end), np.maximum(start, end)
     _, first = np.unique(low * len(position) + high, return_index=True)
@@ -180,7 +181,7 @@ def _nodes(surface: Surface, spacing: float) -> tuple[FloatArray, list[IndexArra
 def _links(
     outline: list[IndexArray], face: IndexArray, nodes: int
 ) -> tuple[IndexArray, IndexArray]:
-    """Return the ends of all ways through a face: node to node, and node to point."""
+    """Return the ends of all segments through a face: node to node, and node to point."""
     start, end = [], []
     for corner_nodes in outline:
         one, other = np.triu_indices(len(corner_nodes), 1)

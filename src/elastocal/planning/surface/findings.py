@@ -33,7 +33,7 @@ _TOO_SMALL = {phrase("m and read as mm"): 1e3, phrase("inches and read as mm"): 
 _POINTS = 200
 _SPINS = 4
 _CLEARLY = 0.25
-"""By how much of the points the other side has to be the better reachable one."""
+"""Share of the points by which the other side must be better reachable."""
 Reachable = Callable[[FloatArray], BoolArray]
 """Whether the robot reaches poses T_base_tcp, shape (pose, 4, 4), within its limits."""
 
@@ -147,7 +147,7 @@ def placement_findings(
 
 
 def tiny_finding(surface: Surface, reach: float) -> tuple[Finding, ...]:
-    """Return a finding when a surface is so small that its unit is doubtful.
+    """Return a finding if a surface is so small that its unit is doubtful.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def _misread(size: float, reach: float) -> str:
 
 
 def unit_findings(path: Path, unit: str, key: str) -> tuple[Finding, ...]:
-    """Return a finding when a mesh file speaks of inches and is read in another unit.
+    """Return a finding if a mesh file mentions inches and is read in another unit.
 
     Parameters
     ----------
@@ -219,11 +219,11 @@ def size_findings(path: Path, unit: float, key: str, reach: float) -> tuple[Find
 
 
 def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> tuple[Finding, ...]:
-    """Return a finding when the normals point to the side where the robot cannot work.
+    """Return a finding if the normals point to the side where the robot cannot work.
 
-    A closed mesh tells its outside by the sign of its volume. An open one has no outside: there
-    the side counts from which the robot reaches clearly more of 200 points. A mesh that has but
-    one side cannot be turned.
+    The sign of the volume of a closed mesh shows its outside. An open one has no outside: the side
+    counts from which the robot reaches clearly more of 200 points. A mesh with one side only (a
+    Möbius strip) cannot be turned.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Read a triangle mesh: STL, OBJ or PLY, welded, in metres, without faces that have no area."""
+"""Read a triangle mesh: STL, OBJ or PLY, welded, in metres, without degenerate faces."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ _FARTHEST = 1e9
 
 
 class SurfaceError(ElastocalError, ValueError):
-    """A tooling surface that cannot be used: unreadable mesh, no faces, empty region."""
+    """Error of a tooling surface: unreadable mesh, no faces, empty region."""
 
 
 @brief_repr
@@ -34,7 +34,7 @@ class TriangleMesh:
     degenerate: int = 0
     """Faces without area that were left out."""
     duplicate: int = 0
-    """Faces that stood twice, either way round, and were left out the second time."""
+    """Repeated faces, in either winding, which were left out."""
 
 
 def read_mesh(path: Path, unit: float) -> TriangleMesh:
@@ -69,7 +69,7 @@ def read_mesh(path: Path, unit: float) -> TriangleMesh:
 
 
 def weld(vertices: FloatArray, faces: IndexArray, what: str) -> TriangleMesh:
-    """Return a mesh whose coincident vertices are one and whose faces all have an area.
+    """Return a mesh with merged coincident vertices and without degenerate faces.
 
     Parameters
     ----------

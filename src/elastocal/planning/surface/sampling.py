@@ -54,7 +54,7 @@ def sample_uniform(surface: Surface, count: int, rng: Generator) -> SurfacePoint
 
 
 def sample_blue_noise(surface: Surface, count: int, rng: Generator) -> SurfacePoints:
-    """Return points that keep their distance from one another, in all other ways random.
+    """Return random points that keep a distance from one another.
 
     Weighted sample elimination over five times as many uniform points; see
     `_eliminate`. Parameters and errors: see `sample_uniform`.
@@ -131,7 +131,7 @@ def _eliminate(position: FloatArray, normal: FloatArray, count: int, area: float
     Returns
     -------
     ndarray of int, shape (count,)
-        Ascending; all points when there are no more than ``count``.
+        Ascending; all points if there are at most ``count``.
     """
     total = len(position)
     if total <= count:

@@ -1,7 +1,7 @@
 """The tooling surface S of the paper (2.2): triangles in base, their normals and their borders.
 
-Faces hang together over edges; where an edge is open, shared by more than two faces or a crease,
-a smooth patch of the surface ends.
+Faces are connected over edges; a smooth patch of the surface ends where an edge is open, shared by
+more than two faces, or a crease.
 """
 
 import math
@@ -22,7 +22,7 @@ from elastocal.planning.surface.mesh import SurfaceError, TriangleMesh, read_mes
 from elastocal.results import brief_repr
 
 CREASE_ANGLE = math.radians(30.0)
-"""Normals of neighbouring faces further apart than this meet in a crease, by default.
+"""Angle between the normals of adjacent faces above which they meet in a crease, by default.
 
 A tessellated dome has a few degrees between its faces, a machined edge 45° and more.
 """
@@ -66,7 +66,7 @@ class SurfacePoints(Rows):
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The edges of a mesh. Half-edge ``3 f + k`` runs from corner k of face f to the next one."""
+    """Edges of a mesh. Half-edge ``3 f + k`` runs from corner k of face f to the next one."""
 
     of_half_edge: IndexArray
     """Edge number of each half-edge, shape (3 face,)."""
@@ -87,7 +87,7 @@ class Surface:
 
     name: str
     mesh: TriangleMesh
-    """In base, in m; faces wound alike."""
+    """Mesh in base, in m; faces of consistent winding."""
     crease_angle: float
     """In rad."""
     T_base_surface: FloatArray
@@ -144,14 +144,14 @@ class Surface:
         """Smooth normals at the corners of the faces, shape (face, 3, 3); not over creases.
 
         The angle-weighted mean ``n = Σ α_i n_i / |Σ α_i n_i|`` over the faces i at the corner that
-        smooth edges join, α_i their angles at the vertex; independent of how a flat part is cut
-        into triangles.
+        smooth edges join, α_i their angles at the vertex; independent of the triangulation of a
+        flat part.
 
         Source: G. Thürmer, C. A. Wüthrich, "Computing vertex normals from polygonal facets",
         Journal of Graphics Tools 3(1), 1998.
         """
         corners, smooth = self.mesh.vertices[self.mesh.faces], self._smooth
-        # Corners at one vertex are of one group when their faces are joined by smooth edges there.
+        # Corners at one vertex are in one group if smooth edges join their faces there.
         following = smooth + np.where(smooth % 3 == 2, -2, 1)
         links = np.stack([smooth.T, following[:, ::-1].T], axis=2).reshape(-1, 2)
         count, groups = _parts(links, 3 * len(corners))
@@ -193,7 +193,7 @@ class Surface:
 
     @cached_property
     def signed_volume(self) -> float:
-        """Volume in m³ that the faces bound; negative when a closed mesh is inside out."""
+        """Volume in m³ that the faces enclose; negative if a closed mesh is inside out."""
         corners = self.mesh.vertices[self.mesh.faces] - self.mesh.vertices.mean(axis=0)
         return float(np.linalg.det(corners).sum() / 6.0)
 
@@ -312,10 +312,10 @@ def _edges_of(faces: IndexArray) -> Edges:
 
 
 def _wound_alike(faces: IndexArray) -> tuple[IndexArray, int]:
-    """Return the faces with one sense of winding a connected part, and how many were turned.
+    """Return the faces with one winding for each connected part, and the number of reversed ones.
 
-    The sense that most faces of a part have is kept. A part that has no consistent winding (a
-    Möbius strip) keeps some edges where it changes.
+    The winding of most faces of a part is kept. A part that has no consistent winding (a Möbius
+    strip) keeps some edges where it changes.
 
     Parameters
     ----------

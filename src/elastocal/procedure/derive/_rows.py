@@ -1,7 +1,7 @@
 """From the readings of a run to the rows of its dataset: each load against its reference.
 
 Displacements count from the reference of the pose, which is unloaded or in light contact; forces
-from the unloaded sensor, whichever it is.
+count from the unloaded sensor in both cases.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ class LoadValues:
     marker_displacement: FloatArray
     """Shape (3,), in m; NaN of a press that no station saw."""
     marker_sigma: FloatArray
-    """Shape (3,), in m; likewise."""
+    """Shape (3,), in m."""
     force: FloatArray
     """Force on the robot, shape (3,), in N."""
     moment: FloatArray
@@ -50,7 +50,7 @@ class LoadRow:
     note: str
     """Why it is not ok."""
     numbers: LoadValues | None
-    """None where something that they need is missing."""
+    """None where an input is missing."""
 
 
 def load_rows(
@@ -129,7 +129,7 @@ def _press(
 
 
 def _unseen(pose: PoseReadings, load: Reading) -> _LoadAndReference | None:
-    """Return load and reference of a marker that nobody saw; None where they are not known."""
+    """Return load and reference of an unseen marker; None where they are unknown."""
     reference = None if pose.zero is None else pose.zero.tool
     tare = None if pose.reference is None else pose.reference.tool
     if load.tool is None or reference is None or tare is None:
@@ -182,7 +182,7 @@ def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: SensorLoad) -> Lo
 
 
 class UnloadedReferences(NamedTuple):
-    """Where the displacements of each pose count from; NaN where that is not known."""
+    """References of the displacements of each pose; NaN where unknown."""
 
     q: FloatArray
     """Joints there, shape (pose, joint), in rad or m."""
@@ -195,7 +195,7 @@ class UnloadedReferences(NamedTuple):
 def unloaded_references(
     poses: Sequence[PoseReadings], labels: Sequence[int], sensor: SensorLoad
 ) -> UnloadedReferences:
-    """Return where the displacements of poses, given by their labels, count from."""
+    """Return the references of the displacements of poses, given by their labels."""
     found = {
         pose.pose: (pose.zero.tool, pose.reference.tool)
         for pose in poses

@@ -9,16 +9,16 @@ of the point at the lever arm ``r`` that moves rigidly with its tool frame,
     controller_displacement = (p_tcp + R_tcp r) - (p_tcp,0 + R_tcp,0 r).
 
 Their difference is the elastic deflection of the marker, which the marker's own Jacobian explains
-(docs/explanation/registration.md). A press that gave no reading keeps its force and joints, and
-its place in time: friction felt it. Presses of an attempt that failed are left out: the arm was
-retracted by a free motion after them, and the reference was read anew.
+(docs/explanation/registration.md). A press without a reading keeps its force and joints, and its
+position in time, since it changed the state of friction. Presses of a failed attempt are left out:
+a free motion retracted the arm after them, and the reference was read again.
 
-An error of ``R_base_tracker`` by an angle turns the marker's displacement by it: 1 mrad makes 1 µm
-of each millimetre; the tracker's place does not enter at all.
+An angular error of ``R_base_tracker`` rotates the marker's displacement: 1 mrad gives 1 µm per
+millimetre; the tracker's position does not enter.
 
-Sum up what was found on the way to a dataset, and warn of what a person should know of it.
+The summary collects the findings, with warnings for the user.
 
-What the summary of a run may warn of.
+The kinds of warnings are declared here.
 """
 
 import json
@@ -181,7 +181,7 @@ _LARGE_ROTATION = 5e-3
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class RunFindings:
-    """All that was found on the way to the dataset."""
+    """All findings on the way to the dataset."""
 
     poses: Sequence[PoseReadings]
     rows: Sequence[LoadRow]
@@ -291,7 +291,7 @@ def _tool(tool: SensorLoad, found: ToolEstimate, weighed: Sequence[int]) -> summ
 
 
 def _drift(poses: Sequence[PoseReadings]) -> summary.DriftSummary:
-    """Return how far the sensor is from its tare when the tool is free again, pose by pose."""
+    """Return the sensor's deviation from its tare when the tool is free again, by pose."""
     found = []
     for pose in poses:
         before = pose.reference.tool if pose.reference else None
@@ -368,7 +368,7 @@ def _vector(values: FloatArray) -> summary.Vector:
 
 
 def _number(value: float) -> summary.Number:
-    """Return a number, or None where there is none: JSON has no NaN."""
+    """Return a number, or None if it is not finite: JSON has no NaN."""
     return value if np.isfinite(value) else None
 
 
@@ -493,7 +493,7 @@ class CommittedRun:
     cell: Cell
     plan: PlanResult
     poses: tuple[PoseReadings, ...]
-    """In the order of time, the last one of each."""
+    """Poses in the order of time, the last attempt of each."""
     signs: tuple[Finding, ...]
     """Signs that the journal has lost its end; see `signs_of_a_cut`."""
 
@@ -507,7 +507,7 @@ class MeasuredArm:
     urdf: str
     """With the tool's mass."""
     gravity: tuple[float, float, float] | None = None
-    """Acceleration of gravity in base, in m/s²; None: the base stands upright."""
+    """Acceleration of gravity in base, in m/s²; None: the base is upright."""
     conditioned: bool = False
     """Whether a full press went before each reference."""
     check: str | None = None
@@ -515,7 +515,7 @@ class MeasuredArm:
 
 
 def read_run(run: Path) -> CommittedRun:
-    """Return the poses that a run has committed, its files held against their SHA-256.
+    """Return the poses that a run has committed, its files verified by their SHA-256.
 
     Parameters
     ----------
@@ -595,7 +595,7 @@ def derive_run(run: Path, sensor: SensorLoad | None = None, tool: Path | None = 
 def write_derived(run: Path, derived: DerivedRun) -> DerivedRun:
     """Write ``dataset.nc`` and ``summary.json`` of a run, each whole or not at all.
 
-    What is returned states in its summary the hash of the dataset's file.
+    The summary of the returned object states the hash of the dataset's file.
 
     Raises
     ------
@@ -667,7 +667,7 @@ def measured_arm(cell: Cell) -> MeasuredArm:
 
 
 def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
-    """Return one log a pose, the last one of each."""
+    """Return one log for each pose, the last one."""
     latest = {log.pose: log for log in logs}
     return [log for log in logs if latest[log.pose] is log]
 
@@ -700,7 +700,7 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
 
 
 def run_provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
-    """Return where the data of a run come from, as its dataset says."""
+    """Return the provenance of a run's data, as its dataset states it."""
     corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
     return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
 

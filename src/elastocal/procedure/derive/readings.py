@@ -5,7 +5,7 @@ a first-order autoregressive process (Bayley and Hammersley 1946),
 
     sigma_mean = s sqrt(1 / n) sqrt((1 + r) / (1 - r)),
 
-with ``r`` cut off below at 0; a sensor's own filter makes samples that are not independent.
+with ``r`` at least 0; a sensor's own filter correlates its samples.
 """
 
 from collections.abc import Sequence
@@ -187,11 +187,11 @@ class PoseReadings:
 
     log: PoseLog
     reference: Reading | None
-    """The first unloaded window; None when there is none."""
+    """The first unloaded window; None if there is none."""
     loads: tuple[Reading, ...]
     """One a load case, in the order in which they were applied."""
     released: Reading | None
-    """A later unloaded window, after the loads; None when there is none."""
+    """A later unloaded window, after the loads; None if there is none."""
     light: Reading | None = None
     """The reference in light contact; None: the reference is the unloaded one."""
 
@@ -311,7 +311,7 @@ def marker_readings(
 
 
 def robot_errors(robot: Robot, q: FloatArray, gravity: FloatArray, lever: FloatArray) -> FloatArray:
-    """Return how a robot's likely errors move the marker, shape (pose, 3, error), in m.
+    """Return the marker's displacement by likely errors of a robot, shape (pose, 3, error), in m.
 
     Columns, each by one standard deviation: the offset of each joint; where the robot's link
     masses are known, its sag under gravity; and for each joint the three shifts and two tilts of

@@ -42,7 +42,7 @@ def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record:
     Raises
     ------
     DatasetError
-        If a name or a number of cell or plan could not stand in the dataset.
+        If a name or a number of cell or plan is not allowed in the dataset.
     ProcedureError
         If the cell has no sensor.
     """

@@ -1,7 +1,7 @@
-"""The summary of a run, ``summary.json``: what was found on the way to its dataset.
+"""The summary of a run, ``summary.json``: findings on the way to its dataset.
 
-Numbers are in SI units; the unit stands in the key where it is not that of a length in m, an angle
-in rad, a time in s. None stands for a number that is not known.
+Numbers are in SI units; the key states the unit where it is not that of a length in m, an angle in
+rad, a time in s. None marks an unknown number.
 """
 
 from pathlib import Path
@@ -69,7 +69,7 @@ class StationSummary:
 
 @record()
 class MoveSummary:
-    """A station that stood elsewhere from a pose on."""
+    """A station that moved between two poses."""
 
     station: str
     from_pose: int
@@ -98,7 +98,7 @@ class RegistrationSummary:
     moves: tuple[MoveSummary, ...]
     blunders: tuple[Blunder, ...]
     detectable_move: Number = None
-    """Smallest jump of a station half way that would have been found, in m; see
+    """Smallest jump of a station midway that would have been found, in m; see
     `elastocal.procedure.registration.Registration`."""
 
 
@@ -156,7 +156,7 @@ class ToolSummary:
 
 @record()
 class DriftSummary:
-    """How far the sensor was from its tare when the tool was free again, at the worst pose."""
+    """Deviation of the sensor from its tare when the tool was free again, at the worst pose."""
 
     released_windows: int
     largest_N: Number
@@ -230,10 +230,10 @@ class RunSummary(Result):
     attempts: AttemptSummary
     times: TimeSummary
     warnings: tuple[Finding, ...]
-    """What a person should know of it; sentences alone in files of version 1."""
+    """Warnings for the user; sentences alone in files of version 1."""
     lines: tuple[LineCounts, ...] = ()
-    """What was counted on the lines of the devices, all sessions together; none of simulated ones,
-    and of runs before it was."""
+    """Counts on the lines of the devices, over all sessions; none for simulated devices and in
+    older runs."""
     dataset_sha256: str = ""
     """SHA-256 of the file ``dataset.nc`` that it was written with; empty before it was."""
 

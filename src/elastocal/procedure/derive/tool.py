@@ -1,9 +1,9 @@
-"""The tool's weight: taken off each reading, estimated from a run, and watched for a change.
+"""The tool's weight: removed from each reading, estimated from a run, and tested for a change.
 
-How a sensor reads, and how a reading becomes the wrench on the robot, is in
-`elastocal.cell.sensor`, which the compensator takes its numbers from, too. The unloaded reference
-of the same pose is the tare: with almost the same rotation it takes bias and weight away, and what
-the weight turns by between the two is taken away by the cell file's mass.
+The sensor's equations, from reading to wrench on the robot, are in `elastocal.cell.sensor`, which
+the compensator uses, too. The unloaded reference of the same pose is the tare: at almost the same
+orientation it removes bias and weight; the cell file's mass removes the small change of the
+weight's direction between the two.
 
 `estimate_tool` finds mass, centre of mass, bias and drift by the unloaded references of a run. With
 a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases and drifts:
@@ -11,13 +11,12 @@ a bias that drifts linearly they are linear in the mass, ``h = mass c``, biases 
     F_i = R_i^T g mass + b + d (t_i - t_mean),
     M_i = -[R_i^T g]x h + b_m + d_m (t_i - t_mean).
 
-Ordinary least squares with intervals by Student's t; what the orientations do not tell apart is
-NaN, and named. What a sensor misreads by cross-talk and gain turns with the tool as its weight
-does: no residual shows it, so the intervals hold it besides, each entry of the matrix thought to be
-off by a hundredth of the ranges of its axes. `tool_change` asks whether one mass fits the whole
-run: a step of it at some reading is one more unknown; the best place for it is the one that takes
-most off the sum of squares, and an F test, with the number of places allowed for, says whether that
-is more than chance.
+Ordinary least squares with intervals by Student's t; undetermined values are NaN, and named. The
+error of a sensor by cross-talk and gain turns with the tool as its weight does, so no residual
+shows it; the intervals include it, with an assumed error of each entry of the matrix of a hundredth
+of the ranges of its axes. `tool_change` tests whether one mass fits the whole run: a step at some
+reading is one more unknown; the best reading is the one that reduces the sum of squares most, and
+an F test, corrected for the number of readings, decides on its significance.
 """
 
 from dataclasses import dataclass, replace
@@ -242,7 +241,7 @@ class ToolEstimate:
     moment_scatter: float
     """The same of the moment, in N·m."""
     undetermined: tuple[str, ...]
-    """Names of what the orientations and times do not tell apart."""
+    """Names of the unknowns that orientations and times do not determine."""
     change: ToolChange | None = None
     """Set where one mass does not fit the whole run: mass, centre and biases are then those of no
     tool."""
@@ -315,7 +314,7 @@ def _misreadings(weight: FloatArray, ranges: FloatArray) -> FloatArray:
 class _Solution(Interval):
     scatter: float
     inverse: FloatArray
-    """From readings to the solution, shape (unknown, row)."""
+    """Matrix from readings to the solution, shape (unknown, row)."""
     free: int
 
     def doubted(self, misread: FloatArray) -> "_Solution":

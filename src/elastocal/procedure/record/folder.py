@@ -67,7 +67,7 @@ class RunFolder:
 
     @property
     def signature(self) -> Path:
-        """The signature of the journal; there where somebody vouches for the run."""
+        """Signature of the journal, if the run is signed."""
         return self.path / "signature.json"
 
     def stream(self, pose: int, attempt: int) -> Path:
@@ -80,10 +80,10 @@ class RunFolder:
 
 
 def cell_path_in_run(cell: Cell) -> str:
-    """Return where the cell file goes in the run's folder ``cell``.
+    """Return the path of the cell file in the run's folder ``cell``.
 
-    Its own folder there stands to those of the files that it names as in the original, so that
-    the copy reads like it.
+    Relative paths to the files that it names are the same as in the original, so that the copy can
+    be read in the same way.
     """
     return os.path.relpath(_absolute(cell.path), _root(cell))
 
@@ -190,7 +190,7 @@ def make_folder(folder: Path) -> None:
 
 
 def read_copies(folder: RunFolder, record: RunRecord) -> tuple[Cell, PlanResult]:
-    """Return the cell and the plan that a run was made with, as they stand in its folder.
+    """Return the cell and the plan of a run, from the copies in its folder.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Which run a journal belongs to, and which runs of its cell were before it.
+"""The run of a journal, and the earlier runs of its cell.
 
-Beside the folders of runs stands `HISTORY`, to which each run adds a line when it begins. A run
-takes into its own record what it finds there, so that its signature covers it, and so that neither
-a run that is put forward as the newest nor one that was measured again passes unseen.
+The file `HISTORY` is beside the folders of runs; each run adds a line to it when it begins. A run
+copies the earlier lines into its own record, so that its signature covers them. This reveals a run
+that is wrongly presented as the newest, and one that was repeated.
 """
 
 import contextlib
@@ -34,7 +34,7 @@ class EarlierRun(StrictModel):
 
 
 class RunRecord(StrictModel):
-    """Which run a journal belongs to."""
+    """Identity of the run of a journal."""
 
     schema_name: str = JOURNAL_SCHEMA
     elastocal: str
@@ -53,15 +53,17 @@ class RunRecord(StrictModel):
     """SHA-256 of the cell file: the fingerprint leaves out by what a result is judged. None in
     journals before it was written."""
     signer: str | None = None
-    """Public key of who signs it; None: nobody does."""
+    """Public key of the signer; None: not signed."""
     stated: dict[str, str] = Field(default_factory=dict)
-    """What was stated for the certificate when the run began, by key: who, where, serials."""
+    """Statements for the certificate at the beginning of the run, by key: operator, place, serial
+    numbers."""
 
     files_sha256: dict[str, str] = Field(default_factory=dict)
     """SHA-256 of every file that was copied into the run's folder, by its path there; empty in
     journals before it was written."""
     run_number: int | None = None
-    """The how manieth run of its cell by the history beside it; None in journals of before."""
+    """Ordinal number of this run among those of its cell, by the history beside it; None in older
+    journals."""
     earlier_runs: tuple[EarlierRun, ...] = ()
     """The runs of its cell before it, the last at the end."""
 
@@ -80,7 +82,7 @@ class RunRecord(StrictModel):
 
     @model_serializer(mode="wrap")
     def _schema_first(self, rest: SerializerFunctionWrapHandler) -> dict[str, object]:
-        # An entry leaves out what is at its default; the schema must be there all the same.
+        # An entry leaves out default values, but must state the schema.
         return {"schema_name": self.schema_name, **rest(self)}
 
 
@@ -111,7 +113,7 @@ def read_history(folder: Path, cell: str) -> tuple[HistoryEntry, ...]:
 
 
 def note_run(folder: Path, cell: str, record: RunRecord) -> None:
-    """Add a run to the history in a folder; where nothing can be written, there is none."""
+    """Add a run to the history in a folder; without effect where nothing can be written."""
     entry = HistoryEntry(run=record.identity, cell=cell, plan=record.plan, started=record.started)
     with contextlib.suppress(OSError), (folder / HISTORY).open("ab") as file:
         file.write(entry.model_dump_json().encode() + b"\n")

@@ -1,8 +1,8 @@
-"""Journal of a run: JSON lines, only ever appended to, on the disk before anything moves on.
+"""Journal of a run: JSON lines that are only appended, each on the disk before the run goes on.
 
-An entry that is on the disk is complete: a line that a crash has torn is known by its missing end
-and cut off before the next entry is written. Each line ends with a checksum of itself and of the
-line before it, so that one that a disk or a hand has changed is known, and one that is gone.
+Entries on the disk are complete: a line that a crash has truncated lacks its end and is removed
+before the next entry is written. Each line ends with a checksum of itself and of the line before
+it, which reveals changed and missing lines.
 """
 
 import contextlib
@@ -54,7 +54,7 @@ class PoseLog(StrictModel):
     pose: int
     """Id in the plan."""
     attempt: int
-    """From 1; earlier attempts failed and were given up."""
+    """Number of the attempt, from 1; earlier attempts failed and were given up."""
     streams: str
     """Name of the file with the raw streams, in the run's folder ``streams``."""
     windows: tuple[Window, ...]
@@ -74,7 +74,7 @@ class Event(Enum):
     RESUME = "resume"
     """A person let the run go on."""
     BEGIN = "begin"
-    """Written before the devices are told to move or press."""
+    """Written before the devices receive a command to move or press."""
     END = "end"
     """Written after that is over."""
     FAULT = "fault"
@@ -119,13 +119,13 @@ class Entry(StrictModel):
     """Joint positions of a move in rad or m; name of the load case of a hold; distance of a
     straight motion in m."""
     text: str = ""
-    """For people: what went wrong, or how a reading came about."""
+    """Text for people: what went wrong, or the origin of a reading."""
     run: RunRecord | None = None
     log: PoseLog | None = None
     streams_sha256: str | None = None
     """SHA-256 of the file with the raw streams of a finished pose."""
     lines: tuple[LineCounts, ...] = ()
-    """What was counted on the lines of the devices, at the end of a session."""
+    """Counts on the lines of the devices, at the end of a session."""
 
 
 Sync = Callable[[int], None]
@@ -199,7 +199,7 @@ class Journal:
             rest = line
             while rest:  # A disk that is full says so when the rest is written.
                 rest = rest[os.write(self._file, rest) :]
-            # Counted before the sync: should that be interrupted, the line is there all the same.
+            # Counted before the sync: if that is interrupted, the line is written nevertheless.
             self._count, self._size = self._count + 1, self._size + len(line)
             self._check = check
             self._sync(self._file)
@@ -249,7 +249,7 @@ def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
 def _read(path: Path) -> tuple[tuple[Entry, ...], int, bytes]:
     """Return the complete entries, the bytes that they take, and the checksum of the last.
 
-    Journals of before have no checksums, up to where a later version went on with them.
+    Older journals have no checksums, up to the line where a later version continued them.
     """
     data = read_bytes(path)
     whole = data.rfind(b"\n") + 1

@@ -70,7 +70,7 @@ _DAMAGE = (
     struct.error,
     zstandard.ZstdError,
 )
-"""What the libraries raise for damage; to a user all of it means the same."""
+"""Exceptions of the libraries for damage; for a user all of them mean the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -396,9 +396,9 @@ SAME_TIME = 1e-6
 _METADATA = "elastocal"
 """Name of the metadata record that carries the schema."""
 _NANOSECONDS = 1e9
-"""In a second."""
+"""Nanoseconds in a second."""
 _BAD_JSON = (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError)
-"""What JSON of another shape, of other types, of endless numbers or brackets raises."""
+"""Exceptions for JSON of another shape, of other types, or with endless numbers or brackets."""
 
 _MOST_VALUES = Limit("ELASTOCAL_MAX_STREAM_VALUES", 20_000_000, "values")
 """Values of a topic; ten times as many as of a document: an hour of a pose takes 3 million."""

@@ -1,4 +1,4 @@
-"""Tracker registration: where the stations stand, where the marker sits, what has moved."""
+"""Tracker registration: positions of the stations, position of the marker, and what has moved."""
 
 import lazy_loader
 

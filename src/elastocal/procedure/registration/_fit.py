@@ -1,16 +1,16 @@
 """Least squares of stations, lever arm and robot errors (Gauss-Newton).
 
-Reading ``i`` of a group ``g`` (a station between two moves) says
+Reading ``i`` of a group ``g`` (a station between two moves) satisfies
 
     R_g p_i + t_g = p_tcp,i + R_tcp,i r + B_i b,
 
 with the marker ``p_i`` in the tracker's frame, the lever arm ``r`` and the robot's own errors ``b``
-(offsets of its joints, gravity sag), whose effects on the marker are the columns of ``B_i``.
-``r`` has the cell file's value as a weak prior, ``b`` is thought to be 0 with standard deviation
-``k``. Without ``b`` those errors, smooth over the workspace, would look like stations that move.
-How large they are, and how large the scatter ``s`` is that has no shape at all, the readings tell:
-both are where the restricted likelihood of the residuals is largest (Patterson and Thompson 1971),
-with weak priors that few poses fall back on.
+(offsets of its joints, gravity sag), whose effects on the marker are the columns of ``B_i``. ``r``
+has the cell file's value as a weak prior, ``b`` has the prior 0 with standard deviation ``k``.
+Without ``b`` those errors, smooth over the workspace, would look like stations that move. Their
+size ``k`` and the size ``s`` of the unstructured scatter are estimated from the readings, by the
+maximum of the restricted likelihood of the residuals (Patterson and Thompson 1971), with weak
+priors that decide for few poses.
 """
 
 import math
@@ -60,7 +60,7 @@ class UnloadedReadings:
         )
 
     def expected(self, lever: FloatArray) -> FloatArray:
-        """Return where the marker is by the controller, in base, shape (reading, 3), in m."""
+        """Return the marker's position by the controller, in base, shape (reading, 3), in m."""
         T = self.T_base_tcp
         return T[:, :3, 3] + T[:, :3, :3] @ lever
 
@@ -71,8 +71,8 @@ class UnloadedReadings:
 
 
 _ROTATION_SIGMA = 0.02
-"""Largest standard deviation of a rotation that is of use, in rad: it turns a displacement of
-1 mm into one that is off by 20 µm, as much as a tracker's own noise."""
+"""Largest usable standard deviation of a rotation, in rad: it gives a displacement of 1 mm an error
+of 20 µm, as much as a tracker's own noise."""
 
 
 def determined(position: FloatArray, scatter: float) -> bool:
@@ -336,7 +336,7 @@ def _likeliest(result: Fit, readings: UnloadedReadings, start: FloatArray) -> Fl
     plain = np.repeat(1.0 / result.weight, 3)[:, None]
     columns = plain * np.column_stack([result.A[:rows], result.e[:rows]])
     columns[:, free + 3 : free + 3 + errors] /= result.size
-    # Priors count from their own means, not from where the fit stands.
+    # Priors count from their own means, not from the present state of the fit.
     off = np.zeros(columns.shape[1] - 1)
     off[free : free + 3] = result.e[rows : rows + 3] * LEVER_SIGMA
     off[free + 3 :] = result.errors

@@ -1,16 +1,15 @@
-"""Register the stations of a run: fit, look for what moved, part it there, fit again.
+"""Register the stations of a run: fit, find moves, split the readings there, fit again.
 
-A station that moved, or a reading that is a blunder, is one hypothesis more at a time
+A station that moved, or a blunder, is added as one hypothesis at a time
 (`elastocal.procedure.registration.register`). All hypotheses together cost as much as the fit:
 linear in the number of poses.
 
 Hypotheses of a registration: which station moved, which reading is a blunder.
 
-Each adds columns to the linear equations of a fit: six for a station that stood elsewhere from a
-pose on, three for a reading of its own. How much of the sum of squares they take away is judged by
-the F distribution, against the scatter and the errors of the robot that are really there, and by
-Bonferroni's factor for the number of hypotheses that were tried (Cook and Weisberg 1982, section
-2.2.2, the mean-shift outlier model).
+Each adds columns to the linear equations of a fit: six for a station that moved at a pose, three
+for a blunder. The reduction of the sum of squares is judged by the F distribution, relative to the
+estimated scatter and errors of the robot, with Bonferroni's factor for the number of hypotheses
+that were tried (Cook and Weisberg 1982, section 2.2.2, the mean-shift outlier model).
 """
 
 import math
@@ -41,9 +40,9 @@ from elastocal.results import brief_repr
 _CHANCE = 1e-4
 """Largest probability that a run without any move or blunder is said to have one."""
 _LEAST = 0.1e-3
-"""Smallest shift of the marker that is called a move or a blunder, in m. A move of that
-size half way that nobody sees turns the registration by 0.2 mrad: 0.2 µm of each millimetre of
-displacement (docs/explanation/registration.md)."""
+"""Smallest shift of the marker that is called a move or a blunder, in m. An undetected move of that
+size midway rotates the registration by 0.2 mrad: 0.2 µm per millimetre of displacement
+(docs/explanation/registration.md)."""
 _IMPROBABLE = -300.0
 """Least logarithm of a probability: smaller ones are no numbers."""
 _DEPENDENT = 1e-12
@@ -107,7 +106,7 @@ def _judge(hypothesis: _Hypothesis, fit: Fit, tried: int) -> Finding | None:
 
 
 def _blunders(readings: UnloadedReadings, fit: Fit) -> Iterator[_Hypothesis]:
-    """Each reading may not belong to the others, if they determine the station without it."""
+    """Yield the hypothesis that a reading is a blunder, if the others determine the station."""
     q, e = _of_readings(np.linalg.qr(fit.A)[0], readings), _of_readings(fit.e, readings)[..., 0]
     for number in range(len(fit.R)):
         mine = np.flatnonzero(fit.group == number)
@@ -120,7 +119,7 @@ def _blunders(readings: UnloadedReadings, fit: Fit) -> Iterator[_Hypothesis]:
 
 
 def _moves(readings: UnloadedReadings, fit: Fit) -> Iterator[_Hypothesis]:
-    """Each station may have stood elsewhere from any reading on that parts it into two."""
+    """Yield the hypothesis that a station moved at a reading, where both parts determine it."""
     q, e = _of_readings(np.linalg.qr(fit.A)[0], readings), _of_readings(fit.e, readings)
     plain = motion_columns(centred_points(fit.R, readings.position, fit.group))
     columns = plain * fit.weight[:, None, None]
@@ -175,7 +174,7 @@ class StationFit:
 
 @dataclass(frozen=True)
 class StationMove:
-    """A station that stood elsewhere from some pose on."""
+    """A station that moved at some pose."""
 
     station: str
     before: int
@@ -183,11 +182,11 @@ class StationMove:
     pose: int
     """First pose that it measured from the new one."""
     distance: float
-    """How far the marker seems to have jumped, at the centre of the poses, in m."""
+    """Apparent jump of the marker, at the centre of the poses, in m."""
     distance_sigma: float
     """Standard deviation of it, the robot's likely errors included, in m."""
     angle: float
-    """How far the station turned, in rad."""
+    """Angle by which the station turned, in rad."""
     improbability: float
     """Decimal logarithm of the probability that scatter and errors of the robot alone look like
     this anywhere in the run (F-test)."""
@@ -200,7 +199,7 @@ class Blunder:
     pose: int
     station: str
     distance: float
-    """How far the marker was from where it had to be, in m."""
+    """Distance of the marker from its expected position, in m."""
 
 
 @brief_repr
@@ -222,22 +221,22 @@ class Registration:
     """Scatter that is left in one coordinate when station, lever arm and the robot's likely
     errors are fitted, tracker noise taken out, in m."""
     detectable: float
-    """Smallest jump half way through the poses of the station with most of them that would have
-    been found in these readings along each axis of the tracker, of 0.2, 0.3, 0.5, 1, 2, 3 and
-    5 mm, in m; NaN where none would."""
+    """Smallest jump midway through the poses of the station with most of them that would have been
+    found in these readings along each axis of the tracker, of 0.2, 0.3, 0.5, 1, 2, 3 and 5 mm, in
+    m; NaN where none would."""
     moves: tuple[StationMove, ...]
     blunders: tuple[Blunder, ...]
     unregistered: dict[str, str]
     """Stations without a transform, and why."""
 
     def station_of(self, station: str, pose: int) -> StationFit | None:
-        """Return where a station stood at a pose; None where that is not known."""
+        """Return the transform of a station at a pose; None where it is unknown."""
         stood = (each for each in self.stations if each.station == station and pose in each.poses)
         return next(stood, None)
 
 
 _JUMPS = (0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3)
-"""Jumps that are planted to tell which would have been found, in m."""
+"""Simulated jumps that show which ones would have been found, in m."""
 _MOST_FINDINGS = 0.2
 """Largest share of the readings that may be called moves or blunders."""
 _UNDETERMINED = 0.5
@@ -245,15 +244,15 @@ _UNDETERMINED = 0.5
 
 
 def register(readings: UnloadedReadings, lever_prior: FloatArray) -> Registration:
-    """Return where the stations stand and where the marker sits.
+    """Return the transforms of the stations and the position of the marker.
 
     Parameters
     ----------
     readings : UnloadedReadings
         In the order of time.
     lever_prior : ndarray, shape (3,)
-        Marker in the tcp frame by the cell file, in m. It is a weak prior, and the answer where
-        the orientations are too similar to tell.
+        Marker in the tcp frame by the cell file, in m. It is a weak prior, and the result where the
+        orientations are too similar.
 
     Returns
     -------
@@ -322,7 +321,7 @@ def _detectable(readings: UnloadedReadings, group: IndexArray, lever_prior: Floa
 
 
 def _unusable(readings: UnloadedReadings, station: str) -> str | None:
-    """Return why a station cannot be registered; None when it can."""
+    """Return why a station cannot be registered; None if it can."""
     position = readings.position[np.array(readings.station) == station]
     if len(position) < 3:
         return f"it saw {len(position)} of the 3 unloaded poses that its rotation needs"

@@ -1,8 +1,8 @@
 """State of one attempt at a pose, and the motions that it is made of.
 
-A motion (joint move, straight move, force release) begins with one cycle that looks at the arm,
-journals what it tells the arm before it does, and waits under the watchdog until the arm says that
-it has got there, never longer than a limit.
+A motion (joint move, straight move, force release) begins with one cycle that checks the arm. It
+journals the command before it is sent, and waits under the watchdog until the arm reports the end,
+at most for a limited time.
 """
 
 from dataclasses import dataclass, field
@@ -43,9 +43,9 @@ class Attempt:
     pose: PoseRecord
     station: str
     number: int
-    """From 1, over all sessions of the run."""
+    """Number of the attempt, from 1, over all sessions of the run."""
     legs: tuple[Joints, ...]
-    """Joint positions to pass on the way to the approach pose, which is the last."""
+    """Joint positions to pass on the path to the approach pose, which is the last."""
     streams: str
     """Name of the file with the raw streams."""
     step: Step = Step.MOVE
@@ -68,7 +68,7 @@ class Attempt:
     jump: SlideDetector | None = None
     """Along the normal, during the windows of the present load case."""
     location: ArmLocation = ArmLocation.BETWEEN_POSES
-    """Where the arm is left after a mistake in the program."""
+    """Position of the arm if the program fails."""
 
     @property
     def settings(self) -> RunSettings:
@@ -77,7 +77,7 @@ class Attempt:
 
     @property
     def line(self) -> ApproachLine:
-        """Straight way to the surface."""
+        """Straight line to the surface."""
         return ApproachLine.of_pose(self.pose, self.settings.procedure.travel_limit)
 
     @property
@@ -109,7 +109,7 @@ class Attempt:
 
     @property
     def noise(self) -> float:
-        """Force that is felt where there is none: noise, and the tool's own inertia, in N."""
+        """Force without contact: noise, and the inertia of the tool, in N."""
         return 2.0 * self.settings.procedure.force_spread
 
     @property
@@ -186,7 +186,7 @@ def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> Non
 
 
 def _adopt_position(supervisor: Supervisor) -> None:
-    """Let the arm take its place for the programmed one, if the tool is off the surface.
+    """Let the arm adopt its position as the programmed one, if the tool is off the surface.
 
     Raises
     ------
@@ -231,14 +231,14 @@ def retract_to(
     height: float,
     leaving: LeavingWatch | None = None,
 ) -> None:
-    """Go along a line's normal until a height above the expected contact, in m.
+    """Move along a line's normal to a height above the expected contact, in m.
 
     Parameters
     ----------
     supervisor, line, guard, height : Supervisor, ApproachLine, Guard, float
-        The cycle, the way, what must hold on it, and its end.
+        The cycle, the line, the conditions on it, and its end.
     leaving : LeavingWatch, optional
-        Refuses a force that grows on the way.
+        Refuses a force that grows during the retreat.
 
     Raises
     ------
@@ -318,7 +318,7 @@ def largest_force(seen: Snapshot) -> float:
 
 
 def is_idle(arm: ArmState) -> bool:
-    """Return whether the arm stands in position control."""
+    """Return whether the arm is at rest in position control."""
     return arm.motion is Motion.IDLE
 
 

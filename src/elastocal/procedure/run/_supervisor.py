@@ -1,9 +1,9 @@
-"""The supervision cycle: read every device, record what it says, let the watchdog judge it.
+"""The supervision cycle: read every device, record its state, let the watchdog judge it.
 
-The order within a cycle matters. Time passes first, so that what is read is news. Every device is
-read and recorded before anything is judged: the streams then hold what led to a fault. Only then
-may the watchdog refuse, and last somebody interrupt, so that a wish to stop hides neither a reading
-nor a fault.
+The order within a cycle matters. Time passes first, so that the readings are new. Every device is
+read and recorded before anything is judged, so that the streams contain the cause of a fault. Only
+then may the watchdog refuse, and an interruption comes last, so that it hides neither a reading nor
+a fault.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ class Observers:
     report: Callable[[Snapshot], None]
     """Called each cycle."""
     interrupted: Callable[[], bool]
-    """Whether somebody wants the run to stop."""
+    """Whether the run was asked to stop."""
     fault: Callable[[str], None] = lambda _: None
     """Called when a fault is seen, before anything is done about it."""
 
@@ -106,12 +106,12 @@ class Supervisor:
         self.restart_watching()
 
     def restart_watching(self) -> None:
-        """Give every device its time to say something, from now on."""
+        """Restart the time limits of all devices now."""
         self.watchdog.restart(self.now)
         self.pause()
 
     def pause(self) -> None:
-        """Say that until the next cycle nobody needs to watch: the arm stands off the surface."""
+        """Pause the supervision until the next cycle: the arm stands still, off the surface."""
         self._last_read = None
 
     def tare(self, force_sensor: FloatArray) -> None:
@@ -119,7 +119,7 @@ class Supervisor:
         self._tare = force_sensor
 
     def tell_fault(self, text: str) -> None:
-        """Let a person read a fault now: what follows may take long."""
+        """Report a fault at once, since the reaction may take long."""
         self._observers.fault(text)
 
     def feels_free(self) -> bool:
@@ -147,13 +147,13 @@ class Supervisor:
         return found
 
     def aim(self, station: str) -> None:
-        """Let a tracker station look for the marker."""
+        """Let a tracker station search the marker."""
         self.station = self.watchdog.station = station
         self.devices.metrology.look(station)
         self.watchdog.expect_points(self.now)
 
     def ask(self, what: str) -> bool:
-        """Have the marker measured, where that is a person's work; return whether it is."""
+        """Request a measurement of the marker if a person makes it; return whether one does."""
         metrology = self.devices.metrology
         if not isinstance(metrology, AskedMetrology):
             return False
@@ -161,12 +161,12 @@ class Supervisor:
         return True
 
     def cycle(self, guard: Guard) -> Snapshot:
-        """Let one cycle pass and return what the devices say.
+        """Let one cycle pass and return the readings of the devices.
 
         Raises
         ------
         FaultError
-            If something is wrong, or somebody wants the run to stop.
+            If the watchdog refuses a reading, or the run was asked to stop.
         DeviceError
             If a device does not answer.
         """
@@ -186,10 +186,10 @@ class Supervisor:
         return seen
 
     def arm_cycle(self) -> ArmState | None:
-        """Let one cycle pass and return what the arm says; None when it does not answer.
+        """Let one cycle pass and return the arm's state; None if it does not answer.
 
-        For the way off the surface after a fault: the other devices and the clock may be what is
-        out of order, so what they do changes nothing.
+        It is used for the retreat after a fault: the other devices and the clock may be the cause,
+        so they are ignored.
         """
         self.pause()
         with contextlib.suppress(*DEVICE_ERRORS):
@@ -206,7 +206,7 @@ class Supervisor:
         return None
 
     def _read_devices(self) -> Snapshot:
-        """Let one cycle pass and return what the devices say."""
+        """Let one cycle pass and return the readings of the devices."""
         self._pass_time()
         arm, wrenches, points = (
             self._read_arm(),
@@ -214,7 +214,7 @@ class Supervisor:
             self._read_metrology(),
         )
         force_tcp = (wrenches.force - self._tare) @ self._R_sensor_tcp
-        # What happens from here to the next cycle, nobody watches.
+        # The time from here to the next cycle is not supervised.
         self._last_read = now = self.devices.clock.now()
         return Snapshot(now, arm, wrenches, points, force_tcp)
 
@@ -246,7 +246,7 @@ class Supervisor:
     def wait(
         self, guard: Guard, done: Callable[[Snapshot], bool], limit: float, what: str
     ) -> Snapshot:
-        """Let cycles pass until something is done; return what was seen then.
+        """Let cycles pass until a condition holds; return the readings of that cycle.
 
         Raises
         ------

@@ -24,7 +24,7 @@ from elastocal.procedure.run.routes import ApproachLine
 from elastocal.procedure.run.steps import Fault, FaultError
 
 _LOOK_AGAIN = 1.0
-"""Time after which a tracker that has not found the marker is told again to look, in s."""
+"""Time after which a tracker without the marker is sent another search command, in s."""
 _MOST_LOOKED_AT = 20
 """Samples of a cycle that are looked at for a collision."""
 
@@ -87,12 +87,12 @@ class Watchdog:
         self._lost_at: float | None = None
         self._looked_at = -np.inf
         self.station: str | None = None
-        """Which station is to measure; None: any."""
+        """Station that is to measure; None: any."""
         self.breaks = 0
-        """How often the beam was found broken so far."""
+        """Number of breaks of the beam so far."""
 
     def restart(self, now: float) -> None:
-        """Give every device ``stale`` seconds to say something, from now on."""
+        """Give every device ``stale`` seconds from now to deliver data."""
         self._sensor_time = self._changed = now
         self.expect_points(now)
 
@@ -106,7 +106,7 @@ class Watchdog:
         return self._lost_at is None
 
     def check(self, seen: Snapshot, guard: Guard) -> bool:
-        """Refuse what is wrong; return whether the tracker should be told to look again.
+        """Refuse unsafe or missing data; return whether the tracker needs another search command.
 
         Raises
         ------
@@ -138,7 +138,7 @@ class Watchdog:
             if not math.isfinite(block.moment.sum()):
                 raise FaultError(Fault.SENSOR_FAULT, f"{block.source}: its moment is not finite")
             first = float(block.time[0])
-            # Samples of a time in which nobody watched, a disk that took long, are none too early.
+            # Samples from an unsupervised period, such as a slow disk access, are not too early.
             if not first >= self._last_sample - self._stale:
                 text = f"{block.source}: {first:.3f} s after {self._last_sample:.3f} s"
                 raise FaultError(Fault.CLOCK, text)
@@ -192,7 +192,7 @@ class Watchdog:
         if not math.isfinite(block.position.sum()):
             text = f"{block.source} is locked, but its positions are not finite"
             raise FaultError(Fault.TRACKER_FAULT, text)
-        # Another station may still deliver for a moment after it was told to leave off.
+        # Another station may deliver for a moment after the command to stop.
         late = now - self._looked_at > self._stale
         if late and self.station is not None and block.station != self.station:
             text = f"{block.source}: {block.station} measures, not {self.station}"

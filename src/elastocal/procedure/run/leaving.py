@@ -1,6 +1,6 @@
-"""What presses on the tool, measured, and how it leaves a surface: the force must not grow.
+"""Measured force on the tool, and its retreat from a surface: the force must not grow.
 
-What the arm remembers is not asked: a process that was killed has taken its memory with it.
+The state in the driver is not used, since a killed process has lost it.
 """
 
 import math
@@ -18,7 +18,7 @@ from elastocal.results import brief_repr
 _WRONG_WEIGHT = 0.35
 """Part of the weight that may be missing: a mass a quarter off, with a tool turned by 90 deg."""
 _STRAIGHT_TOLERANCE = 1e-3
-"""How near to its end a straight motion has come when it is over, in m."""
+"""Largest distance of a straight motion's end from its target, in m."""
 _BIAS = 0.1
 """Bias of a sensor that is let pass, as a part of the force limit."""
 
@@ -26,10 +26,10 @@ _BIAS = 0.1
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class ToolLoad:
-    """How to tell what presses on the tool from its weight."""
+    """Separation of a contact force from the tool's weight."""
 
     weight_base: FloatArray
-    """Weight of the tool, base, shape (3,), in N; zero where nobody has stated a mass."""
+    """Weight of the tool, base, shape (3,), in N; zero where no mass is stated."""
     R_tcp_sensor: FloatArray
     """Axes of the sensor in the tcp frame, shape (3, 3)."""
     force_limit: float
@@ -137,12 +137,13 @@ def leave_surface(
     watch: LeavingWatch,
     interrupted: Callable[[], bool],
 ) -> None:
-    """Retract an enabled arm along a way, base, shape (3,), in m, and wait until it is there.
+    """Retract an enabled arm by a vector, base, shape (3,), in m, and wait for the end.
 
     Parameters
     ----------
     devices : tuple
-        Arm, force and clock. Without a force nothing is watched: the speed then has to be low.
+        Arm, force and clock. Without a force sensor there is no supervision, and the speed must be
+        low.
     way : ndarray, shape (3,)
         Base, in m.
     speed : float
@@ -150,7 +151,7 @@ def leave_surface(
     watch : LeavingWatch
         Refuses a force that grows.
     interrupted : callable
-        Whether a person wants it to stop.
+        Whether a person asked to stop.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The ways of the arm: the line to each surface, the legs between HOME and the approach poses.
+"""Paths of the arm: the line to each surface, the legs between HOME and the approach poses.
 
 Legs are those of the plan, forwards and backwards, because only those were checked for collisions.
 Stops are numbered by the poses' ids: before the first pose and after the last one is HOME.
@@ -25,8 +25,8 @@ _AT_HOME = 0.01
 _ON_LEG = 0.02
 """A joint that is closer to a leg than this is on it, in rad or m."""
 _TILTED = 0.2
-"""A tool whose z axis is turned from the inward normal by more does not stand before that
-surface, in rad."""
+"""Angle between a tool's z axis and the inward normal, in rad, beyond which the tool does not
+belong to that surface."""
 _SAME_POSTURE = 0.5
 """Joints of one posture differ by less between approach pose and contact, in rad or m."""
 
@@ -34,14 +34,14 @@ _SAME_POSTURE = 0.5
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class ApproachLine:
-    """The straight way between approach pose and surface, along the normal."""
+    """Straight line between approach pose and surface, along the normal."""
 
     contact: FloatArray
     """Expected contact point in base, shape (3,), in m."""
     normal: FloatArray
     """Outward unit normal of the surface in base, shape (3,)."""
     travel_limit: float
-    """How far beyond the contact or aside is too far, in m."""
+    """Largest distance beyond the contact or sideways, in m."""
 
     @classmethod
     def of_pose(cls, pose: PoseRecord, travel_limit: float) -> "ApproachLine":
@@ -49,7 +49,7 @@ class ApproachLine:
         return cls(np.array(pose.tcp_position), np.array(pose.normal), travel_limit)
 
     def height(self, T_base_tcp: FloatArray) -> float:
-        """Return how far off the expected surface a tool frame is, in m; below it: negative."""
+        """Return the height of a tool frame above the expected surface, in m; negative below."""
         return float((T_base_tcp[:3, 3] - self.contact) @ self.normal)
 
     def aside(self, T_base_tcp: FloatArray) -> float:
@@ -109,7 +109,7 @@ def stop_joints(plan: PlanResult, stop: int) -> Joints:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class HomeRoute:
-    """How to get to HOME from where the arm stands."""
+    """Path to HOME from the present position of the arm."""
 
     retract_from: PoseRecord | None
     """Pose along whose normal the tool must go first."""
@@ -124,26 +124,26 @@ def home_route(
     travel_limit: float,
     likely: int | None = None,
 ) -> HomeRoute:
-    """Return the way to HOME, over legs that the arm may have come along.
+    """Return the path to HOME, over legs that the arm may have come along.
 
     Parameters
     ----------
     plan : PlanResult
         The plan.
     q : ndarray, shape (joint,)
-        Where the arm stands, in rad or m.
+        Present joint positions, in rad or m.
     T_base_tcp : ndarray, shape (4, 4)
         Its tool frame.
     travel_limit : float
-        How far the tool may be beyond the contact or aside, in m.
+        Largest distance of the tool beyond the contact or sideways, in m.
     likely : int, optional
-        The pose that the journal says the arm was at. Of several poses that the arm may stand
-        before it is the one; without it, the one whose line is nearest.
+        Pose of the arm by the journal. It decides among several possible poses; without it, the
+        pose with the nearest line is taken.
 
     Raises
     ------
     ProcedureError
-        If it stands neither at HOME, nor at a pose, nor on a leg between them.
+        If the arm is neither at HOME, nor at a pose, nor on a leg between them.
     """
     if float(np.abs(q - plan.robot.home).max()) <= _AT_HOME:
         return HomeRoute(None, ())
@@ -182,7 +182,7 @@ def _stands_before(
 def _legs_with_way_back(
     plan: PlanResult, q: FloatArray
 ) -> Iterator[tuple[float, tuple[Joints, ...]]]:
-    """Yield how far each leg is, and the way to HOME from it against its direction."""
+    """Yield the distance of each leg, and the path to HOME from it in the opposite direction."""
     for stop in range(len(plan.poses) + 1):
         start = stop_joints(plan, stop - 1)
         postures = [start, *plan.moves[stop].via, stop_joints(plan, stop)]
@@ -204,10 +204,10 @@ class PlannedStep:
     """One step of a run before it is made."""
 
     pose: int | None
-    """None: on the way to HOME."""
+    """None: on the path to HOME."""
     step: Step
     what: str
-    """For people."""
+    """Description for people."""
     seconds: float
     """Estimated; what waits for something is taken at its shortest."""
 
@@ -240,7 +240,7 @@ def itinerary(plan: PlanResult, settings: RunSettings) -> tuple[PlannedStep, ...
 def remaining_times(plan: PlanResult, settings: RunSettings) -> FloatArray:
     """Return the time from before each pose to the end, shape (pose + 1,), in s.
 
-    The last is that of the way HOME.
+    The last is that of the path HOME.
     """
     seconds = np.zeros(len(plan.poses) + 1)
     for step in itinerary(plan, settings):

@@ -2,22 +2,22 @@
 
 The states of one attempt, in the order of Procedure 1: one action each.
 
-The order is what makes a reading worth something, and the cell safe. The sensor is tared in free
-air just before contact, so that its drift since the last pose and the weight of the tool are not
-taken for load; the reference of the tracker is taken there too, so that only what happens between
-it and the load counts as deflection. With ``procedure.reference: light_contact`` that is read once
-more, in contact, as the first press or the second: no step is added, the force of it is in the
-plan's list of presses. Contact is made in position control, slowly and up to a small
-force; only then is force control switched on. It is switched off, with the force ramped to zero,
-before the tool leaves the surface: an arm in force control in free air would accelerate.
+The order makes readings valid and the cell safe. The sensor is tared in free air just before
+contact, so that its drift since the last pose and the weight of the tool do not count as load; the
+reference of the tracker is taken there too, so that only changes between it and the load count as
+deflection. With ``procedure.reference: light_contact`` that is read again, in contact, as the first
+press or the second: no step is added, since its force is in the plan's list of presses. Contact is
+made in position control, slowly and up to a small force; only then is force control switched on. It
+is switched off, with the force ramped to zero, before the tool leaves the surface: an arm in force
+control in free air would accelerate.
 
 Run one attempt at a pose state after state, and make the cell safe when a state fails.
 
-The way back is always the same, and its order matters. First the force is ramped to zero while the
+The retreat is always the same, and its order matters. First the force is ramped to zero while the
 tool still rests on the surface: a stop at once would leave it pressing, and only position control,
-in which the release ends, can retract. Then the tool goes straight off along the normal, the one
-direction that the approach has shown to be free. The stop comes last, and always: it is the one
-command that an arm takes in every state.
+in which the release ends, can retract. Then the tool moves straight off along the normal, the only
+direction that the approach has shown to be free. The stop is always sent, last: it is the only
+command that an arm accepts in every state.
 """
 
 import contextlib
@@ -84,13 +84,13 @@ from elastocal.procedure.run.steps import (
 _AGREES = 0.5
 """Smallest part of a force of the arm that its sensor must feel."""
 _REACH_MARGIN = 1e-3
-"""How much earlier than at the travel limit the surface counts as missed, in m."""
+"""Distance before the travel limit from which the surface counts as missed, in m."""
 _WINDOW_TRIES = 3
 """Windows of one load case that may be spoiled before it is given up."""
 
 
 def move(a: Attempt) -> StepResult:
-    """Go to the approach pose."""
+    """Move to the approach pose."""
     drive(a.supervisor, a.legs, a.guard(beam=False))
     return StepResult.GOOD
 
@@ -115,7 +115,7 @@ def aim(a: Attempt) -> StepResult:
 
 
 def near(a: Attempt) -> StepResult:
-    """Go straight to near contact; nothing may be touched on the way."""
+    """Move straight to near contact; a contact on the way is a fault."""
     procedure = a.settings.procedure
     seen = a.supervisor.cycle(a.guard())
     distance = a.line.height(seen.arm.T_base_tcp) - a.settings.near_contact
@@ -158,7 +158,7 @@ def unloaded(a: Attempt) -> StepResult:
 
 
 def engage(a: Attempt) -> StepResult:
-    """Go on until the contact force is felt."""
+    """Move on until the contact force is reached."""
     procedure = a.settings.procedure
     seen = a.supervisor.cycle(a.guard())
     # Less than the limit: a place that is noisy must not turn a miss into something worse.
@@ -179,7 +179,7 @@ def load(a: Attempt) -> StepResult:
     ramp = a.settings.procedure.ramp
     felt = s.cycle(a.guard()).force_tcp
     change = force - felt[-1] if len(felt) else force
-    # Set before the command, not after: should the command fail half way, the force is released.
+    # Set before the command, not after: if the command fails midway, the force is released.
     a.in_force_control = True
     reference = present(a.slip_reference, "slip reference")
     a.slide = SlideDetector(reference)
@@ -246,14 +246,14 @@ def average(a: Attempt) -> StepResult:
 
 def release(a: Attempt) -> StepResult:
     """Ramp the force to zero; the arm then is in position control."""
-    # From here on the beam may break: no reading depends on it, and the way off must not.
+    # From here on the beam may break: no reading depends on it, and the retreat must not.
     release_force(a.supervisor, a.guard(beam=False))
     a.in_force_control = False
     return StepResult.GOOD
 
 
 def lift(a: Attempt) -> StepResult:
-    """Go straight back until near contact."""
+    """Move straight back to near contact."""
     retract_to(a.supervisor, a.line, a.guard(beam=False), a.settings.near_contact)
     return StepResult.GOOD
 
@@ -273,7 +273,7 @@ def released(a: Attempt) -> StepResult:
 
 
 def retract(a: Attempt) -> StepResult:
-    """Go straight back to the approach pose."""
+    """Move straight back to the approach pose."""
     retract_to(a.supervisor, a.line, a.guard(beam=False), a.settings.approach_distance)
     return StepResult.GOOD
 
@@ -292,10 +292,10 @@ def _wait_for_beam(a: Attempt, station: str | None = None) -> None:
 
 
 def _ask(a: Attempt) -> bool:
-    """Have the standing marker measured, where that is a person's work; return whether it is."""
+    """Request a measurement of the resting marker if a person makes it; return whether one does."""
     is_asked = a.supervisor.ask(_what(a))
     if is_asked:
-        # Nobody watched the way from the reading before: it is no slide.
+        # The motion since the previous reading was not supervised, so it is no slide.
         if a.slide is not None:
             a.slide.forget()
         _wait_for_beam(a)
@@ -307,7 +307,7 @@ def _what(a: Attempt) -> str:
 
 
 def _stand_still(a: Attempt, *, beam: bool = True) -> None:
-    """Let what still swings after a motion die down."""
+    """Wait until vibrations after a motion have decayed."""
     for _ in a.supervisor.stay(a.guard(beam=beam), a.settings.procedure.dwell):
         pass
 
@@ -331,14 +331,14 @@ def _repeat(a: Attempt, status: ReadingStatus, note: str) -> StepResult:
 
 
 def _why_slipped(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
-    """Return how the marker slipped during a window or on the way to it; empty: it did not."""
+    """Return how the marker slipped during or before a window; empty: it did not."""
     reference, slide, jump, procedure = a.slip_reference, a.slide, a.jump, a.settings.procedure
     reference = present(reference, "reference")
     slide = present(slide, "slide")
     jump = present(jump, "jump")
     a.slip = reference.so_far(positions)
     if a.load[0] == LIGHT_CONTACT:
-        # The zero is read here: where the marker stands now is where it counts from.
+        # The zero is read here: displacements count from the marker's present position.
         a.slip_origin = a.slip
     moved, limit = abs(a.slip - a.slip_origin), procedure.slip_limit
     expected = procedure.contact_compliance * float(np.linalg.norm(force))
@@ -476,9 +476,9 @@ def between_poses(supervisor: Supervisor) -> ArmLocation:
 def _back_off(a: Attempt) -> BackOffResult:
     """Make the cell safe after a fault: no force, off the surface, stopped.
 
-    Devices are no longer trusted here and their faults change nothing any more: only the arm is
-    asked, and one that does not answer is still told. What it refuses is left out; the stop at
-    the end is always sent.
+    Devices are no longer trusted here and their faults are ignored: only the arm is read, and it is
+    sent commands even if it does not answer. Refused commands are skipped; the stop at the end is
+    always sent.
 
     Parameters
     ----------
@@ -514,7 +514,7 @@ def _leave_surface(a: Attempt) -> BackOffResult:
 
 
 def _location_without_retract(a: Attempt) -> ArmLocation:
-    """Return where the tool is by the arm's own joints; one that does not answer may press."""
+    """Return the tool's position by the arm's own joints; an arm that does not answer may press."""
     arm = a.supervisor.arm_state()
     if arm is not None:
         high = a.line.height(arm.T_base_tcp) > a.settings.procedure.travel_limit
@@ -553,7 +553,7 @@ def _release(a: Attempt) -> None:
 
 
 def _retract(a: Attempt) -> None:
-    """Go straight back to the approach pose; nothing but the arm is asked whether it did."""
+    """Move straight back to the approach pose; only the arm is read."""
     s = a.supervisor
     arm = s.arm_state()
     if arm is not None and arm.motion in (Motion.APPROACHING, Motion.RETRACTING):
@@ -574,7 +574,7 @@ def _retract(a: Attempt) -> None:
 
 
 def _wait(supervisor: Supervisor, done: Callable[[ArmState], bool], limit: float) -> None:
-    """Let cycles pass until the arm says that it is done; no other device is watched.
+    """Let cycles pass until the arm reports the end; no other device is supervised.
 
     Raises
     ------
@@ -582,8 +582,8 @@ def _wait(supervisor: Supervisor, done: Callable[[ArmState], bool], limit: float
         If it stops, or does not say so in time.
     """
     procedure = supervisor.settings.procedure
-    # Counted in cycles, as the clock may be what is out of order. An arm that does not answer may
-    # still do what it was told: it is given the time that this takes.
+    # Counted in cycles, as the clock may be faulty. An arm that does not answer may still carry out
+    # its command, so it is given the time for it.
     patience = int((limit - procedure.timeout) / procedure.cycle) + 1
     for _ in range(int(limit / procedure.cycle) + 1):
         arm = supervisor.arm_cycle()
@@ -619,7 +619,7 @@ def _send(supervisor: Supervisor, action: Action, command: Callable[[], None]) -
 _REPORT_EVERY = 5
 """Cycles between two reports of progress."""
 _MOST_GIVEN_UP = 2
-"""As many poses in a row that cannot be had end the run: it is not the pose then."""
+"""Number of consecutive failed poses that ends the run, since the cause is then not the pose."""
 
 
 class Runner:
@@ -683,11 +683,11 @@ class Runner:
         return result
 
     def _begin(self) -> None:
-        """Bring the arm to HOME from wherever an earlier session, or a crash, has left it.
+        """Bring the arm to HOME from the position in which an earlier session, or a crash, left it.
 
         Out of force control first, then straight off the surface, then along the plan's legs: a
-        joint move that begins at the surface would drag the tool over it. Whether the tool presses
-        is measured; a run that begins anew does not free it.
+        joint move that begins at the surface would drag the tool over it. A force on the tool is
+        measured; a new run does not release it.
         """
         s = self._supervisor
         home, moving = self._session.home, (Motion.MOVING, Motion.APPROACHING, Motion.RETRACTING)
@@ -732,7 +732,7 @@ class Runner:
             )
 
     def _present_location(self) -> ArmLocation:
-        """Return where the arm is; between poses the force says whether it is off every surface."""
+        """Return the position of the arm; between poses the force shows a contact."""
         if self._location is ArmLocation.BETWEEN_POSES:
             return between_poses(self._supervisor)
         return self._location
@@ -770,7 +770,7 @@ class Runner:
             _require_settled_load_case(a)
             # The streams before the journal: an entry on the disk means that its streams are, too.
             digest = _save(recorder, path)
-            # The arm stands at the approach pose: the time that a disk takes is nobody's fault.
+            # The arm is at the approach pose: the time of a disk access is not a device's fault.
             self._supervisor.pause()
             self._log.write(Event.COMMIT, log=a.log(), streams_sha256=digest)
             return StepResult.GOOD
@@ -778,7 +778,8 @@ class Runner:
         try:
             run_attempt(a, self._enter, commit)
         except AttemptFailedError as error:
-            # First of all: what fails from here on must not change where the arm is said to stand.
+            # First of all, so that a later failure does not change the recorded position of the
+            # arm.
             self._location = error.location
             self._failed += error.fault is not Fault.INTERRUPTED
             self._keep(error, recorder, path)
@@ -926,7 +927,7 @@ def _require_settled_load_case(a: Attempt) -> None:
     """
     for window in a.windows:
         wanted = window.load_case in (CONDITIONING, LIGHT_CONTACT)
-        # A press that slipped has pressed all the same; a reference has to stand still.
+        # A press that slipped has still loaded the arm; a reference must be at rest.
         slipped = window.load_case == CONDITIONING and window.status is ReadingStatus.SLIPPED
         if wanted and window.status is not ReadingStatus.OK and not slipped:
             raise FaultError(Fault.REFERENCE_LOST, f"{window.load_case}: {window.note}")

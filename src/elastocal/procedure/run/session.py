@@ -50,7 +50,7 @@ class Session:
     attempts: Mapping[int, int] = field(default_factory=dict)
     """Attempts that each pose has seen already."""
     home: HomeRoute = field(default_factory=lambda: HomeRoute(None, ()))
-    """The way to HOME, which comes first."""
+    """Path to HOME, which comes first."""
     resumes: bool = False
     """Whether it goes on with a run: a tool that an earlier session left pressing is freed."""
 
@@ -64,33 +64,33 @@ class SessionHooks:
     report: Callable[[Progress], None] = lambda _: None
     """Called several times a second."""
     interrupted: Callable[[], bool] = lambda: False
-    """Whether somebody wants the run to stop."""
+    """Whether the run was asked to stop."""
     fault: Callable[[str], None] = lambda _: None
     """Called at once when a fault is seen; what follows may take long. It must not wait."""
 
 
 class RunEnd(Enum):
-    """How a session ended."""
+    """Reason for the end of a session."""
 
     DONE = "done"
     """Every pose was tried; the arm is at HOME."""
     STOPPED = "stopped"
-    """By a fault."""
+    """A fault."""
     INTERRUPTED = "interrupted"
-    """By a person."""
+    """A person."""
 
 
 @brief_repr
 @dataclass(frozen=True)
 class SessionResult:
-    """How a session ended, and where it left the arm."""
+    """Result of a session, and the position of the arm at its end."""
 
     end: RunEnd
     location: ArmLocation
     message: str
     """Why; empty when all went well."""
     given_up: tuple[int, ...]
-    """Poses of this session that could not be had."""
+    """Poses of this session that failed."""
     failed_attempts: int
     """Attempts of this session that failed."""
 
@@ -98,14 +98,14 @@ class SessionResult:
 @brief_repr
 @dataclass(frozen=True)
 class LastKnown:
-    """How far a run came."""
+    """Progress of a run."""
 
     entry: Entry
     """The last one."""
     committed: tuple[int, ...]
     """Poses that are finished, in the order in which they were."""
     given_up: tuple[int, ...]
-    """Poses that could not be had."""
+    """Poses that failed."""
     attempts: Mapping[int, int]
     """Attempts that each pose has seen."""
     may_touch: bool
@@ -128,7 +128,7 @@ class LastKnown:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Lines that a person should read before the run goes on."""
+        """Lines that a person should read before the run continues."""
         entry = self.entry
         done = ", ".join(map(str, self.committed)) or "none"
         where = "between poses" if entry.pose is None else f"pose {entry.pose}"
@@ -148,7 +148,7 @@ class LastKnown:
 
 
 def last_known(entries: tuple[Entry, ...]) -> LastKnown:
-    """Return how far a run came.
+    """Return the progress of a run.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def check_same_settings(used: Cell, wanted: Cell) -> None:
     Parameters
     ----------
     used, wanted : Cell
-        As it stands in the run's folder, and as it is now.
+        Cell in the run's folder, and the present one.
 
     Raises
     ------

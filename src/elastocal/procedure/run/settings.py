@@ -29,7 +29,8 @@ _COLLISION, _COLLISION_PER_WEIGHT = 50.0, 0.2
 _COLLISION_WINDOW = 0.1
 """Time over which its change is looked at, in s: two cycles and a half."""
 _WRONG_WEIGHT = 0.35
-"""Part of the weight that may be missing on a way: a mass a quarter off, turned by 90 deg."""
+"""Part of the weight that may be missing during a retreat: a mass wrong by a quarter, turned by 90
+deg."""
 _SAME_PLACE = 1e-5
 """Largest distance between a frame and where its joints lead, in m."""
 _SAME_TURN = 1e-5
@@ -47,7 +48,7 @@ class RunSettings:
     override: float
     """Part of the axis speeds that is used between poses."""
     axes: AxisMotion
-    """For estimates of time."""
+    """Axis motion for estimates of time."""
     R_tcp_sensor: FloatArray
     """Axes of the force sensor in the tcp frame, shape (3, 3)."""
     force_limit: float
@@ -76,7 +77,7 @@ class RunSettings:
 
     @property
     def tool_load(self) -> ToolLoad:
-        """What tells a press from the tool's weight."""
+        """Separation of contact forces from the tool's weight."""
         return ToolLoad(self.weight_base, self.R_tcp_sensor, self.force_limit)
 
     def collision_watch(self) -> CollisionWatch:
@@ -100,9 +101,9 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
     Raises
     ------
     ProcedureError
-        If the cell has no force sensor or no tracker, the force limit leaves no room between the
-        largest load case and the range of the sensor, or the contact force is not below every
-        load case (and with it below the force limit).
+        If the cell has no force sensor or no tracker, the force limit is not between the largest
+        load case and the range of the sensor, or the contact force is not below every load case
+        (and with it below the force limit).
     """
     T_sensor_tcp = cell.T_sensor_tcp
     if T_sensor_tcp is None:
@@ -131,9 +132,9 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
 
 
 def refusal_of_forces(cell: Cell) -> str | None:
-    """Return why no run of the cell can begin, as far as its forces tell before a plan is made.
+    """Return why no run of the cell can begin, as far as its forces show before a plan is made.
 
-    None: nothing speaks against it, or it has no force sensor and is for planning alone.
+    None: a run is possible, or the cell has no force sensor and is for planning alone.
     """
     if (T_sensor_tcp := cell.T_sensor_tcp) is None:
         return None
@@ -159,7 +160,7 @@ def _check_contact_force(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) 
 
 
 def _force_tolerance(cell: Cell, loads: tuple[tuple[str, FloatArray], ...]) -> float:
-    """Return how far a force may be from its load case: sensors err by a part of what they read."""
+    """Return the tolerance of a force, since the error of sensors is relative to their reading."""
     asked = cell.file.procedure.force_tolerance
     largest = max(float(np.linalg.norm(force)) for _, force in loads)
     return max(_TOLERANCE_PER_LOAD * largest, _LEAST_TOLERANCE) if asked is None else asked

@@ -1,10 +1,10 @@
-"""The steps of an attempt at a pose (paper Procedure 1, steps 4-26): states, faults, judgements.
+"""Steps of an attempt at a pose (paper Procedure 1, steps 4-26): states, faults, judgements.
 
-A fault has one message, and says whether it ends the attempt or the run. A load case is judged
-while it is held: a force is steady when it is close to what is wanted, without drift, without
-spread; a marker slips when it moves sideways more than the force explains. The tracker's
-orientation is not known during a run, but the approach shows it the normal: on the straight way to
-near contact the marker moves along it. Lateral is what is at right angles to that.
+A fault has one message, and states whether it ends the attempt or the run. A load case is judged
+while it is held: a force is steady if it is close to its target, without drift and without spread;
+a marker slips if it moves sideways more than the force explains. The tracker's orientation is not
+known during a run, but the straight motion to near contact shows the direction of the normal in its
+frame. Lateral motion is orthogonal to it.
 """
 
 from collections import deque
@@ -66,7 +66,7 @@ def steadiness(time: FloatArray, force: FloatArray) -> Steadiness:
 
 
 def why_off(found: Steadiness, target: FloatArray, tolerance: float) -> str:
-    """Return why a force is not the one that is wanted; empty when it is.
+    """Return why a force differs from its target; empty if it does not.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def why_off(found: Steadiness, target: FloatArray, tolerance: float) -> str:
 
 
 def why_unsteady(found: Steadiness, limits: ProcedureSettings) -> str:
-    """Return why a force is not steady enough; empty when it is.
+    """Return why a force is not steady enough; empty if it is.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def why_unsteady(found: Steadiness, limits: ProcedureSettings) -> str:
 
 
 def why_shaking(positions: FloatArray, limit: float) -> str:
-    """Return why a marker is not quiet enough; empty when it is.
+    """Return why a marker is not quiet enough; empty if it is.
 
     Parameters
     ----------
@@ -186,12 +186,12 @@ class SlipReference:
         return 0.0 if self.normal is None else abs(float(movement @ self.normal))
 
     def during(self, positions: FloatArray) -> float:
-        """Return how far the marker moved sideways within a window, shape (sample, 3), in m."""
+        """Return the lateral motion of the marker within a window, shape (sample, 3), in m."""
         ends = max(len(positions) // _ENDS, 1)
         return self.lateral(positions[-ends:].mean(axis=0) - positions[:ends].mean(axis=0))
 
     def so_far(self, positions: FloatArray) -> float:
-        """Return how far the marker is aside of where it was unloaded, in m."""
+        """Return the lateral distance of the marker from its unloaded position, in m."""
         return self.lateral(positions.mean(axis=0) - self.unloaded)
 
 
@@ -213,7 +213,7 @@ class SlideDetector:
         """Longest sudden slide so far, in m."""
 
     def forget(self) -> None:
-        """Begin anew after a gap; the longest slide is kept."""
+        """Restart after a gap; the longest slide is kept."""
         self._recent.clear()
 
     def see(self, positions: FloatArray) -> None:
@@ -232,7 +232,7 @@ class Step(Enum):
     MOVE = "move"
     """4-5: to the approach pose A_i, in joint space."""
     AIM = "aim"
-    """The tracker finds the marker; the sensor is tared for the way to the surface."""
+    """The tracker finds the marker; the sensor is tared for the approach."""
     NEAR = "near"
     """6-7: straight towards contact pose H_i, until near contact."""
     UNLOADED = "unloaded"
@@ -260,13 +260,13 @@ class Step(Enum):
 
 
 class StepResult(Enum):
-    """How a state was left."""
+    """Result of a state."""
 
     GOOD = "good"
     REPEAT = "repeat"
     """The window was spoiled (beam broken for a moment): settle again."""
     LOAD_CASE_LOST = "load case lost"
-    """The load case cannot be had; its status says why."""
+    """The load case failed; its status states why."""
 
 
 ON_APPROACH_LINE = frozenset(Step) - {Step.MOVE, Step.AIM, Step.COMMIT, Step.DONE}
@@ -290,7 +290,7 @@ def next_step(step: Step, result: StepResult, loads_left: int) -> Step:
     Returns
     -------
     Step
-        The next one. ENGAGE is followed by RETRACT on every way to another ENGAGE.
+        The next one. Every sequence from one ENGAGE to another contains RETRACT.
     """
     if step is Step.AVERAGE and result is StepResult.REPEAT:
         return Step.SETTLE
@@ -335,7 +335,7 @@ class Progress:
     count: int
     """Poses in the plan."""
     pose: int | None
-    """Id of the pose; None on the way to HOME."""
+    """Id of the pose; None on the path to HOME."""
     attempt: int
     step: Step
     load_case: str | None
@@ -352,13 +352,13 @@ class Progress:
 
 
 class FaultScope(Enum):
-    """How much a fault ends. What ends less than an attempt is a `ReadingStatus`, not a fault."""
+    """Extent of the work that a fault ends. Smaller failures are a `ReadingStatus`, not a fault."""
 
     ATTEMPT = "attempt"
     """The attempt at this pose: a reading was lost, with force and contact in order. After a full
     retract it may be tried again."""
     RUN = "run"
-    """The run; a person has to look."""
+    """The run; a person must inspect the cell."""
 
 
 class Fault(Enum):
@@ -395,7 +395,7 @@ class Fault(Enum):
 
     @property
     def scope(self) -> FaultScope:
-        """How much of the run it ends."""
+        """Extent of the run that the fault ends."""
         return self.value[0]
 
     def message(self, detail: str) -> str:

@@ -22,7 +22,7 @@ from elastocal.verdict import (
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
 _MOST_REASONS = 3
-"""Reasons on the sheet, on paper of two or three lines each: the rest stands in the appendix."""
+"""Reasons on the sheet, of two or three lines each on paper: the rest is in the appendix."""
 _LONG_REASON, _LONG_NAME = 110, 60
 _WIDE, _HIGH = 600.0, 190.0
 """Inner size of the picture before and after, in its own units."""
@@ -62,7 +62,7 @@ class ToleranceBar:
 @brief_repr
 @dataclass(frozen=True)
 class BeforeAfter:
-    """Every reading twice: how far the arm gave way, and how wrong the prediction was."""
+    """Deflection and error of the prediction for every reading."""
 
     before: str
     after: str
@@ -84,13 +84,13 @@ class BeforeAfter:
 @brief_repr
 @dataclass(frozen=True)
 class Certificate:
-    """Everything that stands on the first page."""
+    """Contents of the first page."""
 
     number: str
     identity: tuple[tuple[Phrase, tuple[str | Stamp, ...]], ...]
     """Rows: what, and the parts that are known."""
     not_entered: Phrase | None
-    """What nobody stated, in a line."""
+    """Entries that are missing, in a line."""
     bar: ToleranceBar | None
     picture: BeforeAfter | None
     reasons: tuple[str, ...]
@@ -117,7 +117,7 @@ def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = 
     evidence, verdict : Evidence, Verdict
         Whatever is there, and what it comes to.
     signer : str
-        Public key of who signs the report; empty where nobody does.
+        Public key of the signer of the report; empty without one.
     """
     reasons = tuple(verdict.reasons[:_MOST_REASONS])
     known, missing = _identity(evidence)
@@ -142,7 +142,7 @@ def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = 
 
 
 def _more(reasons: int) -> Phrase | None:
-    """Return where the reasons are that found no place."""
+    """Return the place of the reasons that are not on the sheet."""
     if reasons <= 0:
         return None
     many = counted(reasons, "more reason")
@@ -153,7 +153,7 @@ _Row = tuple[Phrase, tuple[str | Stamp, ...]]
 
 
 def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
-    """Return the details of the calibration in rows, and those that nobody stated."""
+    """Return the details of the calibration in rows, and the missing ones."""
     entry, cell = evidence.certificate, evidence.cell
     sensor = None if cell is None else cell.file.sensor
     named = None if sensor is None else sensor.name
@@ -194,7 +194,7 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
 
 
 def _equipment(thing: Equipment, own: str | None) -> tuple[tuple[str, ...], list[Phrase]]:
-    """Return the details of a thing, and the missing ones; ``own`` stands where it has no type."""
+    """Return the details of a device, and the missing ones; ``own`` replaces a missing type."""
     kind = thing.type or own
     parts, lacking = [kind] if kind else [], [] if kind else [phrase("type")]
     if thing.serial:
@@ -339,7 +339,7 @@ def _scale(longest: float, lines: int) -> tuple[float, float]:
 
 
 def _digits(step: float) -> int:
-    """Return the decimals that tell lines apart.
+    """Return the decimals that distinguish lines.
 
     >>> _digits(0.1), _digits(0.25), _digits(2.0)
     (1, 2, 0)

@@ -1,8 +1,8 @@
-"""Drive a Chromium that nobody sees, through a pipe.
+"""Drive a headless Chromium through a pipe.
 
-The page says itself when it is ready; nothing here guesses how long that takes. The browser's
-DevTools protocol goes over two pipes (file descriptors 3 and 4 of the child): nothing listens on
-any port, and nothing is asked of the network.
+The page itself reports when it is ready, so no waiting time is guessed. The browser's DevTools
+protocol goes over two pipes (file descriptors 3 and 4 of the child): no port is opened, and the
+network is not used.
 """
 
 import base64
@@ -29,7 +29,7 @@ _APPLICATIONS = (
     "Chromium.app/Contents/MacOS/Chromium",
     "Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
 )
-"""Where macOS has them, in its folders of applications: no search path knows these."""
+"""Folders of applications on macOS, which no search path contains."""
 _APPLICATION_FOLDERS = (Path("/Applications"), Path.home() / "Applications")
 _SECONDS = 180.0
 """Longest wait for an answer: a software renderer on a busy machine is slow."""
@@ -178,8 +178,8 @@ class Tab:
 def open_tab(browser: str) -> Iterator[Tab]:
     """Start a browser with a profile of its own and yield a tab; end it with the block.
 
-    It runs in its sandbox, but for where there is none: for root it refuses to, and in many
-    containers the kernel does.
+    It runs in its sandbox where that is possible: it refuses one for root, and the kernel of many
+    containers allows none.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def _tab(browser: str, *flags: str) -> Iterator[Tab]:
 
 
 def _high(end: int) -> int:
-    """Return a copy of a descriptor that is none of those that the child needs."""
+    """Return a copy of a descriptor that does not collide with those of the child."""
     import fcntl  # not on Windows, where no tab is opened
 
     copy = fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10)

@@ -26,7 +26,7 @@ from elastocal.units import in_unit
 from elastocal.wording import counted, mm, phrase, phrases, point
 
 REPORT_TITLE = "Geometry report"
-"""How the title of every such page in English begins."""
+"""Start of the title of every such page in English."""
 _MOST_ROWS = 200
 _LINKS = phrase(
     "A link goes from its joint's axis to the next by Rz(theta + q) Tz(d) Tx(a) Rx(alpha) (Denavit"
@@ -40,7 +40,7 @@ _LINKS = phrase(
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class GeometryFindings:
-    """What a report of a geometry shows."""
+    """Contents of a report of a geometry."""
 
     model: GeometryModel
     accuracy: GeometryAccuracy

@@ -68,8 +68,8 @@ def write_report(
     signer : str
         Public key of who signs it.
     beside : callable, optional
-        Makes what stands beside the report, from the finished page: where it raises, no report is
-        written either.
+        Writes files beside the report, from the finished page: if it raises, no report is written
+        either.
 
     Raises
     ------

@@ -54,7 +54,7 @@ class Section:
     title: Phrase
     question: Phrase
     place: int
-    """Sections stand in the order of these numbers."""
+    """Sections are in the order of these numbers."""
     blocks: Callable[[Evidence], Iterable[Block]]
 
     def body(self, evidence: Evidence) -> Content:

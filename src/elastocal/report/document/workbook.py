@@ -123,7 +123,7 @@ def _value(value: object, language: Language) -> str | float:
         case Stamp(text) | Code(text) | Graded(text, _):
             return _text(text, language)
     text = str(value)
-    # What is a figure by itself can be reckoned with; with its unit it is a text.
+    # A figure alone can be used in formulas; with its unit it is a text.
     return float(text) if _NUMBER.fullmatch(text) else _text(value, language)
 
 

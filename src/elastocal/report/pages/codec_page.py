@@ -39,10 +39,10 @@ from elastocal.report.plots import (
 )
 
 KINDS = (".svg", ".png")
-"""In which kinds every figure is written."""
+"""File formats in which every figure is written."""
 PAGE = "codec.html"
 _MOST_PAIRS = 3
-"""Pairs of variants that stand on the page unfolded."""
+"""Pairs of variants that are shown unfolded on the page."""
 _MANY = 30
 """Springs above which drawing takes longer than processes take to start."""
 
@@ -126,8 +126,8 @@ def write_codec_page(
     data, verdicts : CodecData, Verdicts
         The arrays and what they say.
     seen : sequence of SpringObservability, optional
-        What each variant tells apart; without it the page shows no compliances, since it could
-        not say which of them are findings.
+        Springs that each variant determines; without it the page shows no compliances, since it
+        could not mark the undetermined ones.
     correlations : sequence of Correlation, optional
         Correlations of all variants; without them the page has no table of indices.
 

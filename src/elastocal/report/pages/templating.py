@@ -39,7 +39,7 @@ _STYLES_SET_BY_RULE = """(() => {
 ``unsafe-inline`` ignores those, and lets scripts set the same styles as properties."""
 
 _STYLE_OF_MAPS = re.compile(r"(e\.textContent=)'\.maplibregl(?:[^'\\]|\\.)*'")
-"""Its only style that is written out is of maps, which no page of ours has."""
+"""Its only style that is written out in full is for maps, which no page uses."""
 
 
 def render(template: str, language: Language = ENGLISH, **values: Any) -> str:
@@ -91,7 +91,7 @@ def _pages(code: str) -> "Environment":
         "embedded": embedded,
         "pieces": _pieces,
         "say": say,
-        # As say, for what stands between tags and not within one.
+        # For text between tags, not within one.
         "shown": language.markup,
         # Words of the templates themselves.
         "words": lambda text: say(phrase(text)),
@@ -117,7 +117,7 @@ def _hashes(texts: Iterable[str]) -> str:
 
 
 def _asset(name: str) -> "Markup":
-    """Return a style sheet or a script of the templates or of the viewer, as it stands."""
+    """Return a style sheet or a script of the templates or of the viewer, unchanged."""
     from markupsafe import Markup
 
     if name.startswith("viewer."):
@@ -136,7 +136,7 @@ def _plotly() -> "Markup":
 
 
 def _pieces(text: str) -> list[str]:
-    """Return a text in pieces, every second of which stood in backticks; of markup, markup.
+    """Return a text in pieces, every second of which was in backticks; markup stays markup.
 
     >>> _pieces("run `elastocal tool` & see")
     ['run ', 'elastocal tool', ' & see']

@@ -26,7 +26,7 @@ _DECADES = 12.0
 ROW = 0.22
 """Height of a row, in inches."""
 _CHARACTER, _SWATCH = 0.075, 0.55
-"""Width of a letter, and of what stands before a name, in inches."""
+"""Width of a letter, and of the symbol before a name, in inches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Boxes:
     outlier_box: IndexArray
     """Number of the box, from 0, of each value beyond the whiskers, shape (outlier,)."""
     outlier: FloatArray
-    """Those values."""
+    """Values of the outliers."""
     hollow: BoolArray
     """Boxes drawn as pale outlines, since their values are no finding, shape (box,)."""
 
@@ -129,7 +129,7 @@ def draw_boxes(axes: Axes, boxes: Boxes, variant: VariantStyle) -> None:
     """
     x, half = variant.at(boxes.n), 0.5 * variant.width
     left, right = x - half, x + half
-    # A box without height shows nothing but its median, which then has to tell the variant.
+    # A box without height shows only its median, which must then identify the variant.
     full = np.where(boxes.q3 > boxes.q1, style.INK, variant.colour)
     inks = np.where(boxes.hollow, style.REFUSED, full)
     corners = [left, boxes.q1], [right, boxes.q1], [right, boxes.q3], [left, boxes.q3]
@@ -244,7 +244,7 @@ def draw_error_panel(
 
 
 def label_sizes(axes: Axes, last: int, width: float, shown: bool = True) -> None:
-    """Label numbers of training poses, every one where there is room.
+    """Label numbers of training poses, every one where space allows.
 
     Parameters
     ----------

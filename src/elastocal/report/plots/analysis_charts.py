@@ -74,9 +74,9 @@ KIND_TITLES = {
 """Titles of the comparisons that correlations are made over."""
 _INDEX_LEFT, _INDEX_RIGHT, _INDEX_HEAD, _INDEX_FOOT = 1.25, 0.2, 0.98, 1.05
 _FOREST, _FOREST_GAP = 2.65, 0.25
-"""Width of a panel of correlations and room between two, in inches."""
+"""Width of a panel of correlations and of the gap between two, in inches."""
 _GROWTH_COLUMNS, _GROWTH, _GROWTH_SIDE, _GROWTH_OVER = 5, 1.25, 0.48, 0.42
-"""Panels of an index: columns, height, and room at their left and above them, in inches."""
+"""Panels of an index: columns, height, and margins at their left and above them, in inches."""
 _BETWEEN = 0.75
 
 
@@ -87,12 +87,12 @@ class SpringBoxes:
 
     spring: str
     unit: str
-    """The unit that people read."""
+    """Unit for people."""
     boxes: dict[str, Boxes]
-    """By variant; hollow for numbers of training poses that leave the spring mixed up with others
-    in at least half of the splits."""
+    """Boxes by variant; hollow for numbers of training poses that leave the spring undetermined in
+    at least half of the splits."""
     never: tuple[str, ...]
-    """Variants that never tell it apart."""
+    """Variants that never determine it."""
 
 
 def compliance_chart(data: CodecData, seen: Sequence[SpringObservability]) -> Figure:
@@ -103,7 +103,7 @@ def compliance_chart(data: CodecData, seen: Sequence[SpringObservability]) -> Fi
     data : CodecData
         The arrays.
     seen : sequence of SpringObservability
-        What each variant tells apart, in the order of the variants.
+        Springs that each variant determines, in the order of the variants.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def _columns(springs: Sequence[SpringBoxes]) -> int:
 
 
 def never_told_apart(each: SpringBoxes) -> str:
-    """Return the mark of a spring that is not told apart, empty for one that is."""
+    """Return the mark of a spring that is never determined, empty for others."""
     if not each.never:
         return ""
     if len(each.never) == len(each.boxes):
@@ -240,7 +240,7 @@ def _draw_compliance(
 
 
 def _notes(seen: Sequence[SpringObservability], width: int) -> list[str]:
-    """Return the combinations that are not told apart, once for variants that share them."""
+    """Return the undetermined combinations, once for variants that share them."""
     variants: dict[str, list[str]] = {}
     for each in seen:
         if each.groups:
@@ -330,7 +330,7 @@ def _draw_forest(axes: Axes, found: Sequence[Correlation], styles: Sequence[Vari
         y = np.arange(len(INDICES)) + variant.place
         rows = [of[name] for name in INDICES]
         for at, each in zip(y, rows, strict=True):
-            ends = np.array([each.low, each.high], dtype=float)  # NaN where none is known
+            ends = np.array([each.low, each.high], dtype=float)  # NaN where it is unknown
             axes.plot(ends, [at, at], color=variant.colour, lw=1.1)
         values = np.array([each.correlation for each in rows], dtype=float)
         axes.plot(

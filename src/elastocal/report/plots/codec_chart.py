@@ -1,7 +1,7 @@
-"""Errors on paper over the number of poses: of a codec (paper Fig. 7, 9, 10) and of a study.
+"""Printed figures of errors over the number of poses: codec (paper Fig. 7, 9, 10) and study.
 
 Mean errors above, largest errors below. Over those of a codec, its accuracy competency development
-chart, a strip tells from where on each variant has saturated.
+chart, a strip marks from where on each variant has saturated.
 """
 
 from collections.abc import Sequence
@@ -112,7 +112,7 @@ class ErrorCurve:
     """Over the splits, shape (size,), in m."""
     low: FloatArray
     high: FloatArray
-    """Quartiles, likewise."""
+    """Upper quartiles."""
     saturated: int | None
     """Poses from which on more do not help; None: never."""
 
@@ -131,7 +131,7 @@ def error_curves(data: CodecData, saturation: Sequence[Saturation]) -> list[Erro
 
 
 def pose_count_figure(curves: Sequence[ErrorCurve], tolerance: float | None) -> Figure:
-    """Return how the error falls with the number of poses, all variants in one panel.
+    """Return the figure of the error over the number of poses, all variants in one panel.
 
     Parameters
     ----------

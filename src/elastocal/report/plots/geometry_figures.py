@@ -1,7 +1,7 @@
-"""Figures of a calibrated geometry: where in the workspace it was and is wrong, and what is known.
+"""Figures of a calibrated geometry: errors in the workspace before and after, and parameters.
 
 Maps show every position from above and from the side, coloured by its error at poses that were left
-out; before and after share one scale, so that they can be held against one another.
+out; before and after share one scale, so that they can be compared.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ _TITLE = 0.62
 _MAP, _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN = 2.6, 0.75, 0.8, 0.35, 0.5, 0.75
 """Height of a map, margins, and what is between rows of maps, in inches."""
 _GAPS = (0.4, 1.25)
-"""After the maps of before and after, and after their bar, in inches."""
+"""Gaps after the maps of before and after, and after their bar, in inches."""
 _ROW, _AXIS = 0.17, 0.62
 """Height of a parameter's line, and of what belongs to a group of them, in inches."""
 _VIEWS = (
@@ -56,7 +56,7 @@ def error_maps(accuracy: GeometryAccuracy, title: str = "") -> Figure:
     accuracy : GeometryAccuracy
         The errors.
     title : str, optional
-        Written above with what the errors are of, where no page says it.
+        Title with the description of the errors, where no page states it.
     """
     before, after = (
         in_unit(np.linalg.norm(e, axis=1), "mm") for e in (accuracy.registration, accuracy.chosen)
@@ -93,7 +93,7 @@ def error_maps(accuracy: GeometryAccuracy, title: str = "") -> Figure:
 
 
 def _about(accuracy: GeometryAccuracy) -> str:
-    """Return how many positions there are, and what the errors at poses that were left out are."""
+    """Return the number of positions, and the description of the errors at left-out poses."""
     norm = accuracy.axes[-1]
     return (
         f"{counted(len(accuracy.row), 'position')}, each at a pose that was left out of its fit:"

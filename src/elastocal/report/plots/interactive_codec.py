@@ -138,7 +138,7 @@ def _box_traces(
 ) -> list[_Json]:
     """Return the traces of one variant in one panel.
 
-    The same numbers as in print. What a box holds stands as text in an unseen trace that has a
+    The same numbers as in print. The contents of a box are the text of an invisible trace with a
     point at each number of training poses; the page shows it beside the chart.
 
     Parameters

@@ -1,9 +1,9 @@
-"""Figures along a process path: its stiffness, and its deviation before and after correction.
+"""Figures along a process path: stiffness, and deviation before and after correction.
 
-The map of a survey shows stiffness by spin and by rail along the path, and what to choose: colour
-tells how stiff the stiffest allowed posture is, hatched cells have none; below are the curves of
-the postures as programmed and chosen, with their 95 % intervals. Maps and courses of a process show
-the deviation that is left (paper Fig. 11 and 13).
+The map of a survey shows stiffness by spin and by rail along the path, and the choice: colour gives
+the stiffness of the stiffest allowed posture, hatched cells have none; below are the curves of the
+postures as programmed and chosen, with their 95 % intervals. Maps and courses of a process show the
+remaining deviation (paper Fig. 11 and 13).
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ _MM = 1e3
 
 @dataclass(frozen=True)
 class _Line:
-    """How the curve of a choice is drawn; of a path with one station, a dot."""
+    """Curve of a choice; a dot for a path with one station."""
 
     colour: str
     dashes: str
@@ -186,7 +186,7 @@ def _draw_curves(axes: Axes, along: FloatArray, curves: Sequence[Curve]) -> None
 
 
 def _along(stations: PathStations) -> FloatArray:
-    """Return the way along the path in mm; a path that stays in one place is counted in rows."""
+    """Return the distance along the path in mm; rows are counted where a path does not move."""
     way = in_unit(stations.arc_length, "mm")
     return way if way[-1] > 0.0 else np.arange(len(way), dtype=float)
 

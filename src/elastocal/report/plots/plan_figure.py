@@ -1,8 +1,8 @@
 """One printable figure of a plan, after the paper's Fig. 3: two search techniques side by side.
 
-Colour tells how far each candidate is from its nearest chosen pose; the numbers under a panel
-tell the same in short. Clustering at the edges shows as dark areas, a large covering radius, a
-small distance from the edge and a small distance between neighbours.
+Colour gives the distance of each candidate from its nearest chosen pose; the numbers under a panel
+summarise it. Clustering at the edges appears as dark areas, a large covering radius, a small
+distance from the edge and a small distance between neighbours.
 
 The surface is laid flat on paper, where every candidate can be seen. A surface that faces one way
 is seen along its mean normal. A block is unfolded like a paper net: each of its faces is turned
@@ -35,7 +35,7 @@ _GAP = 0.1
 _HEIGHT = 1e-3
 """Height above the surface from which candidates are looked up on it, in m."""
 _TURNED_AWAY = np.cos(np.radians(135.0))
-"""A face turned further than this from the middle one cannot hang on it."""
+"""Angle from the middle face beyond which a face cannot be attached to it."""
 _NET_GAP = 0.05
 """Between the parts of a net, as part of the middle one's size."""
 _TOUCHING = 0.02
@@ -107,7 +107,7 @@ def flat_map(surface: Surface, contact: FloatArray, normal: FloatArray) -> FlatM
 def _seen_along(
     surface: Surface, towards: FloatArray, upward: FloatArray, candidates: IndexArray
 ) -> Sheet:
-    """Return the view against a unit vector; faces that look away are left out."""
+    """Return the view against a unit vector; faces that point away are left out."""
     A = axes_across(towards, upward)
     depth = surface.mesh.vertices[surface.mesh.faces].mean(axis=1) @ towards
     facing = np.flatnonzero(surface.face_normals @ towards > 0.0)
@@ -132,10 +132,10 @@ def _two_sides(surface: Surface, normal: FloatArray) -> tuple[Sheet, Sheet]:
 
 
 def _face_under(surface: Surface, contact: FloatArray, normal: FloatArray) -> IndexArray:
-    """Return the face that each candidate lies on, shape (candidate,)."""
+    """Return the face that contains each candidate, shape (candidate,)."""
     origin = contact + _HEIGHT * normal
     face = np.array(surface.rays.ray.intersects_first(origin, -normal), dtype=np.intp)
-    # A ray right along an edge may slip through: the nearest face will do.
+    # A ray right along an edge may miss both faces: the nearest face is taken.
     missed = np.flatnonzero(face < 0)
     if len(missed):
         centres = surface.mesh.vertices[surface.mesh.faces].mean(axis=1)
@@ -146,8 +146,8 @@ def _face_under(surface: Surface, contact: FloatArray, normal: FloatArray) -> In
 def unfold(surface: Surface, patch: IndexArray, normal: FloatArray) -> tuple[Sheet, ...] | None:
     """Return a net of the smooth patches that hold candidates; None if none is free of overlap.
 
-    The patch that faces the way of most others stays in the middle; each other one is turned
-    by the least rotation about its corner that is nearest to the middle one.
+    The patch that faces in the same direction as most others stays in the middle; each other one is
+    turned by the least rotation about its corner that is nearest to the middle one.
 
     Parameters
     ----------
@@ -245,10 +245,10 @@ def _unit(vector: FloatArray) -> FloatArray:
 _HEAD, _FOOT, _SIDE = 0.7, 1.95, 0.25
 """Room above, below and beside the panels, in inches."""
 _FLATTEST, _TALLEST = 0.25, 1.3
-"""Height of a panel as part of its width; a longer surface has room beside it."""
+"""Height of a panel as part of its width; a longer surface has space beside it."""
 _ROUNDS = 200
 _PULL = 0.02
-"""Part of its way back to its anchor that a label is drawn in each round."""
+"""Part of the distance to its anchor by which a label returns in each round."""
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 """Turn between the first steps of labels that share an anchor, in rad."""
 _WIDTH = 5.1
@@ -256,9 +256,9 @@ _WIDTH = 5.1
 _DISC, _CROWD = 13.0, 200.0
 """Diameter of a numbered disc in points; with many it shrinks to the second over their root."""
 _MANY = 20_000
-"""With more candidates than this their dots are stored as an image."""
+"""Number of candidates above which their dots are stored as an image."""
 _FINE = 5_000
-"""With more faces or border lines than this the surface is stored as an image."""
+"""Number of faces or border lines above which the surface is stored as an image."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +273,7 @@ class _Choice:
     names: list[str]
     """Id of the pose at each; empty where it is no pose of the plan."""
     distance: FloatArray
-    """How far each candidate is from the nearest chosen one, straight, in m."""
+    """Distance of each candidate from the nearest chosen one, straight, in m."""
     spread: SpreadRecord
     metric: str
     """Metric of the covering radius: ``euclidean`` or ``geodesic``."""
@@ -353,7 +353,7 @@ def _choices(plan: PlanResult, pool: PoolData) -> list[_Choice]:
 
 
 def _extent(surface: Surface, flat: FlatMap) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of the map with some room about it, each of shape (2,), in m."""
+    """Return the corners of the map with a margin, each of shape (2,), in m."""
     points = np.concatenate(
         [
             sheet.flat(surface.mesh.vertices[surface.mesh.faces[sheet.faces]]).reshape(-1, 2)
@@ -476,7 +476,7 @@ def spread_labels(anchor: FloatArray, distance: float) -> FloatArray:
 
 
 def _pushes(place: FloatArray, distance: float) -> FloatArray:
-    """Return how far each label is pushed by those that are too near, shape (label, 2)."""
+    """Return the displacement of each label by those that are too near, shape (label, 2)."""
     offset = place[:, None] - place[None]
     gap = np.linalg.norm(offset, axis=2)
     np.fill_diagonal(gap, np.inf)

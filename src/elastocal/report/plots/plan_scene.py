@@ -1,4 +1,4 @@
-"""The view of a plan in three dimensions: its cell with candidates, poses and ways."""
+"""Three-dimensional view of a plan: its cell with candidates, poses and paths."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -26,7 +26,7 @@ class WeakestMargins:
     """The smallest relative margin of each candidate."""
 
     share: FloatArray
-    """As part of the pool's median margin of that check, shape (candidate,)."""
+    """Share of the pool's median margin of that check, shape (candidate,)."""
     check: IndexArray
     """Row of the check in the pool's margins, shape (candidate,)."""
     label: tuple[str, ...]
@@ -158,7 +158,7 @@ def _hint(plan: PlanResult, pose: PoseRecord) -> str:
 
 
 def _approaches(plan: PlanResult) -> Strokes:
-    """Return the last part of the way to each pose; near the surface it would cross the number."""
+    """Return the last part of the path to each pose; near the surface it would cross the number."""
     far = plan.contact.approach_distance
     ends = [(_above(pose, 0.4 * far), _above(pose, 1.0 * far)) for pose in plan.poses]
     return Strokes(np.array(ends), "--muted", 1.5)

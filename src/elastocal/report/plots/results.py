@@ -150,7 +150,7 @@ def _draw_shades(
             axes.text(pose, case, sign, ha="center", va="center", color=style.VERMILLION)
         elif len(poses) <= _MANY:
             ink = style.ON_BRIGHT if value > 0.55 * top else style.ON_DARK
-            # In little room: 1.23, .041.
+            # Short forms for little space: 1.23, .041.
             text = f"{value:.2f}" if value >= 1.0 else f"{value:.3f}".lstrip("0")
             axes.text(pose, case, text, ha="center", va="center", color=ink, fontsize=6.0)
 
@@ -252,7 +252,7 @@ def _logs(found: ImportedLogs) -> Figure:
 
 @_draw.register
 def _run(summary: RunSummary) -> Figure:
-    """Return how well the tracker stations of a run are registered."""
+    """Return the quality of the registration of a run's tracker stations."""
     stations = [
         StationResiduals(each.station, each.poses, np.array(each.residual, dtype=float))
         for each in summary.registration.stations

@@ -25,10 +25,10 @@ from elastocal.report.plots.style import literal, wrapped
 from elastocal.wording import phrase
 
 _BAR, _BAR_FOOT = 0.23, 0.75
-"""Heights of a spring and of what stands below its panel, in inches."""
+"""Heights of a spring and of the space below its panel, in inches."""
 _WIDTH, _LEFT, _MIDDLE, _RIGHT = 7.5, 2.75, 0.25, 0.2
 _HEAD, _ROW, _BETWEEN, _ROWS, _FOOT = 1.0, 0.21, 0.7, 2.0, 1.0
-"""In inches; `_ROW` is a spring, `_ROWS` the height of the change along the rows."""
+"""Sizes in inches; `_ROW` is a spring, `_ROWS` the height of the change along the rows."""
 _TITLE = 0.62
 """Room for a title and what is said below it, in inches."""
 _SHARE = 0.6
@@ -43,7 +43,7 @@ _EDGE = 3.0
 
 @dataclass(frozen=True)
 class SpringBar:
-    """One spring in the unit that people read."""
+    """A spring in the unit for people."""
 
     name: str
     unit: Unit
@@ -51,7 +51,7 @@ class SpringBar:
     low: float
     high: float
     group: int | None
-    """Number of the group of springs that it cannot be told apart from."""
+    """Number of its group of springs that are not separately observable."""
     too_weak: bool = False
     """See `SpringSummary.too_weak`."""
     at_bound: bool = False
@@ -59,7 +59,7 @@ class SpringBar:
 
     @property
     def is_own(self) -> bool:
-        """Whether the readings tell it by itself, with an interval."""
+        """Whether the readings determine it separately, with an interval."""
         return self.group is None and not self.too_weak
 
 
@@ -93,7 +93,7 @@ def spring_figure(springs: Sequence[SpringBar], title: str = "", about: str = ""
     title, about : str, optional
         Written above, where no page says it.
     """
-    # The unit of most springs comes first, so that a rail does not stand above the joints.
+    # The unit of most springs comes first, so that a rail is not above the joints.
     counts = Counter(bar.unit for bar in springs).most_common()
     left = max(1.26, 0.3 + 0.068 * max(len(bar.name) for bar in springs))
     bottom = _BAR * len(springs) + _BAR_FOOT * len(counts)
@@ -110,7 +110,7 @@ def spring_figure(springs: Sequence[SpringBar], title: str = "", about: str = ""
 
 
 def _draw_bars(axes: Axes, unit: str, bars: Sequence[SpringBar]) -> None:
-    # A value that is not by itself has no interval that means anything.
+    # A value that is not separately determined has no meaningful interval.
     highs = [bar.high if bar.is_own else bar.value for bar in bars]
     lows = [bar.low if bar.is_own else bar.value for bar in bars]
     bottom, top = min(0.0, *lows), max(0.0, *highs)

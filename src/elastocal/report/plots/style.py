@@ -1,8 +1,8 @@
-"""One palette, one type and one way to file for all pictures.
+"""Palette, typeface and file output of all figures.
 
-Colours are those of M. Okabe and K. Ito, "Color Universal Design", 2008: told apart by
-colour-blind readers, and on paper. Shapes or words always say the same again, so that no figure
-needs colour to be read. The same figure has the same bytes, and says in words what it shows.
+Colours are those of M. Okabe and K. Ito, "Color Universal Design", 2008: distinguishable for
+colour-blind readers, and on paper. Shapes or words repeat the information, so that no figure needs
+colour to be read. The same figure has the same bytes, and a description in words.
 """
 
 import io
@@ -90,7 +90,7 @@ _UNDATED: dict[str, dict[str, str | None]] = {
 
 @dataclass(frozen=True)
 class VariantStyle:
-    """How one variant of several is drawn."""
+    """Drawing style of one variant of several."""
 
     name: str
     colour: str
@@ -100,7 +100,7 @@ class VariantStyle:
     place: float
     """Middle of its boxes from the middle of their group, in numbers of training poses."""
     width: float
-    """Width of its boxes, likewise."""
+    """Width of its boxes."""
 
     @property
     def symbol(self) -> str:
@@ -108,7 +108,7 @@ class VariantStyle:
         return _SCREEN[self.marker]
 
     def at(self, n: IndexArray) -> FloatArray:
-        """Return where its boxes stand, shape (box,)."""
+        """Return the positions of its boxes, shape (box,)."""
         return np.asarray(n + self.place, dtype=float)
 
 
@@ -139,7 +139,7 @@ def tint(colour: str, part: float = _FILL, ground: int = 255) -> str:
     colour : str
         ``#rrggbb``.
     part : float
-        How much of it is left, from 0 to 1.
+        Remaining share of it, from 0 to 1.
     ground : int
         Background of each channel: 255 for paper, 0 for black.
     """
@@ -164,7 +164,7 @@ class Page(Figure):
     def add_title(
         self, text: str, left: float, size: float = 11.5, top: float = 0.1, about: str = ""
     ) -> None:
-        """Write the title, ``top`` below the upper edge; below it what the figure is of."""
+        """Write the title, ``top`` below the upper edge; below it the description of the figure."""
         across, tall = self.get_size_inches()
         self.text(
             left / across, 1.0 - top / tall, literal(text), va="top", fontsize=size, weight="bold"
@@ -326,7 +326,7 @@ def figure_bytes(draw: Callable[[], Figure], suffix: str, dpi: int) -> bytes:
 def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] | None = None) -> bytes:
     """Return a figure as SVG whose greys follow the colour scheme of the page that shows it.
 
-    What has very many parts is held as an image in it, without a ground.
+    Artists with very many parts are embedded as an image with a transparent background.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from elastocal.units import in_unit
 from elastocal.wording import counted
 
 _MOST = 4000
-"""Samples of a curve: more are not told apart on the page."""
+"""Samples of a curve; more cannot be distinguished on the page."""
 _MARGIN = 4.0
 """Time before and after the pose that is shown closely, in s."""
 
@@ -42,8 +42,8 @@ def write_timeline_figure(path: Path, found: ImportedLogs, title: str) -> Path:
 def timeline_figure(found: ImportedLogs, title: str) -> Figure:
     """Return the figure: the whole recording above, one pose closely below.
 
-    Instants at which arm, force and marker start and stop must stand under one another, and every
-    band on a stretch where all three are flat.
+    Starts and stops of arm, force and marker must be aligned, and every band must be where all
+    three are constant.
     """
     poses = max((each.pose for each in found.plateaus), default=0) + 1
     figure = style.new_figure(9.6, 7.4)

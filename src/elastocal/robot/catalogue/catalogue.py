@@ -1,18 +1,18 @@
 """The robot catalogue: dimensions, limits and masses of robots, each with its source.
 
 The table `robots.yaml` beside this file is the only copy of the numbers; the URDF is made from it
-on demand. A number has its source or its excuse: what has no source says so in `Robot.assumptions`,
-and masses of a robot may be estimated from those of a sister with sourced ones.
+on demand. A number has its source, or is listed in `Robot.assumptions`; masses of a robot may be
+estimated from those of a related one with sourced masses.
 
-Zero pose and signs are those of the maker's pendant, so that its angles can be used as they stand.
+Zero pose and signs are those of the maker's pendant, so that its angles can be used unchanged.
 KUKA: at zero the arm is stretched forward along x, positive A1, A4 and A6 turn clockwise about the
 axis that points out of the robot. ABB, FANUC: upper arm up, forearm forward; FANUC's J3 is counted
 from the upper arm here and from the horizontal on the pendant. Staeubli: the arm straight up.
 Universal Robots: stretched along -x, level.
 
-Boxes and cylinders stand for the links until real meshes are given. Sized from the dimensions so
-that they look and collide plausibly, they are assumptions, not drawings: whoever checks collisions
-close to the arm brings the maker's meshes.
+Boxes and cylinders represent the links until real meshes are given. They are sized from the
+dimensions to look and collide plausibly, and are assumptions, not drawings: collision checks close
+to the arm need the maker's meshes.
 """
 
 import difflib
@@ -44,7 +44,7 @@ class Group(StrictModel):
     """Numbers that share an origin. At least one of the two texts is there."""
 
     source: str | None = None
-    """Where the numbers were read."""
+    """Source of the numbers."""
     assumption: str | None = None
     """Why they are not to be taken as fact, or why there are none; None for sourced numbers."""
 
@@ -75,17 +75,17 @@ class Dimensions(ArmDimensions):
     """
 
     a1: _Length
-    """From the A1 axis forward to the A2 axis."""
+    """Distance from the A1 axis forward to the A2 axis."""
     a2: FiniteFloat
-    """From the A3 axis *down* to the A4 axis, the forearm stretched forward."""
+    """Distance from the A3 axis *down* to the A4 axis, with the forearm stretched forward."""
     c1: _Length
-    """From the floor up to the A2 axis."""
+    """Height from the floor to the A2 axis."""
     c2: _Length
-    """From the A2 axis to the A3 axis."""
+    """Distance from the A2 axis to the A3 axis."""
     c3: _Length
-    """From the A3 axis along the forearm to the wrist centre."""
+    """Distance from the A3 axis along the forearm to the wrist centre."""
     c4: _Length
-    """From the wrist centre to the flange."""
+    """Distance from the wrist centre to the flange."""
 
 
 class ParallelDimensions(ArmDimensions):
@@ -95,7 +95,7 @@ class ParallelDimensions(ArmDimensions):
     """
 
     d1: _Length
-    """From the foot up to axis 2."""
+    """Height from the foot to axis 2."""
     a2: FiniteFloat
     """Along the upper arm from axis 2 to axis 3."""
     a3: FiniteFloat
@@ -107,7 +107,7 @@ class ParallelDimensions(ArmDimensions):
     d6: _Length
     """Along axis 6 from axis 5 to the flange."""
     shoulder: _Length
-    """How far the upper arm lies beside the foot, along axis 2; for shapes alone."""
+    """Offset of the upper arm from the foot, along axis 2; for shapes alone."""
     elbow: _Length
     """The same of the forearm."""
 
@@ -266,12 +266,12 @@ _UNTURNED = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class _Pendant:
-    """How a maker counts the axes of an arm with a spherical wrist."""
+    """Convention of a maker for the axes of an arm with a spherical wrist."""
 
     signs: tuple[int, ...]
     """Sense of each axis against +z (axis 1), +y (2, 3, 5) and +x along the arm (4, 6)."""
     zeros: tuple[float, ...]
-    """Where axes 2 and 3 are at zero, in rad from the arm stretched forward, positive down."""
+    """Zero positions of axes 2 and 3, in rad from the arm stretched forward, positive down."""
     flange: tuple[float, ...] = (0.0, math.pi / 2, 0.0)
     """Flange against the last link, whose x points out, as roll, pitch, yaw."""
 
@@ -553,7 +553,7 @@ _MAKERS: Mapping[Maker, re.Pattern[str]] = {
     "Staeubli": re.compile(r"\b(sta?eubli|staubli|stäubli|(rx|tx)2?[ -]?\d+)", re.IGNORECASE),
     "Universal Robots": re.compile(r"\b(universal robots?|ur ?\d{1,2}e?)\b", re.IGNORECASE),
 }
-"""How makers name their robots, in words."""
+"""Names of makers in the names of robots."""
 _SUGGESTED = 3
 """Most names that are proposed for one that is not known."""
 _ALIKE = 0.4
@@ -672,7 +672,7 @@ def _entries() -> dict[str, CatalogueEntry]:
 
 
 def _entry(name: str, by_name: Mapping[str, Mapping[str, Any]], what: str) -> CatalogueEntry:
-    """Return one robot; masses that are ``like`` a sister's are estimated from hers."""
+    """Return one robot; masses that are ``like`` those of another are estimated from them."""
     robot = by_name[name]
     sister_name = _inertia(robot).get("like")
     if sister_name is not None:

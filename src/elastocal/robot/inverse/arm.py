@@ -121,8 +121,8 @@ def nearest_zero(robot: Robot, q: ArrayLike) -> FloatArray:
 def turns(robot: Robot, q: ArrayLike) -> FloatArray:
     """Return all configurations within the limits that differ from ``q`` by whole turns.
 
-    A KUKA A4 or A6 that may turn by ±350° reaches most poses in two ways. A joint without
-    limits (continuous) keeps its position; the others are never infinitely many.
+    A KUKA A4 or A6 with a range of ±350° reaches most poses in two ways. A joint without limits
+    (continuous) keeps its position, so that the number of configurations is finite.
 
     Parameters
     ----------

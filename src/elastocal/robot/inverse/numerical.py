@@ -24,7 +24,7 @@ from elastocal.robot.robot import Robot
 from elastocal.robot.singularity import characteristic_length
 
 _EXACT = 1e-8
-"""How far an axis may be off the geometry of the kind, in m or rad."""
+"""Largest deviation of an axis from the geometry of the kind, in m or rad."""
 _SINGULAR = 1e-9
 """Lengths (m) and sines below this count as zero."""
 _BRANCHES = 8
@@ -40,9 +40,9 @@ class ParallelGeometry:
     """Axes of an arm whose second, third and fourth are parallel, and whose last two meet."""
 
     axes: AxisLines
-    """At q = 0, in the arm frame."""
+    """Axes at q = 0, in the arm frame."""
     wrist: FloatArray
-    """Where axes 5 and 6 meet, shape (3,), in m."""
+    """Intersection of axes 5 and 6, shape (3,), in m."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,7 +140,7 @@ def _planar(
 def _projected(
     n: FloatArray, axis: FloatArray, v: FloatArray, wanted: FloatArray, sign: int
 ) -> FloatArray:
-    """Return the angle with ``n · Rot(axis, angle) v = wanted``, one of two; NaN: there is none.
+    """Return one of the two angles with ``n · Rot(axis, angle) v = wanted``; NaN: there is none.
 
     Parameters
     ----------
@@ -283,7 +283,7 @@ class NumericalInverse(InverseKinematics):
     iterations: int = 60
     """Largest number of steps of a descent."""
     reason: str = ""
-    """Why there is no closed form, in words; empty when nobody tried one."""
+    """Reason why there is no closed form, in words; empty if none was tried."""
 
     def __post_init__(self) -> None:
         for name in ("starts", "iterations"):

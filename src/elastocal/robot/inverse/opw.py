@@ -94,22 +94,22 @@ class OpwGeometry:
 class OpwInverse(InverseKinematics):
     """All eight branches of a six-axis arm with ortho-parallel basis and spherical wrist.
 
-    Branch slots: ``4 * wrist + 2 * shoulder + elbow``, in OPW angles: elbow 0 bends by plus,
-    1 by minus the same angle; shoulder 0 faces the wrist centre, 1 reaches back over the
-    head; wrist 1 is wrist 0 with joint 4 half a turn on and joint 5 of the other sign. The
-    numbering is that of py-opw-kinematics.
+    Branch slots: ``4 * wrist + 2 * shoulder + elbow``, in OPW angles: elbow 0 bends by plus, 1 by
+    minus the same angle; shoulder 0 faces the wrist centre, 1 reaches backwards; wrist 1 is wrist 0
+    with joint 4 half a turn on and joint 5 of the other sign. The numbering is that of
+    py-opw-kinematics.
 
     Singular poses have a defined answer:
 
-    * straight wrist (axes 4 and 6 in one line; only their sum counts): joint 4 is at zero,
-      or as near as its limits allow, joint 6 takes the rest; wrist 0 and 1 are equal;
+    * straight wrist (axes 4 and 6 in one line; only their sum counts): joint 4 is at zero, or as
+      near as its limits allow, joint 6 has the rest; wrist 0 and 1 are equal;
     * wrist centre on axis 1 with ``b = 0`` (any joint 1 will do): joint 1 of shoulder 0 is at
       zero, or as near as its limits allow, that of shoulder 1 half a turn from it;
     * stretched or folded elbow, and wrist centre at distance ``b`` from axis 1: the two
       branches that meet there are equal.
 
-    Where such a choice puts another joint outside its limits, other members of the family may
-    still be inside: they are not searched.
+    Where such a choice takes another joint outside its limits, other members of the family may be
+    inside: they are not searched.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def _shoulder(
     bearing = np.arctan2(centre[:, 1], centre[:, 0])
     bearing = np.where(radius <= _SINGULAR, rest, bearing)
     reach = np.sqrt(np.maximum(radius**2 - b**2, 0.0)) * (1 - 2 * shoulder)
-    # atan2 tells a reach of -0.0 from 0.0: the two shoulders stay half a turn apart.
+    # atan2 distinguishes a reach of -0.0 from 0.0: the two shoulders stay half a turn apart.
     theta1 = bearing - np.arctan2(b, reach)
     return np.where(radius >= abs(b) - _SINGULAR, theta1, np.nan), reach
 
@@ -345,7 +345,7 @@ def _deviation(
     robot: Robot, parameters: OpwParameters, T_arm_opw: FloatArray, T_flange_tcp: FloatArray
 ) -> float:
     """Return the largest entry by which OPW and `Robot.forward` differ, in m and rad."""
-    # Seeded here and not passed in: a certificate has to come out the same for every caller.
+    # Seeded here and not passed in, so that a certificate is the same for every caller.
     rng = np.random.default_rng(0)
     q = rng.uniform(-np.pi, np.pi, (_SAMPLES, len(robot.joint_names)))
     external, arm = q[:, : robot.external_axes], q[:, robot.external_axes :]

@@ -12,11 +12,11 @@ from elastocal.robot.inverse.arm import TURN
 from elastocal.robot.inverse.numerical import NumericalInverse
 
 RowName = Callable[[int], str]
-"""Names a row for a person, e.g. ``row 12``."""
+"""Function that names a row for a person, e.g. ``row 12``."""
 _ON_LIMIT = 1e-9
 """Outside by less than this, in rad or m, is on the limit."""
 _FREE = 6
-"""An arm with more joints than a pose has coordinates reaches it in infinitely many ways."""
+"""Number of joints above which an arm reaches a pose in infinitely many ways."""
 _JUMP = 0.5 * np.pi
 """A joint that turns farther than this from one row to the next has changed its posture, in rad."""
 
@@ -198,7 +198,7 @@ def largest_move(robot: Robot, gap: FloatArray) -> FloatArray:
 def _unwound(robot: Robot, q: FloatArray, previous: FloatArray) -> FloatArray:
     """Return the joints with whole turns that go on from ``previous`` while the limits allow."""
     revolute = np.array(robot.revolute)
-    # External axes stand where the path says.
+    # External axes are where the path states.
     revolute[: robot.external_axes] = False
     together = np.vstack([previous, q])
     unwound = np.where(revolute, np.unwrap(together, axis=0), together)[1:]
@@ -208,7 +208,7 @@ def _unwound(robot: Robot, q: FloatArray, previous: FloatArray) -> FloatArray:
         rows = np.flatnonzero(outside.any(axis=1))
         if not len(rows):
             break
-        # From here on the joint stands a whole number of turns elsewhere.
+        # From here on the joint is shifted by a whole number of turns.
         first += int(rows[0])
         shift = q[first] - unwound[first]
         unwound[first:] += np.where(outside[rows[0]], TURN * np.round(shift / TURN), 0.0)

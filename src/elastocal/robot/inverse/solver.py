@@ -190,8 +190,8 @@ def pose_error(T_reached: FloatArray, T_wanted: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (pose, 6)
-        ``p_wanted - p_reached`` in m, then ``log(R_wanted R_reachedᵀ)`` in rad: what the
-        geometric Jacobian times a joint step has to make up for, to first order.
+        ``p_wanted - p_reached`` in m, then ``log(R_wanted R_reachedᵀ)`` in rad: which the geometric
+        Jacobian times a joint step must cancel, to first order.
     """
     turn = T_wanted[..., :3, :3] @ np.swapaxes(T_reached[..., :3, :3], -1, -2)
     shift = T_wanted[..., :3, 3] - T_reached[..., :3, 3]

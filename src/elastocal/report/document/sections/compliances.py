@@ -1,4 +1,4 @@
-"""Compliances with intervals, what the readings tell apart, and what changed since last time."""
+"""Section: compliances with intervals, determined combinations, and changes since last time."""
 
 from collections.abc import Iterator
 from functools import partial

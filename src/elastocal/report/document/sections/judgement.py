@@ -1,4 +1,4 @@
-"""What the verdict rests on: its reasons, the uncertainty, and what was not verified."""
+"""Section: evidence of the verdict: reasons, uncertainty, and what was not verified."""
 
 from collections.abc import Iterator
 

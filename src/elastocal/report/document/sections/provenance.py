@@ -1,4 +1,4 @@
-"""Where the figures come from: times, versions, seeds, hashes, settings."""
+"""Section: provenance of the figures: times, versions, seeds, hashes, settings."""
 
 import platform
 from collections.abc import Iterator

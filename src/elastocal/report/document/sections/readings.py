@@ -206,7 +206,7 @@ def _suspicious(evidence: Evidence) -> Iterator[blocks.Block]:
 
 
 def _worst(unseen: UnseenErrors) -> blocks.Block:
-    """Return where the model errs most."""
+    """Return the reading with the largest error of the model."""
     order = np.argsort(-unseen.error, kind="stable")[:5]
     rows = tuple(
         (_reading(int(unseen.pose[k]), unseen.load_case[k]), mm(float(unseen.error[k])))
