@@ -25,7 +25,8 @@ Span = tuple[FloatArray, FloatArray]
 where the line stays outside."""
 
 _PARALLEL = 1e-30
-"""Put for a direction that has no part across a face, so that its line meets it at infinity."""
+"""Substitute for a direction without a component across a face, so that its line meets it at
+infinity."""
 
 
 @brief_repr
@@ -77,7 +78,7 @@ class SightSolid(Solid):
 
     @abstractmethod
     def depth(self, point: FloatArray) -> float:
-        """Return how far a point, shape (3,), is under the surface, in m; not positive outside."""
+        """Return the depth of a point, shape (3,), in m; not positive outside."""
 
     @abstractmethod
     def crosses(self, beams: Beams, seat: float) -> BoolArray:
@@ -144,7 +145,7 @@ class Convex(SightSolid):
         return (enters < leaves) & (enters < beams.length) & (leaves > seat)
 
     def crosses_again(self, beams: Beams) -> BoolArray:
-        """Return that no beam does."""
+        """Return that no beam crosses again."""
         return np.zeros(len(beams), dtype=bool)
 
 
@@ -162,7 +163,7 @@ class Box(Convex):
         return coal.Box(self.x, self.y, self.z)
 
     def triangulated(self, sections: int = 32) -> trimesh.Trimesh:  # noqa: ARG002 - no sides are round
-        """Return two triangles a face."""
+        """Return two triangles for each face."""
         mesh: trimesh.Trimesh = trimesh.creation.box((self.x, self.y, self.z))
         return mesh
 
@@ -171,11 +172,11 @@ class Box(Convex):
         return 0.5 * np.array([self.x, self.y, self.z])
 
     def depth(self, point: FloatArray) -> float:
-        """Return the distance under the nearest face, in m."""
+        """Return the distance below the nearest face, in m."""
         return float((self._half - np.abs(point)).min())
 
     def span(self, beams: Beams) -> Span:
-        """Return where each line is between all three pairs of faces."""
+        """Return the interval of each line between all three pairs of faces."""
         return _shared(*(_between(beams, axis, half) for axis, half in enumerate(self._half)))
 
 
@@ -203,7 +204,7 @@ class Sphere(Convex):
         return self.radius - float(np.linalg.norm(point))
 
     def span(self, beams: Beams) -> Span:
-        """Return where |p + t d| <= radius."""
+        """Return the interval with |p + t d| <= radius."""
         return _within(beams.start, beams.direction, self.radius)
 
 
@@ -234,7 +235,7 @@ class Cylinder(Convex):
         return min(wall, 0.5 * self.length - abs(float(point[2])))
 
     def span(self, beams: Beams) -> Span:
-        """Return where each line is inside the wall and between the ends."""
+        """Return the interval of each line inside the wall and between the ends."""
         wall = _within(beams.start[:, :2], beams.direction[:, :2], self.radius)
         return _shared(wall, _between(beams, 2, 0.5 * self.length))
 
@@ -264,7 +265,7 @@ class Capsule(Convex):
         return self.radius - float(np.linalg.norm(point - [0.0, 0.0, nearest]))
 
     def span(self, beams: Beams) -> Span:
-        """Return where each line is in the cylinder or in one of the balls."""
+        """Return the interval of each line in the cylinder or in one of the balls."""
         ends = [np.array([0.0, 0.0, side * 0.5 * self.length]) for side in (-1.0, 1.0)]
         spans = [Cylinder(self.radius, self.length).span(beams)]
         spans += [_within(beams.start - end, beams.direction, self.radius) for end in ends]
@@ -275,7 +276,7 @@ class Capsule(Convex):
 
 
 def _between(beams: Beams, axis: int, half: float) -> Span:
-    """Return where each line is between the planes -half and +half of an axis."""
+    """Return the interval of each line between the planes -half and +half of an axis."""
     along = beams.direction[:, axis]
     along = np.where(np.abs(along) < _PARALLEL, _PARALLEL, along)
     ways = (np.array([[-half], [half]]) - beams.start[:, axis]) / along
@@ -283,7 +284,7 @@ def _between(beams: Beams, axis: int, half: float) -> Span:
 
 
 def _within(start: FloatArray, direction: FloatArray, radius: float) -> Span:
-    """Return where |p + t d|² <= r², a quadratic in t; shapes (beam, 2 or 3)."""
+    """Return the interval with |p + t d|² <= r², a quadratic in t; shapes (beam, 2 or 3)."""
     a = np.maximum(np.sum(direction**2, axis=1), _PARALLEL)
     b = np.sum(start * direction, axis=1)
     c = np.sum(start**2, axis=1) - radius**2
@@ -294,7 +295,7 @@ def _within(start: FloatArray, direction: FloatArray, radius: float) -> Span:
 
 
 def _shared(*spans: Span) -> Span:
-    """Return where each line is inside all."""
+    """Return the common interval of each line."""
     enters, leaves = zip(*spans, strict=True)
     return np.max(enters, axis=0), np.min(leaves, axis=0)
 
@@ -305,7 +306,7 @@ _closest_point: Callable[[FloatArray, FloatArray], FloatArray] = trimesh.triangl
 
 @dataclass(frozen=True, eq=False)
 class Mesh(SightSolid):
-    """A triangle mesh. Unless it is closed, with faces turned outward, nothing is under it."""
+    """A triangle mesh. Only a closed one with outward faces has an inside."""
 
     mesh: trimesh.Trimesh
 

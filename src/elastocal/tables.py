@@ -1,9 +1,9 @@
-"""CSV tables: the one place that reads and writes them.
+"""Reader and writer of all CSV tables.
 
 A table has a header line that names each column, with its unit where it has one (``force_x[N]``);
-comment and blank lines may stand above it. Rows are counted as lines of the file from 1, as editors
-and spreadsheets show them. Nothing here knows what a table is about: what a column must be called,
-how long a row must be, is for whoever reads it to refuse in the words of its file.
+comment and blank lines may precede it. Rows are counted as lines of the file from 1, as editors and
+spreadsheets show them. This module does not know the meaning of a table: its caller checks names of
+columns and lengths of rows, and words the refusals.
 """
 
 import csv
@@ -36,7 +36,7 @@ _POINT, _COMMA = (re.compile(_NUMBER.format(re.escape(sign))) for sign in ".,")
 
 
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?!(?:[0-9]*[.,]?[0-9]*(?:[eE][-+]?[0-9]+)?|inf|nan)\s*\Z)")
-"""How a cell begins that a spreadsheet computes; a number with its sign is none."""
+"""Beginnings of a cell that a spreadsheet computes; a signed number is not meant."""
 
 
 class TableError(ElastocalError, ValueError):
@@ -48,7 +48,7 @@ class Column:
     """A column of numbers."""
 
     index: int
-    """Where it stands in a row."""
+    """Position in a row."""
     name: str
     unit: str
     """The unit as the header states it; empty for a plain number."""
@@ -65,7 +65,7 @@ class Column:
 
 @dataclass(frozen=True)
 class TableLayout:
-    """How a table is written, so that it can be written back the same way."""
+    """Format of a table, so that it can be written back in the same way."""
 
     header: tuple[str, ...] = ()
     """Name of each column; none where there is no header."""
@@ -129,7 +129,7 @@ class TableRows:
     """Some consecutive rows of a table; those that are blank are left out."""
 
     cells: list[list[str]]
-    """As they stand in the file."""
+    """Cells as in the file."""
     lines: list[int]
     """Line of the file that each row ends on."""
     delimiter: str = DELIMITERS[0]
@@ -176,7 +176,7 @@ class TableRows:
         cells = [row[column.index] for row in self.cells]
         values = plain_numbers(cells)
         if values is None:
-            # Rarely taken: some cell is blank or no number, and its row has to be found.
+            # Rarely taken: some cell is blank or not a number, and its row must be found.
             comma = "," if self.decimal_comma else ""
             pairs = zip(self.lines, cells, strict=True)
             values = np.array([_parsed(cell, comma, line, column, parse) for line, cell in pairs])

@@ -47,7 +47,7 @@ def templates(package: str, markup: bool = False) -> "Environment":
 
 
 def _one_line(value: object) -> object:
-    """Return a value as it stands in a program: what a macro made, or one line of text."""
+    """Return a value as written in a program: from a macro, or one line of text."""
     from markupsafe import Markup
 
     if isinstance(value, Markup):
@@ -59,7 +59,7 @@ def _one_line(value: object) -> object:
 
 
 def plain(text: str) -> str:
-    r"""Return a text that may stand in a comment: ASCII, one line, without fold parameters.
+    r"""Return a text that is allowed in a comment: ASCII, one line, without fold parameters.
 
     >>> plain("Höhe 5 %\nneu")
     'Hohe 5 ? neu'

@@ -50,8 +50,7 @@ SHOWN = {
     "mm": 1e3, "µm": 1e6, "mm/s": 1e3, "ms": 1e3, "mrad": 1e3, "N/mm": 1e-3, "N/µm": 1e-6,
     "deg": 180.0 / math.pi, "°": 180.0 / math.pi,
 }  # fmt: skip
-"""How many of a unit that people read are in one of SI: the only place that says so for what is
-shown."""
+"""Factors from SI to units for people, in the only table of them."""
 V = TypeVar("V", float, "FloatArray")
 
 _LARGEST: dict[str, tuple[float, str]] = {
@@ -106,7 +105,7 @@ def factor(unit: str, dimension: str) -> float:
 
 
 def in_unit(value: V, unit: str) -> V:
-    """Return an SI value, or an array of them, in a unit that people read.
+    """Return an SI value, or an array of them, in another unit.
 
     >>> in_unit(0.0123, "mm"), in_unit(math.pi, "deg")
     (12.3, 180.0)
@@ -114,13 +113,13 @@ def in_unit(value: V, unit: str) -> V:
     Raises
     ------
     KeyError
-        If the unit is none that people read (`SHOWN`).
+        If the unit is not in `SHOWN`.
     """
     return value * SHOWN[unit]
 
 
 def quantity(value: float, unit: str, spec: str = "g") -> str:
-    """Return an SI value in a unit that people read, with the unit.
+    """Return an SI value in another unit, with the unit.
 
     >>> quantity(0.0123, "mm"), quantity(0.5, "°", ".1f"), quantity(-1e-9, "mm", ".1f")
     ('12.3 mm', '28.6°', '0.0 mm')
@@ -128,7 +127,7 @@ def quantity(value: float, unit: str, spec: str = "g") -> str:
     Raises
     ------
     KeyError
-        If the unit is none that people read (`SHOWN`).
+        If the unit is not in `SHOWN`.
     """
     number = f"{in_unit(float(value), unit):{spec}}"
     bare = number.removeprefix("-")
@@ -161,7 +160,7 @@ def parse_quantity(text: object, dimension: str) -> float:
 
 
 def parse_number(text: str) -> float:
-    """Return the number that a text is, as people and controllers write it; it may be NaN or inf.
+    """Return the number in a text, as people and controllers write it; it may be NaN or inf.
 
     Python's own ``float`` also takes ``1_100`` and the digits of any script.
 
@@ -192,7 +191,7 @@ def largest(dimension: str) -> tuple[float, str]:
 
 
 def impossible(dimension: str, *values: float) -> str | None:
-    """Return why a number in SI can be none of a robot cell's; None if all can. NaN is none.
+    """Return why a number in SI, or NaN, is impossible in a robot cell; None if it is possible.
 
     >>> impossible("length", 0.5, 1e160)
     '1e+160 m: the largest length is 1 km'
@@ -229,7 +228,7 @@ def dimension_of_unit(unit: str) -> str | None:
 
 
 def in_unit_of(value: float, quantity: str) -> str | None:
-    """Return an SI value in the unit of a quantity; None if the text is none.
+    """Return an SI value in the unit of a quantity; None if the text is no quantity.
 
     >>> in_unit_of(0.02, "25 mm/s")
     '20 mm/s'
@@ -284,7 +283,7 @@ def split_column(header: str) -> tuple[str, str | None]:
     Raises
     ------
     UnitError
-        If brackets do not match or nothing stands before them.
+        If brackets do not match or nothing precedes them.
     """
     match = _COLUMN.fullmatch(header)
     if match is None or not match["name"].strip():

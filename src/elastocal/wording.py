@@ -1,4 +1,4 @@
-"""Quantities and counts as people read them, and phrases that can be said in other languages."""
+"""Quantities and counts for people, and phrases that can be translated."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ class Phrase(str):
     template: str
     """English, with names of values in braces; empty where it is not known how it was made."""
     parts: Mapping[str, object]
-    """By name; phrases among them are said in the other language too."""
+    """Values by name; phrases among them are translated, too."""
 
     def __str__(self) -> str:
         # Or `str` would forget how the text was made.
@@ -55,7 +55,7 @@ def sentences(texts: Sequence[str], between: str = " ") -> Phrase:
 
 
 def readable(value: float, unit: str) -> str:
-    """Return an SI value in the unit that people read, with three digits.
+    """Return an SI value in its usual unit, with three digits.
 
     >>> readable(0.0123, "m"), readable(0.5, "rad"), readable(1234.0, "N"), readable(0.25, "1")
     ('12.3 mm', '28.6°', '1234 N', '0.25')
@@ -69,7 +69,7 @@ def readable(value: float, unit: str) -> str:
 
 
 def plainly(value: object, unit: str = "") -> str:
-    """Return a value of a JSON-ready record as people read it, numbers of an SI unit with it.
+    """Return a value of a JSON-ready record in words, numbers with their unit.
 
     >>> plainly(["normal", "north"]), plainly([0, 1, 2, 5]), plainly([]), plainly(True)
     ('normal, north', '0 to 2, 5', 'none', 'yes')

@@ -16,12 +16,12 @@ _ROLL = (0, 3, 5)
 @brief_repr
 @dataclass(frozen=True)
 class JointReading:
-    """A way of reading joints that differs from the URDF's."""
+    """A convention for joints that differs from the URDF's."""
 
     message: str
-    """What the joints then are, as a sentence without its end."""
+    """Meaning of the joints, as a sentence without its end."""
     read: Callable[[Robot, FloatArray], FloatArray]
-    """From joints as recorded, shape (row, joint), to those of the URDF."""
+    """Function from recorded joints, shape (row, joint), to those of the URDF."""
 
 
 def _turn_roll(robot: Robot, q: FloatArray) -> FloatArray:
@@ -55,9 +55,9 @@ JOINT_READINGS = (
     ),
     JointReading("the joints are in reverse order", lambda _, q: q[:, ::-1]),
 )
-"""Those of arms of six axes or more, the likeliest first."""
+"""Conventions of arms with six axes or more, the likeliest first."""
 
 
 def other_joint_readings(robot: Robot) -> tuple[JointReading, ...]:
-    """Return the other ways in which joints of a robot may have been recorded."""
+    """Return the other conventions in which the joints of a robot may have been recorded."""
     return JOINT_READINGS if len(robot.joint_names) >= 6 else ()

@@ -17,7 +17,7 @@ from elastocal.units import impossible
 from elastocal.wording import listed
 
 _RIGID = 1e-6
-"""How far R R^T of a transform that a person wrote may be from identity."""
+"""Largest deviation of R R^T of a transform in a file from identity."""
 
 
 @brief_repr
@@ -89,7 +89,7 @@ def with_tool(
     ------
     RobotError
         If the URDF cannot be read, the parent is missing, a name is taken, the transform is not
-        rigid, or the mass is none.
+        rigid, or the mass is invalid.
     """
     root = _parse(urdf)
     links = _names(root, "link")
@@ -125,7 +125,7 @@ def with_tool_mass(urdf: str, tool: str, mass: float, centre: ArrayLike) -> str:
     Raises
     ------
     RobotError
-        If the URDF cannot be read, the link is missing or has a mass, or the mass is none.
+        If the URDF cannot be read, the link is missing or has a mass, or the mass is invalid.
     """
     if mass == 0.0:
         return urdf
@@ -203,7 +203,7 @@ def on_rail(urdf: str, rail: Rail) -> str:
 
 
 def with_joint_origins(urdf: str, T_joint_new: Mapping[str, ArrayLike]) -> str:
-    """Return a URDF whose joints stand elsewhere in the links before them.
+    """Return a URDF with other positions of the joints in the links before them.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from elastocal.robot.urdf import (
 )
 
 GRAVITY = (0.0, 0.0, -9.80665)
-"""Standard gravity in the base frame of a robot that stands upright, in m/s² (ISO 80000-3)."""
+"""Standard gravity in the base frame of an upright robot, in m/s² (ISO 80000-3)."""
 _ARM, _REDUNDANT = 6, 7
 """Numbers of joints of an arm."""
 _CROSSED = 0.1
@@ -37,7 +37,7 @@ _JOINTS_SHOWN = 12
 class Jacobian:
     """Velocity of a point per unit joint velocity, in base axes (paper Eq. 1-2).
 
-    The paper stacks rotation over translation, Pinocchio the other way round; here the two
+    The paper stacks rotation over translation, Pinocchio translation over rotation; here the two
     parts have names.
     """
 
@@ -53,12 +53,12 @@ class Jacobian:
 @brief_repr
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of the joints, in SI units; what is not known is infinite or NaN."""
+    """Limits of the joints, in SI units; unknown ones are infinite or NaN."""
 
     lower: FloatArray
-    """Shape (joint,), in rad or m; -inf when there is none."""
+    """Shape (joint,), in rad or m; -inf if there is none."""
     upper: FloatArray
-    """Shape (joint,), in rad or m; inf when there is none."""
+    """Shape (joint,), in rad or m; inf if there is none."""
     velocity: FloatArray
     """Shape (joint,), in rad/s or m/s; NaN when not known."""
     effort: FloatArray

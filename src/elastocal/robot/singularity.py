@@ -1,7 +1,7 @@
-"""How near a configuration is to losing a direction of motion.
+"""Distance of a configuration from a singularity.
 
-All measures look at the arm alone (the joints behind the external axes): a rail in front of it
-would hide a singular wrist, and does not help a correction that the arm has to make.
+All measures are of the arm alone (the joints behind the external axes): a rail in front of it would
+hide a singular wrist, and does not help a correction that the arm must make.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ def characteristic_length(robot: Robot) -> float:
     # Limits that leave nothing of the window (say 200° to 300°) are sampled as they are.
     empty = ~(lower <= upper)
     lower, upper = np.where(empty, limits.lower, lower), np.where(empty, limits.upper, upper)
-    # Seeded here and not passed in: a default has to be the same for every caller.
+    # Seeded here and not passed in, so that a default is the same for every caller.
     q = np.random.default_rng(0).uniform(lower, upper, (_SAMPLES, len(lower)))
     jacobian = robot.jacobian(q)
     turning = np.arange(len(revolute)) >= robot.external_axes

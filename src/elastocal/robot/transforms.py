@@ -1,4 +1,4 @@
-"""Rigid transforms: their inverse, and KUKA's way to write them.
+"""Rigid transforms: inverse, and KUKA's notation.
 
 A KUKA pose is x, y, z and the Z-Y'-X'' Euler angles A, B, C with ``R = Rz(A) Ry(B) Rx(C)``, which
 is also what URDF calls roll, pitch, yaw = C, B, A.
@@ -27,7 +27,7 @@ def nearest_rotation(M: FloatArray) -> FloatArray:
 
     With ``M = sum b a^T`` over centred points it is the rotation that brings points ``a`` nearest
     to ``b`` (W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
-    Crystallographica A32, 1976); a mirror image is none.
+    Crystallographica A32, 1976); reflections are excluded.
 
     Parameters
     ----------

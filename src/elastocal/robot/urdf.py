@@ -1,13 +1,13 @@
-"""Read a URDF, as people publish them: check it by name, then let Pinocchio chain it.
+"""Reader of published URDFs: elements are checked by name, then Pinocchio builds the chain.
 
-Only the joints from the base to the asked tip are a robot here. Every other joint is fixed at zero,
-whatever it is (a mimicking piston, a gripper's fingers), so that what hangs on it keeps its place
-and its weight; frames beside the chain (``base``, twins of the flange) do no harm.
+Only the joints from the base to the requested tip are a robot here. Every other joint of any kind
+is fixed at zero (a mimicking piston, a gripper's fingers), so that the links behind it keep their
+position and weight; frames beside the chain (``base``, copies of the flange) do no harm.
 
-The checks come before Pinocchio because its parser reports problems on the C++ error stream;
-a user of elastocal gets one line that names the link, the joint and the allowed ones. Pinocchio
-gets a copy (`serial_urdf`) with nothing in it but what is computed with: statics needs masses and
-their centres, no inertia tensor.
+The checks come before Pinocchio because its parser reports problems on the C++ error stream; a user
+of elastocal gets one line that names the link, the joint and the allowed ones. Pinocchio gets a
+copy (`serial_urdf`) reduced to what the computation needs: statics needs masses and their centres,
+no inertia tensor.
 
 The elements of a URDF, checked by name: links, joints, and the joints of a chain.
 """
@@ -41,7 +41,7 @@ _NUMBERS = {
     "cylinder": {"radius": 1, "length": 1},
     "mesh": {"scale": 3},
 }
-"""How many numbers each attribute of each element holds (ROS wiki, urdf/XML)."""
+"""Number of values of each attribute of each element (ROS wiki, urdf/XML)."""
 _DIMENSIONS = {
     ("origin", "xyz"): "length",
     ("origin", "rpy"): "angle",
@@ -58,9 +58,9 @@ _MOVABLE = ("revolute", "continuous", "prismatic")
 
 
 def check_elements(root: ElementTree.Element) -> None:
-    """Refuse numbers that are none, and names that are missing or stand twice.
+    """Refuse invalid numbers, and names that are missing or repeated.
 
-    What only a drawing needs is not looked at; axes and limits are where a joint moves.
+    Elements for display only are not checked; axes and limits are checked for joints that move.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def _check_names(root: ElementTree.Element, kind: str) -> None:
 
 
 def _place(root: ElementTree.Element, kind: str, index: int) -> str:
-    """Return where a link or joint without a name stands, in words."""
+    """Return the position of a link or joint without a name, in words."""
     element = root.findall(kind)[index]
     ends = (element.find(role) for role in ("parent", "child"))
     linked = " to ".join(repr(end.get("link", "")) for end in ends if end is not None)
@@ -195,7 +195,7 @@ def is_movable(joint: ElementTree.Element) -> bool:
     Raises
     ------
     RobotError
-        If it is none that a chain may have.
+        If its type is not allowed in a chain.
     """
     name, kind, limit = joint.get("name"), joint.get("type"), joint.find("limit")
     if kind == "fixed":
@@ -239,7 +239,7 @@ def limits_of(joint: ElementTree.Element) -> dict[str, float]:
 
 _ENCODING = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([\w.-]+)")
 _BEFORE_ROOT = re.compile(r"\A(?:\ufeff|\s|<!--.*?-->)*(?:<\?xml\b.*?\?>)?", re.S)
-"""What authors put before the XML declaration, where XML allows nothing; and the declaration."""
+"""Text that authors put before the XML declaration, where XML allows none; and the declaration."""
 _FEWEST_OF_AN_ARM, _MOST_OF_A_FINGER = 3, 4
 """Joints before a gripper, and of one of its fingers."""
 _TOOL_LINKS = ("flange", "tool0", "tool_0")
@@ -257,15 +257,15 @@ _XACRO = (
 class Assumption:
     """A number of a robot description that has no source.
 
-    Read from the element ``<assumption field="…" reason="…"/>`` that the catalogue writes into
-    its URDFs; whoever uses such a number has to say so.
+    Read from the element ``<assumption field="…" reason="…"/>`` that the catalogue writes into its
+    URDFs; every use of such a number must be reported.
     """
 
     field: str
     """Field that is assumed: ``dimension``, ``position``, ``velocity``, ``effort``, ``inertia`` or
     ``shape``."""
     reason: str
-    """Where the value comes from, in words."""
+    """Origin of the value, in words."""
 
 
 @contextlib.contextmanager
@@ -315,7 +315,7 @@ def parse_urdf(text: str, comments: bool = False) -> ElementTree.Element:
     Parameters
     ----------
     text : str
-        The URDF; blank lines and comments may stand before its XML declaration.
+        The URDF; blank lines and comments may precede its XML declaration.
     comments : bool
         Whether comments are kept.
 
@@ -366,7 +366,7 @@ def robot_name(root: ElementTree.Element) -> str:
 
 
 def root_link(root: ElementTree.Element) -> str:
-    """Return the link that is nobody's child.
+    """Return the link without a parent.
 
     Raises
     ------
@@ -486,11 +486,11 @@ def _fingers(root: ElementTree.Element, moved: Mapping[str, int]) -> dict[str, s
 
 
 def tool_link(text: str) -> str:
-    """Return the link of a URDF that a tool is mounted on, as far as names and axes tell.
+    """Return the link of a URDF on which a tool is mounted, by names and axes.
 
-    That is ``flange``, ``tool0``, or else the leaf behind the most joints; of several behind as
-    many joints, one whose z axis points out of the arm. ROS-Industrial's ``flange`` has its x axis
-    there, its ``tool0`` the z axis.
+    That is ``flange``, ``tool0``, or else the leaf behind the most joints; of several behind
+    equally many joints, one whose z axis points out of the arm. In ROS-Industrial the x axis of
+    ``flange`` points there, and the z axis of ``tool0``.
 
     Raises
     ------
@@ -559,7 +559,7 @@ def serial_urdf(root: ElementTree.Element, joints: Iterable[str], shapes: bool =
         A URDF that `read_chain` accepts.
     joints : iterable of str
         Names of the joints that move, each by one number: a continuous one becomes a revolute one.
-        The others are fixed at zero. Limits are not told.
+        The others are fixed at zero. Limits are left out.
     shapes : bool
         Whether links keep their collision shapes.
     """
@@ -582,7 +582,7 @@ def serial_urdf(root: ElementTree.Element, joints: Iterable[str], shapes: bool =
 
 
 def _copy_mass(link: ElementTree.Element, copy: ElementTree.Element) -> None:
-    """Give the copy of a link its mass and its centre, if it has one."""
+    """Copy mass and centre of a link, if it has them."""
     mass = link.find("inertial/mass")
     if mass is None or mass.get("value") is None:
         return

@@ -24,8 +24,8 @@ class SimulatedDriver:
     ) -> DeviceSet:
         """Make the devices of a simulated cell.
 
-        Where all are wanted, time passes when somebody sleeps, and results are the same to the last
-        bit. Beside devices of others the cell goes on with the clock of the rig.
+        If all devices are simulated, time passes only while a caller sleeps, and results are
+        reproducible to the last bit. Beside real devices the cell follows the clock of the rig.
         """
         if wanted.keys() == self.kinds:
             all_of_it = simulated_devices(cell, context.seed, context.start)

@@ -1,10 +1,10 @@
 """The sections `simulation` and `faults` of a cell file: the hidden truth of the simulated cell.
 
 Planning, procedure and calibration do not know them; `elastocal.cell` finds them by name
-(`SECTIONS_OF_OTHERS`). What makes one cell harder than another is in the table of `presets`, each
-figure with its source; all other defaults are assumptions of a plausible size.
+(`SECTIONS_OF_OTHERS`). The difficulty of a cell is in the table of `presets`, each figure with its
+source; all other defaults are plausible assumptions.
 
-How bad the simulated cell is: the figures of the presets `kind`, `typical`, `harsh`.
+The presets `kind`, `typical` and `harsh` state the size of the imperfections of the simulated cell.
 
 One table gives the defaults of the section ``simulation`` and the page on the simulated cell. A
 figure that is not in it is the same in all presets.
@@ -57,13 +57,13 @@ class PresetFigure:
     key: str
     """Place in the section ``simulation``, such as ``gears.growth``."""
     effect: str
-    """What it says."""
+    """Description of the figure."""
     kind: _Value
-    """As a cell file has it: quantities with their unit."""
+    """Value as in a cell file: a quantity with its unit."""
     typical: _Value
     harsh: _Value
     source: str
-    """Where the magnitude comes from: "assumption" where nobody was found to say it, † where a data
+    """Origin of the magnitude: "assumption" where no published value was found, † where a data
     sheet is cited from memory."""
 
     def of(self, preset: Preset) -> _Value:
@@ -244,7 +244,7 @@ def with_preset(data: dict[str, Any], preset: Preset) -> dict[str, Any]:
     Parameters
     ----------
     data : dict
-        The section as it stands in a file.
+        The section as in a file.
     preset : str
         Which.
     """
@@ -253,7 +253,7 @@ def with_preset(data: dict[str, Any], preset: Preset) -> dict[str, Any]:
         section, name = figure.key.split(".")
         own = filled.get(section, {})
         if not isinstance(own, dict) or {name, *_INSTEAD.get(figure.key, ())} & own.keys():
-            continue  # said otherwise, or no section at all: refused later by its path
+            continue  # Set otherwise, or no section at all: refused later with its path
         filled[section] = own | {name: figure.of(preset)}
     return filled
 
@@ -278,11 +278,11 @@ class Gears(StrictModel):
     """Gears of the six arm joints (`elastocal.sim.workcell`)."""
 
     stiffness: Annotated[tuple[RotationalStiffness, ...], _SIX] | None = None
-    """At high torque, in N·m/rad; by default those of a 1.1 t arm, scaled with the moved mass."""
+    """At high torque, in N·m/rad; by default that of a 1.1 t arm, scaled with the moved mass."""
     growth: ShareBelowHalf = kind_default("gears.growth")
-    """How much softer a gear is at rest, over its stiffness at high torque."""
+    """Loss of stiffness of a gear at rest, over its stiffness at high torque."""
     growth_angle: Annotated[AngleUpToPi, Field(gt=0.0)] = 3e-4
-    """Twist at which it is half way between the two, in rad."""
+    """Twist at which it is half-way between the two, in rad."""
     backlash: AngleUpToPi = 3e-5
     """Twist that is lost between a torque and its opposite, in rad; there the gear is soft, not
     free."""
@@ -297,8 +297,8 @@ class Gears(StrictModel):
     presliding: Annotated[AngleUpToPi, Field(gt=0.0)] = kind_default("gears.presliding")
     """Twist from rest after which the friction is at its full height, in rad."""
     residual: Annotated[FiniteFloat, Field(ge=0.0, le=10.0)] = kind_default("gears.residual")
-    """Standard deviation of the last stroke of a gear before it stands, over `presliding`: what a
-    free move leaves of the friction."""
+    """Standard deviation of the last stroke of a gear before it stops, over `presliding`: it sets
+    the friction that a free move leaves."""
 
 
 class Bearings(StrictModel):
@@ -307,9 +307,9 @@ class Bearings(StrictModel):
     ratio: tuple[Scale, Scale] = kind_default("bearings.ratio")
     """Stiffness of the two tilts over that of the joint's gear."""
     turn: AngleUpToPi = kind_default("bearings.turn")
-    """How far the axes of the tilts are turned about the joint's, in rad."""
+    """Rotation of the axes of the tilts about the joint's, in rad."""
     offset: Distance = kind_default("bearings.offset")
-    """How far along its axis from the joint's origin they sit, in m."""
+    """Distance along the axis from the joint's origin to the tilts, in m."""
 
 
 class Links(StrictModel):
@@ -377,7 +377,7 @@ class ContactTruth(StrictModel):
     normal_stiffness: TranslationalStiffness = 4e6
     """Normal stiffness of the urethane disk, in N/m: 0.3 mm at 1.1 kN."""
     shear_stiffness: TranslationalStiffness = 1.5e6
-    """Shear stiffness of the disk before it slips at all, in N/m: 0.2 mm at 280 N."""
+    """Shear stiffness of the disk before it slips, in N/m: 0.2 mm at 280 N."""
     friction: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
     """True coefficient of friction; by default that of the load cases."""
     micro_slip: Distance = 8e-6
@@ -388,7 +388,7 @@ class ContactTruth(StrictModel):
     tooling_stiffness: TranslationalStiffness = 2.5e7
     """Stiffness of the tooling along its normal, in N/m."""
     surface_offset: Point = (0.0, 0.0, 0.0)
-    """How far the tooling stands from where the cell file puts it, in base, in m."""
+    """Deviation of the tooling's position from the cell file, in base, in m."""
     tilt: AngleUpToPi = kind_default("contact.tilt")
     """Standard deviation of the disk's tilt on the tooling in a visit, about each lateral axis, in
     rad: it moves the point of attack."""
@@ -406,7 +406,7 @@ class ControllerTruth(StrictModel):
     ripple: Force = 0.7
     """Amplitude of the unrest of a held force, in N."""
     reaction: PositiveTime = 0.004
-    """From the contact force to the standstill of a guarded approach, in s."""
+    """Time from the contact force to the standstill of a guarded approach, in s."""
     repeatability: Distance = kind_default("controller.repeatability")
     """Standard deviation of a stop along each axis of base, in m; the controller knows nothing
     of it."""
@@ -419,7 +419,7 @@ class ControllerTruth(StrictModel):
 
 
 class SensorTruth(StrictModel):
-    """Force/torque sensor; ranges and place stand in the section ``sensor``."""
+    """Force/torque sensor; ranges and position are in the section ``sensor``."""
 
     rate: SampleRate = 100.0
     force_noise: Force = 0.8
@@ -434,12 +434,12 @@ class SensorTruth(StrictModel):
     cross_talk: Share = kind_default("sensor.cross_talk")
     """Standard deviation of what an axis reads of each axis, itself too, over the ranges."""
     hysteresis: Share = kind_default("sensor.hysteresis")
-    """How much more an axis reads on the way down than up, at half of a load of a fifth of its
+    """Excess reading of an axis during unloading over loading, at half of a load of a fifth of its
     range, over that load."""
 
 
 class TrackerTruth(StrictModel):
-    """Laser trackers; stations stand in the section ``trackers``."""
+    """Laser trackers; stations are in the section ``trackers``."""
 
     rate: SampleRate = 100.0
     noise: Distance = 15e-6
@@ -453,20 +453,20 @@ class TrackerTruth(StrictModel):
 
 
 class Geometry(StrictModel):
-    """How the robot is built, against how its description has it."""
+    """Errors of the robot's geometry against its description."""
 
     tcp: Distance = kind_default("geometry.tcp")
     """Length of the error of the tool centre point, in a random direction, in m."""
     links: Distance = kind_default("geometry.links")
-    """Length of the error of each joint's place against the joint before, likewise, in m."""
+    """Length of the error of each joint's position relative to the joint before, in m."""
 
 
 class Thermal(StrictModel):
     """Growth of the arm by its own warmth."""
 
     drift: Distance = kind_default("thermal.drift")
-    """How far the tool drifts at HOME between cold and warm, away from the foot, in m. A visit of
-    the calibration finds the arm somewhere between; a process has it warm."""
+    """Drift of the tool at HOME between cold and warm, away from the foot, in m. In a visit of the
+    calibration the arm is in between; in a process it is warm."""
 
 
 class Simulation(StrictModel):
@@ -544,25 +544,25 @@ class Fault(StrictModel):
     """Visit at which it happens, from 0. A visit begins with the first straight approach after a
     joint move or a retract; a pose that is tried again is another visit."""
     visits: Annotated[int, Field(ge=1)] = 1
-    """How many visits in a row it happens at. Not counted by `station_bumped` and `tool_weight`,
-    which stay."""
+    """Number of consecutive visits in which it happens. Not used by `station_bumped` and
+    `tool_weight`, which are permanent."""
     step: _Step = "hold"
     """Step of the visit from whose beginning `after` counts: `approach` the first approach,
     `reference` when it has ended, `engage` the second approach, `hold` a load case."""
     load: Annotated[int, Field(ge=0)] = 0
-    """Which load case of the visit, from 0, where the step is `hold`."""
+    """Load case of the visit, from 0, if the step is `hold`."""
     after: Time = 0.0
     """In s."""
     duration: PositiveTime | None = None
-    """How long it lasts, in s; for good by default."""
+    """Duration, in s; permanent by default."""
     station: str | None = None
     """Tracker station; all by default."""
     distance: PositiveLength = 1e-3
-    """How far the contact slips, in m."""
+    """Length of the contact's slip, in m."""
     amplitude: Force = 40.0
     """Amplitude of the force that never comes to rest; force of a soft collision; in N."""
     offset: Point = (0.5e-3, 0.0, 0.0)
-    """How far the station is moved, in base, in m."""
+    """Displacement of the station, in base, in m."""
     mass: Annotated[Mass, Field(le=1e3)] = 2.0
     """Mass that is put on the tool, in kg."""
 

@@ -1,8 +1,8 @@
-"""Edits of the cell that a page asks for: written back whole and checked, or not at all.
+"""Edits of the cell from a page: checked and written back whole, or not at all.
 
-What is not edited keeps every letter, comments among them. A place in the file is its keys from the
-top: ``("surface", "region", "box", "min", 0)``. YAML says where a value begins and ends; the
-letters between are replaced, and nothing else (docs/decisions/0114-libraries-not-taken.md).
+Text that is not edited stays unchanged, including comments. A position in the file is its keys from
+the top: ``("surface", "region", "box", "min", 0)``. The YAML parser gives the beginning and end of
+a value; only the text between is replaced (docs/decisions/0114-libraries-not-taken.md).
 """
 
 import json
@@ -27,10 +27,10 @@ from elastocal.units import in_unit
 Key = str | int
 """Name of a key, or number of an item."""
 Value = str | float | Sequence["Value"] | Mapping[str, "Value"]
-"""What a place may be given; a text is always written in quotes."""
+"""Value that may be set; a text is always written in quotes."""
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LINE = re.compile(r"[ \t]*(#[^\r\n]*)?(\r\n|\n|\Z)")
-"""What may stand behind a value on its line."""
+"""Text that may follow a value on its line."""
 
 
 def with_value(text: str, place: Sequence[Key], value: Value) -> str:
@@ -50,7 +50,7 @@ def with_value(text: str, place: Sequence[Key], value: Value) -> str:
 
 
 def without(text: str, place: Sequence[Key]) -> str:
-    """Return the text without a place; the same text where there is none.
+    """Return the text without a position; the same text if there is none.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def _child(node: yaml.Node, key: Key) -> yaml.Node | None:
 
 
 def _entries(text: str, node: yaml.Node, key: Key) -> list[tuple[int, int]]:
-    """Return where the lines of a key or item begin and end: of one, or of none."""
+    """Return the range of lines of a key or item; empty if there is none."""
     if isinstance(node, yaml.MappingNode):
         pairs = [(name.start_mark.index, value) for name, value in node.value if name.value == key]
     elif isinstance(node, yaml.SequenceNode) and isinstance(key, int):
@@ -165,14 +165,14 @@ def _entries(text: str, node: yaml.Node, key: Key) -> list[tuple[int, int]]:
 
 
 def _replaced(text: str, node: yaml.Node, new: str) -> str:
-    """Return the text with other letters for a node; a block becomes what stands on one line."""
+    """Return the text with a node replaced; a block is replaced by text on one line."""
     start, end = node.start_mark.index, _end_of(node)
     if isinstance(node, yaml.ScalarNode) or _is_flow(node):
         return text[:start] + new + text[end:]
     line = _line_start(text, start)
     if text[line:start].strip():
         return text[:start] + new + text[end:]
-    # The key stands on a line before: its colon is followed by the value from here on.
+    # The key is on an earlier line: its value is written after its colon.
     colon = text.rindex(":", 0, line)
     return f"{text[: colon + 1]} {new}{text[colon + 1 : line].rstrip()}{text[end:]}"
 
@@ -198,7 +198,7 @@ def _inserted(text: str, end: int, line: str) -> str:
 
 
 def _end_of(node: yaml.Node) -> int:
-    """Return where the last letter of a node ends: YAML lets a block reach to the next key."""
+    """Return the position of a node's last letter; YAML extends a block to the next key."""
     if isinstance(node, yaml.ScalarNode) or _is_flow(node) or not node.value:
         return int(node.end_mark.index)
     last = node.value[-1]
@@ -215,7 +215,7 @@ def _line_start(text: str, index: int) -> int:
 
 
 def _rest_of_line(text: str, index: int) -> int:
-    """Return where the line of an index ends, its comment and its end included."""
+    """Return the end of the line of an index, after its comment."""
     match = _LINE.match(text, index)
     return match.end() if match else index
 
@@ -226,7 +226,7 @@ _REGION, _STATIONS, _LOADS = ("surface", "region"), ("trackers",), ("load_cases"
 
 @record()
 class StationForm:
-    """One tracker station, quantities as they stand in the file."""
+    """One tracker station, quantities as in the file."""
 
     name: str
     position: tuple[str, str, str]
@@ -235,7 +235,7 @@ class StationForm:
 
 @record()
 class RegionForm:
-    """Corners of a box in the frame of the mesh, quantities as they stand in the file."""
+    """Corners of a box in the frame of the mesh, quantities as in the file."""
 
     min: tuple[str, str, str]
     max: tuple[str, str, str]
@@ -244,7 +244,7 @@ class RegionForm:
 @brief_repr
 @record()
 class LoadForm:
-    """Load cases, quantities as they stand in the file."""
+    """Load cases, quantities as in the file."""
 
     fx: str
     fy: str
@@ -257,7 +257,7 @@ class LoadForm:
 @brief_repr
 @record()
 class CellForm:
-    """What of a cell file a page has fields for."""
+    """Fields of a cell file that the page can edit."""
 
     stations: tuple[StationForm, ...]
     region: RegionForm | None
@@ -270,7 +270,7 @@ class CellForm:
 @brief_repr
 @record()
 class CellEdit:
-    """What is to be changed; what is None stays."""
+    """Changes to a cell file; None leaves a field unchanged."""
 
     text: str | None = None
     """The whole file."""
@@ -345,7 +345,7 @@ class CellText:
         Raises
         ------
         SchemaError
-            If somebody else has changed the file since it was read.
+            If the file was changed otherwise since it was read.
         ElastocalError
             If the check refuses the text; nothing is written then.
         """
@@ -354,7 +354,7 @@ class CellText:
         temporary = self.path
         mode = self.path.stat().st_mode & 0o777
         try:
-            # An edit is a command of its own: to whoever opened the cell it is an input.
+            # An edit is a command of its own, for which the cell is an input.
             with ruled(OutputRule(force=True)), replacing(self.path) as temporary:
                 data = ((_BOM if self.bom else "") + text).encode("utf-8")
                 temporary.write_bytes(data)

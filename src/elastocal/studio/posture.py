@@ -34,7 +34,7 @@ from elastocal.wording import millimetres, mm, readable
 _PROBES = 32
 """Points by which positions of the rail are ranked, as planning does."""
 _TOUCHES = 5e-5
-"""Distance in m that is none."""
+"""Distance in m that counts as contact."""
 
 
 @record()
@@ -45,7 +45,7 @@ class JointFigure:
     value: float
     """In rad or m."""
     text: str
-    """With its unit."""
+    """Value with its unit."""
     margin: str
     """Distance to the nearer limit."""
     passes: bool
@@ -92,7 +92,7 @@ class PostureFigures:
     marker: tuple[float, float, float] | None
     sight: tuple[SightFigure, ...]
     surface: str
-    """How far the tooling is along the tool's axis."""
+    """Distance of the tooling along the tool's axis."""
     stiffness: tuple[StiffnessFigure, ...]
     cases: tuple[CaseFigure, ...]
     refusal: str = ""
@@ -101,7 +101,7 @@ class PostureFigures:
 
 @dataclass(frozen=True, eq=False)
 class CellView:
-    """A cell with all that its postures are judged by. Make one with `CellView.of`."""
+    """Cell as drawn."""
 
     cell: Cell
     surface: Surface
@@ -137,7 +137,7 @@ class CellView:
 
     @cached_property
     def _placements(self) -> tuple[BasePlacement, ...]:
-        """Where the external axes should carry the arm, as planning ranks them."""
+        """Positions of the external axes in order of preference, as in planning."""
         probes = sample_uniform(self.surface, _PROBES, np.random.default_rng(0))
         return self.builder.rank(probes)
 
@@ -299,7 +299,7 @@ class CellView:
         return int(faces[0]), np.array([1.0 - (u + v) / share, u / share, v / share])
 
     def _distance(self, T: FloatArray) -> str:
-        """Return how far the tooling is along the tool's axis, in words."""
+        """Return the distance of the tooling along the tool's axis, in words."""
         # From behind the tcp, so that a tool that has gone in is seen as well.
         start = self.builder.solver.approach
         hit = self._hit(T[:3, 3] - start * T[:3, 2], T[:3, 2])
@@ -314,7 +314,7 @@ class CellView:
 
 
 def joint_text(value: float, revolute: bool) -> str:
-    """Return a joint position as a person reads it.
+    """Return a joint position in words.
 
     >>> joint_text(0.5, True), joint_text(0.25, False)
     ('28.6°', '250.0 mm')

@@ -60,7 +60,7 @@ class RunView:
         Raises
         ------
         ProcedureError
-            If there is none, or nothing of it has been written yet.
+            If there is none, or it has not been written yet.
         SchemaError, FileAccessError
             If its journal cannot be read.
         """
@@ -79,7 +79,7 @@ class RunView:
 
     @property
     def state(self) -> str:
-        """How far the run is, in words."""
+        """Progress of the run, in words."""
         last = self.entries[-1]
         count = len(commits(self.entries))
         poses = f"{count} pose{'' if count == 1 else 's'} committed"
@@ -105,8 +105,8 @@ class RunView:
     def pose(self, pose: int) -> dict[str, object]:
         """Return the streams of a committed pose, thinned, JSON-ready.
 
-        Forces are the norms against the mean of the unloaded reference, which takes bias and tool
-        weight out; the marker's way likewise.
+        Forces are norms relative to the mean of the unloaded reference, which removes bias and tool
+        weight; so are the positions of the marker.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class RunView:
         log = next((each for each in commits(self.entries) if each.pose == pose), None)
         if log is None:
             raise ProcedureError(f"pose {pose} is not committed")
-        # Of the way there and back a curve would show nothing else.
+        # The path there and back would dominate the curve.
         start = min(each.start for each in log.windows) - _AROUND
         end = max(each.end for each in log.windows) + _AROUND
         streams = read_streams(self.folder.streams / log.streams, [(start, end)])
@@ -159,7 +159,7 @@ def find_runs(beside: Path) -> tuple[RunEntry, ...]:
 def _curve(
     time: FloatArray, vectors: FloatArray, span: tuple[float, float], start: float
 ) -> dict[str, list[float]]:
-    """Return how far vectors are from their mean within a span, over time."""
+    """Return the distance of vectors from their mean within a span, over time."""
     inside: BoolArray = (time >= span[0]) & (time <= span[1])
     if not inside.any():
         return {"time": [], "value": []}

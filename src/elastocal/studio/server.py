@@ -1,10 +1,10 @@
 """The server of the studio: one page, one token, one origin; every message is bounded.
 
-Whoever knows the address may do what the page can, so the address holds a token that is drawn for
-each start, and nothing is answered without it. A page of somebody else's in the same browser is
-kept out three times: by the token, which it does not know; by ``Host``, so that no name of its own
-can be made to lead here (DNS rebinding); and by ``Origin`` and ``Sec-Fetch-Site``, which a browser
-states truly. The page itself may load nothing but its own files and run no other script.
+The address gives access to everything that the page can do, so it contains a token that is drawn at
+each start, and no request is answered without it. Foreign pages in the same browser are excluded by
+three means: by the token, which they do not know; by ``Host``, against DNS rebinding; and by
+``Origin`` and ``Sec-Fetch-Site``, which browsers set correctly. The page itself may load only its
+own files and run no other script.
 """
 
 import contextlib
@@ -77,11 +77,11 @@ class _RefusedError(Exception):
 
 @dataclass(frozen=True)
 class _Door:
-    """Who is let in."""
+    """Access control."""
 
     token: str
     host: str
-    """What the server is bound to."""
+    """Address that the server is bound to."""
     port: int
 
     def require(self, headers: Any, path: str) -> str:
@@ -135,7 +135,7 @@ class StudioServer:
     actions : mapping
         What a page may ask for, by name.
     news : callable
-        What a page that listens is told.
+        Source of the news for a listening page.
     host : str
         Address to bind to.
     port : int
@@ -217,7 +217,7 @@ class _Listener(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def let_in(self, request: socket) -> None:
-        """Keep a connection, whoever comes; it has shown the token."""
+        """Keep a connection that has shown the token."""
         self._strangers.pop(request, None)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
@@ -229,7 +229,7 @@ class _Listener(ThreadingHTTPServer):
             self._free.release()
 
     def handle_error(self, request: socket | tuple[bytes, socket], client_address: Any) -> None:
-        """Say nothing of browsers that hang up."""
+        """Ignore browsers that disconnect."""
 
 
 class _Request(BaseHTTPRequestHandler):
@@ -304,7 +304,7 @@ class _Request(BaseHTTPRequestHandler):
             raise _RefusedError(HTTPStatus.BAD_REQUEST, "the message is no JSON") from error
 
     def _tell_news(self) -> None:
-        """Tell what is new for as long as the page listens (server-sent events)."""
+        """Send news for as long as the page listens (server-sent events)."""
         self.close_connection = True
         self._head(HTTPStatus.OK, {"Content-Type": "text/event-stream; charset=utf-8"})
         number = -1

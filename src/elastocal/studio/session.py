@@ -1,7 +1,7 @@
-"""What the studio knows and can do: one cell, its view, one work at a time; asked by name.
+"""State and actions of the studio: one cell, its view, one work at a time.
 
-`Session.actions` is what a page may ask for. Each takes a message, refuses what is none, and
-returns JSON-ready data; pages in several windows see the same cell.
+`Session.actions` are the requests of a page, by name. Each takes a message, refuses an invalid one,
+and returns JSON-ready data; pages in several windows show the same cell.
 """
 
 import re
@@ -45,7 +45,7 @@ class PostureMessage:
 @brief_repr
 @record()
 class PlaceMessage:
-    """Where the tool is wanted, from a posture."""
+    """Requested position of the tool, from a posture."""
 
     q: Posture
     position: tuple[float, float, float]
@@ -57,7 +57,7 @@ class PlaceMessage:
 @brief_repr
 @record()
 class LineMessage:
-    """A line of sight of whoever looks at the page, from a posture."""
+    """Line of sight of the viewer, from a posture."""
 
     q: Posture
     origin: tuple[float, float, float]
@@ -66,7 +66,7 @@ class LineMessage:
 
 @record()
 class PlanMessage:
-    """How to plan."""
+    """Options of a plan."""
 
     folder: str
     replace: bool = False
@@ -75,7 +75,7 @@ class PlanMessage:
 
 @record()
 class RunMessage:
-    """Which plan to carry out, and where the record goes."""
+    """Plan to carry out, and folder of the record."""
 
     plan: str
     folder: str
@@ -102,7 +102,7 @@ class Nothing:
 
 
 class StudioWork(Protocol):
-    """What the studio has others do: the work of commands, in a process of its own."""
+    """Works of commands that the studio starts, each in a process of its own."""
 
     def check(self, cell: Path) -> object:
         """Refuse a file that is no cell."""
@@ -179,7 +179,7 @@ class Session:
         self.actions: Mapping[str, Callable[[Any], Mapping[str, object]]] = {
             work.__name__.removeprefix("_"): partial(_asked, kind, work) for kind, work in makers
         }
-        """What a page may ask for, by name."""
+        """Requests of a page, by name."""
 
     @property
     def name(self) -> str:
@@ -318,7 +318,7 @@ class Session:
                     "the page shows another state of the cell file: look at the new one first"
                 )
             message = replace(message, rate=0.0)
-        # The worker reads the file anew: it must be this one.
+        # The worker reads the file again: it must be this one.
         arming = Arming(cell.sha256, real)
         self.worker.begin("run", self._work.run(self._path, message, arming))
         return {}
@@ -385,7 +385,7 @@ def _shown(figures: object) -> Mapping[str, object]:
 
 
 def _bounded(ends: Any, revolute: tuple[bool, ...], sign: float) -> list[float]:
-    """Return limits that a slider can have: a turn, or 10 m, where there is none."""
+    """Return limits for a slider: a turn, or 10 m, where there is none."""
     return [
         float(end) if np.isfinite(end) else sign * (np.pi if turns else 10.0)
         for end, turns in zip(ends, revolute, strict=True)

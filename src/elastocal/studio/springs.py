@@ -16,13 +16,13 @@ from elastocal.units import in_unit, quantity
 from elastocal.wording import mm
 
 _WIND_UP = 2e-3
-"""By how much a gear is taken to wind up under the torque that its joint may use, in rad: makers of
-gears for robots state 1 to 3 mrad."""
+"""Angle by which a gear is assumed to wind up under the permissible torque of its joint, in rad:
+makers of gears for robots state 1 to 3 mrad."""
 _DRIVE = 4e7
 """Stiffness of a linear drive, in N/m."""
 _MICROMETRES = 1e-6
 _RIGID = 1e-12
-"""Compliance in m/N that is none."""
+"""Compliance in m/N below which a spring counts as rigid."""
 
 
 @record()
@@ -59,9 +59,9 @@ class StudioSprings:
     compliance: FloatArray
     """Shape (parameter,)."""
     source: str
-    """In words, for whoever reads a prediction."""
+    """Origin of the springs, in words, for the reader of a prediction."""
     calibrated: CalibratedModel | None = None
-    """With intervals; none of springs by rule of thumb."""
+    """Whether there are intervals, unlike for springs by rule of thumb."""
 
     def stiffness(self, q: FloatArray, T: FloatArray) -> tuple[StiffnessFigure, ...]:
         """Return the stiffness of the tool centre point at a posture, without load.

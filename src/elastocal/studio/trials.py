@@ -1,4 +1,4 @@
-"""Trials before a plan: where the robot can press at all, and what each search would choose."""
+"""Trials before a plan: where the robot can press, and the choice of each search."""
 
 import time
 from dataclasses import replace
@@ -22,7 +22,7 @@ _TECHNIQUES = ("cover", "i_optimal", "ioops", "exchange-a", "exchange-e", "rando
 
 
 def survey_reach(path: Path, outbox: Outbox) -> Data:
-    """Return points on the tooling, each with what refuses it; empty where a pose can be had."""
+    """Return points on the tooling, each with the check that refuses it, or empty."""
     cell = _with_pool(load_cell(path), _SURVEYED)
     surface = cell_surface(cell)
     sampled = sample_pool(cell, surface, np.random.default_rng(0), 1, outbox.progress)
@@ -38,7 +38,7 @@ def survey_reach(path: Path, outbox: Outbox) -> Data:
 
 @one_blas_thread()
 def compare_techniques(path: Path, outbox: Outbox) -> Data:
-    """Return how each search technique would choose from one pool, a row a technique."""
+    """Return the choice of each search technique from one pool, a row a technique."""
     cell = load_cell(path)
     cell = _with_pool(cell, min(_COMPARED, cell.file.search.pool))
     surface = cell_surface(cell)

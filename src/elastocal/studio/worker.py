@@ -19,29 +19,29 @@ from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.results import brief_repr
 
 _GRACE = 5.0
-"""How long a worker that was ended may clean up, in s."""
+"""Time in which a stopped worker may clean up, in s."""
 _ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
-"""Signals by which a person, a terminal or a system ends a program, or halts it."""
+"""Signals by which a person, a terminal or a system ends or halts a program."""
 
 Data = Mapping[str, object]
 """JSON-ready."""
 
 
 class WorkState(Enum):
-    """How far a work has come."""
+    """State of a work."""
 
     NONE = "none"
     BUSY = "busy"
     DONE = "done"
     FAILED = "failed"
     STOPPED = "stopped"
-    """By a person."""
+    """Stopped by a person."""
 
 
 @brief_repr
 @dataclass(frozen=True)
 class WorkNews:
-    """What is known of the work that was begun last."""
+    """State of the work that was started last."""
 
     kind: str = ""
     """plan, compare, survey, watch or run."""
@@ -50,7 +50,7 @@ class WorkNews:
     done: int = 0
     total: int = 0
     live: Data = field(default_factory=dict)
-    """What it said last of itself, beside its progress."""
+    """Its last message, beside its progress."""
     result: Data = field(default_factory=dict)
     message: str = ""
     """Why it failed or stopped."""
@@ -70,14 +70,14 @@ class Outbox:
         self._stage: tuple[str, int, int] | None = None
 
     def progress(self, stage: str, done: int, total: int, /) -> None:
-        """Say how far a stage is; it is an `elastocal.progress.Progress`."""
+        """Report the progress of a stage; it is an `elastocal.progress.Progress`."""
         if (stage, done, total) != self._stage:
             self._stage = (stage, done, total)
             with contextlib.suppress(OSError):
                 self._line.send(("progress", *self._stage))
 
     def tell(self, live: Data) -> None:
-        """Say something else of the work."""
+        """Report other news of the work."""
         with contextlib.suppress(OSError):
             self._line.send(("live", live))
 
@@ -143,7 +143,7 @@ class Worker:
             self._reader.start()
 
     def stop(self) -> None:
-        """Stop the work: a run in its own way, anything else at once."""
+        """Stop the work: a run retracts first, anything else ends at once."""
         with self._lock:
             if self.news.state is not WorkState.BUSY or self._process is None:
                 return
@@ -200,7 +200,7 @@ class Worker:
 
 
 def _carry_out(line: "Connection[object, object]", work: Work, orderly: bool) -> None:
-    """Do a work and send its result; this is the worker's process.
+    """Carry out a work and send its result; this is the worker's process.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _carry_out(line: "Connection[object, object]", work: Work, orderly: bool) ->
         if hasattr(signal, name) and orderly:
             signal.signal(getattr(signal, name), heed)
     if not orderly:
-        # The studio says what is to become of it.
+        # The studio decides how signals end it.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, _leave)
     try:

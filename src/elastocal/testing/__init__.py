@@ -1,4 +1,4 @@
-"""What every variant keeps, as suites for pytest: for those of elastocal and of other packages.
+"""Contract suites for pytest, for variants of elastocal and of other packages.
 
 A suite is a class of tests. Make a subclass whose name begins with ``Test`` and give it the fixture
 that says what is tested::

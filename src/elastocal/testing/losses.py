@@ -1,4 +1,4 @@
-"""What every loss keeps."""
+"""Contract of every loss."""
 
 from collections.abc import Callable
 

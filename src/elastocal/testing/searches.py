@@ -1,4 +1,4 @@
-"""What every search technique and every criterion of the exchange keeps."""
+"""Contract of every search technique and every criterion of the exchange."""
 
 from functools import cache
 

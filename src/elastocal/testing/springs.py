@@ -1,4 +1,5 @@
-"""What every kind of spring keeps that needs no robot: parameters, law, tangents, files."""
+"""Contract of every kind of spring without a robot: parameters, law, tangents, files.
+"""
 
 from dataclasses import replace
 

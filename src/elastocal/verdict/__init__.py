@@ -1,4 +1,4 @@
-"""The verdict on a calibration: evidence gathered, held together, judged; nothing is rendered.
+"""The verdict on a calibration: evidence is gathered, compared and judged; nothing is rendered.
 
 =============  ==================================================================
 `gather`       from the files of a run to its evidence, with what is missing

@@ -35,7 +35,7 @@ _LEFT_OUT = (
     "provenance", "started", "source", "sha256", "file", "findings", "model", "model_sha256",
     "tool", "tool_sha256", "plan", "streams_sha256", "line_check", "dataset_sha256", SEAL,
 )  # fmt: skip
-"""Keys and attributes that tell when and where, or are hashes of what does."""
+"""Keys and attributes for time, place, or hashes of them."""
 _WHOLE_LEFT_OUT = (MADE_FROM, "files_sha256", "run_number", "earlier_runs")
 _STAMPED = (".json", ".jsonl", ".nc")
 _SEALED = (
@@ -57,7 +57,7 @@ def content_hash(path: Path) -> tuple[str, str]:
         try:
             return _content(path), CONTENT
         except (ElastocalError, ValueError, RecursionError):
-            # What is damaged has no content to speak of.
+            # Damaged files have no content to compare.
             return file_sha256(path), BYTES
     return file_sha256(path), BYTES
 
@@ -109,7 +109,7 @@ def read_seal(path: Path) -> Seal:
 
 
 MODEL, TOOL, CODEC, PROCESS = "model.json", "tool.json", "codec", "process"
-"""Default names of what is not part of the run's own folder."""
+"""Default names of files outside the run's own folder."""
 _RUN = "run"
 """Name of a run's folder in the folder that holds everything."""
 Part = TypeVar("Part")
@@ -120,18 +120,18 @@ class EvidenceFolders:
     """Folders in which the parts of the evidence lie."""
 
     run: RunFolder | None
-    """None where there is only a model."""
+    """None if there is only a model."""
     roots: tuple[Path, ...]
     """Folders in which default names are looked for, in order."""
     model: Path | None = None
     """A model that was named in place of a run."""
 
     def default(self, name: str) -> Path | None:
-        """Return where a default name is, or None."""
+        """Return the path of a default name, or None."""
         return next((root / name for root in self.roots if (root / name).exists()), None)
 
     def shown(self, path: Path) -> str:
-        """Return a path as the report shows it: the same wherever the folder stands."""
+        """Return a path as the report shows it: independent of the folder's location."""
         whole = path.resolve()
         for root in sorted({each.resolve() for each in self.roots}, key=lambda p: len(p.parts)):
             if whole.is_relative_to(root):
@@ -150,7 +150,7 @@ class PartReader:
     def read(
         self, name: str, path: Path, read: Callable[[], Part], named: bool = False
     ) -> Part | None:
-        """Return a part, or None and a note of why there is none."""
+        """Return a part, or None and a note with the reason."""
         try:
             part = read()
         except ElastocalError as error:
@@ -198,7 +198,7 @@ class PartReader:
 
 
 def find_folders(run: Path) -> EvidenceFolders:
-    """Return where the files of a run lie.
+    """Return the folders of the files of a run.
 
     Parameters
     ----------

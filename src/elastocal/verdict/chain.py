@@ -1,9 +1,9 @@
-"""The chain from the raw streams to the verdict, each link held against the one before it.
+"""The chain from the raw streams to the verdict, each link checked against the one before it.
 
-Streams, cell and plan are held against the hashes of the journal. Dataset and summary are made
-again from the streams, an imported dataset from its logs, and what differs is named: a hash beside
-them could be renewed by whoever edits them. Model, codec and process state by hash what they were
-made from, and the hash of what they say themselves.
+Streams, cell and plan are checked against the hashes of the journal. Dataset and summary are
+derived again from the streams, an imported dataset from its logs, and differences are named, since
+an editor of the files could renew a hash beside them. Model, codec and process state the hashes of
+their inputs, and of their own content.
 """
 
 import re
@@ -41,12 +41,12 @@ _SAME = 1e-4
 """Difference, by the largest number of its kind, below which two derivations are one: versions and
 machines round differently, and what is smaller changes no verdict."""
 _SAME_PLACE = 1e-6
-"""The same of the place of the marker, which stands as a text."""
+"""The same for the position of the marker, which is stored as a text."""
 _FRACTION = re.compile(r"[-+]?\d+\.\d+(?:e[-+]?\d+)?")
 
 
 def changed_text(stated: Dataset, found: Dataset) -> str:
-    """Return which text of a dataset is not that of the one made again; empty where none is."""
+    """Return the first text of a dataset that differs from the derived one; empty if none does."""
     told = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
     for name in told:
         mine, again = stated.attributes.get(name), found.attributes.get(name)
@@ -69,16 +69,16 @@ def _is_same_text(stated: object, found: object) -> bool:
 
 
 def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> str:
-    """Return how readings differ from those made again; empty where they do not.
+    """Return how readings differ from those derived again; empty if they do not.
 
     Parameters
     ----------
     stated, found : Dataset
-        As it stands, and made again.
+        As in the file, and derived again.
     old : bool
-        What a dataset of before does not have at all is no difference.
+        Variables that an older dataset lacks are no difference.
     source : str
-        What it was made again from: streams, logs.
+        Source of the derivation: streams, logs.
     """
     if content_sha256(stated) == content_sha256(found):
         return ""
@@ -140,20 +140,20 @@ _ADVICE = "; `elastocal {command}` makes it again"
 
 
 class LinkState(Enum):
-    """How a link was found."""
+    """Result of a link."""
 
     WHOLE = "whole"
     BROKEN = "broken"
-    """It costs the green light."""
+    """It prevents the green light."""
     UNSTATED = "not verifiable"
-    """Nothing contradicts it, and nothing proves it: files made before hashes were stated."""
+    """Nothing contradicts it, and nothing proves it: files older than hashes."""
     UNSIGNED = "not signed"
-    """Nobody vouches for it; hashes alone can be renewed by whoever edits a file."""
+    """Nobody has signed it; an editor of a file can renew hashes."""
 
 
 @record()
 class Link:
-    """A file, or a kind of files, held against what it was made from."""
+    """A file, or a kind of files, checked against its inputs."""
 
     name: str
     state: LinkState
@@ -163,7 +163,7 @@ class Link:
 
 @dataclass(frozen=True)
 class ChainFiles:
-    """Where the parts lie that are made again."""
+    """Paths of the parts that are derived again."""
 
     run: RunFolder | None
     tool: Path | None
@@ -247,7 +247,7 @@ def _seals(evidence: Evidence) -> Iterator[Link]:
 
 
 def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
-    """Return who vouches for the journal, which names all that was recorded."""
+    """Return the link of the journal's signature; the journal names all that was recorded."""
     place, trusted = run.signature, files.signer or record.signer
     if not place.exists():
         if trusted is None:
@@ -322,7 +322,7 @@ def _logged(evidence: Evidence) -> Link:
 
 
 def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> Iterator[Link]:
-    """Yield dataset and summary, made again from streams or logs; what was told is not again."""
+    """Yield dataset and summary, derived again; reasons in ``told`` are not repeated."""
     dataset, summary = evidence.dataset, evidence.summary
     if dataset is None:
         return

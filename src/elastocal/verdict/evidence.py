@@ -1,8 +1,8 @@
-"""Evidence: everything that a verdict on a calibration is based on; every part may be missing.
+"""Evidence: all parts that a verdict on a calibration is based on; each may be missing.
 
-What is of another robot, cell or plan is refused, part by part; what merely contradicts another
-part is a doubt. A dataset of another run with the model made from it agrees with itself in every
-figure; only the origins that the files state tell that it is not the run whose journal is shown.
+A part of another robot, cell or plan is refused; a part that merely contradicts another is a
+contradiction in the report. A dataset of another run agrees with the model made from it in every
+figure; only the origins stated in the files show that it does not belong to the journal.
 """
 
 from collections.abc import Iterator, Mapping
@@ -44,7 +44,7 @@ class MissingPart:
     """A part that the report does without."""
 
     name: str
-    """As people call it: ``codec``, ``tool file``."""
+    """Name for people: ``codec``, ``tool file``."""
     reason: str
     """Why it is not there."""
     damaged: bool = False
@@ -57,7 +57,7 @@ class Seal(Enum):
     WHOLE = "whole"
     BROKEN = "broken"
     ABSENT = "absent"
-    """It should state the hash of its content and does not: it was made before, or edited."""
+    """It should state the hash of its content and does not: it is older, or was edited."""
     NONE = "none"
     """Files of its kind state none."""
 
@@ -78,7 +78,7 @@ class UsedFile:
 
 @dataclass(frozen=True)
 class AcceptanceLimits:
-    """Limits that the figures are held against."""
+    """Limits for the figures."""
 
     tolerance: float | None = None
     """Largest error at unseen poses, in m."""
@@ -95,7 +95,7 @@ class ModelEvidence:
 
     model: CalibratedModel
     figures: CalibrationSummary | None
-    """None for a model that was made otherwise."""
+    """None for a model of another origin."""
     urdf_sha256: str
     sha256: str
     """Hash of the file."""
@@ -124,7 +124,7 @@ class Evidence:
     """Name of the cell, or of the robot where there is no cell."""
     cell: Cell | None = None
     cell_text: str | None = None
-    """The cell file as it stands."""
+    """Text of the cell file."""
     surface: Surface | None = None
     plan: PlanResult | None = None
     pool: PoolData | None = None
@@ -149,15 +149,15 @@ class Evidence:
     files: tuple[UsedFile, ...] = ()
     missing: tuple[MissingPart, ...] = ()
     chain: "tuple[Link, ...]" = ()
-    """Every part held against what it was made from."""
+    """Every part, checked against its inputs."""
     stated: Mapping[str, str] = field(default_factory=dict)
-    """What was stated for the certificate when the report was made."""
+    """Statements for the certificate when the report was made."""
     doubts: tuple[str, ...] = ()
     """Contradictions between parts that are sound by themselves, broken links among them."""
 
     @property
     def robot(self) -> str:
-        """Name of the robot; empty when no part tells it."""
+        """Name of the robot; empty if no part states it."""
         if self.cell is not None:
             return self.cell.robot.name
         if self.calibrated is not None:
@@ -177,7 +177,7 @@ class Evidence:
 
     @property
     def certificate(self) -> CertificateEntry:
-        """What is stated of the calibration: by the cell file, at the run, for the report."""
+        """Statements about the calibration: in the cell file, at the run, for the report."""
         entry = CertificateEntry() if self.cell is None else self.cell.file.certificate
         at_run = {} if self.run_record is None else self.run_record.stated
         return certificate_of(entry, at_run, self.stated)
@@ -194,7 +194,7 @@ class Evidence:
 
     @cached_property
     def coverage(self) -> ProductionCoverage | None:
-        """How much of the cell's production the calibration covers; none where not known."""
+        """Share of the cell's production that the calibration covers; None if unknown."""
         process = None if self.cell is None else self.cell.process
         if process is None or self.calibrated is None:
             return None
@@ -203,7 +203,7 @@ class Evidence:
 
     @property
     def doubt_on_production(self) -> PredictionDoubt | None:
-        """How sure predictions on the cell's production are; none where it is not known."""
+        """Uncertainty of predictions on the cell's production; None if unknown."""
         process = None if self.cell is None else self.cell.process
         if process is None or self.calibrated is None:
             return None
@@ -340,7 +340,7 @@ def _doubts(evidence: Evidence) -> Iterator[str]:
             "the calibration made again from the dataset does not give the figures of the model"
             f" file: {_why_not_reproduced(evidence)}"
         )
-    # The origins that the files state tell which part is of another run than the others.
+    # The origins stated in the files show which part belongs to another run.
     for doubts in (_dataset, _summary, _codecs):
         yield from doubts(evidence)
     if plan is not None and dataset is not None:
@@ -350,14 +350,15 @@ def _doubts(evidence: Evidence) -> Iterator[str]:
 
 
 def _why_not_reproduced(evidence: Evidence) -> str:
-    """Return why a calibration that was made again has other figures, as far as files tell."""
+    """Return the likely reason why a repeated calibration has other figures."""
     figures, dataset = evidence.figures, evidence.dataset
     if figures is None or figures.spring_count is not None:
         return (
             "the model is of other data or other settings, or was made by an earlier version of"
             " elastocal"
         )
-    # What every calibration of today says is missing; whether it is of these data is another thing.
+    # A calibration of today states these figures, and they are missing; that does not show other
+    # data.
     alike = dataset is not None and figures.readings == len(dataset.readings(dataset.joint_names))
     also = "" if alike else " from other readings"
     return (

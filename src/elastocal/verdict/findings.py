@@ -1,4 +1,4 @@
-"""Findings: what a reader of the verdict has to know, part by part, in the order of the report."""
+"""Findings for the reader of the verdict, part by part, in the order of the report."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -30,7 +30,7 @@ def find_everything(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def place_of_reading(evidence: Evidence, pose: int, load_case: str) -> Phrase:
-    """Return a reading's pose and load case, with the force where the cell tells it."""
+    """Return a reading's pose and load case, with the force if the cell states it."""
     name = phrase("pose {pose}, load case {load_case}", pose=pose, load_case=load_case)
     presses = {} if evidence.cell is None else evidence.cell.file.presses
     if load_case not in presses:
@@ -283,7 +283,7 @@ PROCESS_OF_OTHERS = Kind(
 
 
 def has_own_process(evidence: Evidence) -> bool:
-    """Return whether no link says that the process is of another model, tool or run."""
+    """Return whether no link shows that the process belongs to another model, tool or run."""
     process = (link.state for link in evidence.chain if link.name == "process")
     return LinkState.BROKEN not in process
 

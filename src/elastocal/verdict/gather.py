@@ -1,8 +1,8 @@
 """Gather the evidence of a report from the files of a run.
 
-What a person names must be there and sound, or the report is refused. What lies under a default
-name and cannot be used is left out, and the report says why. Parts that belong to another robot
-or another cell count as unusable.
+Files named by the user must exist and be valid, or the report is refused. Files under a default
+name that cannot be used are left out, and the report states why. Parts of another robot or another
+cell count as unusable.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -76,7 +76,7 @@ _CELL = "cell.yaml"
 @brief_repr
 @dataclass(frozen=True)
 class EvidenceOptions:
-    """Files and limits that a person names."""
+    """Files and limits named by the user."""
 
     run: Path
     model: Path | None = None
@@ -86,13 +86,13 @@ class EvidenceOptions:
     old: Path | None = None
     """Model file of an earlier calibration of the cell; there is no default name."""
     tolerance: float | None = None
-    """In m; in place of that of the cell file."""
+    """In m; replaces that of the cell file."""
     drift: float | None = None
-    """In m; likewise."""
+    """In m; replaces that of the cell file."""
     signer: str | None = None
     """Public key that must have signed the run, 64 hexadecimal digits."""
     stated: Mapping[str, str] = field(default_factory=dict)
-    """For the certificate, beside what cell file and run state."""
+    """Statements for the certificate, in addition to those of cell file and run."""
 
 
 def gather_evidence(options: EvidenceOptions, made: str) -> Evidence:

@@ -1,7 +1,7 @@
-"""The runs of a cell before a run, and after it: measuring until it is green is seen.
+"""The runs of a cell before and after a run, which reveal repetition until the light is green.
 
-What was before a run stands in its journal, under its signature. What came after it can only be
-seen where the history is at hand.
+Earlier runs are in its journal, under its signature. Later ones are known only where the history
+file is available.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ from elastocal.verdict.manifest import read_manifest
 from elastocal.wording import Phrase, phrase
 
 _SHOWN = 16
-"""Digits of a run's hash that people compare."""
+"""Number of digits of a run's hash that people compare."""
 _NO_REPORT = phrase("no report")
 _LIGHTS = {
     "green": phrase("green light"),
@@ -62,7 +62,7 @@ def begin_record(record: RunRecord, run: RunFolder, cell: str) -> RunRecord:
 
 
 def history_link(record: RunRecord, run: RunFolder, cell: str) -> Link | None:
-    """Return which run of its cell a run is, held against the history that lies beside it.
+    """Return the number of a run among those of its cell, checked against the history beside it.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from elastocal.verdict.findings import find_everything, place_of_reading
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
 _LOUD = 0.3
-"""Part of the mean error from which on the noise of a reading is worth less of it."""
+"""Part of the mean error from which the noise of a reading is reported."""
 
 
 class Light(Enum):
@@ -35,15 +35,15 @@ class Verdict:
     """The first words of the report."""
 
     light: Light | None
-    """None where no tolerance was given or there is nothing to judge."""
+    """None if no tolerance was given or there is nothing to judge."""
     word: str
     """Says the same as the colour."""
     meaning: str
-    """What is proved or not, and what follows for the use of the model."""
+    """What is proved or not, and the consequence for the use of the model."""
     sentence: str
-    """What that rests on."""
+    """Evidence for it."""
     reasons: tuple[str, ...]
-    """Why the light is not green; what else has to be known where there is none."""
+    """Reasons why the light is not green; other notes if there is no light."""
     notes: tuple[str, ...]
     """Further things to know."""
     advice: tuple[str, ...]
@@ -341,7 +341,7 @@ def advise(evidence: Evidence) -> Iterator[str]:
 
 
 def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
-    """Tell how much of the error the tracker explains, and how much the arm's stops."""
+    """Describe the parts of the error due to the tracker and to the arm's stops."""
     if evidence.summary is None:
         return
     sigma = evidence.summary.noise.marker_sigma_median
@@ -375,7 +375,7 @@ def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
 
 
 def _largest(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
-    """Name the pose at which the model errs most when it stands out."""
+    """Name the pose with the largest error of the model, if it is an outlier."""
     k = int(unseen.error.argmax())
     if unseen.max > 2.0 * unseen.mean.value:
         yield phrase(
@@ -387,7 +387,7 @@ def _largest(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
 
 
 def _spare_poses(evidence: Evidence) -> Iterator[str]:
-    """Tell how many poses would have been enough."""
+    """State how many poses would have been enough."""
     best = evidence.saturation
     if best is None:
         return

@@ -43,13 +43,13 @@ class ManifestFile:
     name: str
     """Its path relative to the folder around the run."""
     sha256: str
-    """What ``sha256sum`` gives."""
+    """Output of ``sha256sum``."""
 
 
 @brief_repr
 @record("elastocal.manifest/2", sealed=True)
 class Manifest:
-    """What a report was made of."""
+    """Inputs of a report."""
 
     elastocal: str
     """Version that made it."""
@@ -74,7 +74,7 @@ class FoundManifest:
     page_sha256: str
     """SHA-256 of all bytes before and behind the manifest, as `Manifest.page_sha256`."""
     signed_sha256: str
-    """What a signature must be of: the hash of the manifest without the signature."""
+    """Hash that a signature must refer to: that of the manifest without the signature."""
 
 
 def manifest_of(
@@ -156,10 +156,9 @@ def read_manifest(path: Path) -> FoundManifest:
 
 
 def file_links(manifest: Manifest, folders: tuple[Path, ...]) -> tuple[Link, ...]:
-    """Return the files of a manifest held against those that lie in folders.
+    """Return the files of a manifest, checked against those in folders.
 
-    What is not there is not held against the report: it may stand alone, or show a file that lay
-    elsewhere.
+    Missing files do not count against the report: it may be alone, or show a file from elsewhere.
     """
     places = [_find(each.name, folders) for each in manifest.files]
     count = counted(len(places), "file")
@@ -186,7 +185,7 @@ def file_links(manifest: Manifest, folders: tuple[Path, ...]) -> tuple[Link, ...
 
 
 def _find(name: str, folders: tuple[Path, ...]) -> Path | None:
-    """Return where a file of a manifest lies; a name that leads out of its folder is nowhere."""
+    """Return the path of a file of a manifest; None for a name that leads out of its folder."""
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts:
         return None

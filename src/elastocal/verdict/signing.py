@@ -1,8 +1,8 @@
-"""Signatures: an ed25519 key (RFC 8032) vouches for the journal of a run, or for a report.
+"""Signatures by an ed25519 key (RFC 8032) of the journal of a run, or of a report.
 
-A journal names its recordings, its plan and its cell by hash, so that its own hash stands for the
-whole record of a run. A report carries a manifest with the hash of every file that it shows.
-Whoever has no key can renew every hash; only a signature tells who has vouched for them.
+A journal names its recordings, its plan and its cell by hash, so that its own hash covers the whole
+record of a run. A report carries a manifest with the hash of every file that it shows. Hashes can
+be renewed without a key; only a signature shows who confirmed them.
 """
 
 import importlib.util
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 OF_RUN, OF_REPORT = "run", "report"
-"""What a signature may be of."""
+"""Objects of a signature."""
 _KEY, _SIGNATURE = re.compile("[0-9a-f]{64}"), re.compile("[0-9a-f]{128}")
 _SHOWN = 16
-"""Digits of a public key that people compare."""
+"""Number of digits of a public key that people compare."""
 
 
 @record("elastocal.signature/1")
@@ -51,13 +51,13 @@ class Signature:
 
     @property
     def signed(self) -> bytes:
-        """What the signature is made over."""
+        """Signed bytes."""
         data = to_data(replace(self, signature=""))
         return json.dumps(data, sort_keys=True, separators=(",", ":")).encode()
 
     @property
     def signer(self) -> str:
-        """The key as people compare it."""
+        """Key in the form that people compare."""
         return self.key[:_SHOWN]
 
 
@@ -203,7 +203,7 @@ def check_signature(found: Signature, of: str, sha256: str, trusted: str | None)
     found : Signature
         The signature.
     of, sha256 : str
-        What it should be of.
+        Expected object and hash.
     trusted : str or None
         Public key as `read_public_key` returns it; None: the one that the signature states.
 
@@ -252,7 +252,7 @@ def read_signature(path: Path) -> Signature:
     Raises
     ------
     SchemaError
-        If it is none, or has another space, key or letter than the file that was written.
+        If it is invalid, or differs from the written form in a space, key or letter.
     FileAccessError
         If it cannot be read.
     """

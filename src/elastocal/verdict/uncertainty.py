@@ -4,8 +4,8 @@ The evaluation follows the GUM (JCGM 100:2008): standard uncertainties of type A
 poses that were left out of the fit, of type B from what calibration certificates state, added in
 quadrature; the expanded uncertainty has Student's coverage factor of the effective degrees of
 freedom (JCGM 100, G.4: Welch-Satterthwaite) for the 95.45 % that k = 2 covers of a normal
-distribution. It is of the deflection along any one axis, at poses and under forces like those of
-the run.
+distribution. It applies to the deflection along any one axis, at poses and under forces like those
+of the run.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class UncertaintySource:
     standard: float | None
     """Standard uncertainty of a deflection along one direction, in m; None: not known."""
     origin: Phrase
-    """How it was found."""
+    """Method of its evaluation."""
 
 
 @brief_repr

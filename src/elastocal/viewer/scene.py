@@ -1,13 +1,12 @@
-"""What is drawn of a cell: layers of solids, lines, dots and tags, and from where it is seen.
+"""Scene of a cell: layers of solids, lines, dots and tags, and the camera.
 
-Nothing here draws: ``viewer.js`` shows what `scene_data` describes. Solids are the shapes that
-collisions are checked with: fine meshes of a maker's drawings are not needed to see how the robot
-stands. A part of the robot is held once, in its own frame; a page places it by the transforms of a
-posture.
+`scene_data` only describes the scene, and ``viewer.js`` draws it. Solids are the shapes of the
+collision checks: detailed meshes are not needed to see the robot's posture. A part of the robot is
+held once, in its own frame; a page places it by the transforms of a posture.
 
-Meshes are made coarser by clusters of vertices: J. Rossignac, P. Borrel, "Multi-resolution 3D
+Meshes are simplified by clustering vertices: J. Rossignac, P. Borrel, "Multi-resolution 3D
 approximations for rendering complex scenes", in Modeling in Computer Graphics, Springer, 1993.
-Vertices in one cell of a grid become their mean; faces and edges that lose a corner go.
+Vertices in one cell of a grid become their mean; faces and edges that lose a corner are removed.
 """
 
 import base64
@@ -35,7 +34,7 @@ MOST_OF_FIXTURE = 20_000
 MOST_OF_LINK = 3_000
 """Faces of one part of the robot."""
 _COARSER = 1.25
-"""By how much the cells grow until there are few enough faces."""
+"""Factor by which the cells grow until the number of faces is small enough."""
 _BEAM, _BEAM_APART = 0.12, 0.56
 """Side of a rail's two beams, and from the middle of one to that of the other, in m."""
 
@@ -138,7 +137,7 @@ def rail_solid(cell: Cell) -> Solid | None:
     along = np.asarray(rail.axis, dtype=float) / np.linalg.norm(rail.axis)
     up = rail.pose.T[:3, 2]
     across = np.cross(up, along)
-    if not np.linalg.norm(across) > 1e-6:  # A lift: its beams stand beside the robot.
+    if not np.linalg.norm(across) > 1e-6:  # For a lift, the beams are beside the robot.
         up, across = rail.pose.T[:3, 0], rail.pose.T[:3, 1]
     else:
         across /= np.linalg.norm(across)
@@ -180,7 +179,7 @@ def triangles_of(solid: shapes.Solid) -> Solid:
 
 
 def coarsened(solid: Solid, most: int) -> CoarseSolid:
-    """Return a solid with no more than a number of faces.
+    """Return a solid with at most a number of faces.
 
     Parameters
     ----------
@@ -196,7 +195,7 @@ def coarsened(solid: Solid, most: int) -> CoarseSolid:
     size = float(np.ptp(solid.vertices, axis=0).max())
     middling = float(np.median(np.linalg.norm(b - a, axis=1)))
     cell = max(middling, 1e-6 * size) * np.sqrt(count / most)
-    # Two cells along each side make eight vertices, and those no more than 56 triangles.
+    # Two cells along each side make eight vertices, and those at most 56 triangles.
     coarsest = 0.51 * size
     while True:
         cell = min(cell, coarsest)
@@ -238,7 +237,7 @@ class Paint:
     """A solid and its colour."""
 
     solid: Solid
-    """In base; of a part of the robot in its own frame."""
+    """Solid in base; for a part of the robot in its own frame."""
     colour: str
     """``#rrggbb``, or a name of the page's style sheet, which may follow the scheme."""
     part: int = -1
@@ -248,7 +247,7 @@ class Paint:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """Straight lines, each by itself."""
+    """Separate straight lines."""
 
     ends: FloatArray
     """Shape (line, 2, 3), in m in base."""
@@ -298,17 +297,17 @@ class Layer:
     note: str = ""
     """A remark for readers on how it is drawn."""
     name: str = ""
-    """By which a page gives it other parts; empty for a layer that stays as it is."""
+    """Name by which a page replaces its parts; empty for a constant layer."""
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """From where a scene is seen."""
+    """Viewpoint of a scene."""
 
     name: str
     centre: FloatArray
-    """What stands in the middle of the picture, shape (3,), in m in base."""
+    """Point in the middle of the picture, shape (3,), in m in base."""
     eye: FloatArray
     """Shape (3,), in m in base."""
 
@@ -316,7 +315,7 @@ class Camera:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is drawn, and from where."""
+    """Layers and camera."""
 
     layers: tuple[Layer, ...]
     cameras: tuple[Camera, ...]
@@ -341,8 +340,8 @@ def cell_scene(
     cell, surface, collisions : Cell, Surface, CollisionScene
         Which belong together.
     q : ndarray, shape (posture, joint)
-        Postures that are shown, in rad or m: the first stands above the floor, and the second, if
-        there is one, is looked at.
+        Postures, in rad or m: the first determines the floor, and the second, if there is one, the
+        camera.
     reach : ndarray, shape (point, 3)
         What else the camera for the whole cell has in its picture, in m.
     """
@@ -503,7 +502,7 @@ def _camera(name: str, points: FloatArray, direction: FloatArray, up: FloatArray
 
 
 def _viewing_direction(cell: Cell, tooling: FloatArray, up: FloatArray) -> FloatArray:
-    """Return where to look from: beside the robot, from above, opposite to the stations."""
+    """Return the direction of view: beside the robot, from above, opposite to the stations."""
     middle = tooling.mean(axis=0)
     ahead = middle - up * (up @ middle)
     # A tooling right above or below the base leaves the side open: any will do.

@@ -51,7 +51,7 @@ def _keys(devices: Mapping[str, DeviceSettings], side: str) -> Mapping[str, str]
     found: dict[str, str] = {}
     for kind, settings in devices.items():
         for place in settings.device_places():
-            # A port that the system is to choose is nobody else's.
+            # A port that the system will choose cannot be locked.
             if place.port or not is_loopback(place.host):
                 found.setdefault(f"{side} {_resolved(place)}".strip(), kind)
     return found
@@ -77,7 +77,7 @@ def _resolved(place: DevicePlace) -> DevicePlace:
 
 
 def open_doors(devices: Mapping[str, DeviceSettings]) -> list[str]:
-    """Return warnings of addresses that stand for all addresses of this machine.
+    """Return warnings of addresses that mean all addresses of this machine.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def is_loopback(address: str) -> bool:
 
 @contextmanager
 def at_device(cell: Cell, kind: str) -> Iterator[None]:
-    """Let refusals name the device by its place in the cell file."""
+    """Let refusals name the device by its key in the cell file."""
     try:
         yield
     except DeviceError as error:

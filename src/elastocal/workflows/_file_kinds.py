@@ -40,8 +40,8 @@ FileDescription = tuple[str, dict[str, object]]
 def cell_file(path: Path) -> FileDescription:
     """Describe a cell file.
 
-    Every mesh is read, the surface is held against the robot's reach, and HOME against the
-    solids; no candidate is made.
+    Every mesh is read, the surface is compared with the robot's reach, and HOME with the solids; no
+    candidate is made.
 
     Raises
     ------

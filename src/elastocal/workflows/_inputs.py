@@ -1,6 +1,6 @@
-"""What several workflows ask of their inputs: robot, postures and frames as people write them.
+"""Inputs that several workflows share: robot, postures and frames in the form of options.
 
-Also that a model fits the cell, and how far it carries.
+The module also checks that a model fits the cell, and its coverage.
 """
 
 import contextlib
@@ -48,7 +48,7 @@ from elastocal.units import parse_number, parse_point, parse_quantity, quantity
 from elastocal.wording import listed
 
 _LONGEST_TOOL = 10.0
-"""In m: no tool of a robot is longer; what is, was meant in mm."""
+"""In m: no tool of a robot is longer; a longer one was meant in mm."""
 ROBOT_SUFFIXES = (".urdf", ".xml", ".xacro", ".srdf")
 """Names of robot descriptions; a template of xacro is refused with the command that expands it, an
 SRDF as what it is."""
@@ -88,7 +88,7 @@ def find_robot(
     Raises
     ------
     RobotError
-        If there is no robot, or no way to tell its tool centre point.
+        If there is no robot, or its tool centre point is undetermined.
     """
     urdf, path = _find_urdf(robot, dataset)
     T_tcp_tool = None if tool is None else parse_frame(tool, "tool", error=RobotError)
@@ -170,19 +170,20 @@ class NewTool:
 
 @dataclass(frozen=True, kw_only=True)
 class ArmAsBuilt:
-    """Settings of every command that may know where the unloaded arm truly stands."""
+    """Settings of every command that may use the true position of the unloaded arm."""
 
     geometry: Path | None = None
     """Model file of `geometry` of the same arm: its errors and sag are corrected too."""
     payload: str | None = None
-    """What the tool weighs beyond the description in that model, with its unit."""
+    """Mass of the tool beyond the description in that model, with its unit."""
     payload_centre: str | None = None
     """Its centre in that model's tcp, ``"x, y, z"`` with units."""
 
     def unloaded(self, robot: Robot) -> tuple[Robot, Callable[[FloatArray], FloatArray] | None]:
-        """Return the arm as its controller knows it, and where it stands as it was built.
+        """Return the arm as its controller knows it, and the true position of its tool.
 
-        That is none where its geometry is not known; then the controller's is the model's own.
+        The latter is None where its geometry is unknown; the controller's arm is then the model's
+        own.
 
         Raises
         ------
@@ -355,12 +356,12 @@ def _is_file(path: Path) -> bool:
 
 
 def seconds_of(duration: str | float | None) -> float:
-    """Return a duration in s; a number alone is in s, none is without end.
+    """Return a duration in s; a bare number is in s, None is unlimited.
 
     Raises
     ------
     UnitError
-        If it is none above 0.
+        If it is not above 0.
     """
     if duration is None:
         return float("inf")

@@ -47,9 +47,9 @@ _LOOK = 0.05
 _REPORT = 0.5
 """Between two reports, in s of the wall."""
 _WAIT = 60.0
-"""For the first message of the controller, in s of the wall."""
+"""Time to wait for the first message of the controller, in s of wall time."""
 _STOPPING = 0.2
-"""Time for which the controller is told that corrections are over, in s."""
+"""Time for which the controller is sent the end of corrections, in s."""
 _SLACK = 2.0
 """Beyond the time that a fade takes, in s, after which a controller that is silent is left."""
 _PRIORITY = 40
@@ -68,7 +68,7 @@ _MOST_ROWS = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class LiveReport:
-    """How a live compensation is going."""
+    """State of a live compensation."""
 
     phase: LivePhase
     seconds: float
@@ -121,7 +121,7 @@ class Prepared:
 
 @dataclass(frozen=True, kw_only=True)
 class LiveEnd:
-    """What a live compensation has come to."""
+    """Result of a live compensation."""
 
     ended: str
     problem: str | None
@@ -137,9 +137,9 @@ class LiveEnd:
 
 @contextlib.contextmanager
 def quiet_interpreter() -> Iterator[None]:
-    """Keep Python out of the loop's way: no search for garbage, threads that let one another pass.
+    """Keep Python's pauses short in the loop: no garbage collection, short thread switching.
 
-    What is there when it begins is never looked through; what the loop makes goes by itself.
+    Existing objects are never scanned; those of the loop are freed by reference counting.
     """
     collects, switch = gc.isenabled(), sys.getswitchinterval()
     gc.collect()
@@ -167,9 +167,9 @@ def ask_priority(priority: int = _PRIORITY) -> str:
 
 @contextlib.contextmanager
 def threads_first() -> Iterator[None]:
-    """Let the threads that are made meanwhile go before others: those that hear the sensor.
+    """Give threads that are started meanwhile priority: those that receive the sensor's data.
 
-    A thread has the scheduling of the one that made it; this one has its own again afterwards.
+    A thread inherits the scheduling of its creator, which is restored afterwards.
     """
     known = hasattr(os, "sched_getscheduler")
     before = (os.sched_getscheduler(0), os.sched_getparam(0)) if known else None

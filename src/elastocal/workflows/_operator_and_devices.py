@@ -48,7 +48,7 @@ class Supervision:
     show: Callable[[RunProgress], None]
     """Takes note of every step; never raises, never waits."""
     interrupted: Callable[[], bool]
-    """Whether somebody wants the run to stop: it releases, retracts and stops."""
+    """Whether the run was asked to stop: it releases, retracts and stops."""
 
 
 class Operator(Protocol):
@@ -61,7 +61,7 @@ class Operator(Protocol):
         """Agree that the cell is clear, or raise `ProcedureError`."""
 
     def identify(self, missing: Sequence[str]) -> Mapping[str, str]:
-        """State what the certificate still lacks, by key; what is not known is left out."""
+        """Return the missing entries of the certificate, by key; unknown ones are left out."""
 
     def supervise(self, poses: int) -> AbstractContextManager[Supervision]:
         """Watch while the arm moves to this number of poses."""
@@ -100,13 +100,13 @@ class Rig:
 
     cell: Cell
     drivers: Mapping[str, Driver]
-    """By name, in the order in which they are asked: sensors first, the arm last."""
+    """Drivers by name, in the order of their creation: sensors first, the arm last."""
     wanted: Mapping[str, Mapping[str, DeviceSettings]]
     """Settings by kind of device, by name of the driver."""
 
     @property
     def real(self) -> bool:
-        """Whether something moves that can hurt: a person is asked first."""
+        """Whether a real arm moves: a person is asked first."""
         return any(driver.real for driver in self.drivers.values())
 
     @property
@@ -116,12 +116,12 @@ class Rig:
 
     @property
     def warnings(self) -> list[str]:
-        """What a person should know of the cell's addresses."""
+        """Warnings about the cell's addresses."""
         return open_doors(self.by_kind)
 
     @contextmanager
     def reserved(self, command: str, kinds: Collection[str] = KINDS) -> Iterator["ReservedRig"]:
-        """Have the devices to oneself, and every port that they need; nothing is asked of them yet.
+        """Lock the devices and all ports that they need; the devices are not contacted yet.
 
         Parameters
         ----------
@@ -165,7 +165,7 @@ class Rig:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class ReservedRig:
-    """The rig of a cell that nobody else talks to, as long as `Rig.reserved` lasts."""
+    """Rig of a cell with exclusive access, for the duration of `Rig.reserved`."""
 
     rig: Rig
     ports: Mapping[LocalPort, socket.socket]
@@ -211,7 +211,7 @@ class ReservedRig:
         return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
 
     def connect_sensor(self, context: RigContext) -> DeviceSet:
-        """Return the force sensor alone, with its feed; to be closed by whoever asked.
+        """Return the force sensor alone, with its feed; the caller closes it.
 
         Raises
         ------
@@ -250,20 +250,20 @@ def arm_devices(
     arming: Arming | None = None,
     asks: bool = False,
 ) -> None:
-    """Let the arm of a cell move, which nothing does before: here alone is a real arm armed.
+    """Enable the motion of a cell's arm; only this function arms a real arm.
 
     Parameters
     ----------
     rig, arm : Rig, RobotArm
         Rig and arm of the cell.
     operator : Operator
-        Is asked, where a real arm is to move and nobody has agreed yet.
+        Asked if a real arm is to move and nobody has agreed yet.
     confirmed : bool
         A person has agreed to this command on the cell file as it is now.
     arming : Arming, optional
         Arming of a person who agreed earlier, to the cell file as it was then.
     asks : bool
-        Whether somebody has to agree even where nothing real moves.
+        Whether agreement is needed even if no real arm moves.
 
     Raises
     ------
@@ -310,7 +310,7 @@ def rig_of(cell: Cell) -> Rig:
     DeviceError
         If a driver is not known or does not make such a device.
     SchemaError
-        If what stands under a device does not fit its driver.
+        If the settings of a device do not fit its driver.
     """
     choices = cell.file.devices
     found: dict[str, Driver] = {}

@@ -1,6 +1,6 @@
-"""Describe what CSV files hold, as ``check`` says: a CSV states no schema, its columns tell.
+"""Description of CSV files for ``check``: a CSV states no schema, its columns identify it.
 
-Without a robot at hand, the joints of rows with forces are guessed (`guess_columns`).
+Without a robot, the joints of rows with forces are guessed (`guess_columns`).
 """
 
 import re
@@ -22,7 +22,7 @@ _RESULTS: dict[tuple[str, ...], str] = {
     ("line", "before_mean", "before_max"): "table of a simulated process",
     ("seed", "course", "time"): "table of deviations of a simulated process",
 }
-"""What a table of results is, by its first columns."""
+"""Kind of a table of results, by its first columns."""
 _POSITION, _EULER, _QUATERNION = ("x", "y", "z"), ("a", "b", "c"), ("qx", "qy", "qz", "qw")
 _DISPLACEMENTS = re.compile(r"load_case|(controller|marker)_displacement_[xyz]")
 _ROWS_AT_A_TIME = 20_000
@@ -34,7 +34,7 @@ def table_file(path: Path) -> TableDescription:
     Raises
     ------
     SchemaError
-        If its columns are of no table of ours, or a row is not as long as the header.
+        If its columns belong to no known table, or a row is not as long as the header.
     DatasetError, PathError
         If a number or a column of it cannot be used; by row and column.
     FileAccessError

@@ -1,6 +1,6 @@
-"""How workflows are called: with a record of settings, or with its fields.
+"""Calls of workflows: with a record of settings, or with its fields.
 
-Each runs under a rule for what it may write (`elastocal.outputs`), made from its settings.
+Each runs under the rule for its outputs (`elastocal.outputs`), made from its settings.
 """
 
 import dataclasses
@@ -51,7 +51,7 @@ def workflow(
 ) -> Callable[[Callable[[S, Progress], R]], Workflow[S, R]]:
     """Let a function of settings and progress also be called with the fields of its settings.
 
-    Files may be given as texts, and one item instead of several; `inspect.signature` shows the
+    Files may be given as texts, and a single item instead of a list; `inspect.signature` shows the
     fields.
 
     Parameters
@@ -137,12 +137,12 @@ def _places(settings: Any) -> dict[str, list[Path]]:
 def _is_file(text: str) -> bool:
     try:
         return Path(text).is_file()
-    except (OSError, ValueError):  # too long for a name, or no name at all
+    except (OSError, ValueError):  # too long for a name, or not a name
         return False
 
 
 def _as_hinted(given: Any) -> Any:
-    """Return settings whose files and lists are of the types that their fields name."""
+    """Return settings whose files and lists have the types of their fields."""
     found = {name: getattr(given, name) for name in inspect.signature(type(given)).parameters}
     hints = get_type_hints(type(given))
     wanted = {name: _converted(value, hints[name]) for name, value in found.items()}

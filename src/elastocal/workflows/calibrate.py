@@ -47,10 +47,10 @@ _SAME_MARKER = 0.03
 @brief_repr
 @dataclass(frozen=True)
 class CalibrateSettings(FitSettings):
-    """What to calibrate, from which readings, and how."""
+    """Settings of a calibration: readings, springs and fit."""
 
     data: Annotated[str | PathLike[str] | Sequence[str | PathLike[str]], Option(argument=True)]
-    """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are numbered anew."""
+    """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are renumbered."""
     out: Annotated[Path | None, Option(required=True, help="Model file to write.")] = None
     """Model file to write; none: the result is only returned."""
     robot: Annotated[str | None, Option(choices="robot")] = None
@@ -193,10 +193,10 @@ def _production(
 
 
 def _cell_of_run(path: Path) -> "Cell | None":
-    """Return the cell of the run that a file is the dataset of; None where it is of none."""
+    """Return the cell of the run to which a dataset belongs; None if it belongs to none."""
     if not (path.parent / "cell").is_dir():
         return None
-    # These take longer to import than a calibration takes, and most data are of no run.
+    # Their import takes longer than a calibration, and most data belong to no run.
     from elastocal.cell import load_cell
     from elastocal.procedure import RunFolder, read_journal
 
@@ -213,7 +213,7 @@ def _rows(path: ProductionPath) -> ProductionRows:
 def _on_production(
     path: ProductionPath, calibrated: CalibratedModel
 ) -> tuple[ProductionCoverage | None, PredictionDoubt | None]:
-    """Return how much of a production path the calibration covers, and how sure it is there."""
+    """Return the coverage of a production path by the calibration, and its uncertainty there."""
     loads = path.joint_position, path.force, path.moment
     return calibrated.coverage(*loads, path.course), calibrated.doubt(*loads)
 

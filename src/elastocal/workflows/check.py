@@ -132,7 +132,7 @@ _NETCDF_KINDS: dict[str, _Describe] = {
     "elastocal.pool": kinds.pool_file,
     "elastocal.dataset": dataset_file,
 }
-"""NetCDF files likewise."""
+"""NetCDF files by their schema."""
 _YAML_KINDS: dict[str, _Describe] = {
     "elastocal.cell": kinds.cell_file,
     "elastocal.compensator": kinds.compensator_file,
@@ -140,7 +140,7 @@ _YAML_KINDS: dict[str, _Describe] = {
     "elastocal.log-map": kinds.log_map_file,
     "elastocal.catalogue": _catalogue,
 }
-"""YAML files likewise."""
+"""YAML files by their schema."""
 
 _UNITS = {
     "correction": "m",
@@ -174,7 +174,7 @@ _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
 
 @dataclass(frozen=True)
 class CheckSettings:
-    """Which file to validate."""
+    """Settings of ``check``: the file to validate."""
 
     file: Annotated[str | PathLike[str], Option(argument=True)]
     """Any file of ours, a dataset, a robot, or a folder that a command made."""
@@ -207,7 +207,7 @@ class CheckResult(Result):
         yield Facts(self.lines())
 
     def lines(self) -> tuple[tuple[str, str], ...]:
-        """Return all that the file holds for a person: pairs of a label and its text."""
+        """Return the contents of the file: pairs of a label and its text."""
         return tuple(
             (_label(name), plainly(value, _UNITS.get(name, "")))
             for name, value in self.holds.items()
@@ -215,7 +215,7 @@ class CheckResult(Result):
 
 
 def _label(name: str) -> str:
-    """Return a key as people read it; its unit stands behind the number."""
+    """Return a key in words; its unit follows the number."""
     return name.removesuffix("_m").replace("_", " ")
 
 
@@ -323,14 +323,14 @@ def _settings(path: Path) -> FileDescription:
 
 
 def _stated(data: object) -> object:
-    """Return the schema that keys and values state; None where there is none."""
+    """Return the schema that keys and values state; None if there is none."""
     return data.get("schema") if isinstance(data, dict) else None
 
 
 def _kind(path: Path, stated: object, known: Mapping[str, _Describe]) -> _Describe:
-    """Return the describer of files of a schema; an unknown one is refused with all that are known.
+    """Return the function that describes files of a schema; an unknown one is refused.
 
-    Its version is left to whoever reads the file.
+    The reader of the file checks its version.
     """
     text = stated if isinstance(stated, str) else ""
     name = text.partition("/")[0]

@@ -54,7 +54,7 @@ class CodecSettings(CodecOptions):
             " combination. Springs as for calibrate; default: auto.",
         ),
     ] = ()
-    """What to compare, each ``"KEY=A,B"`` with a key of `codec.KEYS`; every combination is a
+    """Comparisons, each ``"KEY=A,B"`` with a key of `codec.KEYS`; every combination is a
     variant."""
     robot: Annotated[str | None, Option(choices="robot")] = None
     """URDF file or catalogue name; by default the dataset's own."""
@@ -98,7 +98,7 @@ class CodecResult(Result):
     """Every array of Algorithm 1: contents of ``codec.nc``."""
     verdicts: Verdicts
     analysis: CodecAnalysis
-    """Which springs the training sets tell apart, and their indices."""
+    """Springs that the training sets determine, and their indices."""
     files: tuple[str, ...]
     """Names of the files in the folder."""
 

@@ -54,7 +54,7 @@ class CompareSettings:
     CompareSettings, outputs=("out", "figure"), marks=("elastocal.comparison/", *FIGURE_MARKS)
 )
 def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # noqa: ARG001 - done in an instant
-    """Say which springs moved between two calibrations, and whether predictions changed.
+    """State which springs changed between two calibrations, and whether predictions did.
 
     Parameters
     ----------

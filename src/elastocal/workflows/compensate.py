@@ -45,12 +45,12 @@ from elastocal.workflows._workflow import workflow
 _MOST_POSTURES = 500
 """Calibrated postures that are compared with one another."""
 _PROGRAM_MARKS = ("NOT TRIED ON A ROBOT", "DECL E6AXIS XBEFORE=")
-"""How robot programs of ours are known: by their head, KRL's positions by the first."""
+"""Marks of robot programs of elastocal: their head, KRL's positions by the first."""
 
 
 @dataclass(frozen=True)
 class CompensateSettings(NewTool, ArmAsBuilt):
-    """Which model corrects which path."""
+    """Settings of a correction: the model and the path."""
 
     model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
@@ -94,12 +94,12 @@ class CompensateResult(Result, CorrectionFigures):
     tool: str
     """The tool that the correction is for, in words."""
     notes: tuple[str, ...]
-    """Sentences that a person must know."""
+    """Notes for the user."""
     coverage: ProductionCoverage | None = None
-    """How much of the path was calibrated: postures, rail and loads; none where the
-    model does not know where that was."""
+    """Share of the path that the calibration covers in postures, rail and loads; None where the
+    model does not state its domain."""
     doubt: PredictionDoubt | None = None
-    """How sure the predictions along the path are; none where no row has a load."""
+    """Uncertainty of the predictions along the path; None where no row has a load."""
     program: tuple[str, ...] = ()
     """Files of the robot program that was written, the main one first."""
 
@@ -209,10 +209,10 @@ def _written(program: PathProgram, settings: CompensateSettings) -> tuple[str, .
 
 
 def _usual_posture(calibrated: CalibratedModel) -> FloatArray | None:
-    """Return the calibrated posture that the others are nearest to, shape (joint,).
+    """Return the calibrated posture nearest to the others, shape (joint,).
 
-    None where the model does not say where it was calibrated, or the arm has external axes, which
-    nobody places for a path.
+    None where the model does not state its domain, or the arm has external axes, whose position a
+    path does not give.
     """
     domain = calibrated.domain
     if domain is None or calibrated.model.robot.external_axes or not len(domain.joint_position):
@@ -243,7 +243,7 @@ def _path_notes(
 
 
 def _shown(metres: float) -> str:
-    """Return a length in mm; what no tracker sees is not told apart from nothing."""
+    """Return a length in mm; a length below the resolution of trackers is shown as zero."""
     return "below 0.001 mm" if 0.0 < metres < 1e-6 else quantity(metres, "mm", ".3g")
 
 

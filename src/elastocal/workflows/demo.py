@@ -36,7 +36,7 @@ from elastocal.workflows.tool import tool
 LOG = "log.txt"
 README = "README.md"
 _FIRST = "# A demo of elastocal:"
-"""How a README begins that tells an earlier demo from somebody's own folder."""
+"""First line of a README that identifies an earlier demo."""
 
 _FILES = (
     ("report.html", "the report: open it in a browser; it needs no network"),
@@ -55,7 +55,7 @@ _FILES = (
     (LOG, "every command as it was given, and what it printed"),
 )
 _FLAGS = {"models": "--model", "tools": "--tool", "seeds": "--seed", "path": ""}
-"""How commands name a field that workflows call otherwise; empty: by its place."""
+"""Names of options that differ from those of the fields; empty: positional."""
 _POSTURES: dict[str, dict[str, str]] = {"machining": {"posture": STIFFEST}}
 """A spindle may be turned about its axis: there the posture is chosen (paper 4.3.1)."""
 _OWN_FLAGS = {
@@ -72,7 +72,7 @@ class Chapter:
     """A command of the story."""
 
     title: str
-    """What is done, for a person who watches."""
+    """Description for a person who watches."""
     words: tuple[str, ...]
     """The command's words, without the program's name."""
     work: Callable[[Progress, Operator], Result]
@@ -85,7 +85,7 @@ class Chapter:
 
 
 class DemoDisplay(Protocol):
-    """What a person sees of a demo, and what its log takes."""
+    """Display of a demo for a person and for its log."""
 
     operator: Operator
     """Watches the simulated arm."""
@@ -106,7 +106,7 @@ class _Plain:
 
     @contextmanager
     def show(self, chapter: Chapter) -> Iterator[Progress]:
-        """Tell the progress which chapter is at work."""
+        """Report the current chapter to the progress."""
         yield lambda stage, done, total: self._progress(f"{chapter.title}: {stage}", done, total)
 
     def text(self, chapter: Chapter, result: Result) -> str:  # noqa: ARG002 - the protocol's form
@@ -115,13 +115,13 @@ class _Plain:
 
 
 MakeDisplay = Callable[[TextIO, Sequence[Chapter]], AbstractContextManager[DemoDisplay]]
-"""From the open log and the story to a display."""
+"""Function from the open log and the story to a display."""
 
 
 @brief_repr
 @dataclass(frozen=True)
 class DemoSettings:
-    """Which story, and where its files go."""
+    """Settings of a demo: the story and its folder."""
 
     kind: Annotated[str, Option(argument=True, metavar="[afp|machining]")] = "afp"
     """``afp``, fibre placement on a dome, or ``machining``, roughing of a block."""
@@ -132,7 +132,7 @@ class DemoSettings:
     force: bool = False
     """Remove an earlier demo from the folder first."""
     display: MakeDisplay | None = None
-    """What shows the demo; without it only progress is shown."""
+    """Display of the demo; by default only progress is shown."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -293,13 +293,13 @@ def _chapter(
 
 
 def _processes_get_ready() -> AbstractContextManager[object]:
-    """Let the processes of later chapters start while the arm moves, which takes one core."""
+    """Start the processes of later chapters while the simulated run uses one core."""
     cores = process_count()
     return process_pool(cores, _find_workflows) if cores > 1 else nullcontext()
 
 
 def _find_workflows() -> None:
-    """Do nothing: a process that finds this function has imported all workflows with it."""
+    """Do nothing: a process that loads this function has imported all workflows."""
 
 
 def begin(out: Path, kind: str, force: bool) -> None:
@@ -358,9 +358,9 @@ def _refuse_foreign(out: Path, holds: list[str], force: bool) -> None:
 
 
 def _empty(out: Path) -> None:
-    """Remove what a folder holds, the README last: what is left then is known as a demo's.
+    """Remove the contents of a folder, the README last, so that the rest is known as a demo's.
 
-    The folder itself stays: it may be a link, or the one that somebody stands in.
+    The folder itself stays: it may be a link, or the current folder of a shell.
     """
     for entry in sorted(out.iterdir(), key=lambda each: each.name == README):
         if entry.is_dir() and not entry.is_symlink():
@@ -380,7 +380,7 @@ def _opened(path: Path) -> Iterator[TextIO]:
 
 
 def _require_finished(result: Result) -> None:
-    """Go no further than a run did."""
+    """Require that the run is finished."""
     if isinstance(result, RunResult):
         if result.problem is not None:
             raise result.problem

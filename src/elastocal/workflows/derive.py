@@ -26,7 +26,7 @@ from elastocal.workflows._workflow import workflow
 
 @dataclass(frozen=True)
 class DeriveSettings:
-    """Which run to derive."""
+    """Settings of ``derive``: the run."""
 
     run: Annotated[str | PathLike[str], Option(argument=True)]
     """Folder of the run; dataset and summary in it are replaced."""

@@ -39,7 +39,7 @@ EXPORT_TARGETS = ("linux",)
 
 @dataclass(frozen=True)
 class ExportSettings(NewTool):
-    """Which model is written, and how it corrects."""
+    """Settings of an export: the model and the compensator."""
 
     model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
@@ -80,9 +80,10 @@ class ExportResult(Result):
     tool: str
     """The tool that the model is for, in words."""
     notes: tuple[str, ...]
-    """Sentences that a person must know."""
+    """Notes for the user."""
     on_production: PredictionDoubt | None = None
-    """How sure the model is on the production that it was calibrated for; none: none was named."""
+    """Uncertainty of the model on the production that it was calibrated for; None: no production
+    was named."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""

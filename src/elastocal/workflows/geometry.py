@@ -44,7 +44,7 @@ _TABLE = ("joint", "number", "unit", "nominal", "calibrated", "difference", "low
 @brief_repr
 @dataclass(frozen=True)
 class GeometrySettings:
-    """Which positions, of which robot."""
+    """Settings of a geometric calibration: positions and robot."""
 
     positions: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV of joints and markers."""
@@ -61,8 +61,8 @@ class GeometrySettings:
     table: Path | None = None
     """Table of links as drawn and as built to write, ``.csv``."""
     markers: Annotated[tuple[str, ...], Option("--marker")] = ()
-    """Where on the tool each marker is, ``"x, y, z"`` in the tcp with units, where that is known:
-    then an error of the tcp is found too."""
+    """Position of each marker on the tool, ``"x, y, z"`` in the tcp with units, where known: an
+    error of the tcp is then estimated, too."""
     draws: Annotated[int, Option(least=40, most=100_000)] = 200
     """Draws of the bootstrap over blocks of poses."""
     seed: Annotated[int, Option(least=0)] = 0
@@ -96,7 +96,7 @@ class GeometryResult(Result):
         )
 
     def show(self) -> Iterator[Block]:
-        """Yield the tables that a person asks of a calibrated geometry, and its warnings."""
+        """Yield the tables of a calibrated geometry, and its warnings."""
         return show_geometry(self.model, self.accuracy)
 
     def plot(self) -> Any:

@@ -1,4 +1,4 @@
-"""``import``: from other people's logs to a dataset, and a first map of their columns."""
+"""``import``: from foreign logs to a dataset, and a first map of their columns."""
 
 import json
 import os
@@ -28,12 +28,12 @@ from elastocal.workflows._workflow import workflow
 @brief_repr
 @dataclass(frozen=True)
 class ImportLogsSettings:
-    """Which logs, what they are, and where the dataset goes."""
+    """Settings of an import: logs, map, and dataset."""
 
     logs: Annotated[Sequence[str | PathLike[str]], Option(argument=True)]
     """CSV or text, Excel, MCAP, ROS 1 and 2 bags; one or several."""
     map: Path
-    """What their columns are."""
+    """Map of their columns."""
     out: Path | None = None
     """Dataset to write (.nc or .csv); none: it is only returned."""
     picture: Path | None = None
@@ -147,9 +147,9 @@ def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsR
 
 
 def _stating(dataset: Dataset, out: Path, files: Sequence[Path]) -> Dataset:
-    """Return a dataset that states the hash of the map, the first, and of each log.
+    """Return a dataset that states the hashes of the map, which comes first, and of each log.
 
-    Their names are relative to the dataset: whoever gives away the folder gives away the proof.
+    Their names are relative to the dataset, so that the folder contains the evidence.
     """
     folder = os.path.realpath(out.parent)
     made_from = {
@@ -163,7 +163,7 @@ def _stating(dataset: Dataset, out: Path, files: Sequence[Path]) -> Dataset:
 @brief_repr
 @dataclass(frozen=True)
 class GuessMapSettings:
-    """Of which logs a first map is to be written."""
+    """Settings of a first map of logs."""
 
     logs: Sequence[str | PathLike[str]]
     """Files; folders of ROS 2 bags."""
@@ -174,13 +174,13 @@ class GuessMapSettings:
     force: bool = False
     """Replace a map that is there."""
     ask: Callable[[str], str] | None = None
-    """Asks a person for what cannot be told, and returns the answer; an empty one leaves it ``?``
-    in the map. None: nobody is asked."""
+    """Function that asks a person what cannot be determined, and returns the answer; an empty one
+    leaves ``?`` in the map. None: nobody is asked."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GuessMapResult(Result):
-    """What some logs were taken for."""
+    """Guessed meaning of some logs."""
 
     logs: tuple[GuessedLog, ...]
     text: str
@@ -201,7 +201,7 @@ class GuessMapResult(Result):
 
 @workflow(GuessMapSettings)
 def guess_map(settings: GuessMapSettings, progress: Progress) -> GuessMapResult:
-    """Write a first map of logs, by names and sizes of their columns; a person then corrects it.
+    """Write a first map of logs, by names and sizes of their columns, for a person to correct.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def _files(logs: Sequence[str | PathLike[str]]) -> list[Path]:
     Raises
     ------
     LogError
-        If there is none, or two have the same name: the map could not tell them apart.
+        If there is none, or two have the same name, which the map could not distinguish.
     """
     files = list(dict.fromkeys(Path(log) for log in logs))
     if not files:

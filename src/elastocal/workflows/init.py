@@ -21,7 +21,7 @@ _SEED = 0
 
 @dataclass(frozen=True)
 class InitSettings:
-    """Which example goes where."""
+    """Settings of ``init``: example and folder."""
 
     out: Annotated[str | PathLike[str], Option(argument=True, metavar="DIR")]
     """Folder to write into."""

@@ -1,4 +1,4 @@
-"""``krc-config``: the files for a KUKA controller, and the sheet that a person signs."""
+"""``krc-config``: files for a KUKA controller, and the sheet for the signature."""
 
 from dataclasses import dataclass
 from os import PathLike
@@ -29,7 +29,7 @@ _DRIVER = "kuka_rsi"
 
 @dataclass(frozen=True)
 class KrcConfigSettings:
-    """Which cell's controller, and where to."""
+    """Settings of ``krc-config``: the cell and the folder."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm is a KUKA."""
@@ -47,7 +47,7 @@ class KrcConfigResult(Result):
 
     mode: str
     folder: str | None
-    """None where a file was checked."""
+    """None if a file was checked."""
     files: tuple[str, ...]
     bounds: Bounds
     delay: float
@@ -86,10 +86,10 @@ def krc_config(settings: KrcConfigSettings, progress: Progress) -> KrcConfigResu
     Raises
     ------
     DeviceError
-        If the arm of the cell is none of `elastocal.drivers.kuka_rsi`, or the file that is checked
-        does not do what the arm's mode needs.
+        If the arm's driver is not `elastocal.drivers.kuka_rsi`, or the checked file does not
+        provide what the arm's mode needs.
     SchemaError
-        If what stands under the arm does not fit.
+        If the settings of the arm are invalid.
     FileAccessError
         If a file cannot be read or written, or is there and ``force`` is not given.
     """
@@ -125,7 +125,7 @@ def kuka_settings(cell: Cell) -> RsiSettings:
     DeviceError
         If the arm has another driver.
     SchemaError
-        If what stands there does not fit.
+        If they are invalid.
     """
     choice, place = cell.file.devices.arm, f"{cell.path}: devices.arm"
     if choice.driver != _DRIVER:

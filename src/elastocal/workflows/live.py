@@ -46,7 +46,7 @@ _FADE = 0.005
 
 @dataclass(frozen=True)
 class LiveSettings(NewTool):
-    """Which cell is corrected by which model, and who watches."""
+    """Settings of a live compensation: cell, model and observers."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm takes corrections of a path."""
@@ -68,7 +68,7 @@ class LiveSettings(NewTool):
     report: Callable[[LiveReport], None] = lambda _report: None
     """Called twice a second."""
     warn: Callable[[str], None] = lambda _text: None
-    """Called with each thing that a person should know, before the first cycle."""
+    """Called with each warning, before the first cycle."""
     interrupted: Callable[[], bool] = lambda: False
     """Whether it is to end now; Ctrl-C ends it, too."""
 
@@ -83,11 +83,11 @@ class LiveResult(Result):
     started: str
     """Date and time, UTC."""
     seconds: float
-    """From the controller's first message to the end, of the wall."""
+    """Time from the controller's first message to the end, in s of wall time."""
     ended: str
     """Why it ended."""
     problem: str | None
-    """What went wrong; none: nothing."""
+    """Error that ended it; None: no error."""
     limits: PathLimits
     filter_delay: float
     """Delay of a slow wrench by the filters, in s."""
@@ -96,7 +96,7 @@ class LiveResult(Result):
     bias: tuple[float, ...] | None
     """Bias that was taken at the beginning, in N and N·m; none: that of the tool file."""
     scheduling: str
-    """How the loop's thread was scheduled."""
+    """Scheduling of the loop's thread."""
     line: CycleStatistics
     loop: LiveCounts
     logged: int
@@ -104,7 +104,7 @@ class LiveResult(Result):
     dropped: int
     """Cycles that it could not take."""
     notes: tuple[str, ...]
-    """Sentences that a person must know."""
+    """Notes for the user."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
@@ -138,9 +138,9 @@ class LiveResult(Result):
 def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG001 - it reports
     """Correct the path that an arm's own program follows, by the measured wrench, cycle by cycle.
 
-    Soft real time: the answers are counted, and the late ones among them. It ends after the
-    duration or when it is interrupted: the correction fades to zero, the controller is told that
-    corrections are over, and the record is written.
+    Soft real time: answers, and late ones among them, are counted. It ends after the duration or
+    when it is interrupted: the correction fades to zero, the controller is sent the end of
+    corrections, and the record is written.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def settings_within(file: Path | None, limits: PathLimits, cell: Cell) -> Compen
     Raises
     ------
     CompensationError, SchemaError
-        If they go beyond the limits, or are of another cycle or frame.
+        If they exceed the limits, or have another cycle or frame.
     """
     if file is None:
         data: dict[str, object] = _range(cell) | {

@@ -30,7 +30,7 @@ from elastocal.workflows._workflow import workflow
 from elastocal.workflows.krc_config import kuka_settings
 
 _MOST_AMPLITUDE = 2e-3
-"""In m: what is free on all sides is not known to the program."""
+"""In m: the program does not know the free space around the tool."""
 _LOOK = 0.02
 """Time between two looks at the arm, in s."""
 _SLACK = 10.0
@@ -39,14 +39,14 @@ _SLACK = 10.0
 
 @dataclass(frozen=True)
 class MeasureDelaySettings:
-    """Which cell's arm is measured, and who watches."""
+    """Settings of ``measure-delay``: the cell and observers."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm is a KUKA in mode ``contact``."""
     out: Annotated[str | PathLike[str], Option(metavar="RECORD.json")]
     """Commissioning record, ``.json``."""
     amplitude: str = "0.5 mm"
-    """Amplitude of the movement about where the tool stands, with its unit."""
+    """Amplitude of the movement about the tool's present position, with its unit."""
     seconds: float = 6.0
     """Duration of each of the three movements, in s."""
     confirmed: Annotated[bool, Option("--yes")] = False
@@ -134,7 +134,7 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
 
 
 def _follow(arm: KukaArm, places: np.ndarray, clock: Clock, most: float) -> DelayEstimate:
-    """Return how the arm has answered a chirp, shape (cycle, 3), in m."""
+    """Return the response of the arm to a chirp, shape (cycle, 3), in m."""
     recorder, begun = arm.excite(places), clock.now()
     while (excitation := recorder.excitation()) is None or arm.state().motion is Motion.MOVING:
         state = arm.state()

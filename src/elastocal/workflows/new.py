@@ -29,10 +29,10 @@ from elastocal.workflows._workflow import workflow
 from elastocal.workflows.new_settings import NONE, NewSettings
 
 _AHEAD, _ABOVE = (0.55, 0.65, 0.45, 0.75), (0.15, 0.3, 0.0, 0.45)
-"""Where a surface is tried, in reaches of the arm: its middle ahead of the base, its lowest point
-above it."""
+"""Positions tried for a surface, in reaches of the arm: its middle ahead of the base, its lowest
+point above it."""
 _RETREATS = (0.25, 0.15, 0.4)
-"""How far HOME is from the surface, in m, as tried."""
+"""Distances of HOME from the surface that are tried, in m."""
 _TRIED, _TURNS = 40, 8
 """Points before which HOME is looked for, and turns of the tool at each."""
 _MOST_POSTURES = 40
@@ -48,15 +48,15 @@ class NewResult(Result):
     cell: Path
     robot: str
     findings: tuple[str, ...]
-    """What ``check`` says of it."""
+    """Findings of ``check``."""
 
 
 @workflow(NewSettings)
 def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001 - seconds
     """Write a cell file for a robot and a mesh, which ``check`` passes.
 
-    Where the surface stands is tried, if it is not said, until the arm comes to it. HOME is a
-    posture before the surface that is free of collisions.
+    Positions of the surface are tried, unless given, until the arm reaches it. HOME is a posture
+    before the surface that is free of collisions.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001
 
 
 def _tries(settings: NewSettings, known: NewSettings) -> list[tuple[str, bool]]:
-    """Return where the surface is tried, and whether its normals are turned round."""
+    """Return the positions tried for the surface, and whether its normals are reversed."""
     if settings.place is not None:
         return [(settings.place, False), (settings.place, True)]
     tries = product(_ABOVE, _AHEAD, (False, True))

@@ -1,4 +1,4 @@
-"""What a person says of a new cell, and what is guessed of the rest by the robot and the mesh."""
+"""Settings of a new cell, and guesses of the rest from robot and mesh."""
 
 import contextlib
 import math
@@ -23,7 +23,7 @@ from elastocal.units import in_unit, parse_point, parse_quantity
 from elastocal.workflows._inputs import ROBOT_SUFFIXES, parse_frame
 
 NONE = "none"
-"""What leaves sensor, tracker, process or tolerance out."""
+"""Value that leaves out sensor, tracker, process or tolerance."""
 _MOST_METRES = 25.0
 """Largest extent that a mesh is taken for metres up to; beyond, for millimetres."""
 _INCH_SIZES = (0.1, 3.0)
@@ -39,9 +39,9 @@ _ABOVE_PROCESS, _ASIDE = 1.05, 3.0
 
 @dataclass(frozen=True)
 class NewSettings:
-    """What is known of a cell; quantities are texts with their units, and what is None is guessed.
+    """Settings of a new cell; quantities are texts with their units, and None is guessed.
 
-    `filled` says what is guessed.
+    `filled` states the guesses.
     """
 
     out: Annotated[str | PathLike[str], Option(metavar="CELL.yaml")] = "cell.yaml"
@@ -69,7 +69,7 @@ class NewSettings:
     force_range: str | None = None
     """Largest forces of the sensor along its axes, ``"fx, fy, fz"``, or ``none``: no sensor."""
     moment_range: str | None = None
-    """Its largest moments, likewise."""
+    """Range of its moments."""
     tracker: str | None = None
     """Place of the tracker in base, ``"x, y, z"``, or ``none``: no tracker."""
     marker_place: Annotated[str | None, Option("--marker")] = None
@@ -152,7 +152,7 @@ class NewSettings:
         return done._with_devices()
 
     def _with_devices(self) -> "NewSettings":
-        """Return settings with the sensor's ranges, twice what it has to bear, and the tracker."""
+        """Return settings with the sensor's ranges, twice its largest load, and the tracker."""
         centre = self.tool_centre or ", ".join(f"{500.0 * x:.0f} mm" for x in self.tip)
         force, weight = parse_quantity(self.press, "force"), _GRAVITY * self._mass
         lever = float(np.linalg.norm(self.tip)) + 0.1
@@ -214,7 +214,7 @@ class NewSettings:
 
     @cached_property
     def reach(self) -> float:
-        """How far the arm comes, in m."""
+        """Reach of the arm, in m."""
         return arm_reach(self.arm)
 
     @cached_property

@@ -55,7 +55,7 @@ _FREE_SEARCH = "i_optimal"
 
 @dataclass(frozen=True)
 class PlanSettings:
-    """Which cell to plan, and where the files go."""
+    """Settings of a plan: the cell and the folder."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
@@ -97,9 +97,9 @@ class PlanTimes:
 
     travel: float
     total: float
-    """Time of the presses, their ways included."""
+    """Time of the presses, including the motions."""
     positions: float | None = None
-    """On the ways through the poses in free space; none where there are none."""
+    """Positions on the paths through the poses in free space; None if there are none."""
 
 
 @brief_repr
@@ -120,10 +120,10 @@ class PlanFigures:
     """Valid candidates."""
     sampled: int
     refused: dict[str, int]
-    """How many points each check refused."""
+    """Number of points that each check refused."""
     bottleneck: str | None
     stations: dict[str, int]
-    """How many poses each tracker station sees."""
+    """Number of poses that each tracker station sees."""
     time: PlanTimes
     findings: tuple[str, ...]
     production: ProductionRecord | None = None
@@ -148,7 +148,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     Raises
     ------
     PlanningError
-        If no plan can be made of this cell, or the program's name is none that a controller takes.
+        If no plan can be made of this cell, or a controller does not accept the program's name.
     FileAccessError
         If a file cannot be read or written, or the folder holds files.
     """
@@ -167,7 +167,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     with filling(Path(settings.out), PLAN, settings.force) as folder:
         planned = planning.make_plan(cell, other, settings.jobs, progress)
         if settings.poses is not None:
-            # A plan is of the cell file, whatever number of poses was asked for beside it.
+            # A plan belongs to the cell file, whatever number of poses an option requests.
             own = fingerprint(load_cell(Path(settings.cell)))
             record = replace(planned.plan.cell, fingerprint=own)
             planned = replace(planned, plan=replace(planned.plan, cell=record))
@@ -181,7 +181,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
 
 
 def _require_free_poses(settings: PlanSettings) -> None:
-    """Refuse a number of poses in free space that is none, or that nobody would see."""
+    """Refuse a number of poses in free space that is not positive, or without a station."""
     if settings.free_poses is None:
         return
     if not settings.free_poses >= 1:
@@ -280,7 +280,7 @@ def _write_folder(
 
 @dataclass(frozen=True)
 class PlanPositionsSettings:
-    """Where in free space to measure positions for ``geometry``."""
+    """Settings of a plan of positions in free space for ``geometry``."""
 
     cell: str | PathLike[str]
     """Cell file, ``.yaml``, with marker and trackers."""
@@ -300,7 +300,7 @@ class PlanPositionsSettings:
 
 @workflow(PlanPositionsSettings)
 def plan_positions(settings: PlanPositionsSettings, progress: Progress) -> PositionPlan:
-    """Choose poses in free space that tell the geometry of the arm best; write plan and table.
+    """Choose poses in free space that determine the geometry of the arm best; write plan and table.
 
     Parameters
     ----------
@@ -312,7 +312,7 @@ def plan_positions(settings: PlanPositionsSettings, progress: Progress) -> Posit
     Raises
     ------
     PlanningError
-        If no plan can be made of this cell, or the program's name is none that a controller takes.
+        If no plan can be made of this cell, or a controller does not accept the program's name.
     FileAccessError
         If a file cannot be read or written, or the folder holds files.
     """

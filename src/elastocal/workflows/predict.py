@@ -26,7 +26,7 @@ _NO_MISFIT = (
 
 @dataclass(frozen=True)
 class PredictSettings(NewTool, ArmAsBuilt):
-    """Which model predicts which rows."""
+    """Settings of a prediction: the model and the rows."""
 
     model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
@@ -49,13 +49,14 @@ class PredictSummary:
     misfit: float | None
     """Share of `CalibratedModel.misfit`; none where the model does not know it."""
     misfit_floor: float | None
-    """Floor of it, in m; none likewise."""
+    """Floor of the misfit, in m; None without a misfit."""
     tool: str
-    """The tool that the rows are of, in words."""
+    """Tool of the rows, in words."""
     notes: tuple[str, ...]
-    """Sentences that a person must know."""
+    """Notes for the user."""
     coverage: ProductionCoverage | None = None
-    """How much of the rows was calibrated; none where the model does not know where that was."""
+    """Share of the rows that the calibration covers; None where the model does not state its
+    domain."""
 
     @property
     def warning(self) -> str:

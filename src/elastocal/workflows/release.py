@@ -43,9 +43,9 @@ from elastocal.workflows._operator_and_devices import (
 from elastocal.workflows._workflow import workflow
 
 _SLOW, _SLOW_WAY = 0.002, 0.01
-"""Speed of the first part of the way in m/s, and its length in m: what is wrong shows there."""
+"""Speed of the first part of the retreat in m/s, and its length in m, to detect errors early."""
 _GROWTH = 50.0
-"""By how much the force may grow on the way, in N."""
+"""Largest growth of the force during the retreat, in N."""
 _MEASURED = 0.4
 """Time over which the force is looked at before and after, in s."""
 _LIMIT_PER_LOAD = 1.3
@@ -54,7 +54,7 @@ _LIMIT_PER_LOAD = 1.3
 
 @dataclass(frozen=True)
 class ReleaseSettings:
-    """Which cell's tool is brought off the surface, and who watches."""
+    """Settings of ``release``: the cell and observers."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
@@ -73,9 +73,9 @@ class ReleaseFigures:
     moved: bool
     """Whether the arm was moved."""
     distance: float
-    """By which the tool was, or would be, retracted."""
+    """Distance by which the tool was, or would be, retracted."""
     direction: tuple[float, ...]
-    """Direction of the way, base."""
+    """Direction of the retreat, base."""
     force_before: float | None
     """Force on the tool beyond its weight; None where none can be trusted."""
     force_after: float | None
@@ -84,16 +84,16 @@ class ReleaseFigures:
     sensor: str
     """Why there is no force sensor; empty where there is one."""
     message: str
-    """What is known of the tool at the end."""
+    """State of the tool at the end."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ReleaseResult(Result):
-    """How a tool was brought off the surface."""
+    """Result of a retreat of a tool from the surface."""
 
     figures: ReleaseFigures
     plan: tuple[str, ...]
-    """What was said before."""
+    """Announcement before the retreat."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the facts shown at the end."""
@@ -113,7 +113,7 @@ class _Bench:
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """The way off the surface."""
+    """Path off the surface."""
 
     direction: FloatArray
     """Base, shape (3,)."""
@@ -126,7 +126,7 @@ class _Way:
         return sum(length for length, _ in self.stages)
 
     def sentence(self) -> str:
-        """Return the way as a phrase."""
+        """Return the path as a phrase."""
         x, y, z = self.direction
         parts = ", then ".join(
             f"{quantity(length, 'mm')} at {quantity(speed, 'mm/s')}"
@@ -144,7 +144,7 @@ class _NoForce:
 
 @workflow(ReleaseSettings)
 def release(settings: ReleaseSettings, progress: Progress) -> ReleaseResult:  # noqa: ARG001 - short
-    """Bring a tool that stands at a surface off it, along its own axis.
+    """Retract a tool from a surface along its own axis.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def release(settings: ReleaseSettings, progress: Progress) -> ReleaseResult:  # 
 
 @contextlib.contextmanager
 def _connected(cell: Cell, reserved: ReservedRig) -> Iterator[_Bench]:
-    """Yield arm and force; a sensor that is missing is none."""
+    """Yield arm and force; None for a missing sensor."""
     rig, made, problem = reserved.rig, list[DeviceSet](), ""
     clock: Clock = WallClock(0.0, cell.file.devices.clock_rate)
     with contextlib.ExitStack() as opened:
@@ -251,7 +251,7 @@ def _force_sentence(bench: _Bench, force: FloatArray | None) -> str:
 
 
 def _way_from(start: FloatArray, arm: RobotArm) -> str:
-    """Return how far the tool is from where it stood."""
+    """Return the distance of the tool from its initial position."""
     return quantity(float(np.linalg.norm(arm.state().T_base_tcp[:3, 3] - start)), "mm", ".1f")
 
 

@@ -41,7 +41,7 @@ from elastocal.workflows._workflow import workflow
 @brief_repr
 @dataclass(frozen=True)
 class ReportSettings:
-    """What to report on, and where to."""
+    """Settings of a report: the run and the page."""
 
     run: Annotated[str | PathLike[str], Option(argument=True, metavar="RUN")]
     """Folder of a run, a folder that holds one, or a model file."""
@@ -86,7 +86,7 @@ class ReportSettings:
     xlsx: bool = False
     """Also write its tables beside it, as a workbook."""
     state: Statements = field(default_factory=dict)
-    """For the certificate, beside what cell file and run state; see
+    """Statements for the certificate, in addition to those of cell file and run; see
     `elastocal.cell.read_statements`."""
 
 
@@ -111,13 +111,13 @@ class ReportFigures:
     pdf: str | None
     xlsx: str | None
     light: str | None
-    """None where nothing can be judged."""
+    """None if nothing can be judged."""
     verdict: str
     reasons: tuple[str, ...]
     advice: tuple[str, ...]
     tolerance: float | None
     unseen: UnseenFigures | None
-    """None where the calibration could not be made again."""
+    """None if the calibration could not be repeated."""
     missing: tuple[str, ...]
     """Parts that were not found."""
 
@@ -236,7 +236,7 @@ def _figures(
 
 
 def _require_page(out: Path) -> None:
-    """Refuse a place for a report before the work, so that none is done in vain."""
+    """Refuse an unusable path of a report before the work, not after it."""
     if out.suffix.lower() not in (".html", ".htm"):
         # Any other name could be that of a model.
         raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")

@@ -1,8 +1,7 @@
 """``run``: Procedure 1 on the devices that a cell names, journaled, derived when it is done.
 
-Nothing moves before cell, plan, folder and devices have been found to fit together, and nothing
-that a person must look at first moves before the operator has agreed. A fault is told at once,
-before the arm is brought off the surface.
+Nothing moves before cell, plan, folder and devices were found consistent, and no real arm moves
+before the operator has agreed. A fault is reported at once, before the arm retracts.
 """
 
 import contextlib
@@ -58,9 +57,9 @@ def contact_sentence(state: ArmState) -> str:
 
 
 def tell_at_once(operator: Operator, fault: str) -> None:
-    """Let a person read a fault before the arm is brought off the surface, which may take long.
+    """Report a fault before the arm retracts from the surface, which may take long.
 
-    In a thread of its own: a terminal that takes nothing must not hold the arm up.
+    A separate thread writes, since a blocked terminal must not delay the arm.
     """
     lines = [
         f"fault: {fault}",
@@ -76,7 +75,7 @@ POSES_MEASURED = "poses measured"
 @brief_repr
 @dataclass(frozen=True)
 class RunSettings:
-    """Which cell carries out which plan, and who watches."""
+    """Settings of a run: cell, plan and observers."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
@@ -85,7 +84,7 @@ class RunSettings:
     out: Annotated[str | PathLike[str], Option(metavar="RUN")]
     """Folder of the run."""
     resume: bool = False
-    """Go on with the run that is in the folder."""
+    """Continue the run in the folder."""
     confirmed: Annotated[bool, Option("--yes")] = False
     """A person has looked at the cell: do not ask. On real devices this arms the arm."""
     seed: Annotated[int | None, Option(least=0)] = None
@@ -94,9 +93,10 @@ class RunSettings:
     sign: Annotated[Path | None, Option(metavar="KEY")] = None
     """Private key that signs the journal at the end; see `elastocal.verdict.make_key`."""
     state: Statements = field(default_factory=dict)
-    """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
+    """Statements for the certificate, in addition to the cell file's: see
+    `elastocal.cell.read_statements`."""
     arming: Arming | None = None
-    """Arming by a person who agreed before: the cell file must still be the same, to the byte."""
+    """Arming by a person who agreed before: the cell file must be unchanged since."""
 
 
 @brief_repr
@@ -107,9 +107,9 @@ class RunFigures:
     run: str
     """Folder of the run."""
     state: str
-    """How this stretch ended: done, interrupted."""
+    """End of this session: done, interrupted."""
     arm: str
-    """Where the arm is."""
+    """Position of the arm."""
     message: str
     poses: int
     committed: int
@@ -119,12 +119,12 @@ class RunFigures:
     failed_attempts: int
     seconds: float
     dataset: str | None
-    """None where nothing was derived."""
+    """None if nothing was derived."""
     warnings: tuple[str, ...]
     problem: str | None
     """Why nothing was derived of a run that is done."""
     lines: tuple[LineCounts, ...] = ()
-    """What was counted on the lines of the devices in this session; none of simulated ones."""
+    """Counts on the lines of the devices in this session; none for simulated devices."""
 
     def counts(self) -> str:
         """Return the number of readings of each status, as a phrase."""
@@ -137,7 +137,7 @@ _LOST_SHOWN = 5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunResult(Result):
-    """How a stretch of a run ended, and what its streams say when it was the last one."""
+    """End of a session of a run, and the derived result after the last one."""
 
     figures: RunFigures
     end: RunEnd
@@ -159,7 +159,7 @@ class RunResult(Result):
         )
 
     def show(self) -> Iterator[Block]:
-        """Yield how it ended in a sentence, what is to be noticed, and what comes next."""
+        """Yield the end in a sentence, the warnings, and the next steps."""
         found = self.figures
         counts = found.counts() or "no readings"
         derived = "" if found.dataset else ", not derived"
@@ -212,7 +212,7 @@ class DryRunResult(Result):
 
     @property
     def seconds(self) -> float:
-        """How long it would take, in s."""
+        """Expected duration, in s."""
         return float(sum(step.seconds for step in self.steps))
 
     @property
@@ -274,8 +274,8 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
     Raises
     ------
     ProcedureError
-        If the folder holds something else, the operator does not agree, or the run was stopped
-        by a fault; its message says which and where the arm stands.
+        If the folder holds something else, the operator does not agree, or the run was stopped by a
+        fault; its message states the fault and the position of the arm.
     ElastocalError
         If cell, plan, a file or a device cannot be used.
     """
@@ -440,7 +440,7 @@ def _figures(
 
 
 def _session(job: _Job, known: LastKnown | None, devices: Devices) -> Session:
-    """Return the poses left to do, and the way to HOME from where the arm stands."""
+    """Return the remaining poses, and the path to HOME from the present position of the arm."""
     state, limit = devices.arm.state(), job.settings.procedure.travel_limit
     likely = known.uncommitted if known else None
     return Session(
@@ -477,7 +477,7 @@ def _check_folder(job: _Job, entries: tuple[procedure.Entry, ...], resume: bool)
 
 
 def _confirm(job: _Job, known: LastKnown | None, devices: Devices, settings: RunSettings) -> None:
-    """Have the operator agree before anything moves that was not expected to."""
+    """Ask the operator to agree before an unexpected motion."""
     settings.operator.warn([f"warning: {text}" for text in (*job.rig.warnings, *job.warnings)])
     if known is not None:
         settings.operator.warn((*known.lines, contact_sentence(devices.arm.state())))

@@ -24,7 +24,7 @@ from elastocal.workflows._workflow import workflow
 @brief_repr
 @dataclass(frozen=True)
 class SimulateSettings:
-    """Which cell is put on the wire, and for how long."""
+    """Settings of ``simulate``: the cell and the duration."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
@@ -41,11 +41,11 @@ class SimulateSettings:
     rate: float | None = None
     """Seconds of the cell a second of the wall; by default `clock_rate` of the cell file."""
     seed: Annotated[int | None, Option(least=0)] = None
-    """By default the cell's."""
+    """Seed; by default the cell's."""
     force: bool = False
     """Replace a file that is no former output of this command."""
     meanwhile: Callable[["SimulateResult"], None] = lambda found: found.wait()
-    """What is done while the servers answer; they are closed when it returns. By default: wait for
+    """Function that runs while the servers answer; they close when it returns. By default: wait for
     Ctrl-C."""
 
 
@@ -61,7 +61,7 @@ class Ports:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulateResult(Result):
-    """Where the devices of a simulated cell answer."""
+    """Addresses of the devices of a simulated cell."""
 
     cell: str
     rate: float
@@ -94,7 +94,7 @@ def simulate(
     settings: SimulateSettings,
     progress: Progress,  # noqa: ARG001 - it runs until it is stopped
 ) -> SimulateResult:
-    """Serve the devices of a simulated cell on this machine until somebody stops it.
+    """Serve the devices of a simulated cell on this machine until stopped.
 
     Parameters
     ----------
@@ -106,7 +106,8 @@ def simulate(
     Raises
     ------
     DeviceError
-        If the cell cannot be simulated, there is no simulator of a device, or the rate is none.
+        If the cell cannot be simulated, there is no simulator of a device, or the rate is not
+        positive.
     ElastocalError
         If the cell cannot be used.
     """

@@ -52,7 +52,7 @@ class ProcessTrial:
     cell: Cell
     model: CalibratedModel
     load: SensorLoad | None
-    """None: the cell file's tool, and a bias that is measured in the air."""
+    """None: the cell file's tool, and a bias measured in the air."""
     settings: CompensatorSettings
     seed: int
     controller: process.Controller = field(default_factory=process.Controller)
@@ -335,7 +335,7 @@ _SUDDEN = 0.1
 @brief_repr
 @dataclass(frozen=True)
 class SimulateProcessSettings(NewTool):
-    """Which process on which cell, corrected by which models."""
+    """Settings of a simulated process: cell, process and models."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file."""
@@ -346,14 +346,14 @@ class SimulateProcessSettings(NewTool):
     kind: Annotated[str | None, Option("--process", choices="process")] = None
     """``afp`` (courses) or ``machining`` (rings of a dome); none: a process of one's own."""
     path: Path | None = None
-    """That process: CSV as for `compensate`, with columns ``course`` and ``time[s]``."""
+    """Path of the process: CSV as for `compensate`, with columns ``course`` and ``time[s]``."""
     speed: Annotated[
         float | None,
         Option(read="speed", help="Of --path, '0.1 m/s'; default: its column time[s]."),
     ] = None
     """Speed of the tool along `path`, in m/s; by default its column ``time[s]`` says it."""
     direction: Annotated[str, Option(default="lateral")] = process.LATERAL
-    """What the deviation of `path` counts along: ``lateral``, ``normal`` or ``"1,0,0"``."""
+    """Direction of the deviation of `path`: ``lateral``, ``normal`` or ``"1,0,0"``."""
     start: str | None = None
     """Posture before the first row of a path of poses, a quantity a joint from base to tip, such as
     ``0 deg, -90 deg, 90 deg, 0 deg, 45 deg, 0 deg``."""
@@ -403,7 +403,7 @@ def simulate_process(
         If the process is not known, or the robot cannot follow; if a path of one's own does not
         fit, by its line.
     RobotError
-        If a model is of another robot or tool than the cell's.
+        If a model belongs to another robot or tool than the cell's.
     DeviceError, EquilibriumError
         If the cell cannot be simulated, or not under these forces.
     SchemaError, FileAccessError
@@ -465,7 +465,7 @@ def _simulate(
 
 @dataclass(frozen=True)
 class _Lines:
-    """The lines of the seeds so far, at one load."""
+    """Lines of the seeds so far, at one load."""
 
     lines: list[process.DeviationComparison] = field(default_factory=list)
     spatial: list[process.DeviationComparison] = field(default_factory=list)
@@ -484,7 +484,7 @@ class _Lines:
 
 @dataclass
 class _SeedRuns:
-    """The runs of the seeds so far, and the record of all."""
+    """Runs of the seeds so far, and the record of all."""
 
     settings: SimulateProcessSettings
     cell: Cell
@@ -493,7 +493,7 @@ class _SeedRuns:
     loads: dict[float, _Lines]
     """Lines by the share of the force."""
     unturned: _Lines = field(default_factory=_Lines)
-    """Those of the programmed posture, where another is taken."""
+    """Runs of the programmed posture, if another is taken."""
     stiffest: process.StiffestPosture | None = None
     programmed: tuple[Course, ...] = ()
     """Courses of the first seed."""
@@ -622,7 +622,7 @@ def _direction_name(settings: SimulateProcessSettings) -> str:
 def _on_production(
     model: CalibratedModel, courses: tuple[Course, ...]
 ) -> tuple[ProductionCoverage | None, PredictionDoubt | None]:
-    """Return how much of some courses the calibration of a model covers, and how sure it is."""
+    """Return the coverage of some courses by the calibration of a model, and its uncertainty."""
     names = [course.name for course in courses for _ in course.q]
     q, force = (np.vstack(each) for each in zip(*((c.q, c.force) for c in courses), strict=True))
     return model.coverage(q, force, course=names), model.doubt(q, force)

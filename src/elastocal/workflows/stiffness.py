@@ -38,7 +38,7 @@ _FILES = ("postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", _SUMMA
 
 @dataclass(frozen=True)
 class StiffnessSettings(NewTool):
-    """Which model, along which path, and what may be chosen."""
+    """Settings of a survey of stiffness: the model, the path, and the free choices."""
 
     model: Annotated[str | PathLike[str], Option(argument=True)]
     """Model file of `calibrate`."""
@@ -81,7 +81,7 @@ class PostureCounts:
     tried: int
     allowed: int
     refused: dict[str, int]
-    """By what refused them."""
+    """Number of postures refused, by the check."""
 
 
 @record()
@@ -92,11 +92,11 @@ class ChosenStiffness:
     stations: int
     """Stations at which there is a posture."""
     softest: float
-    """In N/m; 0 without a posture."""
+    """Stiffness of the softest station, in N/m; 0 without a posture."""
     mean: float
     """In N/m."""
     spin: float | None
-    """In rad; none where it varies."""
+    """In rad; None where it varies."""
     stand: float | None
     """Position of the first external axis, in rad or m; none where it varies."""
     posture_jumps: int
@@ -140,7 +140,7 @@ class StiffnessResult(Result):
     survey: PostureSurvey
     choice: PostureChoice
     notes: tuple[str, ...]
-    """Sentences that a person must know."""
+    """Notes for the user."""
     robot: str
     curves: tuple[Curve, ...]
     """Stiffness of each choice along the path."""
@@ -159,7 +159,7 @@ class StiffnessResult(Result):
         )
 
     def show(self) -> Iterator[Block]:
-        """Yield the choices as a table, and what else a person asks."""
+        """Yield the choices as a table, and further facts."""
         counts, rail = self.summary.postures, self.summary.external_axes[:1]
         # Of several external axes the figure shows the first; choice.csv has all.
         yield Table(

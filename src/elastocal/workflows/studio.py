@@ -54,7 +54,7 @@ _PAUSE = 0.1
 @brief_repr
 @dataclass(frozen=True)
 class StudioSettings:
-    """Which cell the studio opens, and who may see it."""
+    """Settings of the studio: the cell and its access."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``; edits are written back to it."""
@@ -67,30 +67,30 @@ class StudioSettings:
     arm: bool = False
     """Let a run move devices that are not simulated."""
     while_open: Callable[["StudioResult"], None] = lambda found: found.wait()
-    """What is done while the page is answered, which ends when it returns. By default: wait for
+    """Function that runs while the page is served, which ends when it returns. By default: wait for
     Ctrl-C."""
 
 
 @brief_repr
 @record()
 class StudioFigures:
-    """What ``studio --json`` prints."""
+    """Output of ``studio --json``."""
 
     address: str
-    """With its token: whoever knows it may do what the page can."""
+    """Address with its token, which gives access to everything that the page can do."""
     cell: str
     notes: tuple[str, ...]
-    """What a person must know of who may come in."""
+    """Notes on the access."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StudioResult(Result):
-    """Where the page is, and what it can ask for."""
+    """Address of the page, and its requests."""
 
     figures: StudioFigures
     session: Session
     at_end: contextlib.ExitStack
-    """What is left to be done when the studio ends."""
+    """Work left for the end of the studio."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
@@ -98,10 +98,10 @@ class StudioResult(Result):
         return (("cell", found.cell), ("page", found.address), *(("note", n) for n in found.notes))
 
     def open_page(self) -> None:
-        """Show the page in the browser of whoever sits here, if there is one.
+        """Open the page in the user's browser, if there is one.
 
-        Arguments of a program can be read by every user of the machine, so the browser gets a file
-        that leads to the page, which this user alone may read.
+        Every user of the machine can read the arguments of a program, so the browser gets a file
+        that redirects to the page and that only this user may read.
         """
         handle, name = tempfile.mkstemp(".html", "elastocal-studio-")
         self.at_end.callback(Path(name).unlink, missing_ok=True)
@@ -119,7 +119,7 @@ def studio(
     settings: StudioSettings,
     progress: Progress,  # noqa: ARG001 - it runs until it is stopped
 ) -> StudioResult:
-    """Serve the page of a cell on this machine until somebody stops it.
+    """Serve the page of a cell on this machine until stopped.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ class _Commands:
     def is_real(self, cell: Cell) -> bool:
         try:
             return rig_of(cell).real
-        except DeviceError:  # a driver that is not here; what cannot be told may hurt
+        except DeviceError:  # a missing driver; an unknown device may move a real arm
             return True
 
 

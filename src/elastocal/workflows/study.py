@@ -64,7 +64,7 @@ class StudySettings:
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder of the study; one that is there goes on."""
     samples: Annotated[int, Option(most=1_000_000)] = 200
-    """Simulated arms, each calibrated anew."""
+    """Simulated arms, each calibrated separately."""
     vary: Annotated[
         tuple[str, ...],
         Option(
@@ -73,8 +73,8 @@ class StudySettings:
             " truth; repeatable, then every combination. Default: poses=6,10,15,20,31.",
         ),
     ] = (DEFAULT_VARIATION,)
-    """What to vary, each ``"KEY=A,B"``; see `codec.study.FACTORS`. Every combination is a
-    condition; what is not varied is as the cell file has it."""
+    """Factors to vary, each ``"KEY=A,B"``; see `codec.study.FACTORS`. Every combination is a
+    condition; other factors are as in the cell file."""
     target: Annotated[
         float | None,
         Option(metavar="LENGTH", read="length", help="Error that is good enough, e.g. '0.05 mm'."),
@@ -159,7 +159,7 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
 
 
 def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]:
-    """Return the conditions of a study; what is not varied is as the cell file has it.
+    """Return the conditions of a study; factors that are not varied are as in the cell file.
 
     Raises
     ------
@@ -183,7 +183,7 @@ class _StudySimulation:
     """Calibration poses of each condition."""
     robot: Robot
     models: dict[str, ElasticModel]
-    """By spring layout; those that readings decide are chosen anew in each sample."""
+    """Models by spring layout; a choice by readings is made again in each sample."""
     truth: CampaignSimulator
     errors: CampaignErrors
     pool: studies.StudyPool

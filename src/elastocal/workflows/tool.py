@@ -36,7 +36,7 @@ _LEVER = 0.1
 
 @dataclass(frozen=True)
 class ToolSettings:
-    """Which static postures, and how the sensor was mounted."""
+    """Settings of ``tool``: static postures, and the mounting of the sensor."""
 
     postures: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV of postures with raw wrenches, or the folder of a run."""
@@ -59,7 +59,8 @@ class ToolSettings:
     mass: str | None = None
     """Mass of the tool as weighed, with its unit, for a CSV; a cell says it itself."""
     free_rotation: Annotated[bool, Option("--free-rotation/--keep-rotation")] = False
-    """Find the sensor's rotation where unseen postures speak for it; else it is as mounted."""
+    """Estimate the sensor's rotation if left-out postures support it; otherwise it is as
+    mounted."""
     matrix: bool = False
     """Correct readings by the calibration matrix, too; the data that a model is calibrated from
     must then be derived with this tool file."""

@@ -31,14 +31,14 @@ from elastocal.workflows._workflow import workflow
 
 _HASH = re.compile("[0-9a-f]{8,64}")
 _SHOWN = 16
-"""Digits of a run's hash that people compare."""
+"""Number of digits of a run's hash that people compare."""
 _OF_A_RUN = ("run", "journal", "cell", "plan", "dataset", "summary of the run")
 """Parts that a run has, whatever was made from it; without one nothing is verified."""
 
 
 @dataclass(frozen=True)
 class VerifySettings:
-    """What to verify, and by whom it should be signed."""
+    """Settings of ``verify``: the object and its expected signer."""
 
     file: str | PathLike[str]
     """A report, or the folder of a run, or a folder that holds one."""
@@ -59,7 +59,7 @@ class VerifyResult(Result):
 
     @property
     def broken(self) -> Link | None:
-        """The first link that is broken; None where none is."""
+        """The first broken link; None if there is none."""
         return next((link for link in self.links if link.state is LinkState.BROKEN), None)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
@@ -171,7 +171,7 @@ def _signature(found: FoundManifest, trusted: str | None) -> Link:
 
 
 def _expected(found: str | None, expect: str | None) -> list[Link]:
-    """Return whether a run is the one that somebody expects."""
+    """Return whether a run is the expected one."""
     if expect is None:
         return []
     if not _HASH.fullmatch(expect):
@@ -191,7 +191,7 @@ def _expected(found: str | None, expect: str | None) -> list[Link]:
 def _run(
     folder: Path, trusted: str | None, expect: str | None = None, *, alone: bool = False
 ) -> list[Link]:
-    """Return the links of a run, with every part that is damaged and every doubt about it."""
+    """Return the links of a run, including every damaged part and every contradiction."""
     made = datetime.now(UTC).isoformat(timespec="seconds")
     try:
         evidence = gather_evidence(EvidenceOptions(folder, signer=trusted), made)

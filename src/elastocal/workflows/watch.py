@@ -37,30 +37,30 @@ _AGAIN = 1.0
 _OVER = 2.0
 """Time over which a rate is taken, in s of the clock."""
 _ENDING = 3.0
-"""For a line to end, in s of the wall; one that waits for its device ends by itself."""
+"""Time for a line to end, in s of wall time; one that waits for its device ends by itself."""
 
 
 @brief_repr
 @record()
 class WatchFigures:
-    """What ``watch --json`` prints."""
+    """Output of ``watch --json``."""
 
     cell: str
     seconds: float
-    """For which the devices were watched, of the wall."""
+    """Time for which the devices were watched, in s of wall time."""
     devices: tuple[DeviceReading, ...]
     """Arm, sensor, metrology; one for each station of the latter."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WatchResult(Result):
-    """What the devices of a cell show."""
+    """State of the devices of a cell."""
 
     figures: WatchFigures
 
     @property
     def problem(self) -> str | None:
-        """Which devices were never heard, and why, in one line; None where all were."""
+        """Devices that never sent anything, and why, in one line; None if all did."""
         silent = [each for each in self.figures.devices if not each.heard]
         whys = "; ".join(f"{each.kind} {each.device}: {each.cells()[0]}" for each in silent)
         return f"not heard: {whys}" if silent else None
@@ -76,7 +76,7 @@ class WatchResult(Result):
 @brief_repr
 @dataclass(frozen=True)
 class WatchSettings:
-    """Which cell's devices are watched, and for how long."""
+    """Settings of ``watch``: the cell and the duration."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""
@@ -217,6 +217,6 @@ class _Line(threading.Thread):
 
 
 def _close(found: DeviceSet) -> None:
-    """Give the line back, whatever it says."""
+    """Close the line, ignoring its errors."""
     with contextlib.suppress(ElastocalError, OSError):
         found.close()

@@ -58,7 +58,7 @@ GEAR_ANGLE = 5.0e-4
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Where a loaded arm comes to rest. Leading axes are those of the joints and forces given."""
+    """State of rest of a loaded arm. Leading axes are those of the joints and forces given."""
 
     theta: FloatArray
     """Spring positions, shape (..., spring), in rad or m, in the order of `ElasticArm.springs`."""
@@ -79,7 +79,7 @@ class ElasticArm:
 
     linkage: Linkage
     springs: tuple[TruthSpring, ...]
-    """From base to tip; kept in that order (those of one frame in the order given)."""
+    """Springs from base to tip; kept in that order (those of one frame in the order given)."""
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Acceleration in base, in m/s²; zero leaves the weight of the links out.
 

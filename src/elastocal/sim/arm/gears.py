@@ -1,35 +1,36 @@
-"""All springs of the simulated robot at once: gears that stiffen, lose way and remember.
+"""All springs of the simulated robot at once: gears with stiffening, lost motion and friction.
 
 The torque of a gear over its twist is
 
     tau(x) = k x - sum_m L_m a_m atan(x / a_m) + sum_i kappa_i clip(x - s_i, -d_i, d_i)
 
 *Growth and backlash* (the sum over m): near rest the stiffness is smaller by ``L_m``, and half of
-that is back at the twist ``a_m``; see `_softening`. A small ``a_m``
-with nearly all of ``k`` is a smoothed play: beyond it the twist is larger by ``b / 2`` with
-``b = pi a_m L_m / k``, so that a torque and its opposite are ``b`` further apart.
+that is regained at the twist ``a_m``; see `_softening`. A small ``a_m`` with nearly all of ``k`` is
+a smoothed play: beyond it the twist is larger by ``b / 2`` with ``b = pi a_m L_m / k``, so that a
+torque and its opposite are ``b`` further apart.
 
 *Friction in the teeth* (the sum over i): springs ``kappa_i`` in parallel, each with a slider that
-gives way at the travel ``d_i``: the stop operators of Prandtl and Ishlinskii (A. Visintin,
-"Differential Models of Hysteresis", Springer 1994, chapter III). The torque then depends on where
-the sliders ``s_i`` stand, which is the memory; it does not depend on speed. A reversal starts stiff
-and ends ``2 sum kappa_i d_i`` below the torque of the way up; loops close at once (Masing's rule).
+slips at the travel ``d_i``: the stop operators of Prandtl and Ishlinskii (A. Visintin,
+"Differential Models of Hysteresis", Springer 1994, chapter III). The torque then depends on the
+positions ``s_i`` of the sliders, which are the memory; it does not depend on speed. A reversal
+starts stiff and ends ``2 sum kappa_i d_i`` below the torque of loading; loops close at once
+(Masing's rule).
 
 *Lost motion* ``w`` is the width of that loop at no torque. Each branch crosses zero where the
 elastic torque ``g`` is the friction's, so ``sum kappa_i d_i = g(w / 2)`` gives the friction of a
-gear whose lost motion a catalogue states; play is then in it.
+gear whose lost motion a catalogue states; it then includes play.
 
-*What a free move leaves* is the state of a gear that last moved by a stroke ``v``: strains
-``clip(v, -d_i, d_i)``, held while the free robot comes to rest.
+*After a free move*, a gear that last moved by a stroke ``v`` has strains ``clip(v, -d_i, d_i)``,
+held while the free robot comes to rest.
 
-The seals of the balancer's cylinder rub too: one more stop beside the gear of axis 2, whose torque
-is the seals' force times the balancer's lever at that posture.
+The seals of the balancer's cylinder have friction, too: one more stop parallel to the gear of axis
+2, whose torque is the seals' force times the balancer's lever arm at that posture.
 
-The estimator has stops on *torque* and a compliance in arc tangents of torque; here stops are on
-*twist*, in parallel with a spring that is not linear, so neither is the inverse of the other.
+The estimator's stops act on *torque*, with a compliance in arc tangents of torque; the stops here
+act on *twist*, in parallel with a nonlinear spring, so that neither is the inverse of the other.
 
 At given sliders the torque has a potential, so that an equilibrium is a minimum; afterwards the
-sliders are drawn along. That is exact as long as no gear turns back within one step of load.
+sliders follow. That is exact as long as no gear reverses within one step of load.
 """
 
 import math
@@ -46,7 +47,7 @@ from elastocal.sim.truth import Gears
 _STOPS = 4
 """Number of sliders of a gear's friction."""
 _SEAL_TRAVEL = 20e-6
-"""How far a seal yields before it slides, in m. An assumption."""
+"""Travel of a seal before it slides, in m. An assumption."""
 _PLAY_FLOOR = 0.2
 """Stiffness in the middle of the backlash over that at high torque: soft, not free."""
 
@@ -126,7 +127,7 @@ class StiffeningGear:
     growth: float
     """1 - K1/K3: what is missing at rest, over the stiffness at high torque."""
     angle: float
-    """Twist at which it is half way between the two, in rad."""
+    """Twist at which it is half-way between the two, in rad."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.k < np.inf and 0.0 <= self.growth < 1.0 and 0.0 < self.angle < np.inf):
@@ -145,7 +146,7 @@ class GearLaws:
     """Growth, backlash and friction of the gears, beside their stiffness at high torque."""
 
     which: IndexArray
-    """Which springs are gears, shape (gear,)."""
+    """Numbers of the springs that are gears, shape (gear,)."""
     loss: FloatArray
     """L: stiffness that is missing at rest, shape (gear, effect), in N·m/rad."""
     angle: FloatArray
@@ -238,11 +239,11 @@ class RobotSprings:
     """k: at high torque, shape (spring,), in N·m/rad or N/m."""
     gears: GearLaws
     slider: FloatArray | None
-    """s: where the sliders stand, shape (gear, stop) or (posture, gear, stop), in rad; None: no
-    friction at all."""
+    """s: positions of the sliders, shape (gear, stop) or (posture, gear, stop), in rad; None: no
+    friction."""
     balancer: BalancerSpring | None
     balanced: int
-    """Which spring the balancer lies beside."""
+    """Number of the spring parallel to the balancer."""
     joint_angle: FloatArray
     """Angle that the motor of the balanced joint holds, shape () or (posture,), in rad."""
     strain: FloatArray | None = None
@@ -339,7 +340,7 @@ def _softening(twist: FloatArray, loss: FloatArray, scale: FloatArray) -> Spring
     loss : ndarray
         L in N·m/rad, of a shape that broadcasts with ``twist``.
     scale : ndarray
-        a in rad, likewise.
+        a in rad, of the same shape.
     """
     ratio = twist / scale
     bend, square = np.arctan(ratio), ratio**2

@@ -135,9 +135,9 @@ class Linkage:
     revolute: tuple[bool, ...]
     """Whether each joint turns (else it slides)."""
     lower: FloatArray
-    """Lower limits in rad or m, -inf when there is none, shape (joint,)."""
+    """Lower limits in rad or m, -inf if there is none, shape (joint,)."""
     upper: FloatArray
-    """Upper limits in rad or m, inf when there is none, shape (joint,)."""
+    """Upper limits in rad or m, inf if there is none, shape (joint,)."""
     T_base_tip: FloatArray
     """Tip frame with the arm at zero, shape (4, 4)."""
     masses: tuple[PointMass, ...]
@@ -263,7 +263,7 @@ def solve_inverse(
     tolerance : float
         Largest error that counts as reached, in m and rad.
     locked : int
-        Number of joints, from the base on, that stand still.
+        Number of joints, from the base on, that do not move.
     """
     q = np.array(start, dtype=float)
     error = pose_error(linkage.forward(q), T_base_tip)

@@ -4,10 +4,10 @@ For tests and demonstrations, without a planner: poses are spread evenly over a 
 the free spin about the tool axis drawn at random. The inverse kinematics is the simulator's own.
 
 The tool is stopped a few millimetres before contact and read (paper steps 7-9), then pressed until
-the load case stands, and read again (13-17). In between the controller drives through the gap and
-on against the arm's own compliance; the marker moves through the gap, and by what the friction
-disk gives and slips. Their difference is the deflection (Eq. 12, with our signs), and by how much
-less or more the arm sags at the loaded joints than at those of the first reading.
+the load case is reached, and read again (13-17). In between the controller moves through the gap
+and on against the arm's own compliance; the marker moves through the gap, and by the yielding and
+slip of the friction disk. Their difference is the deflection (Eq. 12, with our signs), plus the
+difference of the arm's sag between the loaded joints and those of the first reading.
 """
 
 from collections.abc import Sequence
@@ -29,8 +29,8 @@ START = (0.0, -1.75, 1.9, 0.0, 1.0, 0.0)
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 _ATTEMPTS = 40
 _SETTLING_ROUNDS = 2
-"""How often the commanded joints follow the deflection. Millimetres of travel change it by some
-micrometres, those by nanometres."""
+"""Number of iterations in which the commanded joints follow the deflection. Millimetres of travel
+change it by some micrometres, those by nanometres."""
 
 
 @dataclass(frozen=True)
@@ -158,9 +158,9 @@ def measure(
 def _marker_travel(
     T_base_touch: FloatArray, force: FloatArray, contact: Contact, slip: FloatArray
 ) -> FloatArray:
-    """Return how far the tool tip truly moves, shape (pose, load_case, 3), in m.
+    """Return the true motion of the tool tip, shape (pose, load_case, 3), in m.
 
-    The disk yields against the force on the robot: the tip sinks in and is dragged sideways.
+    The disk deforms: the tip sinks in and is displaced sideways.
     """
     R_base_tcp = T_base_touch[:, None, :3, :3]
     force_tcp = (R_base_tcp.swapaxes(-1, -2) @ force[..., None])[..., 0]
@@ -225,7 +225,7 @@ def _press(
 
 
 def _sag(arm: ElasticArm, q: FloatArray) -> FloatArray:
-    """Return how far the unloaded tip hangs from where the joints say it is, shape (..., 3)."""
+    """Return the sag of the unloaded tip below its nominal position, shape (..., 3)."""
     hanging = arm.equilibrium(q, np.zeros(3)).tcp_position
     return hanging - arm.linkage.forward(q)[..., :3, 3]
 
@@ -254,7 +254,7 @@ def _offsets(
 
 @dataclass(frozen=True)
 class SphericalCap:
-    """A dome to press on. The default stands in front of a 2.7 m arm and leans towards it."""
+    """A dome to press on. The default is in front of a 2.7 m arm and leans towards it."""
 
     apex: tuple[float, float, float] = (1.6, 0.0, 0.75)
     """Middle of the dome in base, in m."""
@@ -328,7 +328,7 @@ def press_poses(
     start : array_like, shape (joint,)
         Posture near which solutions are sought, in rad or m.
     spin : float
-        The tool is turned about its axis by up to this angle either way, in rad.
+        Largest rotation of the tool about its axis in either sense, in rad.
 
     Raises
     ------

@@ -59,7 +59,7 @@ class TruthSpring:
     distal: bool = False
     """False: in the frame before the joint has moved; True: in the moving one."""
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where it sits in that frame, in m; off the origin for a flexure within the link."""
+    """Position in that frame, in m; off the origin for a flexure within the link."""
 
 
 @brief_repr
@@ -72,9 +72,9 @@ class SpringChain:
     springs: tuple[TruthSpring, ...]
     """The springs in that order."""
     spring_elements: IndexArray
-    """Which screws are springs, ascending, shape (spring,)."""
+    """Numbers of the screws that are springs, ascending, shape (spring,)."""
     motor_elements: IndexArray
-    """Which screws are motors, ascending, shape (joint,)."""
+    """Numbers of the screws that are motors, ascending, shape (joint,)."""
     ends: tuple[int, ...]
     """Number of screws up to and with those of each joint."""
 
@@ -188,7 +188,7 @@ def tilt_springs(
 def link_hinges(
     linkage: Linkage, joint: str, stiffness: float, fraction: float = 0.5
 ) -> list[TruthSpring]:
-    """Return two hinges across the link behind a joint, at a part of the way to the next joint.
+    """Return two hinges across the link behind a joint, at a fraction of its length.
 
     Raises
     ------

@@ -1,13 +1,13 @@
 """Potential energy of an elastic mechanism under dead loads, with exact first two derivatives.
 
-Everything that loads the arm is a force fixed in base at a point fixed in a body: the contact
-force at the tip, the weight of every link, and a moment as pairs of such forces. So one formula
-serves them all (paper Eq. 1-10 linearise what stands here in full):
+Every load is a force fixed in base at a point fixed in a body: the contact force at the tip, the
+weight of every link, and a moment as pairs of such forces. So one formula covers them all (paper
+Eq. 1-10 are its linearisation):
 
     U(theta) = sum_i phi_i(theta_i) - sum_k F_k · p_k(theta)
 
-With ``z_i`` the axis of spring i and ``a_k = p_k - r_i`` the lever, both where the *deformed* arm
-has carried them, and sums over the loads behind the spring,
+With ``z_i`` the axis of spring i and ``a_k = p_k - r_i`` the lever arm, both on the *deformed* arm,
+and sums over the loads behind the spring,
 
     dU/dtheta_i           = phi_i' - z_i · sum_k a_k × F_k
     d²U/dtheta_i dtheta_j = phi_i'' [i = j] - z_i · sum_k (z_j × a_k) × F_k      (i in front of j)
@@ -64,10 +64,10 @@ class Reaction:
     stiffness: float
     """In N/m."""
     reference: FloatArray
-    """Where it is relaxed, in base, shape (batch, 3), in m."""
+    """Point where it is relaxed, in base, shape (batch, 3), in m."""
 
     def shift(self, point: FloatArray) -> FloatArray:
-        """Return how far a point (batch, 3) is beyond the reference, shape (batch, 1), in m."""
+        """Return the shift of a point (batch, 3) beyond the reference, shape (batch, 1), in m."""
         beyond: FloatArray = np.sum(self.normal * (point - self.reference), axis=1, keepdims=True)
         return beyond
 
@@ -108,7 +108,7 @@ class LoadedMechanism:
 
     screws: Screws
     springs: NDArray[np.intp]
-    """Which elements are springs, ascending, shape (spring,)."""
+    """Numbers of the elements that are springs, ascending, shape (spring,)."""
     laws: Sequence[TorqueLaw] | SpringBank
     """Law of each spring, or of all together."""
     held: FloatArray
@@ -124,7 +124,7 @@ class LoadedMechanism:
         return motions(self.screws, positions)
 
     def load_points(self, total: FloatArray) -> FloatArray:
-        """Return where the points of attack are now, shape (load, batch, 3), in m."""
+        """Return the current points of attack, shape (load, batch, 3), in m."""
         here, point = total[self.loads.after], self.loads.point
         point = point[:, None] if point.ndim == 2 else point
         turned = (here[..., :3, :3] @ point[..., None])[..., 0]

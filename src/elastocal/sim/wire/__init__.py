@@ -1,7 +1,7 @@
-"""The simulated cell on the wire: servers that speak as controllers, sensors and trackers do.
+"""The simulated cell on the network: servers with the protocols of controllers, sensors, trackers.
 
-They are written from what vendors and public programs state, not from `elastocal.drivers`: two
-readings of one fact. All bind to one address, the loopback unless told otherwise.
+They are written from vendors' documents and public programs, not from `elastocal.drivers`, so that
+the two are independent. All bind to one address, by default the loopback.
 
 ============= =================================================================================
 `live_cell`   `LiveCell`, which all of them show: the simulated plant, moved along by a clock

@@ -24,12 +24,12 @@ _CORRECTIONS = ("RKorr.X", "RKorr.Y", "RKorr.Z", "RKorr.A", "RKorr.B", "RKorr.C"
 
 
 class RsiStopError(DeviceError):
-    """The controller stops the arm and the RSI context; an operator has to reset it."""
+    """The controller stops the arm and the RSI context; an operator must reset it."""
 
 
 @dataclass(frozen=True)
 class PosCorrLimits:
-    """Limits in the RSI context; the defaults are the controller's, but for the ways."""
+    """Limits in the RSI context; the defaults are the controller's, except for the lengths."""
 
     lower: tuple[float, float, float] = (-0.2, -0.2, -0.2)
     """LowerLimX..Z of POSCORR in m; it clamps and says nothing."""
@@ -97,7 +97,7 @@ def _angle(turn: FloatArray) -> float:
 LARGEST = 65536
 """Longest datagram that the controller reads, in bytes."""
 _CHANNELS = 64
-"""Most channels each way."""
+"""Largest number of channels in each direction."""
 _KINDS = ("BOOL", "STRING", "LONG", "DOUBLE")
 _POSE = ("X", "Y", "Z", "A", "B", "C")
 _ARM = tuple(f"A{n}" for n in range(1, 7))
@@ -219,7 +219,7 @@ class RobWriter:
         body = "".join(_form(element, parts) for element, parts in elements.items())
         self._form = f'<Rob Type="KUKA">{body}<IPOC>{{:d}}</IPOC></Rob>'
         order = [name.partition(".")[0] for name, _, _ in self._fields]
-        # Attributes of one element stand together, wherever their channels are.
+        # Attributes of one element are written together, wherever their channels are.
         self._fields.sort(key=lambda field: order.index(field[0].partition(".")[0]))
 
     def write(self, values: Values, ipoc: int) -> bytes:
@@ -248,7 +248,7 @@ class Answer:
 
     ipoc: int
     values: Mapping[str, float]
-    """By tag, those that came."""
+    """Received values by tag."""
 
 
 class SenReader:

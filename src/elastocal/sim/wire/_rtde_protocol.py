@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from elastocal.errors import DeviceError
 
 VERSIONS = (1, 2)
-"""Versions of the protocol; a client that asks for none is spoken to in the first."""
+"""Versions of the protocol; a client that requests none gets the first."""
 _HEADER = struct.Struct(">HB")
 _LARGEST = 1 << 16
 """Bytes of one client that wait to be understood, at most."""
@@ -90,7 +90,7 @@ class Recipe:
 
     @property
     def layout(self) -> struct.Struct:
-        """How the values stand one behind the other."""
+        """Layout of the values in sequence."""
         return struct.Struct(">" + "".join(_TYPES[kind] for kind in self.types))
 
     def pack(self, values: Mapping[str, Value]) -> bytes:
@@ -128,7 +128,7 @@ def message(kind: str, payload: bytes) -> bytes:
 
 
 def text_message(text: str, version: int, source: str = "elastocal", level: int = 2) -> bytes:
-    """Return a text for whoever shows it; level 2 is a warning."""
+    """Return a text message for display; level 2 is a warning."""
     if version == 1:
         return message("M", bytes([level]) + text.encode())
     parts = [part.encode()[:255] for part in (text, source)]

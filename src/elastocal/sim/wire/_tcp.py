@@ -25,7 +25,7 @@ class Peer:
     def __init__(self, name: str, line: socket.socket) -> None:
         self.name, self.line = name, line
         self.rest = b""
-        """What was received and not used yet."""
+        """Bytes that were received and not used yet."""
 
     def send(self, data: bytes) -> bool:
         """Send; return whether the peer is still there."""
@@ -148,7 +148,7 @@ class TcpServer(ABC):
 
     @abstractmethod
     def tick(self) -> None:
-        """Do what is to be done all the time."""
+        """Do the periodic work."""
 
 
 def probe_orientation(live: LiveCell, station: str) -> FloatArray:

@@ -1,9 +1,9 @@
-"""The simulated tracker as a Leica controller speaks: emScon TPI over TCP, one client at a time.
+"""The simulated tracker with a Leica controller's protocol: emScon over TCP, one client at a time.
 
-Written from the layout in public (sizes, offsets, numbers), not from our driver. What is an
-assumption, because no public text tells it: a broken beam ends the measurement, with status change
-25 and an error 10004 for StartMeasurement; a search without a marker fails with 10004; a start
-while it measures is answered "busy".
+It is written from the public layout (sizes, offsets, numbers), not from the driver. Assumptions,
+for lack of a public source: a broken beam ends the measurement, with status change 25 and an error
+10004 for StartMeasurement; a search without a marker fails with 10004; a start while it measures is
+answered "busy".
 """
 
 import struct
@@ -28,7 +28,7 @@ _MILLIMETRE = 1
 _REFLECTORS = ((1, "CCR-1.5in"), (2, "CCR-0.5in"), (7, "T-Mac"))
 _STATIONARY, _CONTINUOUS, _PROBE = 0, 1, 7
 _STATIONARY_TIME = 0.5
-"""How long a stationary point is averaged, in s."""
+"""Averaging time of a stationary point, in s."""
 _SIZES = {
     5: 32,
     7: 12,
@@ -91,11 +91,11 @@ class EmsconServer(TcpServer):
         self._still: list[FloatArray] = []
 
     def say_change(self, code: int) -> None:
-        """Say next that the system's state has changed."""
+        """Report next that the system's state has changed."""
         self._faults.append(lambda peer: self.send(peer, _status_change(code)))
 
     def say_error(self, status: int) -> None:
-        """Say next an error that nobody has asked for."""
+        """Report next an error that is no answer."""
         self._faults.append(lambda peer: self.send(peer, _error(0, status)))
 
     def lose_power(self) -> None:

@@ -1,6 +1,6 @@
-"""The simulated trackers as an adapter that speaks in lines over TCP.
+"""The simulated trackers as an adapter that sends text lines over TCP.
 
-The format is that of docs/how-to/metrology.md. A station without a beam says ``beam broken`` once,
+The format is that of docs/how-to/metrology.md. A station without a beam sends ``beam broken`` once,
 or nothing at all; ``look STATION`` makes a station measure.
 """
 
@@ -33,7 +33,7 @@ class LineStreamServer(TcpServer):
     unit : str
         What the header says that lengths are in; the numbers are in mm, whatever it says.
     silent : bool
-        Whether a broken beam is told by silence.
+        Whether a broken beam is shown by silence.
     offset, drift : float
         The adapter's clock is ``(1 + drift) t + offset``, in s.
     """
@@ -60,13 +60,13 @@ class LineStreamServer(TcpServer):
         self._point = np.array(point, dtype=float)
         self._said: BeamState | None = None
         self.frame = "setup 1"
-        """Name of the frame; another one is told at once."""
+        """Name of the frame; a change is sent at once."""
         self._framed = ""
         self.faults: list[str] = []
         """Lines to be said next."""
 
     def opened(self, peer: Peer) -> None:
-        """Say what the columns are, and which frame they are in."""
+        """Send the names of the columns and of their frame."""
         turns = ",qx,qy,qz,qw" if self._point.any() else ""
         unit = self._unit
         self.send(
@@ -77,7 +77,7 @@ class LineStreamServer(TcpServer):
         self._said = None
 
     def received(self, peer: Peer, data: bytes) -> None:
-        """Do what ``look STATION`` says."""
+        """Carry out ``look STATION``."""
         *lines, peer.rest = (peer.rest + data)[-4096:].split(b"\n")
         for line in lines:
             word, _, station = line.decode("ascii", errors="replace").strip().partition(" ")
@@ -88,7 +88,7 @@ class LineStreamServer(TcpServer):
                     self.send(peer, f"error {error}\n".encode())
 
     def tick(self) -> None:
-        """Say what has come since."""
+        """Send the new points."""
         block = self._tracker.read()
         lines, self.faults = (self.faults, []) if self.peers else ([], self.faults)
         if self.frame != self._framed:

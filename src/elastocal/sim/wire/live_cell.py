@@ -24,7 +24,7 @@ from elastocal.cell import (
 from elastocal.sim.workcell import SimulatedCell
 
 _BLOCKS = 512
-"""Blocks that are kept for a tap that nobody reads; older ones are lost."""
+"""Blocks kept for a tap that is not read; older ones are lost."""
 _Result = TypeVar("_Result")
 _Block = TypeVar("_Block", WrenchBlock, PointBlock)
 
@@ -53,7 +53,7 @@ class LiveCell:
         self._points: list[_LiveTracker] = []
 
     def apart(self, act: Callable[[SimulatedCell], _Result]) -> _Result:
-        """Do something with the cell as it is now, alone in it; return what that gave.
+        """Call a function with exclusive access to the present cell; return its result.
 
         Parameters
         ----------
@@ -99,10 +99,10 @@ class LiveCell:
         return self.apart(lambda _: self._newest)
 
     newest = wrench
-    """As a `WrenchFeed`."""
+    """Newest sample, as in `WrenchFeed`."""
 
     def marker(self) -> FloatArray:
-        """Return where the marker truly is, in base, shape (3,), in m."""
+        """Return the true position of the marker, in base, shape (3,), in m."""
 
         def seen(sim: SimulatedCell) -> FloatArray:
             now = np.array([sim.plant.now])
@@ -112,7 +112,7 @@ class LiveCell:
         return self.apart(seen)
 
     def press(self) -> "TruePress":
-        """Return how the tool truly stands and presses now."""
+        """Return the true position and force of the tool."""
 
         def seen(sim: SimulatedCell) -> TruePress:
             segment = sim.plant.segment
@@ -130,7 +130,7 @@ class TruePress(NamedTuple):
     time: float
     """In s of the cell's clock."""
     tool: FloatArray
-    """Where the controller brings the tool centre point, in base, shape (3,), in m."""
+    """Commanded position of the tool centre point, in base, shape (3,), in m."""
     force: FloatArray
     """Force on the robot, in base, shape (3,), in N."""
 

@@ -56,7 +56,7 @@ _TICKS = 70
 @brief_repr
 @dataclass
 class NetFtBox:
-    """How a box is set up, and what is wrong with it; may be changed while it serves."""
+    """Configuration and faults of a box; may be changed while it serves."""
 
     counts_per_force: int
     counts_per_torque: int
@@ -68,11 +68,11 @@ class NetFtBox:
     lose: int = 0
     """So many records are counted and not sent, from now on."""
     stalled: bool = False
-    """The box's own counter stands."""
+    """Whether the box's own counter stalls."""
     bias: tuple[int, ...] = (0,) * 6
-    """In counts; set by the command of software bias."""
+    """Bias in counts; set by the command of software bias."""
     scales: tuple[int, ...] = (0xFFFF,) * 6
-    """By which counts are divided in a READFT reply, which has 16 bits for each."""
+    """Divisors of counts in a READFT reply, which has 16 bits for each."""
 
     @classmethod
     def of(cls, cell: Cell, force_unit: str = "N", torque_unit: str = "N-m") -> "NetFtBox":
@@ -152,7 +152,7 @@ class NetFtServer:
         Raises
         ------
         DeviceError
-            If the cell has no sensor, or a port cannot be had.
+            If the cell has no sensor, or a port is taken.
         """
         self.box = box or NetFtBox.of(live.cell)
         self._sensor = live.sensor()
@@ -225,7 +225,7 @@ class NetFtServer:
         if command == _STOP and client == self._client:
             self._client = None
         elif command in (_REALTIME, _BUFFERED):
-            # Whoever had the stream before is told nothing.
+            # The previous client of the stream is not informed.
             self._client, self._left = client, samples or None
             self._batch = _BUFFER if command == _BUFFERED else 1
             self._rdt, self._waiting = 0, []
@@ -236,7 +236,7 @@ class NetFtServer:
         self.box.bias = tuple(b + c for b, c in zip(self.box.bias, self._last, strict=True))
 
     def answer(self, command: bytes) -> bytes:
-        """Return the reply to a TCP command; nothing to one that is none."""
+        """Return the reply to a TCP command; nothing to an invalid one."""
         code, _, orders = _COMMAND.unpack(command)
         if code == _READ_CALIBRATION:
             return self.box.calibration()
@@ -284,7 +284,7 @@ class _CommandServer(TcpServer):
         self._server = server
 
     def opened(self, peer: Peer) -> None:
-        """Say nothing: the client begins."""
+        """Send nothing: the client begins."""
 
     def received(self, peer: Peer, data: bytes) -> None:
         """Answer all commands that are complete."""
@@ -294,7 +294,7 @@ class _CommandServer(TcpServer):
             self.send(peer, self._server.answer(command))
 
     def tick(self) -> None:
-        """Do nothing on its own."""
+        """Do nothing periodically."""
 
 
 class _PageServer(http.server.ThreadingHTTPServer):
@@ -312,7 +312,7 @@ class _PageServer(http.server.ThreadingHTTPServer):
     def handle_error(
         self, request: socket.socket | tuple[bytes, socket.socket], client_address: object
     ) -> None:
-        """Say nothing of a client that hangs up in the middle; what else fails is ours."""
+        """Ignore a client that disconnects; other errors are raised."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
@@ -336,7 +336,7 @@ class _PageHandler(http.server.BaseHTTPRequestHandler):
         self.wfile.write(page)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 @serves("net_ft")

@@ -1,21 +1,22 @@
-"""A simulated KUKA controller that speaks RSI over Ethernet (UDP, XML) as a robot does.
+"""A simulated KUKA controller with RSI over Ethernet (UDP, XML).
 
 The robot is the client: each cycle it sends a ``<Rob>`` datagram to the PC and waits for the
 ``<Sen>`` with the same ``IPOC``, a count of milliseconds. An answer that is late, or to another
-cycle, has not come; after ``timeout`` cycles in a row without one the controller stops the arm, and
-is silent until an operator resets it. What a correction does depends on the `RsiContext`.
+cycle, counts as missing; after ``timeout`` cycles in a row without one the controller stops the
+arm, and is silent until an operator resets it. The effect of a correction depends on the
+`RsiContext`.
 
-Written from public descriptions of RSI 3 to 5 and from programs that talk to it; never compared
-with a real controller. Assumptions beside those: late answers count in a row; before the first
-answer none is late (an operator starts the program when the PC listens); where this machine cannot
-keep up, the robot's time stands still between two cycles, and ``statistics.stretched`` counts them.
+It is written from public descriptions of RSI 3 to 5 and from client programs; never compared with a
+real controller. Further assumptions: only consecutive late answers count; before the first answer
+none is late (an operator starts the program when the PC listens); if this machine is too slow, the
+robot's time pauses between two cycles, and ``statistics.stretched`` counts them.
 
 A simulated KRC behind RSI: corrections, the interpreter of its KRL program, and the arm.
 
 One call of `RsiRobot.cycle` is one cycle of the controller. `PosCorr` is the object of the RSI
-context that makes corrections act; a KRL program is a generator that is looked at every 12 ms.
-The programmed pose (RSol, ASPos) stays what it is while corrections act: they move the actual
-one (RIst, AIPos), some time after they have come.
+context that makes corrections act; a KRL program is a generator that runs every 12 ms. Corrections
+do not change the programmed pose (RSol, ASPos): they move the actual one (RIst, AIPos), some time
+after their arrival.
 """
 
 import contextlib
@@ -52,7 +53,7 @@ from elastocal.sim.workcell import PoseFollower, SimulatedCell
 POLL = 0.012
 """Time between two looks of the interpreter at its channels, in s."""
 _NONE = 1e-9
-"""A correction below this is none, in m and rad."""
+"""Size below which a correction counts as zero, in m and rad."""
 _ARM_JOINTS = 6
 _STANDING, _GUIDED, _MOVING, _DONE, _BRAKED, _ENDED = 1, 2, 3, 4, 5, 9
 """Krl.State; 0 until the program is in its loop."""
@@ -69,7 +70,7 @@ Steps = Generator[None, None, None]
 
 @dataclass
 class KrlState:
-    """What the KRL program has written into its channels."""
+    """Values that the KRL program has written into its channels."""
 
     number: int = 0
     """Krl.N: of the last PTP that is over."""
@@ -83,7 +84,7 @@ KrlProgram = Callable[["RsiRobot"], Steps]
 
 
 def run_program(robot: "RsiRobot") -> Steps:
-    """Do what the PC wants: stand, be guided, go to a target; the program of a run."""
+    """Obey the PC: stand, be guided, go to a target; the program of a run."""
     krl = robot.krl
     yield
     while True:
@@ -112,7 +113,7 @@ def run_program(robot: "RsiRobot") -> Steps:
 
 
 def corrected_program(robot: "RsiRobot") -> Steps:
-    """Be guided where the arm stands until the PC says stop: the plain use of RSI."""
+    """Be guided at the present position until the PC stops it: the plain use of RSI."""
     robot.krl.state = _GUIDED
     yield from robot.move_corr()
 
@@ -120,7 +121,7 @@ def corrected_program(robot: "RsiRobot") -> Steps:
 @brief_repr
 @dataclass(frozen=True)
 class RsiContext:
-    """How the controller is set up, and how patient the simulation is."""
+    """Configuration of the controller, and tolerances of the simulation."""
 
     program: KrlProgram = run_program
     """The KRL program that runs."""
@@ -130,8 +131,8 @@ class RsiContext:
     cycle: float = 0.004
     """In s: 4 ms (IPO_FAST) or 12 ms (IPO)."""
     delay: float = 0.012
-    """From a correction to the motion, in s; at least a cycle. RSI 2 has 120 ms, and nobody has
-    published a number for later ones."""
+    """Delay from a correction to the motion, in s; at least a cycle. RSI 2 has 120 ms; no value is
+    published for later versions."""
     timeout: int = 100
     """Cycles in a row without an answer after which the controller stops; 10 by default on a
     controller, 100 in the contexts that public drivers come with."""
@@ -149,7 +150,7 @@ class RsiRobot:
     """The controller with its arm."""
 
     def __init__(self, live: LiveCell, receive: Sequence[Channel], context: RsiContext) -> None:
-        """Stand ready; ``receive`` are the channels from the PC."""
+        """Set up the robot; ``receive`` are the channels from the PC."""
         self._live, self._receive, self._krl_program = live, receive, context.program
         self._cycle = context.cycle
         self._latency = max(0, round(context.delay / context.cycle) - 1)
@@ -222,7 +223,7 @@ class RsiRobot:
         }
 
     def cycle(self, heard: Mapping[str, float] | None) -> None:
-        """Do what a cycle does after its answer.
+        """Do the work of a cycle after its answer.
 
         Parameters
         ----------
@@ -262,7 +263,7 @@ class RsiRobot:
             raise RsiStopError(fault)
 
     def _lead(self, offset: FloatArray) -> None:
-        """Lead the arm to its corrected pose; refuse what its axes cannot follow."""
+        """Move the arm to its corrected pose; refuse what its axes cannot follow."""
         before = self._follower.q
         self._follower.follow(_corrected(self._T_programmed, offset), self._cycle)
         speed = np.abs(self._follower.q - before) / self._cycle / self._fastest
@@ -313,7 +314,7 @@ class RsiRobot:
         return bool(np.array_equal(q, goal))
 
     def adopt(self) -> Steps:
-        """RSI_OFF, PTP $AXIS_ACT_MEAS, RSI_ON: correct nothing, stand where the arm stands."""
+        """RSI_OFF, PTP $AXIS_ACT_MEAS, RSI_ON: adopt the present position without correction."""
         self.silent = True
         for _ in range(round(_OFF / POLL)):
             yield
@@ -329,7 +330,7 @@ class RsiRobot:
 
     @property
     def command(self) -> tuple[int, int]:
-        """What the PC wants, and the number of it."""
+        """Command of the PC, and its number."""
         return round(self.channels.get("Cmd.Op", 0.0)), round(self.channels.get("Cmd.N", 0.0))
 
     def _target(self) -> FloatArray:
@@ -372,7 +373,7 @@ def _frame(T: FloatArray) -> list[float]:
 IPOC_START = 4_208_163_634
 """First count of milliseconds of a session; a restart of the controller begins lower."""
 SENTYPE = "elastocal"
-"""``Type`` of the answers, where nothing else is told."""
+"""Default ``Type`` of the answers."""
 _MALFORMED = (
     b"<Rob Type='KUKA'><RIst X='",
     b"\xff\x00" * 700,
@@ -534,7 +535,7 @@ class RsiServer:
 
     @property
     def ports(self) -> dict[str, int]:
-        """The port of the PC, which has to listen there, and the robot's own."""
+        """Port of the PC, which must listen there, and the robot's own."""
         return {"udp": self._config.port, "robot": self.port}
 
     def start(self) -> None:
@@ -554,7 +555,7 @@ class RsiServer:
         self._reset.set()
 
     def inject(self, *faults: RsiFault, after: int = 0) -> None:
-        """Let faults happen, one a cycle, after so many cycles without."""
+        """Schedule faults, one a cycle, after a number of cycles without."""
         self._faults.extend([*[None] * after, *faults])
 
     def _run(self) -> None:
@@ -580,7 +581,7 @@ class RsiServer:
                 self._reset.wait(self._context.operator)
 
     def _session(self, number: int, ipoc: int) -> str:
-        """Be in RSI from RSI_ON on; return why it has ended."""
+        """Run RSI from RSI_ON on; return why it has ended."""
         clock, counts = self._live.clock, self.statistics
         due, missed, heard = clock.now(), 0, False
         while not self._closing.is_set():
@@ -655,7 +656,7 @@ class RsiServer:
             try:
                 self._socket.sendto(each, self._peer)
             except OSError:
-                return  # nobody listens yet
+                return  # no listener yet
 
     def _await(self, ipoc: int, window: float) -> Answer | None:
         """Return the answer to a cycle; None when it does not come within a time of the wall."""
@@ -676,7 +677,7 @@ class RsiServer:
 
 
 def _free_port(address: str) -> int:
-    """Return a UDP port that nobody has at the moment."""
+    """Return a free UDP port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind((address, 0))
         return int(probe.getsockname()[1])

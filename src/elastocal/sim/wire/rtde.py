@@ -60,7 +60,7 @@ _RUNNING_BIT = 1 << 15
 _FORCE_RATE = 2000.0
 """Fastest change of the force of force mode, in N/s: the controller takes a new value at once."""
 _FAR = 0.2
-"""How far force mode goes in free space, in m."""
+"""Distance of force mode in free space, in m."""
 _STEP_TIME = 0.002
 _POLYSCOPE = (5, 11, 1, 108318)
 _ROBOT_RUNNING, _SAFETY_NORMAL, _PROTECTIVE_STOP = 7, 1, 3
@@ -228,7 +228,7 @@ class UrRobot:
     # -- the loop of the program --------------------------------------------------------------
 
     def cycle(self) -> None:
-        """Do what the program does in one cycle of the controller."""
+        """Run the program for one cycle of the controller."""
         if not self.program:
             return
         if self._by_line:
@@ -462,7 +462,7 @@ def shown_text(values: Mapping[str, Value], text: str) -> bytes:
 
 
 def exception_message(values: Mapping[str, Value], text: str) -> bytes:
-    """Return why a script was refused, as an exception in its first line."""
+    """Return why a script was refused: the exception in its first line."""
     return _message(
         values, _EXCEPTION, struct.pack(">ii", 1, 1) + text.encode("latin-1", "replace")
     )
@@ -498,7 +498,7 @@ PORTS = {
     "primary": 30001,
     "secondary": 30002,
 }
-"""Those of a controller, which its clients take for granted."""
+"""Ports of a controller, which its clients presuppose."""
 _MOST_RATE, _LEAST_RATE = 500.0, 1.0
 _RATE = 125.0
 """Rate of outputs in version 1 of RTDE, in Hz; the least that clients of version 2 take for
@@ -529,7 +529,7 @@ class RtdeServer:
         Raises
         ------
         DeviceError
-            If the arm has external axes or not six joints, or a port cannot be had.
+            If the arm has external axes or not six joints, or a port is taken.
         """
         robot = live.cell.robot
         if not _takes(robot):
@@ -718,7 +718,7 @@ class _Session:
         Raises
         ------
         DeviceError, struct.error
-            If it is none that a controller understands.
+            If a controller does not understand it.
         """
         match kind:
             case "V":

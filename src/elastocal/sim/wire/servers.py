@@ -1,6 +1,7 @@
-"""The table of servers by the driver that they answer; each module here registers its own.
+"""Table of servers by the driver that connects to them; each module here registers its own.
 
-A server shows a `LiveCell` to whoever connects, in threads of its own, from `start` to `close`.
+A server makes a `LiveCell` available to its clients, in threads of its own, from `start` to
+`close`.
 """
 
 import importlib
@@ -20,15 +21,15 @@ from elastocal.sim.wire.live_cell import LiveCell
 @brief_repr
 @dataclass(frozen=True)
 class Told:
-    """What the cell file says under the devices of a driver, for its server."""
+    """Settings of the devices of a driver in the cell file, for its server."""
 
     address: str = LOOPBACK
-    """To bind to."""
+    """Address to bind to."""
     settings: Mapping[str, object] = field(default_factory=dict)
     """Keys and values in SI, those of all kinds of device that the driver makes."""
 
     def port(self, key: str = "port") -> int:
-        """Return the port under a key; 0, which is any free one, where there is none."""
+        """Return the port under a key; 0, any free port, if there is none."""
         port = self.settings.get(key, 0)
         if not (isinstance(port, int) and 0 <= port <= 65535):
             raise DeviceError(f"{key} is {port!r}: must be 0 to 65535")
@@ -51,7 +52,8 @@ class WireServer(Protocol):
 
 MakeServer = Callable[[LiveCell, Told], WireServer]
 SERVERS: dict[str, MakeServer] = {}
-"""What makes a server, by the name of the driver that it answers; see `wire_servers`."""
+"""Functions that make a server, by the name of the driver that connects to it; see
+`wire_servers`."""
 _TAKES: dict[str, Callable[[Robot], bool]] = {}
 """Whether the line of a server can carry a robot, where not every one."""
 _Make = TypeVar("_Make", bound=MakeServer)
@@ -105,7 +107,7 @@ def bound(kind: socket.SocketKind, port: int, address: str = LOOPBACK) -> socket
     Raises
     ------
     DeviceError
-        If it cannot be had.
+        If it is taken.
     """
     line = socket.socket(socket.AF_INET, kind)
     try:

@@ -1,4 +1,4 @@
-"""A simulated cell: devices that behave like a robot that bends, a sensor that drifts, and so on.
+"""A simulated cell: devices with the imperfections of a real robot, sensor and tracker.
 
 ===================  ==========================================================================
 `cell`               `simulated_devices`: the devices of a cell file; the cell under a process

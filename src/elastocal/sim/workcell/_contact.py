@@ -1,22 +1,22 @@
-"""The contact disk on the tooling: where it touches, what gives way under a force, when it slips.
+"""The contact disk on the tooling: point of contact, deformation under a force, and slip.
 
 The tooling is the triangles of the cell's mesh, met by a straight approach as by a ray.
 
 The disk sinks in by ``f_n / k_n`` and the tooling yields by ``f_n / k_t`` along its normal; both
-are true motion of the tool, which marker and controller see alike. Sideways the disk follows
+are true motion of the tool, which marker and controller measure alike. Sideways the disk follows
 Mindlin's law for a contact of which an outer ring slips already (R. D. Mindlin, "Compliance of
 elastic bodies in contact", J. Appl. Mech. 16, 1949; K. L. Johnson, "Contact Mechanics", 1985, 7.2),
 
     shear = (3 mu f_n / 2 k_s) (1 - (1 - f_l / mu f_n)^(2/3)),
 
 which starts as ``f_l / k_s`` and ends in full sliding at Coulomb's limit ``f_l = mu f_n``. It is
-taken without its own hysteresis. The ring does not slip the same way twice: a random part of the
-slip grows towards the limit.
+taken without its own hysteresis. The slip of the ring does not repeat exactly: a random part of it
+grows towards the limit.
 
-The force attacks the disk beside its middle. A disk of radius R that is tilted by ``a`` on the
-tooling is pressed unevenly, with the moment ``k_n R² a / 4`` of an elastic bed (Johnson, chapter
-4), so that the force moves by that over ``f_n``, at most to half the radius; and it wanders a
-little from load case to load case.
+The force acts off the middle of the disk. A disk of radius R that is tilted by ``a`` on the tooling
+is pressed unevenly, with the moment ``k_n R² a / 4`` of an elastic bed (Johnson, chapter 4), so
+that the point of attack moves by that over ``f_n``, at most to half the radius; and it varies
+slightly from load case to load case.
 """
 
 from dataclasses import dataclass, replace
@@ -74,7 +74,7 @@ class ContactLaw:
         )
 
     def attack(self, force_tcp: FloatArray, chance: FloatArray) -> FloatArray | None:
-        """Return where forces act, from the disk's middle, tcp frame, (..., 3) in m; None: there.
+        """Return the offsets of the points of attack in the tcp frame, (..., 3), in m, or None.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class ContactLaw:
         return held
 
     def shear(self, force_tcp: FloatArray) -> FloatArray:
-        """Return how far the tool goes sideways, tcp frame, shape (3,), in m."""
+        """Return the lateral motion of the tool, tcp frame, shape (3,), in m."""
         effort = self.effort(force_tcp)
         if effort == 0.0:
             return np.zeros(3)
@@ -135,7 +135,7 @@ class Contact:
 
     law: ContactLaw
     anchor: FloatArray
-    """Where the tool is without any force, in base, shape (3,), in m; moves when it slips."""
+    """Position of the tool without any force, in base, shape (3,), in m; changes when it slips."""
     R_base_tcp: FloatArray
     """Orientation that the controller keeps, shape (3, 3)."""
     normal: FloatArray
@@ -146,11 +146,11 @@ class Contact:
     """Tilt and wander of the load case, shape (4,); see `ContactLaw.attack`."""
 
     def attack(self, force_base: FloatArray) -> FloatArray | None:
-        """Return where a force in base acts on the tool, tcp frame, shape (3,), in m."""
+        """Return the point of the tool where a force in base acts, tcp frame, shape (3,), in m."""
         return self.law.attack(self.R_base_tcp.T @ force_base, self.chance)
 
     def tool_position(self, force_base: FloatArray) -> FloatArray:
-        """Return where the tool is under a force on the robot, in base, shape (3,), in m."""
+        """Return the tool's position under a force on the robot, in base, shape (3,), in m."""
         force_tcp = self.R_base_tcp.T @ force_base
         sunk = -force_tcp * np.array([0.0, 0.0, 1.0]) / self.law.normal_stiffness
         tooling = -self.normal * (self.normal @ force_base) / self.law.tooling_stiffness
@@ -164,7 +164,7 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """Where a ray meets the surface."""
+    """Intersection of a ray with the surface."""
 
     distance: float
     """Along the ray, in m."""
@@ -174,7 +174,7 @@ class Hit:
 
 @dataclass(frozen=True, eq=False)
 class TrueSurface:
-    """The tooling where it really stands."""
+    """The tooling at its true position."""
 
     corners: FloatArray
     """Triangles in base, shape (face, 3, 3), in m."""
@@ -194,7 +194,7 @@ class TrueSurface:
         return cls(corners @ T[:3, :3].T + T[:3, 3] + offset)
 
     def hit(self, origin: FloatArray, direction: FloatArray, reach: float) -> Hit | None:
-        """Return the nearest point of the surface ahead; None when there is none within reach.
+        """Return the nearest point of the surface ahead; None if there is none within reach.
 
         Source: T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection", Journal
         of Graphics Tools 2(1), 1997.

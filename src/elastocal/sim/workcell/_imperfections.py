@@ -1,9 +1,9 @@
-"""What a description does not say of a robot and its sensor, and what differs between visits.
+"""Imperfections of a robot and its sensor beyond their description, and variations between visits.
 
-A robot is *built* a little otherwise than drawn; it is somewhere between cold and warm; its gears
-stop somewhere in their loops; the disk does not lie flat, and the force wanders on it; a force
-sensor reads more on the way down than up. Sizes are those of the cell file, with their sources in
-`elastocal.sim.truth`; what is random belongs to a seed and a visit, whatever happened before.
+A robot is *built* slightly differently from its drawing; its temperature is between cold and warm;
+its gears stop within their hysteresis loops; the disk does not lie flat, and its point of attack
+varies; a force sensor has hysteresis. Sizes are those of the cell file, with their sources in
+`elastocal.sim.truth`; random values depend on a seed and a visit only.
 """
 
 from dataclasses import dataclass, replace
@@ -18,11 +18,11 @@ from elastocal.sim.truth import Geometry
 from elastocal.sim.workcell._timeline import generator
 
 DRAWS = 64
-"""Random load cases of a visit; more begin anew."""
+"""Random load cases of a visit; further ones repeat them."""
 _CYCLE = 0.2
 """Load over the range for which a sensor's hysteresis is stated: what a process uses of it."""
 _THRESHOLDS = np.array([1.0, 2.0, 4.0]) * _CYCLE / 16.0
-"""Loads at which the sensor's elements slide, over the range; all are turned round at half way."""
+"""Loads at which the sensor's elements slide, over the range; half-way all are reversed."""
 
 
 @brief_repr
@@ -33,11 +33,12 @@ class VisitChance:
     stroke: FloatArray
     """Last stroke of each gear in standard deviations, shape (..., gear)."""
     tilt: FloatArray
-    """Likewise of the disk about its two axes, shape (..., 2)."""
+    """Tilt of the disk about its two axes, in standard deviations, shape (..., 2)."""
     wander: FloatArray
-    """Likewise of the point of attack, by load case, shape (..., load, 2)."""
+    """Variation of the point of attack, in standard deviations, by load case, shape (..., load,
+    2)."""
     warmth: FloatArray
-    """How warm the arm is, from 0 to 1, shape (...)."""
+    """Thermal state of the arm, from 0 (cold) to 1 (warm), shape (...)."""
 
     @classmethod
     def of(cls, seed: int, key: str) -> "VisitChance":
@@ -93,7 +94,7 @@ class Growth:
     screws: Screws
     """Axes before the arm."""
     foot: FloatArray
-    """Where axis 1 is with those axes at zero, shape (4,): a point, and 1."""
+    """Point of axis 1 with those axes at zero, shape (4,): a point, and 1."""
     share: float
     """Growth when warm, over length."""
 
@@ -107,7 +108,7 @@ class Growth:
         return replace(growth, share=drift / float(np.linalg.norm(growth.shift(home, tool))))
 
     def shift(self, q: FloatArray, tool: FloatArray) -> FloatArray:
-        """Return how far the tool of a warm arm is from that of a cold one, shape (..., 3), in m.
+        """Return the shift of the tool of a warm arm from that of a cold one, shape (..., 3), in m.
 
         Parameters
         ----------
@@ -126,7 +127,7 @@ class Growth:
 
 @dataclass(frozen=True)
 class ForceGain:
-    """What the force axes of a sensor read, in its frame."""
+    """Readings of the force axes of a sensor, in its frame."""
 
     force: FloatArray
     """Per force at the tool centre point as described, shape (3, 3)."""
@@ -134,7 +135,7 @@ class ForceGain:
     """Per moment about that point, shape (3, 3), in N per N·m."""
 
     def beside(self, lever: FloatArray) -> FloatArray:
-        """Return the gain (3, 3) for a force that acts so far (3,) from that point, in m."""
+        """Return the gain (3, 3) for a force at a distance (3,) from that point, in m."""
         if not np.any(lever):
             return self.force
         gain: FloatArray = self.force + self.moment @ np.cross(lever, np.eye(3)).T
@@ -142,12 +143,12 @@ class ForceGain:
 
 
 class SensorHysteresis:
-    """A force sensor that follows a load late: three elements an axis that stick and slide.
+    """A force sensor with hysteresis: three elements for each axis that stick and slide.
 
     Their states are stop operators of the load, ``s = clip(s + change, -r, r)``; the axis reads
-    ``sum eta s`` less than the load. After a load of a fifth of the range and half of it back, all
-    ``s`` have gone from ``r`` to ``-r``, so that the reading is ``2 eta sum r`` higher than on the
-    way up: that over the load is the figure of the cell file.
+    ``sum eta s`` less than the load. After a load of a fifth of the range and unloading to half of
+    it, all ``s`` have changed from ``r`` to ``-r``, so that the reading is ``2 eta sum r`` higher
+    than during loading: that over the load is the figure of the cell file.
     """
 
     def __init__(self, share: float, ranges: FloatArray) -> None:
@@ -173,14 +174,14 @@ class SensorHysteresis:
             self._state = np.zeros((*load.shape[1:], len(_THRESHOLDS)))
             self._load = load[0]
         way = np.diff(load, axis=0, prepend=self._load[None])
-        # On a way that nowhere turns back, one clip from its beginning is all the small ones.
+        # On a monotonic path one clip from its beginning equals all small ones.
         straight = bool(np.all((way >= 0.0).all(axis=0) | (way <= 0.0).all(axis=0)))
         return (
             self._follow(load) if straight else np.concatenate([*map(self._follow, load[:, None])])
         )
 
     def _follow(self, load: FloatArray) -> FloatArray:
-        """Go on along a way that does not turn back, and return what the axes read beside it."""
+        """Continue along a monotonic path, and return the error of the axes."""
         state = present(self._state, "state of the sensor's hysteresis")
         moved = np.clip(state + (load - self._load)[..., None], -self._limit, self._limit)
         self._state, self._load = moved[-1], load[-1]

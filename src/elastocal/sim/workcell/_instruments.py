@@ -1,16 +1,16 @@
 """The simulated instruments: force/torque sensor and laser trackers.
 
-The sensor (see `elastocal.cell.devices.ForceSensor`) shows
+The sensor (see `elastocal.cell.devices.ForceSensor`) measures
 
     reading = (1 + X) wrench + lag + zero + drift t + noise
 
 with the wrench of contact and tool weight in the sensor's frame, and cross-talk ``X`` over the
 ranges of the axes, itself too (gain). Drift and hysteresis (lag) count from the last restart.
 
-Each tracker station (see `elastocal.cell.devices.Metrology`) stands near where the cell file puts
-it, turned as it happens to be; that turn is what the registration of a run has to find. Noise grows
-with the distance, the same along each axis. A part of it comes from moving air and changes slowly,
-as a first-order process of `_AIR_TIME`.
+Each tracker station (see `elastocal.cell.devices.Metrology`) is near its position in the cell file,
+with a random orientation, which the registration of a run must find. Noise grows with the distance,
+the same along each axis. A part of it comes from moving air and changes slowly, as a first-order
+process of `_AIR_TIME`.
 """
 
 import math
@@ -44,7 +44,7 @@ Draw = Callable[[np.random.Generator], FloatArray]
 
 
 class SampleBuffer:
-    """Samples that nobody has asked for yet, every so many µs from the last restart on."""
+    """Samples that were not read yet, at a fixed interval in µs from the last restart on."""
 
     def __init__(self, rate: float, now: int) -> None:
         """Sample so often, in Hz, from now on, in µs."""
@@ -93,7 +93,7 @@ class NoiseStream:
         self._number, self._block = -1, np.empty((0, 0))
 
     def restart(self, *words: object) -> None:
-        """Begin anew with sample 0, for the purpose that the words say."""
+        """Restart with sample 0, for the purpose that the words name."""
         self._words, self._number = words, -1
 
     def take(self, first: int, last: int) -> FloatArray:
@@ -201,7 +201,7 @@ class SimulatedForceSensor(_SimulatedInstrument):
         return times, values
 
     def _true(self, times: IndexArray) -> FloatArray:
-        """Return readings without noise and drift, shape (sample or 1, 6)."""
+        """Return the true transform of a station, shape (4, 4), in m."""
         segment = self._plant.segment
         if self._still is not None and self._still[0] is segment:
             reading = self._still[1]
@@ -367,7 +367,7 @@ def force_gain(cell: Cell, seed: int) -> ForceGain:
 
 
 def _station(seed: int, name: str, position: FloatArray, placing: float) -> FloatArray:
-    """Return T_base_station, shape (4, 4): some way off, and turned at random."""
+    """Return T_base_station, shape (4, 4): displaced, and with a random orientation."""
     rng = generator(seed, "station", name)
     T = np.eye(4)
     T[:3, 3] = position + placing * rng.standard_normal(3)

@@ -32,12 +32,13 @@ from elastocal.sim.workcell._timeline import (
 )
 
 CLOSED = 1e-8
-"""How far the tool may end from where the contact holds it, in m: 0.03 N of the disk."""
+"""Largest distance of the tool from the position that the contact gives, in m: 0.03 N of the
+disk."""
 _STEPS = 8
 """Pieces of a free movement between knots."""
 _ROUNDS = 8
 _BEYOND = 0.02
-"""How far beyond its end a move looks for the surface, in m: the arm sags."""
+"""Distance beyond its end to which a move searches the surface, in m, since the arm sags."""
 _LAST_TOUCH = 1e-4
 """Shortest path on which a force fades when the tool leaves, in m."""
 
@@ -76,7 +77,7 @@ def straight_path(statics: Quasistatics, states: list[RobotState]) -> RobotPath:
 
 @dataclass(frozen=True, eq=False)
 class GuardedMove:
-    """How a guarded move ends."""
+    """End of a guarded move."""
 
     path: RobotPath
     contact: Contact | None
@@ -105,7 +106,7 @@ def guarded_move(
     plant : Plant
         The cell.
     start : RobotState
-        Where the robot stands.
+        Present state of the robot.
     direction : ndarray, shape (3,)
         Unit vector in base.
     distance : float
@@ -152,7 +153,7 @@ def retract_path(
     plant : Plant
         The cell.
     start : RobotState
-        Where the robot stands.
+        Present state of the robot.
     direction : ndarray, shape (3,)
         Unit vector in base, away from the surface.
     distance : float
@@ -242,7 +243,7 @@ def touching_state(
 def _touch(
     plant: Plant, start: RobotState, direction: FloatArray, distance: float, error: FloatArray
 ) -> tuple[Contact, RobotState] | None:
-    """Return contact and stand where the tool touches the tooling; None when it does not."""
+    """Return contact and robot state where the tool touches the tooling; None if it does not."""
     statics = plant.statics
     if plant.contact is not None:
         return plant.contact, statics.free(plant.contact.q_touch, error, start.theta)
@@ -268,7 +269,7 @@ def _moved(plant: Plant, start: RobotState, shift: FloatArray, error: FloatArray
 
 
 def _advance(plant: Plant, start: RobotState, end: RobotState, direction: FloatArray) -> float:
-    """Return how far the commanded tool goes along a direction, in m."""
+    """Return the motion of the commanded tool along a direction, in m."""
     T = plant.statics.robot.forward(np.stack([start.q, end.q]))
     return float((T[1, :3, 3] - T[0, :3, 3]) @ direction)
 
@@ -336,12 +337,12 @@ class ForceControl:
         plant.run(plant.statics.path(start, end), law, (Motion.RELEASING, Motion.IDLE))
 
     def let_slip(self, fault: Fault, held: Segment) -> None:
-        """Let the contact slip against the lateral force, unless the load case is over."""
+        """Let the contact slip along the lateral force, unless the load case is over."""
         if self._plant.segment is held:
             self._press(fault.distance * self._away(), SLIP_TIME)
 
     def _press(self, slip: FloatArray, least: float = 0.0) -> Segment:
-        """Go for the wanted force, the contact slipping meanwhile; tcp frame, shape (2,), in m."""
+        """Return the slip while the force is built up, tcp frame, shape (2,), in m."""
         plant, contact = self._plant, self._plant.contact
         contact = present(contact, "contact")
         start = plant.robot_state()
@@ -385,7 +386,7 @@ class ForceControl:
         return pressed_state(statics, start, contact, force, plant.stop_error())
 
     def _away(self) -> FloatArray:
-        """Return the direction in which the contact gives way, tcp frame, shape (2,)."""
+        """Return the direction in which the contact slips, tcp frame, shape (2,)."""
         lateral = self._wanted[:2]
         length = float(np.linalg.norm(lateral))
         return -lateral / length if length else np.array([1.0, 0.0])

@@ -42,13 +42,13 @@ _DONE = 1.0 - 1e-3
 
 @dataclass(frozen=True)
 class FaultSpan:
-    """From when to when a device is at fault."""
+    """Period in which a device has a fault."""
 
     kind: str
     begin: int
     """In µs."""
     end: int
-    """In µs, not itself in it."""
+    """End in µs, exclusive."""
     station: str | None
     """Tracker station; None: all."""
     force: float = 0.0
@@ -192,14 +192,14 @@ class Plant:
     _now: int | None = None
 
     def wake(self, now: int) -> None:
-        """Do what was due until a time in µs, in its order."""
+        """Carry out what is due until a time in µs, in order."""
         while self._events and self._events[0][0] <= now:
             self._now, act = self._events.pop(0)
             act()
         self._now = None
 
     def later(self, time: int, act: Callable[[], None]) -> None:
-        """Have something done at a time in µs."""
+        """Schedule a function for a time in µs."""
         self._events.append((time, act))
         self._events.sort(key=lambda event: event[0])
 
@@ -277,7 +277,7 @@ class Plant:
         self.run(self.statics.path(state, state), Uniform(0.0), (motion, motion), fault=fault)
 
     def robot_state(self) -> RobotState:
-        """Return where the robot is now, with the memory that it has gathered so far."""
+        """Return the robot's present state, with the friction memory of its history."""
         path, progress = self.segment.path, self.segment.progress(self.now)
         knots, where = path.knots, np.array([progress])
         columns = (knots.q, knots.twist, knots.force, knots.moment)

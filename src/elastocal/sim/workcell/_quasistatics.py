@@ -1,10 +1,10 @@
-"""Where the tool, the marker and the sensor truly are, and what the sensor truly feels.
+"""True positions of tool, marker and sensor, and the true load of the sensor.
 
-The controller believes in the undeformed robot. What it is off by is the *twist*: shift and turn
-of the tool, and turn of the sensor, in base. Assumption: the controller takes out a part of the
-sag under weight that it knows from its load data, so the part is subtracted from the twist as it
-was when the tool last was free. It knows nothing of how the robot is built, how warm it is, and
-where on the disk the force acts.
+The controller assumes the undeformed robot. Its error is the *twist*: shift and rotation of the
+tool, and rotation of the sensor, in base. Assumption: the controller compensates a part of the sag
+under weight that it knows from its load data, so this part is subtracted from the twist at the time
+when the tool last was free. It does not know the true geometry, the temperature, and the point of
+attack on the disk.
 """
 
 from dataclasses import dataclass, field, replace
@@ -34,11 +34,11 @@ class Quasistatics:
     weight: FloatArray
     """Weight of the tool that the sensor carries, in base, shape (3,), in N."""
     tcp_error: FloatArray
-    """Where the tool centre point is, in the tcp frame, shape (3,), in m."""
+    """Error of the tool centre point, in the tcp frame, shape (3,), in m."""
     growth: Growth | None = None
-    """How the arm grows as it warms up."""
+    """Thermal growth of the arm."""
     warmth: FloatArray = field(default_factory=lambda: np.zeros(()))
-    """How warm the arm is, from 0 to 1, shape () or (posture,)."""
+    """Thermal state of the arm, from 0 to 1, shape () or (posture,)."""
     strain: FloatArray | None = None
     """Strains that friction keeps while the robot is free, shape (..., gear, stop), in rad."""
 
@@ -67,9 +67,9 @@ class Quasistatics:
         return replace(self, warmth=warm, strain=strain)
 
     def heavier(self, mass: float) -> "Quasistatics":
-        """Return the same with some kg more on the tool than was weighed.
+        """Return the same with an additional mass in kg on the tool, unknown to the controller.
 
-        Only the sensor notices: the sag that it causes is the same with and without contact.
+        Only the sensor measures it: the sag that it causes is the same with and without contact.
         """
         return replace(self, weight=self.weight + mass * self.robot.gravity)
 
@@ -185,7 +185,7 @@ class Quasistatics:
         )  # fmt: skip
 
     def lever(self, attack_tcp: FloatArray | None) -> FloatArray:
-        """Return where a force acts from where the controller believes the tool, (..., 3), in m."""
+        """Return the point of attack relative to the controller's tool, (..., 3), in m."""
         return self.tcp_error if attack_tcp is None else self.tcp_error + attack_tcp
 
     def R_base_sensor(self, q: FloatArray, twist: FloatArray) -> FloatArray:
@@ -195,7 +195,7 @@ class Quasistatics:
         return turn.reshape(nominal.shape) @ nominal
 
     def tool_position(self, state: RobotState) -> FloatArray:
-        """Return where the tool centre point truly is, in base, shape (..., 3), in m."""
+        """Return the true position of the tool centre point, in base, shape (..., 3), in m."""
         return self.robot.forward(state.q)[..., :3, 3] + state.twist[..., :3]
 
     def along(self, q: FloatArray, R_base_tcp: FloatArray, points: FloatArray) -> FloatArray:
@@ -217,7 +217,7 @@ class Quasistatics:
         Raises
         ------
         DeviceError
-            If the arm does not reach so far.
+            If it is out of the arm's reach.
         """
         goals = np.zeros((len(points), 4, 4))
         goals[:, :3, :3], goals[:, :3, 3], goals[:, 3, 3] = R_base_tcp, points, 1.0

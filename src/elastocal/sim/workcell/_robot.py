@@ -1,16 +1,16 @@
-"""The simulated robot: where it gives way, and where it comes to rest.
+"""The simulated robot: its elasticities, and its equilibrium.
 
 From the foot to the tool: floor or rail carriage (three turns about the foot), the drives of
-external axes, per arm joint a gear and two tilts of its bearing, a hinge pair in the middle of
-each of the two long links, and the end-effector (three turns and three shifts at the sensor).
-Six or eighteen springs at the joints can express none but the gears and tilts, and those only
-where they are linear. Figures that the file leaves out are those of `elastocal.sim.arm` for an arm
-of 1.1 t, in proportion to the mass that the arm moves: an assumption that brings a small robot to
-the right order of magnitude.
+external axes, per arm joint a gear and two tilts of its bearing, a hinge pair in the middle of each
+of the two long links, and the end-effector (three turns and three shifts at the sensor). Six or
+eighteen springs at the joints describe only the gears and tilts, and those only as far as they are
+linear. Figures that the file does not state are those of `elastocal.sim.arm` for an arm of 1.1 t,
+in proportion to the mass that the arm moves: an assumption that gives the right order of magnitude
+for a small robot.
 
 At rest the potential energy of the deformed robot under its own weight, the tool's and the contact
 force is least (`elastocal.sim.arm.statics`, with the laws of `elastocal.sim.arm.gears`): a
-nonlinear equilibrium with a memory, of one posture or many.
+nonlinear equilibrium with a memory, for one posture or many.
 """
 
 import itertools
@@ -70,7 +70,7 @@ class RobotEquilibrium:
     theta: FloatArray
     """Spring positions, shape (..., spring), in rad or m."""
     springs: RobotSprings
-    """With what the gears remember from now on."""
+    """Springs with the updated memory of the gears."""
     T_base_tcp: FloatArray
     """True tool frame, shape (..., 4, 4)."""
     T_base_sensor: FloatArray
@@ -84,9 +84,9 @@ class TrueRobot:
     """A robot on its floor with its tool; make one with `of`."""
 
     linkage: Linkage
-    """As described: what the controller believes."""
+    """Linkage as described: the controller's."""
     built: Linkage
-    """As it is."""
+    """Linkage as built."""
     chain: SpringChain
     springs: RobotSprings
     """Without friction and memory."""
@@ -191,9 +191,9 @@ class TrueRobot:
         attack_tcp: FloatArray | None = None,
         reaction: Reaction | None = None,
     ) -> RobotEquilibrium:
-        """Return where the robot rests, in one posture or in many side by side.
+        """Return the equilibrium of the robot, in one posture or in many at once.
 
-        Fifty postures side by side take a tenth of the time of one after the other.
+        Fifty postures at once take a tenth of the time of one after another.
 
         Parameters
         ----------
@@ -257,7 +257,7 @@ class TrueRobot:
 
 
 def _springs(cell: Cell, linkage: Linkage, external: int) -> tuple[SpringChain, RobotSprings]:
-    """Return where the springs of a cell's robot sit, and their laws."""
+    """Return the positions of the springs of a cell's robot, and their laws."""
     truth, scale = truth_of(cell), truth_of(cell).truth
     size = _size(linkage, external)
     usual = size * HIGH_TORQUE * np.array(AXIAL_STIFFNESS)
@@ -344,7 +344,7 @@ def _sensor_frame(cell: Cell) -> FloatArray:
 
 
 def _balancer(cell: Cell, linkage: Linkage, size: float) -> BalancerSpring | None:
-    """Return the balancer of axis 2, tuned for the way the robot is mounted.
+    """Return the balancer of axis 2, tuned for the mounting of the robot.
 
     Upright is where the link behind axis 2 points along axis 1 against gravity. Without a link,
     or with axis 1 level (a robot on a wall), no spring balances the arm.

@@ -1,12 +1,12 @@
-"""How the simulated cell moves through time: clock, random numbers, time laws, and segments.
+"""Time in the simulated cell: clock, random numbers, time laws, and segments.
 
-Time is in whole microseconds, so that time differences are exact. A segment is a stretch of time in
-which the cell does one thing: at its knots everything is exact; between them joints, forces and
-small deviations are interpolated along the progress of the movement.
+Time is in whole microseconds, so that time differences are exact. A segment is a period in which
+the cell does one thing: at its knots everything is exact; between them joints, forces and small
+deviations are interpolated along the progress of the movement.
 
-Every generator of random numbers is made from the seed and from words that say what it is for: the
-posture that the arm was sent to, the device, the number of the block. A pose that is done again,
-in the same process or another, meets the same noise.
+Every generator of random numbers is seeded by the seed and by words for its purpose: the target
+posture of the arm, the device, the number of the block. A repeated pose, in the same process or
+another, has the same noise.
 """
 
 import hashlib
@@ -63,10 +63,10 @@ def posture_key(q: FloatArray) -> str:
 
 
 class SimClock:
-    """A clock that stands until somebody sleeps; see `elastocal.cell.devices.Clock`."""
+    """A clock that advances only while a caller sleeps; see `elastocal.cell.devices.Clock`."""
 
     def __init__(self, start: float = 0.0) -> None:
-        """Let the clock show ``start`` s."""
+        """Start the clock at ``start`` s."""
         if not 0.0 <= start < 1e9:
             raise DeviceError(f"start of the simulated clock is {start!r} s: must be 0 to 1e9")
         self._now = to_microseconds(start)
@@ -82,7 +82,7 @@ class SimClock:
         return self._now / MICROSECONDS
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass; simulated devices do what was due meanwhile.
+        """Advance the time; simulated devices carry out what is due.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class SimClock:
             wake(self._now)
 
     def on_wake(self, wake: Callable[[int], None]) -> None:
-        """Have a function called with the time in µs after every sleep."""
+        """Register a function that is called with the time in µs after every sleep."""
         self._woken.append(wake)
 
 
@@ -214,7 +214,7 @@ class Knots:
     N·m, weight in; shape (knot, 9)."""
 
     def at(self, array: FloatArray, progress: FloatArray) -> FloatArray:
-        """Return one of the arrays between the knots, shape (time, column)."""
+        """Return one of the arrays interpolated between the knots, shape (time, column)."""
         if len(self.progress) == 2:
             part = progress[:, None]
             direct: FloatArray = (1.0 - part) * array[0] + part * array[1]
@@ -240,7 +240,7 @@ class RobotState:
     moment: FloatArray
     """See `Knots.moment`, shape (..., 3)."""
     springs: RobotSprings
-    """With the memory of the gears."""
+    """Springs with the memory of the gears."""
     theta: FloatArray
     """Spring positions, shape (..., spring), in rad or m."""
     sag: FloatArray
@@ -300,7 +300,7 @@ class Segment:
         return self.begin + to_microseconds(self.law.duration)
 
     def progress(self, now: int) -> float:
-        """Return how far it is at a time in µs."""
+        """Return the progress at a time in µs."""
         if now >= self.end:
             return 1.0
         return float(self.law.at((now - self.begin) / MICROSECONDS))

@@ -28,12 +28,13 @@ from elastocal.sim.workcell._robot import TrueRobot
 from elastocal.sim.workcell._timeline import RobotState, posture_key
 
 _CLOSED = 1e-6
-"""How far a tool may end from where the contact holds it, in m: nanometres of deflection."""
+"""Largest distance of a tool from the position that the contact gives, in m: nanometres of
+deflection."""
 _ROUNDS = 8
 
 
 class ContactPoses(NamedTuple):
-    """Where to press."""
+    """Poses and loads of presses."""
 
     q: FloatArray
     """Planned joints in contact, shape (place, joint), in rad or m."""
@@ -43,7 +44,7 @@ class ContactPoses(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrueReadings:
-    """Truth where the arm stands still: near contact without load, and under each load."""
+    """True values where the arm is at rest: near contact without load, and under each load."""
 
     q: FloatArray
     """Joints of the controller under load, shape (place, load, joint), in rad or m."""
@@ -55,7 +56,7 @@ class TrueReadings:
     """Displacement of the marker by the controller against the reference, (place, load, 3), in m:
     near contact, or light contact."""
     marker_displacement: FloatArray
-    """True one of the marker, likewise."""
+    """True displacement of the marker, of the same shape and unit."""
     marker: FloatArray
     """Marker near contact in base, shape (place, 3), in m."""
     felt: FloatArray
@@ -67,7 +68,7 @@ class TrueReadings:
     """Joints of the controller where the displacements count from, shape (place, joint), in rad
     or m: near contact, or in light contact."""
     reference_felt: FloatArray
-    """As `felt`, there, shape (place, 3), in N."""
+    """As `felt`, near contact, shape (place, 3), in N."""
 
     def __repr__(self) -> str:
         return "TrueReadings({} places, {} loads)".format(*self.force.shape)
@@ -82,7 +83,7 @@ class CampaignSimulator:
     near: float
     """Height of near contact, in m."""
     offset: FloatArray
-    """How far the tooling stands from where the cell file puts it, shape (3,), in m."""
+    """Deviation of the tooling's position from the cell file, shape (3,), in m."""
     hysteresis: tuple[float, FloatArray]
     """Hysteresis of the force sensor, and its ranges (6,) in N and N·m; see `SensorHysteresis`."""
 

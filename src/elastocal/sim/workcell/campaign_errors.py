@@ -1,9 +1,9 @@
-"""What the instruments add to the truth of a campaign.
+"""Errors of the instruments, added to the truth of a campaign.
 
 The devices sample, the procedure averages; here the averages are drawn at once, with the standard
 deviations that follow from the same figures of the cell file. Assumed perfect: weight of the tool
-and zero of the sensor (identified at every pose), registration of the tracker (0.01 mrad turns 5 mm
-by 50 nm).
+and zero of the sensor (identified at every pose), registration of the tracker (0.01 mrad rotates 5
+mm by 50 nm).
 """
 
 import math

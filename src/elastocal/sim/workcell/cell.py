@@ -1,4 +1,4 @@
-"""The simulated cell: its devices, and the robot that bends under process forces.
+"""The simulated cell: its devices, and the deflection of the robot under process forces.
 
 Assumptions of the process, beside those of `elastocal.sim.workcell._quasistatics`:
 
@@ -105,7 +105,7 @@ class SimulatedArm:
         )
 
     def enable(self) -> None:
-        """Release the arm for motion; it then is idle. Refused while a fault stands."""
+        """Enable motion; the arm then is idle. Refused while a fault persists."""
         plant = self._plant
         if plant.now < self._refused_until:
             raise DeviceError(f"{_SOURCE} cannot be enabled: {self._fault}")
@@ -114,7 +114,7 @@ class SimulatedArm:
             plant.stand(plant.robot_state(), Motion.IDLE)
 
     def disable(self) -> None:
-        """Take the release back; the arm stands."""
+        """Disable motion; the arm stands still."""
         self._freeze(Motion.DISARMED, self._fault)
 
     def stop(self) -> None:
@@ -140,7 +140,7 @@ class SimulatedArm:
         plant.run(path, law, (Motion.MOVING, Motion.IDLE))
 
     def adopt_position(self) -> None:
-        """Do nothing: there are no corrections on top of the programmed place."""
+        """Do nothing: there are no corrections on top of the programmed position."""
 
     def approach(
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
@@ -230,7 +230,7 @@ class SimulatedArm:
             raise DeviceError(f"{_SOURCE} refuses {command}: the tool is at the surface, retract")
 
     def _freeze(self, motion: Motion, fault: str | None) -> None:
-        """Stand where the arm is."""
+        """Stop where the arm is."""
         plant = self._plant
         before = self._motion()
         plant.stand(plant.robot_state(), motion, fault)
@@ -319,7 +319,7 @@ class ProcessState:
     """The robot under a process force, or as many side by side as were lifted."""
 
     shift: FloatArray
-    """How far the tool is from where the undeformed robot has it, in base, (..., 3), in m."""
+    """Shift of the tool from that of the undeformed robot, in base, (..., 3), in m."""
     wrench: FloatArray
     """Wrench at the sensor in its frame, weight in, and what its hysteresis adds, shape (..., 6),
     in N and N·m."""
@@ -422,7 +422,7 @@ class ProcessCell:
         path_base: FloatArray | None = None,
         outward_base: FloatArray | None = None,
     ) -> ProcessState:
-        """Go on to joints and a force on the robot; every array of as many runs as were lifted.
+        """Move to joints and a force on the robot; every array for all runs that were lifted.
 
         Parameters
         ----------
@@ -472,8 +472,8 @@ class ProcessCell:
         statics, robot = self._statics, self._statics.robot
         T, real = robot.undeformed(q)
         path_base, outward = place
-        # The tool is where the springs have it, and beside that by what the controller knows
-        # (a part of the sag) and what no spring makes; the rest of the way is the springs'.
+        # The tool is displaced by the springs, and further by the sag that the controller
+        # compensates and by errors without a spring; the rest of the path is the springs'.
         bare = statics.deviation(q, np.zeros_like(state.sag)) - statics.compensation * state.sag
         unsprung = T[..., :3, 3] + bare[..., :3] + self._stop
         reference = real[..., :3, 3] + path_base - unsprung

@@ -1,26 +1,27 @@
-"""The robot as it follows a commanded pose each cycle, and the contact force that results.
+"""The robot following a commanded pose each cycle, and the resulting contact force.
 
-A segment of the simulated cell is planned from a wanted force; a robot that is corrected from
-outside is told where to go, and what force that makes comes of the give of arm, disk and tooling.
-With the commanded pose ``p``, the twist ``t`` of the arm and the place ``c`` where the contact
-holds the tool (`elastocal.sim.workcell._contact`), the force on the robot solves
+A segment of the simulated cell is planned from a given force; a robot that is corrected from
+outside is given a pose, and the force follows from the compliance of arm, disk and tooling. With
+the commanded pose ``p``, the twist ``t`` of the arm and the position ``c`` that the contact gives
+the tool (`elastocal.sim.workcell._contact`), the force on the robot solves
 
     p + t(F, gears) = c(F),    torque(gears) = J_g^T F + weight
 
 by Newton's method from the force of the cycle before. The twist is *linearised* in the springs
-about the last exact equilibrium (`Quasistatics.loaded`), but for the six gears, whose laws and
-memory are followed in every cycle. The exact equilibrium is found anew when the force or the pose
-has moved away from it, and when the robot stands; a difference to what was foretold is faded in.
+about the last exact equilibrium (`Quasistatics.loaded`), except for the six gears, whose laws and
+memory are evaluated in every cycle. The exact equilibrium is solved again when the force or the
+pose has moved away from it, and when the robot stands; a difference from the linearised one is
+faded in.
 
-Assumptions: the tool's turn changes nothing about the contact; the robot is at rest at every
-instant. What is random from stop to stop (error of the stop, point of attack, slip of the ring)
-comes in over the first part of the way from one standstill to the next.
+Assumptions: the tool's rotation does not influence the contact; the robot is at rest at every
+instant. Random values of each stop (error of the stop, point of attack, slip of the ring) change
+over the first part of the path from one standstill to the next.
 
-The elastic arm about one equilibrium: quick enough to be asked every cycle of a controller.
+The elastic arm about one equilibrium is fast enough for every cycle of a controller.
 
-All springs but the gears count as linear, and as sitting where they sit at the equilibrium; the
-gears keep their laws and their memory (`elastocal.sim.arm.gears`). Vectors of three are multiplied
-by hand: NumPy's own cross product takes ten times as long.
+All springs except the gears are linear and keep their positions of the equilibrium; the gears keep
+their laws and their memory (`elastocal.sim.arm.gears`). Vectors of three are multiplied by hand:
+NumPy's own cross product takes ten times as long.
 """
 
 import math
@@ -56,7 +57,7 @@ class Tangent:
     J_inverse: FloatArray
     """Joint speeds of the arm per velocity over rotation of the tool, shape (joint, 6)."""
     attack: FloatArray
-    """Where the force acts on the tool, tcp frame, shape (3,), in m."""
+    """Point of attack of the force on the tool, tcp frame, shape (3,), in m."""
     compliance: FloatArray
     """Twist per force and moment, of all springs but the gears, shape (9, 6)."""
     gears_twist: FloatArray
@@ -142,7 +143,7 @@ class GearCurves:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What instruments see of one robot; see `Quasistatics.knots`."""
+    """Quantities of one robot that instruments measure; see `Quasistatics.knots`."""
 
     R_tcp_sensor: FloatArray
     marker: FloatArray
@@ -174,7 +175,7 @@ class View:
 
 
 def contact_compliance(contact: Contact, force: FloatArray) -> FloatArray:
-    """Return how far the contact gives way per force, in base, shape (3, 3), in m/N."""
+    """Return the compliance of the contact, in base, shape (3, 3), in m/N."""
     law, R, normal = contact.law, contact.R_base_tcp, contact.normal
     force_tcp = R.T @ force
     effort = min(law.effort(force_tcp), LIMIT)
@@ -204,7 +205,7 @@ def turned(turn: FloatArray, vector: FloatArray) -> FloatArray:
 
 
 _STANDSTILL = 20e-6
-"""A commanded pose that stays so near counts as standing, in m."""
+"""Largest change of a commanded pose that counts as standing, in m."""
 _SETTLE = 0.4
 """Time that it must stay so, in s."""
 _DEPARTED = 50e-6
@@ -212,15 +213,15 @@ _DEPARTED = 50e-6
 _BLEND = 2e-4
 """Way on which the random part of a stop comes in, in m."""
 _FORCE_STEP, _WAY_FREE, _WAY_PRESSED = 150.0, 10e-3, 2e-3
-"""Change of force in N, and of pose in m, after which the equilibrium is found anew."""
+"""Change of force in N, and of pose in m, after which the equilibrium is solved again."""
 _REFRESH_GAP = 10
 """Fewest cycles between two exact equilibria."""
 _FADE = 0.8
 """Part of what the exact equilibrium found otherwise that is left after a cycle."""
 _REFRESH_STANDING, _SMALL_CHANGE, _SMALL_WAY = 50, 0.2, 2e-6
-"""The same while it stands: cycles, force in N, and way in m that count as none."""
+"""The same at standstill: cycles, and changes of force in N and of pose in m that count as none."""
 _TURN = 2e-3
-"""Turn of the tool after which the equilibrium is found anew."""
+"""Rotation of the tool after which the equilibrium is solved again."""
 _SAME_PLACE = 2e-4
 """Joints so near to where they were led to have not been moved by anything else, in rad or m."""
 _ENDS = np.array([0.0, 1.0])
@@ -230,16 +231,17 @@ _CLOSED = 1.0
 _LATERAL = 5e-4
 """Way along the surface after which it is looked for again, in m."""
 _REACH = 0.5
-"""How far ahead the surface is looked for, in m."""
+"""Distance ahead to which the surface is searched, in m."""
 
 
 @dataclass
 class _Chance:
-    """What differs from stop to stop, on the way from one value to the next."""
+    """Random values of each stop, in transition from one to the next."""
 
     before: FloatArray
     after: FloatArray
-    """Error of the stop in m, tilt and wander in standard deviations, slip likewise: (9,)."""
+    """Error of the stop in m; tilt, variation of the point of attack and slip in standard
+    deviations: (9,)."""
     part: float = 1.0
 
     @property
@@ -254,7 +256,7 @@ class PoseFollower:
     q: FloatArray
     """Joints of the controller, shape (joint,), in rad or m."""
     T: FloatArray
-    """Where they bring the undeformed tool, in base, shape (4, 4)."""
+    """Pose of the undeformed tool at these joints, in base, shape (4, 4)."""
     _tangent: Tangent
     _curves: GearCurves
     _gears: FloatArray
@@ -262,20 +264,20 @@ class PoseFollower:
     _row: tuple[FloatArray, ...]
 
     def __init__(self, plant: Plant) -> None:
-        """Stand ready; `begin` takes the robot over."""
+        """Set up; `begin` takes the robot over."""
         self._plant = plant
         self._led = False
         self.contact: Contact | None = None
-        """What is touched."""
+        """Contact, if the tool touches."""
         self.force: FloatArray = np.zeros(3)
         """Force on the robot in base, shape (3,), in N."""
         self.stopped: str | None = None
         """Why the safety controller has stopped the arm; a fault of the cell file."""
 
     def begin(self) -> None:
-        """Take the robot over where it stands, free; a visit begins when it sets out from there.
+        """Take over the free robot at its present position; a visit begins when it leaves it.
 
-        Where nothing else has moved it since, it goes on instead.
+        If nothing else has moved it since, the visit continues instead.
         """
         plant = self._plant
         here = plant.segment.path.end.q
@@ -284,7 +286,7 @@ class PoseFollower:
         stands, self._statics = plant.robot_state(), plant.statics
         free = self._statics.free(stands.q, np.zeros(3), stands.theta)
         self.contact, self.force, self.stopped = None, np.zeros(3), None
-        # Where it stands it stays: what it is off by is the error of its last stop.
+        # At standstill the deviation is the error of the last stop.
         error = (stands.twist - free.twist)[:3]
         values = np.concatenate([error, plant.chance.load(0), np.zeros(2)])
         self._chance, self._load = _Chance(values, values), -1
@@ -299,7 +301,7 @@ class PoseFollower:
         self._missed, self._led = False, True
 
     def _begin_visit(self) -> None:
-        """Begin the visit of the posture that the arm stands in."""
+        """Begin the visit of the present posture."""
         plant = self._plant
         plant.begin_visit()
         self._statics = plant.statics
@@ -309,7 +311,7 @@ class PoseFollower:
         self._begin_step("approach")
 
     def follow(self, T_base_tcp: FloatArray, duration: float) -> None:
-        """Go to a commanded pose of the tool, evenly within some time.
+        """Move uniformly to a commanded pose of the tool within a time.
 
         Parameters
         ----------
@@ -351,7 +353,7 @@ class PoseFollower:
         self.T = self._statics.robot.forward(self.q)
 
     def _note_standstill(self, duration: float) -> None:
-        """Draw anew what differs from stop to stop, each time that the robot sets out."""
+        """Draw new random values of the stop each time that the robot starts to move."""
         here = self.T[:3, 3]
         way = math.dist(here.tolist(), self._rest.tolist())
         if self._standing:
@@ -375,7 +377,7 @@ class PoseFollower:
         elif self.contact is None:
             self._begin_step("engage")
         if self.contact is not None:
-            # What has slipped so far stays where it is.
+            # Slip so far is kept.
             self.contact = self.contact.slipped(self._slipped(self.contact))
             self._load += 1
             slips = plant.slip(self._load)
@@ -386,7 +388,7 @@ class PoseFollower:
             self._fail(self._plant.schedule.begin("hold", plant.visit, self._load, plant.now))
 
     def _slipped(self, contact: Contact) -> FloatArray:
-        """Return how far the ring has slipped at random, tcp frame, shape (2,), in m."""
+        """Return the random slip of the ring, tcp frame, shape (2,), in m."""
         sigma = contact.law.slip_sigma(contact.R_base_tcp.T @ self.force)
         slipped: FloatArray = sigma * self._chance.now[7:]
         return slipped
@@ -399,7 +401,7 @@ class PoseFollower:
             self._fail(plant.schedule.begin(step, plant.visit, 0, plant.now))
 
     def _fail(self, faults: list[tuple[int, Fault]]) -> None:
-        """Let faults come at their times."""
+        """Start faults at their times."""
         for time, fault in faults:
             act = self._slip if fault.kind == "slip" else self._stop
             self._plant.later(time, partial(act, fault.distance))
@@ -408,7 +410,7 @@ class PoseFollower:
         self.stopped = "stopped by the safety controller"
 
     def _slip(self, distance: float) -> None:
-        """Let the contact slip against the lateral force, by so much, in m."""
+        """Let the contact slip along the lateral force, by a length in m."""
         if self.contact is not None:
             lateral = (self.contact.R_base_tcp.T @ self.force)[:2]
             size = float(np.linalg.norm(lateral))
@@ -539,7 +541,7 @@ class PoseFollower:
         return self.q, twist, self.force, moment, self._view.seen(self.T, twist, self.force, moment)
 
     def _run(self, duration: float) -> None:
-        """Let the cell go there evenly."""
+        """Move the cell there uniformly."""
         plant, row, memory = self._plant, self._see(), self._tangent.state
         before, segment = self._row, plant.segment
         if plant.now < segment.end:
