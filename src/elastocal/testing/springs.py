@@ -1,5 +1,4 @@
-"""Contract of every kind of spring without a robot: parameters, law, tangents, files.
-"""
+"""Contract of every kind of spring without a robot: parameters, law, tangents, files."""
 
 from dataclasses import replace
 
