@@ -17,7 +17,9 @@ from elastocal.errors import ElastocalError, PlanningError, PluginError, SchemaE
 from elastocal.identification import LOSSES, CalibratedModel, Observability, read_model, write_model
 from elastocal.planning.search import CRITERIA, TECHNIQUES
 from elastocal.plugins import KINDS as KINDS_OF_PLUGINS, Registry
+from elastocal.report.document import write_report
 from elastocal.report.language import language_of
+from elastocal.verdict import Evidence
 from support import plugged, shown
 from support.cells import robot
 from support.cli import elastocal
@@ -43,6 +45,18 @@ def offered(tmp_path, monkeypatch, source, group="elastocal.losses", name="odd")
     (folder / "odd_module.py").write_text(source)
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.delitem(sys.modules, "odd_module", raising=False)
+
+
+def command_of(tmp_path, monkeypatch, source, doc='"""Show odd things."""'):
+    """Install a command ``odd``, whose ``run`` and ``show`` are in a source, from its line 9 on."""
+    head = (
+        "from dataclasses import dataclass\nfrom elastocal.plugins import Command\n"
+        "from elastocal.wording import phrase\n@dataclass(frozen=True)\nclass Settings:\n"
+        f"    {doc}\n"
+        "    force: float = 1.0\n    most: int = 1\n"
+    )
+    made = f"{head}{source}THING = Command(Settings, run, show)\n"
+    offered(tmp_path, monkeypatch, made, "elastocal.commands")
 
 
 @pytest.mark.parametrize("kind", KINDS_OF_PLUGINS)
@@ -296,6 +310,45 @@ class TestACommandOfAPlugIn:
         reason = elastocal("odd").reason
         assert "command 'odd' of odd-things 1.0 cannot be loaded: ZeroDivisionError" in reason
 
+    @pytest.mark.parametrize(
+        ("work", "show"), [("return 1 / 0", "return ()"), ("return 3", "yield 1 / 0")]
+    )
+    def test_one_that_fails_names_its_distribution_and_the_line(
+        self, tmp_path, monkeypatch, work, show
+    ):
+        command_of(tmp_path, monkeypatch, f"def run(_):\n    {work}\ndef show(_):\n    {show}\n")
+        line = 10 if "1 / 0" in work else 12
+        assert elastocal("odd").reason.endswith(
+            "command 'odd' of odd-things 1.0 cannot be used: ZeroDivisionError: division by zero"
+            f" (odd_module.py:{line})"
+        )
+
+    def test_settings_that_say_nothing_are_refused_in_a_line(self, tmp_path, monkeypatch):
+        command_of(tmp_path, monkeypatch, "run = show = len\n", doc="")
+        for words in (("odd",), ("odd", "--help")):
+            assert elastocal(*words).reason.endswith(
+                "command 'odd' of odd-things 1.0 cannot be used: LookupError:"
+                " module odd_module has no function or class Settings with a docstring"
+            )
+
+    def test_a_force_of_it_is_an_option_like_others(self, tmp_path, monkeypatch):
+        """Of elastocal's commands, --force lets files be replaced and is listed last."""
+        command_of(tmp_path, monkeypatch, "run = show = len\n")
+        shown = elastocal("odd", "--help").out
+        assert shown.index("--force") < shown.index("--most") < shown.index("--page")
+
+    def test_a_phrase_without_words_is_marked_as_english_on_a_german_page(
+        self, tmp_path, monkeypatch
+    ):
+        source = (
+            "from elastocal.blocks import Paragraph\ndef run(_):\n    return 3\n"
+            "def show(_):\n    yield Paragraph(phrase('{n} odd ones', n=phrase('3')))\n"
+        )
+        command_of(tmp_path, monkeypatch, source)
+        page = tmp_path / "odd.html"
+        assert elastocal("odd", "--page", page, "--page-language", "de").code == 0
+        assert '<span lang="en">3 odd ones</span>' in page.read_text("utf-8")
+
     def test_its_phrases_are_said_in_german(self):
         language_of.cache_clear()
         import elastocal_softest
@@ -356,3 +409,29 @@ def test_a_script_adds_one_for_its_process_and_takes_the_place_of_none():
     for taken in ("cover", "median"):
         with pytest.raises(PlanningError, match=f"there is a search technique '{taken}' already"):
             techniques.add(taken, dict)
+
+
+class TestASectionOfAPlugIn:
+    def section(self, tmp_path, monkeypatch, work):
+        source = (
+            "from elastocal.blocks import Paragraph\n"
+            "from elastocal.report.document import Section\n"
+            "from elastocal.wording import phrase\n"
+            f"def blocks(evidence):\n    {work}\n"
+            "THING = Section('odd', phrase('Oddities'), phrase('How odd is it?'), 55, blocks)\n"
+        )
+        offered(tmp_path, monkeypatch, source, "elastocal.sections")
+
+    def test_stands_at_its_place_on_the_page(self, tmp_path, monkeypatch):
+        say = "yield Paragraph(phrase('{name} is odd.', name=evidence.name))"
+        self.section(tmp_path, monkeypatch, say)
+        path = write_report(tmp_path / "r.html", Evidence("2026-01-02T03:04:05Z", "Arm")).path
+        text = path.read_text("utf-8")
+        assert "Arm is odd." in text
+        assert text.index('id="compliances"') < text.index('id="odd"') < text.index('id="codecs"')
+
+    def test_one_that_fails_ends_the_report_with_a_line_and_no_file(self, tmp_path, monkeypatch):
+        self.section(tmp_path, monkeypatch, "return evidence.plan.poses")
+        with pytest.raises(PluginError, match=r"report section 'odd' of odd-things 1.0 cannot be"):
+            write_report(tmp_path / "r.html", Evidence("2026-01-02T03:04:05Z"))
+        assert not (tmp_path / "r.html").exists()

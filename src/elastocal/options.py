@@ -162,13 +162,13 @@ def summary_of(module: str, name: str) -> str:
     Raises
     ------
     LookupError
-        If the module has neither of that name.
+        If the module has neither of that name, or it has no docstring.
     """
     # A list of all commands asks for thirty: a pattern is quicker than a parser.
     pattern = rf'^(?:def|class) {name}\b.*?"""(.*?)(?:\n\s*\n    [A-Z]\w+\n    ---|""")'
     found = re.search(pattern, _text(module), re.DOTALL | re.MULTILINE)
     if found is None:
-        raise LookupError(f"module {module} has no function or class {name}")
+        raise LookupError(f"module {module} has no function or class {name} with a docstring")
     return _plain(found[1])
 
 

@@ -15,6 +15,9 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
+from traceback import walk_tb
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from elastocal.errors import ElastocalError, PluginError, nearest
@@ -82,6 +85,11 @@ KINDS = {
         "elastocal.programs",
         "elastocal.compensation.programs:PROGRAM_WRITERS",
         "elastocal.compensation.programs:ProgramWriter",
+    ),
+    "report section": Kind(
+        "elastocal.sections",
+        "elastocal.report.document:SECTIONS",
+        "elastocal.report.document:Section",
     ),
     "command": Kind(
         "elastocal.commands", "elastocal.cli.commands:COMMANDS", "elastocal.plugins:Command"
@@ -213,11 +221,22 @@ def used(kind: str, name: str, make: Callable[[], _T]) -> _T:
         raise
     except _BROKEN as error:
         what = f"{kind} {name!r} of {source_of(found[0])}"
-        raise PluginError(f"{what} cannot be used: {_reason(error)}") from error
+        place = _place(error, found[0].module.partition(".")[0])
+        raise PluginError(f"{what} cannot be used: {_reason(error)}{place}") from error
 
 
 def _reason(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def _place(error: BaseException, package: str) -> str:
+    """Return where a package's own code was when something was raised; empty where it was not."""
+    frames = [each for each in walk_tb(error.__traceback__) if _package_of(each[0]) == package]
+    return f" ({Path(frames[-1][0].f_code.co_filename).name}:{frames[-1][1]})" if frames else ""
+
+
+def _package_of(frame: FrameType) -> str:
+    return str(frame.f_globals.get("__name__", "")).partition(".")[0]
 
 
 def imported(place: str) -> Any:

@@ -1,7 +1,5 @@
 """What every command has: a group in help, short forms, choices that a shell completes, JSON."""
 
-import dataclasses
-import importlib
 import inspect
 import json
 import os
@@ -15,7 +13,6 @@ import typer
 
 from elastocal.cell.examples import EXAMPLES
 from elastocal.cli.commands import COMMANDS
-from elastocal.cli.generator import _parameter, _read
 from elastocal.cli.main import app, run
 from elastocal.compensation.process import PROCESSES
 from elastocal.compensation.programs.languages import PROGRAM_WRITERS
@@ -24,15 +21,12 @@ from elastocal.identification import LOSSES
 from elastocal.identification.options import _FREE_FRAMES, _WEIGHTS
 from elastocal.options import (
     CHOICES,
-    OWN,
     REQUIRED,
-    Option,
-    SettingsField,
-    settings_fields,
 )
 from elastocal.planning.search import TECHNIQUES
 from elastocal.report.language import LANGUAGES
 from elastocal.robot import catalogue
+from elastocal.testing import CommandSuite
 from elastocal.workflows import SimulateResult, StudioResult
 from elastocal.workflows.export import EXPORT_TARGETS
 from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
@@ -53,19 +47,21 @@ def options_of(command: str) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-class TestEveryCommand:
+class TestEveryCommand(CommandSuite):
+    @pytest.fixture
+    def arguments(self, command, lines):
+        if command in ELSEWHERE:
+            pytest.skip("what it prints is tested beside what it does")
+        with (
+            mock.patch.object(SimulateResult, "wait"),
+            mock.patch.object(StudioResult, "wait"),
+        ):
+            yield lines[command]
+
     def test_stands_in_a_group_of_the_help(self, command):
         text = elastocal("--help").out
         above = text[: text.index(f"│ {command} ")]
         assert f"╭─ {COMMANDS[command].group} ─" in above
-
-    def test_help_prints_every_word_of_its_options(self, command, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "1000")
-        shown = elastocal(command, "--help").out
-        for each in COMMANDS[command].fields():
-            assert (each.option.help or each.doc).partition("\n")[0] in shown
-            if each.option.default and not each.option.required:
-                assert f"[default: {each.option.default}]" in shown
 
     @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="/dev/full is Linux's")
     def test_begins_nothing_where_its_output_is_full(self, command, monkeypatch, capfd, tmp_path):
@@ -81,14 +77,6 @@ class TestEveryCommand:
             message = "elastocal: cannot write output: No space left on device\n"
             assert capfd.readouterr().err == message
         assert not list(tmp_path.iterdir())
-
-    def test_settings_take_what_typer_hands_over_for_what_is_not_given(self, command):
-        made = COMMANDS[command]
-        parameters = inspect.signature(made.callback()).parameters
-        for each in made.fields():
-            default = parameters[each.name].default
-            if default is not inspect.Parameter.empty:
-                assert _read(each, default) in (None, each.default)
 
     def test_prints_json(self, command):
         assert ["--json"] in options_of(command).values()
@@ -145,16 +133,6 @@ def test_every_command_is_quick_or_tried_elsewhere(lines):
     assert lines.keys() | ELSEWHERE >= set(COMMANDS)
 
 
-@pytest.mark.parametrize("command", sorted(set(COMMANDS) - ELSEWHERE))
-def test_json_is_one_object_and_nothing_else(lines, command):
-    waits = mock.patch.object(SimulateResult, "wait"), mock.patch.object(StudioResult, "wait")
-    with waits[0], waits[1]:
-        result = elastocal(command, *lines[command], "--json")
-    assert result.code == 0, result.err
-    assert isinstance(json.loads(result.out), dict)
-    assert result.out.count("\n") == 1
-
-
 def test_ways_of_a_command_that_write_something_else_print_json_too(lines, tmp_path):
     pytest.importorskip("cryptography")
     others = (
@@ -182,31 +160,6 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "page language": tuple(LANGUAGES),
         "purpose": ("elasticity", "geometry", "both"),
     } == CHOICES
-
-
-@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"robots"}))
-def test_what_is_read_from_the_source_is_what_the_settings_are(command):
-    found = COMMANDS[command]
-    settings = getattr(importlib.import_module(found.module), found.settings)
-    real = {each.name: each for each in dataclasses.fields(settings)}
-    read = settings_fields(found.module, found.settings)
-    assert {each.name for each in read} == set(real)
-    for each in read:
-        if each.default is REQUIRED:
-            assert real[each.name].default is dataclasses.MISSING
-        elif each.default is not OWN:
-            assert real[each.name].default == each.default
-        if each.option.default and not each.option.read:
-            assert str(real[each.name].default) == each.option.default
-        elif each.option.default:
-            field = real[each.name]
-            made = field.default_factory is not dataclasses.MISSING
-            default = field.default_factory() if made else field.default
-            assert _numbers(_read(each, each.option.default)) == pytest.approx(_numbers(default))
-
-
-def _numbers(value):
-    return dataclasses.astuple(value) if dataclasses.is_dataclass(value) else (value,)
 
 
 def test_every_option_has_a_sentence():
@@ -265,8 +218,11 @@ class TestCompletion:
 
 def test_a_default_of_what_is_read_from_a_text_is_that_of_the_settings():
     """It is a number already, and a text would be read again."""
-    read = SettingsField("height", "float", 0.02, "Height.", Option(read="length"))
-    parameter = _parameter(read)
-    assert parameter.default is None
-    assert _read(read, parameter.default) is None
-    assert _read(read, "30 mm") == pytest.approx(0.03)
+    found = {
+        (name, each.name): inspect.signature(made.callback()).parameters[each.name].default
+        for name, made in COMMANDS.items()
+        for each in made.fields()
+        if each.option.read and not each.option.required and each.default is not REQUIRED
+    }
+    assert len(found) > 5
+    assert set(found.values()) == {None}

@@ -119,15 +119,19 @@ def plugged(name: str) -> Command:
 
     def run(given: Given) -> None:
         with _page_of(given, name) as write:
-            result = found.run(found.settings(**given.settings))
+            settings = found.settings(**given.settings)
+            result = plugins.used("command", name, lambda: found.run(settings))
+            shown = plugins.used("command", name, lambda: tuple(found.show(result)))
             if given.as_json:
                 output.print_json(result)
             else:
-                output.print_blocks(output.console(), found.show(result))
-            write(found.show(result))
+                output.print_blocks(output.console(), shown)
+            write(shown)
 
     settings = found.settings
-    return _Plugged(OTHERS, settings.__module__, settings.__name__, settings.__name__, run, _Page)
+    made = _Plugged(OTHERS, settings.__module__, settings.__name__, settings.__name__, run, _Page)
+    plugins.used("command", name, made.callback)  # what cannot be read of its settings is said now
+    return made
 
 
 @dataclass(frozen=True)
@@ -188,7 +192,8 @@ def _in_order(
 
     def place(each: SettingsField) -> tuple[bool, bool, bool]:
         # What guards files is read last.
-        return each.name == "force", not each.option.argument, not _is_required(each)
+        guards = each.name == "force" and each.kind == "bool"
+        return guards, not each.option.argument, not _is_required(each)
 
     return sorted((*fields, *here), key=place)
 

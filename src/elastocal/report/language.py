@@ -24,6 +24,7 @@ LANGUAGES = {"en": "English", "de": "Deutsch", "fr": "Français"}
 """Languages that a page can be written in, by their code."""
 _BETWEEN_NUMBERS = re.compile(r"(?<=\d), (?=[-+−]?\d)")
 _DECIMAL = re.compile(r"(?<![\w.])([-+−]?\d*)\.(\d+)(?![\w.])")
+_PLACE, _LETTER = re.compile(r"\{\w+\}"), re.compile("[A-Za-z]")
 _SENTENCE = re.compile(
     r"\b(?:a|an|and|are|as|by|from|has|is|no|not|of|on|that|the|to|was|with)\b(?=.* .* )"
 )
@@ -62,7 +63,10 @@ class Language:
             return Markup('<span lang="en">{}</span>').format(text) if is_english else shown
         template = escape(self.catalogue.get(known, known))
         values = {name: self.markup(value) for name, value in _parts(text).items()}
-        return template.format(**values) if values else template
+        said = template.format(**values) if values else template
+        # A phrase of a plug-in that offers no words for it in this language.
+        stays = known not in self.catalogue and _LETTER.search(_PLACE.sub("", known))
+        return Markup('<span lang="en">{}</span>').format(said) if stays else said
 
     def _template(self, text: str) -> str:
         """Return the template of a text of elastocal; None for names, figures and foreign words."""

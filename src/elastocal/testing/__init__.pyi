@@ -1,3 +1,9 @@
+from .commands import (
+    CommandOutput as CommandOutput,
+    CommandSuite as CommandSuite,
+    run_command as run_command,
+)
 from .losses import LossSuite as LossSuite
 from .searches import CriterionSuite as CriterionSuite, TechniqueSuite as TechniqueSuite
+from .sections import SectionSuite as SectionSuite
 from .springs import SpringSuite as SpringSuite

@@ -10,7 +10,7 @@ from elastocal.codec import codec_summary
 from elastocal.codec.show import show_codec
 from elastocal.identification.recertification import recertify, show_comparison
 from elastocal.identification.show import show_calibration
-from elastocal.report.document.page import SECTIONS
+from elastocal.report.document.page import ordered_sections
 from elastocal.report.pages.codec_page import write_codec_page
 from support.codecs import judged
 from support.recertified import made_up
@@ -32,7 +32,7 @@ def told(parts):
 
 def test_the_report_has_the_tables_of_the_terminal(parts, told):
     report = {}
-    for section in SECTIONS:
+    for section in ordered_sections():
         report |= tables(section.body(parts).blocks)
     both = told.keys() & report.keys() & SHARED
     assert {"Compliances", "Models at the same left-out poses"} <= both
@@ -53,7 +53,7 @@ def assert_cells(shown, page):
 
 def test_the_report_shows_a_comparison_as_the_terminal_does(parts):
     compared = recertify(made_up(0), made_up(1, compliance=np.full(6, 1.2e-6))).summary
-    (section,) = [each for each in SECTIONS if each.identifier == "recertification"]
+    (section,) = [each for each in ordered_sections() if each.identifier == "recertification"]
     shown = tuple(show_comparison(compared))
     found = section.body(replace(parts, recertification=compared))
     assert found.blocks[: len(shown)] == shown

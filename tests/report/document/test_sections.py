@@ -14,7 +14,7 @@ from elastocal.identification import CalibrationSummary, describe
 from elastocal.procedure import Event, RunSummary
 from elastocal.procedure.derive.derivation import MOVED
 from elastocal.records import from_data, to_data
-from elastocal.report.document.page import SECTIONS
+from elastocal.report.document.page import ordered_sections
 from elastocal.report.document.sections.cell import _LIMITS, _tool_file
 from elastocal.verdict import Link, LinkState
 from elastocal.verdict.chain import ChainFiles, verify_chain
@@ -31,7 +31,7 @@ from elastocal.verdict.findings import (
 (
     in_full, uncertainty, cell, poses, readings, instruments, compliances, codecs, process, _,
     provenance, not_verified,
-) = SECTIONS  # fmt: skip
+) = ordered_sections()  # fmt: skip
 
 
 def words(section, parts):

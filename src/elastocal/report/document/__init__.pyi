@@ -9,9 +9,11 @@ from .geometry_page import (
     write_geometry_page as write_geometry_page,
 )
 from .page import (
+    SECTIONS as SECTIONS,
     WrittenReport as WrittenReport,
     section_blocks as section_blocks,
     write_report as write_report,
 )
+from .section import Section as Section
 from .sections_page import write_page as write_page
 from .workbook import require_excel as require_excel, write_workbook as write_workbook

@@ -2,16 +2,18 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from markupsafe import Markup
 
-from elastocal import __version__
+from elastocal import __version__, plugins
 from elastocal.blocks import Block
+from elastocal.errors import ReportError
 from elastocal.files import replacing
 from elastocal.report.document import sections as exported
 from elastocal.report.document.certificate import certificate_of_evidence
-from elastocal.report.document.section import Section
+from elastocal.report.document.section import Content, Section
 from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages import render, view_data
 from elastocal.verdict import (
@@ -26,15 +28,29 @@ from elastocal.verdict import (
 from elastocal.wording import Phrase, phrase
 
 _EXPORTED = (getattr(exported, name) for name in dir(exported))
-SECTIONS: tuple[Section, ...] = tuple(
-    sorted((each for each in _EXPORTED if isinstance(each, Section)), key=lambda each: each.place)
+SECTIONS = plugins.Registry[Section](
+    "report section",
+    {each.identifier: each for each in _EXPORTED if isinstance(each, Section)},
+    ReportError,
 )
-"""Every section that `elastocal.report.document.sections` exports, in order."""
+"""Every section that `elastocal.report.document.sections` exports, and those of other packages."""
+
+
+def ordered_sections() -> tuple[Section, ...]:
+    """Return every section in the order in which a report shows them."""
+    return tuple(sorted(SECTIONS.values(), key=lambda each: each.place))
+
+
+def _contents(evidence: Evidence) -> Iterator[tuple[Section, Content]]:
+    """Yield every section with what it shows."""
+    for each in ordered_sections():
+        make = partial(each.body, evidence)
+        yield each, plugins.used(SECTIONS.kind, each.identifier, make)
 
 
 def section_blocks(evidence: Evidence) -> Iterator[tuple[str, tuple[Block, ...]]]:
     """Yield the title of every section and what it shows."""
-    return ((section.title, section.body(evidence).blocks) for section in SECTIONS)
+    return ((section.title, content.blocks) for section, content in _contents(evidence))
 
 
 @dataclass(frozen=True)
@@ -77,7 +93,7 @@ def write_report(
         If it cannot be written.
     """
     verdict = judge_evidence(evidence)
-    sections = [(section, section.body(evidence)) for section in SECTIONS]
+    sections = list(_contents(evidence))
     scene = next((content.scene for _, content in sections if content.scene), None)
     data = view_data(scene.view, scene.plan, scene.pool, language.say) if scene else {}
     page = render(
