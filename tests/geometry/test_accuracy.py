@@ -67,7 +67,7 @@ def test_errors_by_axis_make_up_those_of_the_ladder():
     # Places are in base: the nominal arm's, but for its errors.
     T = measured.robot.forward(measured.data.q)[figures.row]
     near = T[:, :3, 3] + np.einsum(
-        "nij,nj->ni", T[:, :3, :3], found.fit.state.markers[figures.marker]
+        "nij,nj->ni", T[:, :3, :3], found.whole.fit.state.markers[figures.marker]
     )
     assert np.abs(near - figures.place).max() < 0.05
 

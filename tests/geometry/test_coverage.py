@@ -35,7 +35,7 @@ def test_95_percent_intervals_of_100_campaigns_cover_about_95_percent(arm):
             exact.robot, replace(exact.data, markers=exact.data.markers + noise)
         )
         found = climb(noisy, 200, np.random.default_rng(campaign), silent)
-        low, high = interval(found.draws)
+        low, high = interval(found.whole.draws)
         own = [i for i in free[0] if problem.unknowns[i].rung != "registration"]
         held.append((low[own] <= truth[own]) & (truth[own] <= high[own]))
     covered = np.mean(held, axis=0)

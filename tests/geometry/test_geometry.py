@@ -77,7 +77,7 @@ def test_a_planted_geometry_is_found_to_the_noise(arm):
     chosen = next(each for each in found.rungs if each.rung == found.chosen)
     assert found.chosen == "geometry"
     assert chosen.distance.mean() < 1.1 * FLOOR
-    assert set(problem.row[~found.fit.used].tolist()) == measured.blunders
+    assert set(problem.row[~found.whole.fit.used].tolist()) == measured.blunders
 
 
 @pytest.mark.parametrize(
@@ -106,12 +106,12 @@ def test_sag_under_weight_and_payload_is_told_from_geometry():
     measured = measure(kuka(), 120, payloads=(0.0, 80.0), compliance=2e-7)
     problem, found = ladder(measured, draws=200)
     assert found.chosen == "weight"
-    low, high = np.percentile(found.draws, [2.5, 97.5], axis=0)
+    low, high = np.percentile(found.whole.draws, [2.5, 97.5], axis=0)
     names = [each.name for each in problem.unknowns]
     for joint in ("joint_a2", "joint_a3"):
         index = names.index(f"{joint}.compliance")
         assert 0.9 * low[index] < 2e-7 < 1.1 * high[index]
-        assert abs(found.values[index] - 2e-7) < 2e-8
+        assert abs(found.whole.values[index] - 2e-7) < 2e-8
 
 
 def test_a_payload_that_hardly_tells_the_sag_does_not_hold_up_the_fit():
@@ -123,7 +123,7 @@ def test_a_payload_that_hardly_tells_the_sag_does_not_hold_up_the_fit():
 def test_a_quarter_of_blunders_is_found():
     measured = measure(kuka(), 40, blunders=10, markers=1, stations=1)
     problem, found = ladder(measured)
-    assert set(problem.row[~found.fit.used].tolist()) == measured.blunders
+    assert set(problem.row[~found.whole.fit.used].tolist()) == measured.blunders
 
 
 def test_the_nominal_arm_is_kept_where_it_is_right():
@@ -184,7 +184,7 @@ def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
     )
     figures = json.loads(result.out)
     contract = {"held_out", "ladder", "parameters", "fixed", "blunders"}
-    assert set(figures) == contract | {"axes", "iso_9283"}
+    assert set(figures) == contract | {"axes", "iso_9283", "urdf"}
     assert figures["held_out"]["chosen"]["mean"] < 1.2 * FLOOR
     assert figures["held_out"]["registration"]["mean"] > 5e-4
     assert set(figures["blunders"]) == measured.blunders

@@ -442,6 +442,7 @@ def _geometry(given: Given) -> None:
     kept = ("held_out", "ladder", "parameters", "fixed", "blunders")
     figures = {key: getattr(result.model, key) for key in kept}
     more = {"axes": result.accuracy.axes, "iso_9283": result.accuracy.poses}
+    more["urdf"] = result.expressed
     _show(given, figures | more, result.show())
 
 

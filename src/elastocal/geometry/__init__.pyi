@@ -7,10 +7,13 @@ from .denavit_hartenberg import (
     LinkNumber as LinkNumber,
     link_table as link_table,
 )
+from .fitted_model import (
+    geometry_model as geometry_model,
+)
 from .model import (
+    DistanceFigures as DistanceFigures,
     GeometryModel as GeometryModel,
     GeometryParameter as GeometryParameter,
-    geometry_model as geometry_model,
     read_geometry as read_geometry,
 )
 from .plausibility import (

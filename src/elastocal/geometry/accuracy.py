@@ -117,8 +117,8 @@ def accuracy_figures(problem: GeometryProblem, found: GeometryLadder) -> Geometr
     """
     by_rung = {each.rung: each.residual for each in found.rungs}
     before, after = by_rung["registration"], by_rung[found.chosen]
-    used = np.flatnonzero(found.fit.used)
-    T = found.fit.state.T_station_base[problem.station[used]]
+    used = np.flatnonzero(found.whole.fit.used)
+    T = found.whole.fit.state.T_station_base[problem.station[used]]
     place = np.einsum("nji,nj->ni", T[:, :3, :3], problem.measured[used] - T[:, :3, 3])
     parts = [(name, before[:, i], after[:, i]) for i, name in enumerate("xyz")]
     parts.append(("norm", np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)))
@@ -169,8 +169,8 @@ def _pose_accuracy(
 
 
 def _blunders(problem: GeometryProblem, found: GeometryLadder) -> Iterator[Blunder]:
-    for point in np.flatnonzero(~found.fit.used).tolist():
+    for point in np.flatnonzero(~found.whole.fit.used).tolist():
         row = int(problem.row[point])
-        distance = float(np.linalg.norm(found.fit.residual[point]))
+        distance = float(np.linalg.norm(found.whole.fit.residual[point]))
         station = str(problem.data.station[row])
         yield Blunder(row, int(problem.marker[point]) + 1, station, distance)

@@ -67,6 +67,8 @@ class _Way:
 def link_table(problem: GeometryProblem, found: GeometryLadder) -> tuple[LinkNumber, ...]:
     """Return the numbers of an arm as drawn and as built, with the draws' intervals.
 
+    They are of the fit that has nothing but places and zeros of joints.
+
     Parameters
     ----------
     problem : GeometryProblem
@@ -74,14 +76,15 @@ def link_table(problem: GeometryProblem, found: GeometryLadder) -> tuple[LinkNum
     found : GeometryLadder
         What was found.
     """
-    robot, joints = problem.robot, len(problem.robot.joint_names)
+    robot, joints, chain = problem.robot, len(problem.robot.joint_names), found.chain
     ways = tuple(_ways(robot))
     nominal = np.round(link_numbers(robot, ArmErrors.none(joints), ways), 12) + 0.0
     nominal = np.where(nominal == np.round(-np.pi, 12), -nominal, nominal)
-    calibrated = link_numbers(robot, found.fit.state.errors, ways)
-    drawn = State(found.fit.state.T_station_base, found.fit.state.markers, ArmErrors.none(joints))
+    calibrated = link_numbers(robot, chain.fit.state.errors, ways)
+    at = chain.fit.state
+    drawn = State(at.T_station_base, at.markers, ArmErrors.none(joints))
     draws = np.array(
-        [link_numbers(robot, problem.moved(drawn, draw).errors, ways) for draw in found.draws]
+        [link_numbers(robot, problem.moved(drawn, draw).errors, ways) for draw in chain.draws]
     )
     angles = np.array([_unit(name) == "rad" for _, name in _names(robot)])
     # Angles are compared next to the nominal ones, and do not jump by a turn.

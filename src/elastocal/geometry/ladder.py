@@ -13,8 +13,8 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import GeometryError
 from elastocal.geometry.determined import Fixed, told_apart
-from elastocal.geometry.problem import RUNGS, GeometryProblem, State, prior_weight
-from elastocal.geometry.solve import GeometryFit, fit, register
+from elastocal.geometry.problem import CHAIN_RUNGS, RUNGS, GeometryProblem, State, prior_weight
+from elastocal.geometry.solve import GeometryFit, fit, noise, register
 from elastocal.identification import Overlap, judge_models
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
@@ -22,6 +22,8 @@ from elastocal.results import brief_repr
 FOLDS = 5
 _BLOCKS = 100
 """Most blocks of consecutive poses."""
+_NOISE_STEPS = 3
+"""Times that a rung is fitted to find what it leaves."""
 
 
 @brief_repr
@@ -43,16 +45,38 @@ class RungErrors:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class GeometryLadder:
-    """All rungs, the one that was chosen, its fit and draws of it."""
+class FittedRung:
+    """A rung fitted to all positions, and draws of it."""
 
-    rungs: tuple[RungErrors, ...]
-    chosen: str
+    rung: str
     fit: GeometryFit
     values: FloatArray
     """Value of each unknown, shape (unknown,); 0 of what is fixed."""
     draws: FloatArray
     """Bootstrap over blocks of poses, shape (draw, unknown)."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class GeometryLadder:
+    """All rungs, and the one that was chosen."""
+
+    rungs: tuple[RungErrors, ...]
+    whole: FittedRung
+    """The one that was chosen."""
+    chain: FittedRung
+    """The best that has nothing but places and zeros of joints, fitted anew: all that a URDF or a
+    table of links can express. Without its harmonics a fit of more is worse than the arm as drawn,
+    for shifts, zeros and harmonics stand in for one another."""
+
+    @property
+    def chosen(self) -> str:
+        """Name of the rung that was chosen."""
+        return self.whole.rung
+
+    def errors(self, rung: str) -> RungErrors:
+        """Return the errors of a rung at poses that were left out."""
+        return next(each for each in self.rungs if each.rung == rung)
 
 
 def climb(
@@ -100,12 +124,20 @@ def climb(
     judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)
     chosen = RUNGS[judged.near[0]]
     progress("geometry", 3, 4)
-    begin = _without(reference, problem, chosen)
-    final = fit(problem, free[chosen], begin, reference.used)
-    values = problem.values(final.state)
-    spread = _Sums(problem, final, block).draws(draws, rng)
+    rungs_of_chain = errors[:, : len(CHAIN_RUNGS)].mean(axis=0)
+    of_chain = chosen if chosen in CHAIN_RUNGS else CHAIN_RUNGS[int(rungs_of_chain.argmin())]
+
+    def fitted(rung: str) -> FittedRung:
+        begin = _without(reference, problem, rung)
+        final = fit(problem, free[rung], begin, reference.used)
+        values = problem.values(final.state)
+        spread = _Sums(problem, final, block).draws(draws, rng)
+        return FittedRung(rung, final, values, values + spread)
+
+    whole = fitted(chosen)
+    chain = whole if of_chain == chosen else fitted(of_chain)
     progress("geometry", 4, 4)
-    return GeometryLadder(tuple(rungs), chosen, final, values, values + spread)
+    return GeometryLadder(tuple(rungs), whole, chain)
 
 
 def _up_to(
@@ -156,21 +188,22 @@ class _Sums:
             own = rows == k
             self.G[k] = self.A[own].T @ self.A[own]
             self.h[k] = self.A[own].T @ self.b[own]
-        self.ridge = prior_weight(problem, about.sigma)
 
     def held_out(self, rung: str, free: IndexArray) -> RungErrors:
         """Return the errors of a rung at each fold, fitted to the others."""
         frames = np.array([u.rung == "registration" for u in self.problem.unknowns])
-        # What the fit has and the rung has not goes back to zero.
+        # What the fit has goes back to zero, where the prior of all rungs is.
         back = np.where(frames, 0.0, -self.values)
-        back[free] = np.where(frames[free], 0.0, -self.values[free])
-        b = self.b - self.A @ back
-        residual = np.empty((len(self.block), 3))
+        b, h = self.b - self.A @ back, self.h - self.G @ back
+        residual, ridge = b.reshape(-1, 3), prior_weight(self.problem, self.about.sigma)
+        for _ in range(_NOISE_STEPS):
+            # The noise beside which a rung's prior counts is what that rung leaves.
+            x = _solved(self.G.sum(axis=0), h.sum(axis=0), free, ridge)
+            residual = (b - self.A[:, free] @ x).reshape(-1, 3)
+            ridge = prior_weight(self.problem, noise(residual))
         for k in range(FOLDS):
             train = np.arange(self.count) % FOLDS != k
-            G = self.G[train].sum(axis=0)
-            h = self.h[train].sum(axis=0) - G @ back
-            x = self._solved(G, h, free)
+            x = _solved(self.G[train].sum(axis=0), h[train].sum(axis=0), free, ridge)
             out = self.block % FOLDS == k
             rows = np.repeat(out, 3)
             left = b[rows] - self.A[np.ix_(rows, free)] @ x
@@ -179,18 +212,19 @@ class _Sums:
 
     def draws(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Return how far draws of blocks take the unknowns from the fit, (draw, unknown)."""
-        free = self.about.free
+        free, ridge = self.about.free, prior_weight(self.problem, self.about.sigma)
         there = np.unique(self.block)
         # At the fit the positions pull as much away from zero as the prior pulls back.
-        prior = self.ridge * self.values
+        prior = ridge * self.values
         found = np.zeros((count, len(self.size)))
         for draw in found:
             chosen = rng.choice(there, len(there))
             h = self.h[chosen].sum(axis=0) - prior
-            x = self._solved(self.G[chosen].sum(axis=0), h, free)
+            x = _solved(self.G[chosen].sum(axis=0), h, free, ridge)
             draw[free] = x * self.size[free]
         return found
 
-    def _solved(self, G: FloatArray, h: FloatArray, free: IndexArray) -> FloatArray:
-        own = G[np.ix_(free, free)]
-        return np.asarray(np.linalg.solve(own + np.diag(self.ridge[free]), h[free]))
+
+def _solved(G: FloatArray, h: FloatArray, free: IndexArray, ridge: FloatArray) -> FloatArray:
+    own = G[np.ix_(free, free)]
+    return np.asarray(np.linalg.solve(own + np.diag(ridge[free]), h[free]))

@@ -11,12 +11,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, SchemaError
 from elastocal.findings import Finding
 from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
-from elastocal.geometry.ladder import GeometryLadder
-from elastocal.geometry.mistakes import findings
-from elastocal.geometry.plausibility import require_known_markers
 from elastocal.geometry.positions import Payload, Positions, joint_torques
-from elastocal.geometry.problem import GeometryProblem
-from elastocal.identification import interval
 from elastocal.records import read_json, record
 from elastocal.results import brief_repr
 from elastocal.robot import (
@@ -31,12 +26,11 @@ from elastocal.robot import (
     with_joint_origins,
     with_tool,
 )
+from elastocal.wording import mm
 
-SCHEMA = "elastocal.geometry/2"
+SCHEMA = "elastocal.geometry/3"
 _OFFSET = MOTION.index("offset")
 _DRAWN_TOOL = "tool_as_drawn"
-_LINE = 1e-2
-"""Spread of markers across their line, in m, from which they show a turn."""
 _SAME = 1e-6
 """Largest difference of two descriptions of one arm, in m and rad."""
 
@@ -92,7 +86,32 @@ class FixedParameter:
 
 
 @brief_repr
-@record(SCHEMA, reads=("elastocal.geometry/1",))
+@record()
+class ChainErrors:
+    """Places and zeros of joints fitted alone: all of the arm that a URDF or a table expresses."""
+
+    rung: str
+    """The best of those without yielding and gears."""
+    place: FloatArray
+    """Shape (joint, 6), in m and rad."""
+    offset: FloatArray
+    """Shape (joint,), in rad or m."""
+    markers: FloatArray
+    """In the tcp, shape (marker, 3), in m."""
+    held_out: DistanceFigures
+    T_tcp_built: FloatArray | None = None
+    """As for the whole geometry, shape (4, 4), in m."""
+
+    @property
+    def errors(self) -> ArmErrors:
+        """Its errors."""
+        motion = np.zeros((len(self.offset), len(MOTION)))
+        motion[:, _OFFSET] = self.offset
+        return ArmErrors(self.place.copy(), motion)
+
+
+@brief_repr
+@record(SCHEMA, reads=("elastocal.geometry/1", "elastocal.geometry/2"))
 class GeometryModel:
     """A calibrated geometry, which is also its file."""
 
@@ -121,6 +140,8 @@ class GeometryModel:
     T_tcp_built: FloatArray | None = None
     """The tcp as built in the tcp as described, shape (4, 4), in m; none where nobody knew where on
     the tool the markers are."""
+    chain: ChainErrors | None = None
+    """What a URDF expresses, fitted anew; none in files of before, which leave the rest out."""
 
     @property
     def robot(self) -> Robot:
@@ -204,8 +225,8 @@ class GeometryModel:
     def as_built(self, robot: Robot) -> Robot:
         """Return an arm with joints where they stand, and with the tcp as built where it is known.
 
-        Errors of gears and compliances have no place in a URDF: they are left out. So is an error
-        of the tcp where that is the link of a moving joint.
+        Errors of gears and compliances have no place in a URDF: it is of the fit without them
+        (`chain`). An error of the tcp is left out where that is the link of a moving joint.
 
         Parameters
         ----------
@@ -218,7 +239,7 @@ class GeometryModel:
             If it is another arm, or its joints' frames lie elsewhere on their axes.
         """
         own, T_own_tool, corrections = self.robot, self._way_to(robot), {}
-        joints = robot.chain.joints
+        joints, chain = robot.chain.joints, self._expressed()
         for index, (joint, described) in enumerate(zip(own.chain.joints, joints, strict=True)):
             gap = np.abs(joint.placement - described.placement).max()
             if not (gap < _SAME and np.abs(joint.axis - described.axis).max() < _SAME):
@@ -226,12 +247,14 @@ class GeometryModel:
                     f"the geometry is of another description of the arm: the frame of {joint.name}"
                     " lies elsewhere"
                 )
-            corrections[joint.name] = self._correction(index, joint)
+            corrections[joint.name] = _correction(chain.errors, index, joint)
         tool = fixed_joint_of(robot.urdf, robot.tip)
-        if self.T_tcp_built is not None and tool is not None:
-            corrections[tool] = inverse_transform(T_own_tool) @ self.T_tcp_built @ T_own_tool
+        if chain.T_tcp_built is not None and tool is not None:
+            corrections[tool] = inverse_transform(T_own_tool) @ chain.T_tcp_built @ T_own_tool
         # Two dashes would end a comment of XML.
-        made = f"{BUILT_MARK}: {self.provenance.replace('--', '- -')}"
+        after, before = mm(chain.held_out.mean), mm(self.held_out.registration.mean)
+        error = f"{after} mean error at poses left out, {before} as drawn"
+        made = f"{BUILT_MARK}: {self.provenance.replace('--', '- -')}; {error}"
         urdf = with_joint_origins(robot.urdf, corrections)
         urdf = urdf.replace("</robot>", f"  <!-- {made} -->\n</robot>")
         return replace(Robot.from_urdf(urdf, robot.tip, robot.base), gravity=robot.gravity)
@@ -243,22 +266,18 @@ class GeometryModel:
     def markers_on(self, built: Robot) -> FloatArray:
         """Return the markers in the tcp of an arm by `as_built`, shape (marker, 3), in m."""
         q = np.zeros((1, len(built.joint_names)))
-        place = replace(self.errors, motion=self.motion * (np.arange(len(MOTION)) == _OFFSET))
-        T_base_own = frames(self.robot, q, np.zeros_like(q), place).T_base_tcp[0]
+        chain = self._expressed()
+        T_base_own = frames(self.robot, q, np.zeros_like(q), chain.errors).T_base_tcp[0]
         T = inverse_transform(built.forward(q[0])) @ T_base_own
-        return np.asarray(self.markers @ T[:3, :3].T + T[:3, 3])
+        return np.asarray(chain.markers @ T[:3, :3].T + T[:3, 3])
 
-    def _correction(self, index: int, joint: ChainJoint) -> FloatArray:
-        """Return where a joint stands in its frame as drawn, its zero included, shape (4, 4)."""
-        T, place = np.eye(4), self.errors.place[index]
-        T[:3, 3] = place[:3]
-        T[:3, :3] = Rotation.from_rotvec(place[3:]).as_matrix()
-        offset = self.motion[index, _OFFSET] * joint.axis
-        if joint.revolute:
-            T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(offset).as_matrix()
-        else:
-            T[:3, 3] += T[:3, :3] @ offset
-        return T
+    def _expressed(self) -> ChainErrors:
+        """Return what a URDF expresses."""
+        if self.chain is not None:
+            return self.chain
+        rung, figures = next(each.rung for each in self.ladder if each.chosen), self.held_out.chosen
+        offset = self.motion[:, _OFFSET]
+        return ChainErrors(rung, self.place, offset, self.markers, figures, self.T_tcp_built)
 
     def _way_to(self, robot: Robot) -> FloatArray:
         """Return a tool of the same arm, as drawn or as built, in the tcp, shape (4, 4)."""
@@ -280,6 +299,19 @@ class GeometryModel:
         return np.asarray(T_own_tool[0])
 
 
+def _correction(errors: ArmErrors, index: int, joint: ChainJoint) -> FloatArray:
+    """Return where a joint stands in its frame as drawn, its zero included, shape (4, 4)."""
+    T, place = np.eye(4), errors.place[index]
+    T[:3, 3] = place[:3]
+    T[:3, :3] = Rotation.from_rotvec(place[3:]).as_matrix()
+    offset = errors.motion[index, _OFFSET] * joint.axis
+    if joint.revolute:
+        T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(offset).as_matrix()
+    else:
+        T[:3, 3] += T[:3, :3] @ offset
+    return T
+
+
 def read_geometry(path: Path) -> GeometryModel:
     """Return the model in a file.
 
@@ -295,7 +327,18 @@ def read_geometry(path: Path) -> GeometryModel:
     found = read_json(path, GeometryModel)
     with refusals_naming(path):
         joints = len(found.robot.joint_names)
+    chain = found.chain
+    of_chain = (
+        {}
+        if chain is None
+        else {
+            "chain.place": (chain.place, (joints, len(KINDS))),
+            "chain.offset": (chain.offset, (joints,)),
+            "chain.markers": (chain.markers, found.markers.shape),
+        }
+    )
     wanted = {
+        **of_chain,
         "place": (found.place, (joints, len(KINDS))),
         "motion": (found.motion, (joints, len(MOTION))),
         "markers": (found.markers, (*found.markers.shape[:1], 3)),
@@ -305,85 +348,3 @@ def read_geometry(path: Path) -> GeometryModel:
         if values.shape != shape:
             raise SchemaError(f"{path}: {name} has shape {values.shape}, not {shape}")
     return found
-
-
-def geometry_model(
-    problem: GeometryProblem,
-    found: GeometryLadder,
-    provenance: str,
-    markers: FloatArray | None = None,
-) -> GeometryModel:
-    """Return the model that a ladder has found.
-
-    Parameters
-    ----------
-    problem : GeometryProblem
-        What was fitted.
-    found : GeometryLadder
-        What was found.
-    provenance : str
-        What it was made from, in words.
-    markers : ndarray, shape (marker, 3), optional
-        Where on the tool the markers are known to be, in the tcp, in m: what the positions say
-        otherwise is an error of the tcp.
-
-    Raises
-    ------
-    GeometryError
-        If markers are known of another number than were measured.
-    """
-    robot, data, state = problem.robot, problem.data, found.fit.state
-    T_tcp_built = None if markers is None else _tcp_as_built(state.markers, markers)
-    low, high = interval(found.draws)
-    free = set(found.fit.free.tolist())
-    parameters = tuple(
-        GeometryParameter(
-            each.name,
-            float(found.values[index]),
-            each.unit,
-            float(low[index]),
-            float(high[index]),
-            bool(high[index] - low[index] <= 2.0 * each.size),
-        )
-        for index, each in enumerate(problem.unknowns)
-        if index in free and each.rung != "registration"
-    )
-    rungs = tuple(
-        GeometryRung(each.rung, each.free, _figures(each.distance), each.rung == found.chosen)
-        for each in found.rungs
-    )
-    chosen = next(each for each in rungs if each.chosen)
-    return GeometryModel(
-        robot_urdf=robot.urdf,
-        tcp=robot.tip,
-        place=state.errors.place,
-        motion=state.errors.motion,
-        stations=dict(zip(data.stations, state.T_station_base, strict=True)),
-        markers=state.markers,
-        held_out=HeldOutFigures(rungs[0].held_out, chosen.held_out),
-        ladder=rungs,
-        parameters=parameters,
-        fixed=tuple(FixedParameter(each.name, each.why) for each in found.fit.fixed),
-        blunders=tuple(sorted(set(problem.row[~found.fit.used].tolist()))),
-        positions=len(problem),
-        provenance=provenance,
-        findings=findings(problem, found.fit),
-        T_tcp_built=T_tcp_built,
-    )
-
-
-def _tcp_as_built(fitted: FloatArray, known: FloatArray) -> FloatArray:
-    """Return the tcp in which markers are where they are known to be, shape (4, 4), in m."""
-    require_known_markers(fitted, known)
-    there, here, T = fitted.mean(axis=0), known.mean(axis=0), np.eye(4)
-    if np.linalg.matrix_rank(known - here, tol=_LINE) > 1:
-        # Markers that are not in line say how the tool is turned, too.
-        T[:3, :3] = Rotation.align_vectors(fitted - there, known - here)[0].as_matrix()
-    T[:3, 3] = there - T[:3, :3] @ here
-    return T
-
-
-def _figures(distance: FloatArray) -> DistanceFigures:
-    return DistanceFigures(
-        float(distance.mean()), float(np.percentile(distance, 95)), float(distance.max())
-    )

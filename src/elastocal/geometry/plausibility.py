@@ -430,12 +430,13 @@ def implausible(problem: GeometryProblem, found: GeometryLadder) -> str | None:
             f" links misses by less than {1e3 * MOST_LEFT_OUT * length:.2g} mm once it is"
             " calibrated"
         )
-    blunders = int((~found.fit.used).sum())
+    blunders = int((~found.whole.fit.used).sum())
     if not blunders <= _MOST_BLUNDERS * len(problem):
         return f"{blunders} of {len(problem)} positions contradict the others"
-    spread = found.draws.std(axis=0) if len(found.draws) else np.zeros(len(found.values))
-    least = np.abs(found.values) - 2.0 * spread
-    for unknown, value, sure in zip(problem.unknowns, found.values, least, strict=True):
+    whole = found.whole
+    spread = whole.draws.std(axis=0) if len(whole.draws) else np.zeros(len(whole.values))
+    least = np.abs(whole.values) - 2.0 * spread
+    for unknown, value, sure in zip(problem.unknowns, whole.values, least, strict=True):
         joint, _, kind = unknown.name.rpartition(".")
         what, largest = _LARGEST.get(kind.partition("_")[0], ("", np.inf))
         if unknown.rung != "registration" and not sure <= largest:
@@ -483,8 +484,7 @@ def require_known_markers(found: FloatArray, known: FloatArray) -> None:
 
 def _left_out(found: GeometryLadder) -> float:
     """Return the median error at poses left out, in m."""
-    chosen = next(each for each in found.rungs if each.rung == found.chosen)
-    return float(np.median(chosen.distance))
+    return float(np.median(found.errors(found.chosen).distance))
 
 
 def _as_drawn(robot: Robot, data: Positions) -> float:

@@ -15,6 +15,8 @@ from elastocal.robot import GRAVITY, ChainJoint, Robot
 
 RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics")
 """From the frames alone to errors of the gears; each has all of those before."""
+CHAIN_RUNGS = RUNGS[:3]
+"""Those that have nothing but places and zeros of joints: what a URDF can express."""
 _SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3}
 """Likely sizes in m, rad: a column is weighed by its parameter's."""
 PRIOR_WIDTH = 3.0

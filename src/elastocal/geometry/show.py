@@ -122,6 +122,8 @@ def axis_table(accuracy: GeometryAccuracy) -> Table:
 
 def rung_table(model: GeometryModel) -> Table:
     """Return the models that were tried, with their errors at the same left-out poses."""
+    taken = {"" if model.chain is None else model.chain.rung: phrase("in URDF and table")}
+    taken |= {each.rung: phrase("taken") for each in model.ladder if each.chosen}
     return Table(
         phrase("Models at the same left-out poses, mm"),
         (*phrases("Model", "Unknowns", "Mean", "95 % below", "Largest"), ""),
@@ -130,7 +132,7 @@ def rung_table(model: GeometryModel) -> Table:
                 each.rung,
                 each.unknowns,
                 *(f"{1e3 * value:.3f}" for value in vars(each.held_out).values()),
-                phrase("taken") if each.chosen else "",
+                taken.get(each.rung, ""),
             )
             for each in model.ladder
         ),

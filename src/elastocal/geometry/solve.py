@@ -151,12 +151,16 @@ def fit(
     )
 
 
+def noise(residual: FloatArray) -> float:
+    """Return the robust standard deviation of a coordinate of residuals, shape (point, 3), in m."""
+    return max(float(np.median(np.linalg.norm(residual, axis=1))) / _CHI, _FINEST)
+
+
 def _weights(
     r: FloatArray, keep: BoolArray, used: BoolArray | None, *, robust: bool, returns: bool
 ) -> tuple[FloatArray, BoolArray, float]:
     """Return the weight of each position, which are no blunders, and the noise of a coordinate."""
-    distance = np.linalg.norm(r, axis=1)
-    sigma = max(float(np.median(distance[keep])) / _CHI, _FINEST)
+    distance, sigma = np.linalg.norm(r, axis=1), noise(r[keep])
     if robust:
         return np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)), keep, sigma
     if used is not None:

@@ -9,9 +9,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from elastocal.blocks import Block
-from elastocal.errors import FileAccessError
+from elastocal.errors import FileAccessError, GeometryError, present
 from elastocal.files import write_text
 from elastocal.geometry import (
+    DistanceFigures,
     GeometryAccuracy,
     GeometryModel,
     GeometryProblem,
@@ -55,11 +56,11 @@ class GeometrySettings:
     out: Annotated[Path | None, Option(required=True, help="Model file (.json) to write.")] = None
     """Model file to write; none: the model is only returned."""
     urdf: Path | None = None
-    """Calibrated URDF to write."""
+    """Calibrated URDF to write: places and zeros of joints, fitted without what it cannot hold."""
     report_file: Annotated[Path | None, Option("--report")] = None
     """Report to write, ``.html``."""
     table: Path | None = None
-    """Table of links as drawn and as built to write, ``.csv``."""
+    """Table of links as drawn and as built to write, ``.csv``, of the arm of ``--urdf``."""
     markers: Annotated[tuple[str, ...], Option("--marker")] = ()
     """Position of each marker on the tool, ``"x, y, z"`` in the tcp with units, where known: an
     error of the tcp is then estimated, too."""
@@ -81,6 +82,11 @@ class GeometryResult(Result):
     accuracy: GeometryAccuracy
     """Errors of every position before and after, at poses that were left out."""
 
+    @property
+    def expressed(self) -> DistanceFigures:
+        """Errors at left-out poses of what the URDF and the table of links express."""
+        return present(self.model.chain, "chain").held_out
+
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
         model = self.model
@@ -91,6 +97,7 @@ class GeometryResult(Result):
             ("nominal arm", _phrase(before.mean, before.p95, before.max)),
             ("calibrated", _phrase(after.mean, after.p95, after.max)),
             ("model", next(each.rung for each in model.ladder if each.chosen)),
+            ("as a URDF", _phrase(*vars(self.expressed).values())),
             ("errors of the arm", f"{known} known of {len(model.parameters)} fitted"),
             *(("warning", each) for each in model.findings),
         )
@@ -143,6 +150,8 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
         np.array([parse_point(each) for each in settings.markers]) if settings.markers else None
     )
     model = geometry_model(problem, found, f"elastocal geometry {path.name}", markers)
+    if settings.urdf is not None or settings.table is not None:
+        _require_expressible(model)
     if settings.out is not None:
         write_json(settings.out, model)
     if settings.urdf is not None:
@@ -167,6 +176,18 @@ def _check_suffixes(settings: GeometrySettings) -> None:
     ):
         if path is not None and path.suffix.lower() != suffix:
             raise FileAccessError(f"--{name} {path}: its name must end in {suffix}")
+
+
+def _require_expressible(model: GeometryModel) -> None:
+    """Refuse outputs that would leave out all that was found."""
+    chain, before = present(model.chain, "chain"), model.held_out.registration
+    chosen = next(each.rung for each in model.ladder if each.chosen)
+    if chain.rung == "registration" != chosen:
+        raise GeometryError(
+            f"--urdf and --table express places and zeros of joints, which are no better than the"
+            f" nominal arm here ({mm(before.mean)} mean at poses left out): what was found is"
+            f" {chosen}, {mm(model.held_out.chosen.mean)}; use the model file"
+        )
 
 
 def _cells(row: LinkNumber) -> tuple[object, ...]:
