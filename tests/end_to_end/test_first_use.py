@@ -1,11 +1,14 @@
 """From the files of a foreign cell to a signed certificate, by the commands of the how-to page."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from support.foreign_campaign import ARMS
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "first_use.py"
 
@@ -30,5 +33,10 @@ def test_the_planted_compliances_lie_within_the_certificate(arm, tmp_path):
     assert sum(inside) >= len(known) - 1
     report, verified = (step["said"] for step in found["steps"][-2:])
     assert report.startswith("Within"), report
+    page = (tmp_path / arm / "report.html").read_text(encoding="utf-8")
+    press, aside = re.search(r"poses; (.+?) N pressing, up to (\d+) N", page).groups()
+    for each in press.split(" to "):
+        assert int(each) == pytest.approx(ARMS[arm].press, rel=0.02)
+    assert int(aside) == pytest.approx(0.3 * ARMS[arm].press, rel=0.02)
     for link in ("page", "signature", "files", "logs", "dataset", "model", "codec"):
         assert f"whole          {link}: " in verified, verified

@@ -13,6 +13,10 @@ from .findings import (
     find_everything as find_everything,
     has_own_process as has_own_process,
 )
+from .fitted import (
+    FittedReadings as FittedReadings,
+    fitted_readings as fitted_readings,
+)
 from .gather import EvidenceOptions as EvidenceOptions, gather_evidence as gather_evidence
 from .history import (
     begin_record as begin_record,

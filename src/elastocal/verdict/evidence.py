@@ -157,12 +157,13 @@ class Evidence:
 
     @property
     def robot(self) -> str:
-        """Name of the robot; empty if no part states it."""
-        if self.cell is not None:
-            return self.cell.robot.name
+        """Name of the robot; empty when no part tells it."""
+        # What was measured goes before what was meant to be.
+        if self.dataset is not None:
+            return self.dataset.robot_name
         if self.calibrated is not None:
             return self.calibrated.model.model.robot.name
-        return "" if self.dataset is None else self.dataset.robot_name
+        return "" if self.cell is None else self.cell.robot.name
 
     @property
     def simulated(self) -> bool:
@@ -368,6 +369,9 @@ def _why_not_reproduced(evidence: Evidence) -> str:
 
 
 def _dataset(evidence: Evidence) -> Iterator[str]:
+    cell, dataset = evidence.cell, evidence.dataset
+    if cell is not None and dataset is not None and dataset.robot_name != cell.robot.name:
+        yield f"the dataset is of {dataset.robot_name}, the cell of {cell.robot.name}"
     if evidence.dataset is None or not evidence.journal:
         return
     record = evidence.run_record

@@ -4,8 +4,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from elastocal.codec import Saturation
 from elastocal.findings import Finding, Grade, Kind, as_count, as_number, group_alike
 from elastocal.identification import SuspiciousReading
@@ -13,6 +11,7 @@ from elastocal.identification.recertification import Verdict as Recertified
 from elastocal.procedure import commits
 from elastocal.verdict.chain import LinkState
 from elastocal.verdict.evidence import Evidence
+from elastocal.verdict.fitted import fitted_readings, place_of_force
 from elastocal.verdict.history import history_findings
 from elastocal.wording import Phrase, mm, phrase, sentences, spans
 
@@ -30,18 +29,11 @@ def find_everything(evidence: Evidence) -> tuple[Finding, ...]:
 
 
 def place_of_reading(evidence: Evidence, pose: int, load_case: str) -> Phrase:
-    """Return a reading's pose and load case, with the force if the cell states it."""
+    """Return a reading's pose and load case, with the measured force where it is known."""
     name = phrase("pose {pose}, load case {load_case}", pose=pose, load_case=load_case)
-    presses = {} if evidence.cell is None else evidence.cell.file.presses
-    if load_case not in presses:
-        return name
-    x, y, z = presses[load_case]
-    press, aside = f"{abs(z):.0f}", f"{np.hypot(x, y):.0f}"
-    if aside == "0":
-        return phrase("{name} ({press} N pressing)", name=name, press=press)
-    return phrase(
-        "{name} ({press} N pressing, {aside} N sideways)", name=name, press=press, aside=aside
-    )
+    tested = fitted_readings(evidence)
+    force = None if tested is None else tested.forces.get((pose, load_case))
+    return name if force is None else place_of_force(name, force)
 
 
 LEFT_OUT_BY_HAND = Kind(
@@ -60,8 +52,9 @@ NOT_COVERED = Kind(
 
 
 def reading_findings(evidence: Evidence) -> Iterator[Finding]:
-    """Yield findings on single readings: missing, suspicious, left out."""
+    """Yield findings on single readings: missing, suspicious, left out, of another day."""
     yield from _missing_poses(evidence)
+    yield from _other_date(evidence)
     figures = evidence.figures
     if figures is None:
         return
@@ -102,6 +95,21 @@ def _advice_on_missing(values: Mapping[str, Any]) -> str:
             )
         )
     return sentences(texts)
+
+
+OTHER_DATE = Kind(
+    "verdict.other-date",
+    "the date {stated} was stated for the certificate, and the run began on {began}: the day of"
+    " the run stands there",
+    advice="Take the date out of the cell file, or out of --state.",
+    grade=Grade.NOTE,
+)
+
+
+def _other_date(evidence: Evidence) -> Iterator[Finding]:
+    record, stated = evidence.run_record, evidence.certificate.date
+    if record is not None and stated is not None and not record.started.startswith(stated):
+        yield OTHER_DATE(stated=stated, began=record.started[: len(stated)])
 
 
 PARTIAL = Kind(

@@ -44,12 +44,6 @@ def test_what_is_stated_stands_there_and_the_rest_is_said_to_be_missing_in_one_l
     assert "Tracker (type, calibration certificate), Place" in certificate.not_entered
 
 
-def test_the_forces_of_the_test_stand_on_the_first_page(certificate, parts):
-    (tested,) = {str(name): found for name, found in certificate.identity}["Tested with"]
-    forces = np.array(list(parts.cell.file.presses.values()))
-    assert f" {np.abs(forces[:, 2]).max():.0f} N pressing" in tested
-
-
 def test_the_picture_names_the_reading_with_the_largest_error(certificate, parts):
     worst = parts.unseen.pose[parts.unseen.error.argmax()]
     assert certificate.picture.worst.text.startswith(f"pose {worst}: ")

@@ -16,6 +16,7 @@ from elastocal.verdict import (
     LinkState,
     UncertaintyStatement,
     Verdict,
+    fitted_readings,
     state_uncertainty,
     why_not_stated,
 )
@@ -157,7 +158,7 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
     entry, cell = evidence.certificate, evidence.cell
     sensor = None if cell is None else cell.file.sensor
     named = None if sensor is None else sensor.name
-    mass = () if cell is None else (phrase("{mass} kg", mass=f"{cell.file.tool.mass:g}"),)
+    mass = _tool_mass(evidence)
     things = (
         (phrase("Robot"), entry.robot, evidence.robot, ()),
         (phrase("Controller"), entry.controller, None, ()),
@@ -180,7 +181,7 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
     )
     others: tuple[tuple[Phrase, str | Stamp | None], ...] = (
         (phrase("Tested with"), _tested_with(evidence)),
-        (day, entry.date or began),
+        (day, began or entry.date),
         (phrase("Place"), entry.place),
         (phrase("Temperature"), entry.temperature),
         (phrase("Operator"), entry.operator),
@@ -209,21 +210,22 @@ def _equipment(thing: Equipment, own: str | None) -> tuple[tuple[str, ...], list
     return tuple(parts), lacking
 
 
+def _tool_mass(evidence: Evidence) -> tuple[Phrase, ...]:
+    """Return the mass of the tool as it was measured, else as the cell file states it."""
+    measured = None if evidence.summary is None else evidence.summary.tool.mass_kg.value
+    if evidence.tool is not None and "mass" not in evidence.tool.undetermined:
+        measured = evidence.tool.mass
+    if measured is not None:
+        return (phrase("{mass} kg, measured", mass=f"{measured:.1f}"),)
+    if evidence.cell is None:
+        return ()
+    return (phrase("{mass} kg by the cell file", mass=f"{evidence.cell.file.tool.mass:g}"),)
+
+
 def _tested_with(evidence: Evidence) -> Phrase | None:
-    """Return the poses and the forces of the test."""
-    cell, dataset = evidence.cell, evidence.dataset
-    if cell is None or dataset is None:
-        return None
-    forces = np.array(list(cell.file.presses.values()))
-    push, aside = np.abs(forces[:, 2]), np.hypot(forces[:, 0], forces[:, 1])
-    poses, high = counted(len(dataset.poses), "pose"), f"{push.max():.0f}"
-    low = f"{push.min():.0f}"
-    return phrase(
-        "{poses}; {press} N pressing, up to {aside} N sideways",
-        poses=poses,
-        press=high if low == high else phrase("{low} to {high}", low=low, high=high),
-        aside=f"{aside.max():.0f}",
-    )
+    """Return the poses and the measured forces of the test."""
+    tested = fitted_readings(evidence)
+    return None if tested is None else tested.sentence()
 
 
 def _coverage(found: ProductionCoverage | None, red: bool) -> Phrase:
@@ -287,12 +289,11 @@ def _bar(evidence: Evidence) -> ToleranceBar | None:
 
 
 def _before_after(evidence: Evidence) -> BeforeAfter | None:
-    unseen, dataset = evidence.unseen, evidence.dataset
-    if unseen is None or dataset is None:
+    unseen, tested = evidence.unseen, fitted_readings(evidence)
+    if unseen is None or tested is None:
         return None
-    readings = dataset.readings(dataset.joint_names)
-    size = np.linalg.norm(readings.deflection, axis=1)
-    poses = list(dict.fromkeys(sorted(map(int, readings.pose))))
+    size = np.linalg.norm(tested.deflection, axis=1)
+    poses = sorted(set(map(int, tested.pose)))
     place = {pose: number for number, pose in enumerate(poses)}
     end, step = _scale(in_unit(max(float(size.max()), unseen.max), "mm"), 4)
     between = _WIDE / max(len(poses), 1)
@@ -310,7 +311,7 @@ def _before_after(evidence: Evidence) -> BeforeAfter | None:
     worst = 100.0 * (place[int(unseen.pose[k])] + 0.62) / len(poses)
     named = phrase("pose {pose}: {error}", pose=unseen.pose[k], error=mm(unseen.max))
     return BeforeAfter(
-        dots(readings.pose, size, -0.12),
+        dots(tested.pose, size, -0.12),
         dots(unseen.pose, unseen.error, 0.12),
         level if level is not None and level >= 0.0 else None,
         tuple(Mark(_HIGH * (1.0 - t / end), f"{t:.{_digits(step)}f}") for t in ticks),

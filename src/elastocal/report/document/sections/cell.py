@@ -13,7 +13,7 @@ from elastocal.procedure.derive import RegistrationSummary, RunSummary, ToolSumm
 from elastocal.report.document.section import Section
 from elastocal.report.plots import StationResiduals, station_figure
 from elastocal.units import in_unit, quantity
-from elastocal.verdict import Evidence
+from elastocal.verdict import Evidence, FittedReadings, fitted_readings
 from elastocal.wording import Phrase, counted, mm, phrase, phrases, point, spans, um
 
 
@@ -32,15 +32,36 @@ def _cell(evidence: Evidence) -> Iterator[blocks.Block]:
     heads = phrases("What", "Value")
     instruments = tuple(_instruments(cell))
     yield blocks.Table(phrase("Robot, tool and instruments"), heads, instruments, texts=2)
-    yield blocks.Table(
-        phrase("Presses at a pose, in order: force on the robot in the tcp frame, in N"),
-        (phrase("Load case"), "x", "y", "z"),
-        tuple(
-            (name, *(f"{value + 0.0:.0f}" for value in force))
-            for name, force in cell.file.presses.items()
-        ),
-    )
+    yield _presses(cell, fitted_readings(evidence))
     yield blocks.Table(phrase("Limits of the poses"), heads, tuple(_limits(cell)), texts=2)
+
+
+def _presses(cell: Cell, tested: FittedReadings | None) -> blocks.Table:
+    """Return the presses that the cell file asks for beside what was measured under their names."""
+    asked, cases = cell.file.presses, np.array([] if tested is None else tested.load_case)
+
+    def row(name: str) -> blocks.Row:
+        planned = asked.get(name)
+        wanted = ("–",) * 3 if planned is None else tuple(f"{each + 0.0:.0f}" for each in planned)
+        of_name = cases == name
+        if tested is None or not of_name.any():
+            return (name, *wanted, *("–",) * 3, "0")
+        found = np.median(tested.force_tcp[of_name], axis=0)
+        return (name, *wanted, *(f"{each + 0.0:.0f}" for each in found), str(of_name.sum()))
+
+    return blocks.Table(
+        phrase(
+            "Presses at a pose, in order: force on the robot in the tcp frame, in N, as the cell"
+            " file asks for it, and the median of what was measured"
+        ),
+        (
+            phrase("Load case"),
+            *(phrase("{axis} asked", axis=axis) for axis in "xyz"),
+            *(phrase("{axis} measured", axis=axis) for axis in "xyz"),
+            phrase("Readings of the fit"),
+        ),
+        tuple(row(name) for name in dict.fromkeys((*asked, *cases.tolist()))),
+    )
 
 
 def _instruments(cell: Cell) -> Iterator[tuple[str, str]]:

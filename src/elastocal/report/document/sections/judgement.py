@@ -9,11 +9,12 @@ from elastocal.verdict import (
     Evidence,
     UncertaintySource,
     find_everything,
+    fitted_readings,
     judge_evidence,
     state_uncertainty,
     why_not_stated,
 )
-from elastocal.wording import Phrase, mm, phrase, phrases
+from elastocal.wording import Phrase, mm, phrase, phrases, spans
 
 
 def _findings(evidence: Evidence) -> Iterator[blocks.Block]:
@@ -243,10 +244,17 @@ def _always(evidence: Evidence) -> Iterator[Phrase]:
         )
     if evidence.plan is not None:
         yield phrase(
-            "Places on the surface farther than {radius} from every pose; that is how far the worst"
-            " covered candidate is from one.",
+            "Places on the surface farther than {radius} from every planned pose; that is how far"
+            " the worst covered candidate is from one.",
             radius=mm(evidence.plan.search.covering_radius, 1),
         )
+        tested = fitted_readings(evidence)
+        measured = set() if tested is None else set(map(int, tested.pose))
+        lost = sorted({pose.id for pose in evidence.plan.poses} - measured)
+        if lost:
+            yield phrase(
+                "Places near planned poses without a reading: pose {poses}.", poses=spans(lost)
+            )
 
 
 NOT_VERIFIED = Section(
