@@ -26,7 +26,7 @@ class Grade(Enum):
     """Severity of a finding."""
 
     NOTE = "note"
-    """Worth knowing; it keeps no light from being green."""
+    """Information; it does not affect the light."""
     WARNING = "warning"
     """The light of the report is not green."""
     REFUSAL = "refusal"

@@ -23,8 +23,8 @@ _OPEN_TO_ALL = 0o1777
 _MOST_TEXT = 400
 """Bytes that are read of what a holder has written about itself."""
 _FAR = 0x7FFF_FFFE
-"""The byte that stands for a whole file on Windows, whose locks keep others from reading, too: one
-that no file of ours reaches."""
+"""Byte that represents a whole file on Windows, whose locks also prevent reading: one beyond the
+end of all files of elastocal."""
 
 
 def lock_file(handle: int) -> None:

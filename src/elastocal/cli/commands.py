@@ -467,7 +467,7 @@ class _ToolOrFile:
 
 
 _TOOL = ("tool", "tools", "tool_frame")
-"""Fields that this one option stands for."""
+"""Fields that this single option replaces."""
 
 
 def _tools(given: Given) -> tuple[tuple[Path, ...], str | None]:

@@ -77,7 +77,7 @@ def read_comparison(text: str) -> tuple[str, tuple[str, ...]]:
     Raises
     ------
     CodecError
-        If the key is unknown, or a value is missing or stands twice.
+        If the key is unknown, or a value is missing or repeated.
     """
     key, _, listed = text.partition("=")
     key, values = key.strip(), tuple(value.strip() for value in listed.split(","))
@@ -100,7 +100,7 @@ def read_comparisons(texts: Sequence[str]) -> dict[str, tuple[str, ...]]:
     Raises
     ------
     CodecError
-        If a text does not fit, or a key stands twice.
+        If a text does not fit, or a key is repeated.
     """
     return values_by_key("--compare", texts, read_comparison)
 
@@ -115,14 +115,14 @@ def values_by_key(
     option : str
         For messages.
     texts : sequence of str
-        What was given.
+        Texts of the option.
     read : callable
         Returns key and values of a text, or refuses it.
 
     Raises
     ------
     CodecError
-        If a key stands twice.
+        If a key is repeated.
     """
     found: dict[str, tuple[_Value, ...]] = {}
     for text in texts:
@@ -170,7 +170,7 @@ def training_cases(spec: str, known: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     DatasetError
-        If the dataset lacks one of them, or one stands twice.
+        If the dataset lacks one of them, or one is repeated.
     """
     if spec in known:
         return (spec,)

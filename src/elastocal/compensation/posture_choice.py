@@ -51,8 +51,8 @@ def choose_postures(survey: PostureSurvey, solver: InverseKinematics) -> Posture
     survey : PostureSurvey
         All postures.
     solver : InverseKinematics
-        That found them. Only the closed form's branches go on from station to station; of another
-        solver's, the stiffest of each station stands for all.
+        Solver that found them. Only the branches of the closed form continue from station to
+        station; for another solver, the stiffest posture of each station represents all.
     """
     stiffness = np.where(np.isnan(survey.stiffness), -np.inf, survey.stiffness)
     flat = stiffness.reshape(len(stiffness), -1)

@@ -241,12 +241,12 @@ def joint_name_problem(name: str) -> str | None:
 
 
 def require_joint_names(names: Sequence[str]) -> None:
-    """Refuse joints that no dataset can hold; whatever reads a robot to measure with asks this.
+    """Refuse joints that no dataset can hold; every reader of a robot to measure calls this.
 
     Raises
     ------
     DatasetError
-        If there is none, or one cannot name a column of its own, or stands twice.
+        If there is none, or one cannot name a column of its own, or is repeated.
     """
     if not names:
         raise DatasetError("coordinate 'joint' is empty: a robot has at least one joint")

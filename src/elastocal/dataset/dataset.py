@@ -629,7 +629,7 @@ class Dataset(Result):
         Raises
         ------
         DatasetError
-            If a label is unknown or stands twice, or nothing usable is left.
+            If a label is unknown or repeated, or nothing usable is left.
         """
         return selected(self, poses, load_cases)
 

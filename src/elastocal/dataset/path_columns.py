@@ -81,8 +81,8 @@ def find_columns(
     Raises
     ------
     PathError
-        If a column is missing, stands twice, has no unit or a wrong one, or the path has both
-        joints and poses, or forces both in base and in the tcp frame, or neither.
+        If a column is missing, is repeated, has no unit or a wrong one, or the path has both joints
+        and poses, or forces both in base and in the tcp frame, or neither.
     """
     found = _split(header)
     if not poses:
@@ -183,19 +183,19 @@ def find_time(header: Sequence[str]) -> Column | None:
     Raises
     ------
     PathError
-        If it stands twice, has no unit or a wrong one.
+        If it is repeated, has no unit or a wrong one.
     """
     found = _split(header)
     return _column(found, "time", "time") if "time" in found else None
 
 
 def find_names(header: Sequence[str], name: str) -> int | None:
-    """Return the place of a column of names, such as ``course``; None where there is none.
+    """Return the index of a column of names, such as ``course``; None if there is none.
 
     Raises
     ------
     PathError
-        If it stands twice, has a unit or is all but written so.
+        If it is repeated, has a unit or a nearly equal name.
     """
     found = _split(header)
     if name in found:

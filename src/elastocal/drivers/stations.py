@@ -311,19 +311,19 @@ _AGAIN = 1.0
 
 
 class StationLink(threading.Thread, ABC):
-    """Keeps one connection up until it is closed; what it hears fills the feeds of its stations.
+    """Keeps one connection until it is closed; received events fill the feeds of its stations.
 
     Parameters
     ----------
     name : str
         Name of the thread.
     feeds : sequence of StationFeed
-        Told when the connection is gone.
+        Informed when the connection is lost.
     clock : Clock
         Clock of the rig.
     patience : float
-        How long a connection may be gone before that is a fault, in s. Infinite: nothing is one,
-        it is connected again whatever it said.
+        Largest time without a connection before a fault, in s. Infinite: there is no fault, it is
+        connected again whatever it said.
     """
 
     def __init__(

@@ -130,7 +130,7 @@ def choose_model(
     beside: Sequence[str] = (),
     production: ProductionRows | None = None,
 ) -> Choice:
-    """Return the elastic model that a user asks for.
+    """Return the elastic model that an option requests.
 
     Parameters
     ----------

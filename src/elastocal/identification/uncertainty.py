@@ -40,8 +40,8 @@ _READINGS = 2000
 MOST_FOLDS = 100
 """With more pose blocks than this, several are left out together."""
 _RANGE, _ALIKE = (0.05, 0.95), 1.5
-"""Quantiles of the deflections that are alike where one is no more than this many times the other:
-what is left then does not tell what of it grows with them."""
+"""Quantiles of the deflections, and the largest ratio of the two for which they count as equal: the
+errors then do not show which part grows with the deflection."""
 _REWEIGHTED = 6
 """Rounds of weights, after which a split no longer changes."""
 _LEAST_VARIANCE = 1e-3
@@ -51,10 +51,10 @@ _LEAST_VARIANCE = 1e-3
 @brief_repr
 @dataclass(frozen=True)
 class Misfit:
-    """How far a reading lies from its prediction, beside what the draws of the fit tell.
+    """Distance of a reading from its prediction, beyond the spread of the draws.
 
-    The noise of a reading stays the same when the load becomes smaller; what springs cannot express
-    shrinks with it. They add up as independent errors do, so that the interval holds at every load.
+    The noise of a reading stays the same when the load becomes smaller; the model error shrinks
+    with it. They add up as independent errors do, so that the interval holds at every load.
     """
 
     floor: float
@@ -181,21 +181,21 @@ class Coverage:
 def measured_coverage(
     problem: Problem, held_out: HeldOut, deviations: FloatArray, is_low: BoolArray
 ) -> Coverage:
-    """Return how many left-out readings lie inside the interval of a measurement there.
+    """Return the share of left-out readings inside the interval of a measurement.
 
     The interval is that of the refit without the reading's pose; its misfit is that of the other
-    poses' errors, or the readings would have a part in their own interval.
+    poses' errors, so that a reading does not influence its own interval.
 
     Parameters
     ----------
     problem : Problem
-        What was fitted.
+        Fitted problem.
     held_out : HeldOut
         Its refits.
     deviations : ndarray, shape (draw, parameter)
         Bootstrap draws minus the estimate.
     is_low : ndarray of bool, shape (reading,)
-        Readings of low load, whose coverage is told by itself.
+        Readings of low load, whose coverage is stated separately.
     """
     predicted = np.einsum("rin,rn->ri", problem.O, held_out.compliance[held_out.fold])
     error = np.empty((len(problem), 1))
@@ -328,14 +328,14 @@ def doubt(difference: FloatArray, standard_error: FloatArray, apart: FloatArray)
 def doubt_factor(
     problem: Problem, compliance: FloatArray, draws: FloatArray, moved: float
 ) -> float:
-    """Return the factor at which widened draws hold the doubt about the model besides.
+    """Return the factor by which widened draws are stretched further for model uncertainty.
 
     Parameters
     ----------
     problem, compliance : Problem, ndarray
         As for `widening_factor`.
     draws : ndarray, shape (draw, spring)
-        As they are to be stretched further.
+        Widened draws.
     moved : float
         From `doubt`.
     """

@@ -45,7 +45,7 @@ _UNLOADED = 0.08
 _SAME_LOAD = 0.2
 """Distance of forces as a share of the largest, below which they are one load case."""
 _LARGEST_CHANGE = 99.0
-"""Percentile of the force's distance from its median that stands for the largest load."""
+"""Percentile of the force's distance from its median that represents the largest load."""
 
 
 @brief_repr

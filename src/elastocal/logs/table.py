@@ -337,7 +337,7 @@ def _encoding(path: Path, file: BinaryIO) -> str:
 
 
 def _delimiter(lines: Sequence[str]) -> str:
-    """Return the delimiter of a text; empty where blanks stand between the cells."""
+    """Return the delimiter of a text; empty if blanks separate the cells."""
     for delimiter in _DELIMITERS:
         counts = Counter(line.count(delimiter) for line in lines)
         most, times = counts.most_common(1)[0]
@@ -347,7 +347,7 @@ def _delimiter(lines: Sequence[str]) -> str:
 
 
 def _all_decimal(lines: Sequence[str], delimiter: str) -> bool:
-    """Return whether every comma of a text stands within a number between blanks."""
+    """Return whether every comma of a text is within a number between blanks."""
     if delimiter != ",":
         return False
     rows = [line.split() for line in lines if "," in line]

@@ -80,7 +80,7 @@ class _UniqueKeyLoader(yaml.SafeLoader):
 
 
 def _count_values(node: yaml.Node, known: dict[int, float]) -> float:
-    """Return the number of values that a node stands for; infinite where it holds itself."""
+    """Return the number of values that a node represents; infinite if it contains itself."""
     if id(node) not in known:
         known[id(node)] = math.inf
         inner = node.value if isinstance(node, yaml.CollectionNode) else ()

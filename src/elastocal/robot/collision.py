@@ -24,7 +24,7 @@ from elastocal.shapes import Capsule, Mesh, box_corners
 _PACKAGE, _FILE = "package://", "file://"
 _OF_PINOCCHIO = ("box", "sphere", "cylinder", "mesh")
 _PLACEHOLDER = {"radius": "1"}
-"""Attributes of a sphere that stands for a shape until Pinocchio has made its model."""
+"""Attributes of a sphere that replaces a shape until Pinocchio has made its model."""
 _SIZES = (0.02, 3.0)
 """Sizes of an arm's largest mesh over its reach; outside, it is in another unit than it says."""
 _UNITS = {"mm": 1e-3, "inches": 0.0254, "m": 1e3, "inches, not mm": 25.4}

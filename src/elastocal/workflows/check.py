@@ -161,7 +161,7 @@ _UNITS = {
 _FEW_POSES, _FEW_CANDIDATES = 6, 150
 """Poses and candidates of a preview: seconds, not minutes."""
 _PLAN_PAGE = '<meta name="generator" content="elastocal plan">'
-"""Stands in the page of a plan, whatever its language."""
+"""Mark in the page of a plan, in every language."""
 _FOLDERS: tuple[tuple[tuple[str, ...], _Describe], ...] = (
     ((PLAN,), lambda folder: kinds.plan_file(folder / PLAN)),
     ((JOURNAL,), kinds.run_folder),

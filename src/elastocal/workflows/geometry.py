@@ -38,7 +38,7 @@ from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
 
 _PAGE = '<meta name="generator" content="elastocal geometry">'
-"""Stands in the report, whatever its language."""
+"""Mark in the report, in every language."""
 _TABLE = ("joint", "number", "unit", "nominal", "calibrated", "difference", "low", "high")
 
 

@@ -167,7 +167,7 @@ def run_loads(
     loads : sequence of float
         Shares of the force; see `process.at_load`.
     progress : callable
-        Told how many courses are done.
+        Called with how many courses are done.
 
     Returns
     -------

@@ -115,7 +115,7 @@ def read_variation(text: str) -> tuple[str, tuple[Value, ...]]:
     Raises
     ------
     CodecError, PlanningError
-        If the factor is unknown, or a value is missing, stands twice or cannot be one.
+        If the factor is unknown, or a value is missing, repeated or impossible.
     """
     key, _, listed = text.partition("=")
     key = key.strip()
@@ -136,7 +136,7 @@ def read_variations(texts: Sequence[str]) -> dict[str, tuple[Value, ...]]:
     Raises
     ------
     CodecError
-        Also if a factor stands twice.
+        Also if a factor is repeated.
     """
     return values_by_key("--vary", texts, read_variation)
 

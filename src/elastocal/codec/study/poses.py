@@ -140,7 +140,7 @@ def _under(cell: Cell, candidates: Candidates, load_cases: str) -> Candidates:
     """Return candidates that are observed under some load cases."""
     rows, known = candidates.observation, cell.file.load_cases.cases
     rows = present(rows, "observation of the candidates")
-    # Without a process the whole pool under all loads stands for it.
+    # Without a process the whole pool under all loads represents it.
     process = rows.reshape(-1, rows.shape[2]) if candidates.process is None else candidates.process
     loads = [known.index(case) for case in training_cases(load_cases, known)]
     observed = rows.reshape(len(rows), len(known), 3, -1)[:, loads].reshape(

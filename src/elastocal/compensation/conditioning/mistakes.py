@@ -457,7 +457,7 @@ def refuse_mistakes(
     expected_centre: FloatArray | None = None,
     points: Mapping[str, FloatArray] | None = None,
 ) -> None:
-    """Refuse postures that are explained by another reading of their numbers.
+    """Refuse postures that another interpretation of their numbers explains.
 
     Parameters
     ----------
@@ -468,8 +468,8 @@ def refuse_mistakes(
     R_nominal : ndarray, shape (3, 3), optional
         Rotation of the sensor in the flange as it was mounted.
     expected_centre : ndarray, shape (3,), optional
-        Where the tool's centre of mass should be, in the sensor's frame, in m; without it
-        nothing tells about which point the moments are.
+        Where the tool's centre of mass should be, in the sensor's frame, in m; without it the
+        reference point of the moments is unknown.
     points : mapping of str to ndarray, optional
         Points that moments may be about, in the sensor's frame, in m.
 

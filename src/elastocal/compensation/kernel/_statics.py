@@ -539,7 +539,8 @@ class _Place:
 
     program: Program
     label: str
-    """Tells the names of its statements from those of other points: 2, 2_2, 2_3."""
+    """Suffix that distinguishes the names of its statements from those of other points: 2, 2_2,
+    2_3."""
     lever: Vector
     """Lever arm from it to the tool centre point."""
     moment: Vector

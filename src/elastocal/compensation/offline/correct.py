@@ -118,8 +118,8 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     where : callable
         Names a row in a refusal.
     may_turn : bool
-        Whether a joint that the correction takes over its limit may stand a whole turn elsewhere:
-        in a path of poses the controller chooses the turn, in a path of joints it would rotate.
+        Whether a joint that the correction takes over its limit may move by a whole turn: in a path
+        of poses the controller chooses the turn, in a path of joints it would rotate.
     largest : float
         Largest deflection that is taken for one, and largest correction, in m.
     memory : ndarray, shape (element,), optional

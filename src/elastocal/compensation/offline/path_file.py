@@ -155,7 +155,7 @@ def programmed_rows(
     Raises
     ------
     PathError
-        If a row is out of reach, or nothing says where the external axes stand.
+        If a row is out of reach, or the positions of the external axes are not given.
     """
     robot = solver.robot
     if T_base_tcp is None:

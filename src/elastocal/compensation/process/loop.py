@@ -232,7 +232,7 @@ class _Rows:
     last: IndexArray
     """Last row of each, shape (run,)."""
     q: FloatArray
-    """Shape (row, run, joint); likewise the others."""
+    """Shape (row, run, joint), as the others."""
     force: FloatArray
     path: FloatArray
     """Programmed place with the shift in the air."""

@@ -1,6 +1,6 @@
 """The processes by name, and joints for their courses.
 
-The tool is turned by one angle for all courses; the rail stands still along each of them. Before a
+The tool is turned by one angle for all courses; the rail does not move along each of them. Before a
 calibration the posture is the one farthest from limits (`with_postures`); a calibrated model
 determines the stiffest one (`stiffest_posture`, paper section 4.3.1).
 
@@ -344,8 +344,8 @@ def process_courses(name: str, cell: Cell, seed: int, count: int | None) -> tupl
 def with_postures(cell: Cell, courses: tuple[Course, ...]) -> tuple[Course, ...]:
     """Return courses with joints: the postures farthest from limits and a straight wrist.
 
-    The tool is turned about its axis by the same angle in all courses, as a head that is bolted
-    on; a rail stands still along a course. Collisions are not looked at.
+    The tool is turned about its axis by the same angle in all courses, as a head that is bolted on;
+    a rail does not move along a course. Collisions are not checked.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ class RapidWriter(ProgramWriter):
 
 
 def _speed_name(speed: float) -> str:
-    """Return the name of a speed, in µm/s, which tells all that are written apart.
+    """Return the name of a speed, in µm/s, which is distinct for each speed as written.
 
     >>> _speed_name(0.02)
     'vUm20000'

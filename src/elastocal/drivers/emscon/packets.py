@@ -1,8 +1,8 @@
-"""The packets of emScon TPI 3: little-endian, 4-byte alignment, each with its size in front.
+"""The packets of emScon TPI 3: little-endian, 4-byte alignment, each preceded by its size.
 
 Clean-room: sizes, offsets and numbers are those on which public programs and the published layout
 agree (see docs/references.md); no line of a vendor's header is here. Every packet is ``int32 size,
-int32 type`` and what the type says.
+int32 type`` and the fields of the type.
 """
 
 import struct

@@ -1,7 +1,7 @@
-"""The delay from command to motion: an excitation, its estimate, and the record that is kept.
+"""The delay from command to motion: excitation, estimate, and record.
 
-The arm stands in free space and follows a chirp of some tenths of a millimetre; the command is
-compared with RIst minus RSol. The response is modelled as gain, dead time and a first-order lag,
+The arm is in free space and follows a chirp of some tenths of a millimetre; the command is compared
+with RIst minus RSol. The response is modelled as gain, dead time and a first-order lag,
 
     y(t) = a x_lagged(t - T) + b,   tau dx_lagged/dt = x - x_lagged,
 

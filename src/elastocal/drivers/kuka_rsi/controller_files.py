@@ -233,7 +233,7 @@ def check_controller_file(text: str, cell: Cell, settings: RsiSettings) -> None:
     Parameters
     ----------
     text : str
-        Contents of the file; its root tells which it is.
+        Contents of the file; its root element gives its kind.
     cell : Cell
         The cell.
     settings : RsiSettings

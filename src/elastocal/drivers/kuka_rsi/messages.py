@@ -81,8 +81,8 @@ class Order(IntEnum):
     MOVE = 2
     """``PTP`` to the axis positions given."""
     ADOPT = 3
-    """Take the place where the arm stands for the programmed one: RSI off, ``PTP`` to the measured
-    axes, RSI on. The controller sends nothing meanwhile; programs before 2026-11 do not know it."""
+    """Adopt the present position as the programmed one: RSI off, ``PTP`` to the measured axes, RSI
+    on. The controller sends nothing meanwhile; programs before 2026-11 do not know it."""
     END = 9
 
 
@@ -157,7 +157,7 @@ class Arrival(Enum):
 
 
 class IpocWatch:
-    """Tells from IPOC how messages follow one another.
+    """Relation of consecutive messages by their IPOC.
 
     IPOC counts milliseconds modulo 2**32: it grows by the cycle. Some simulators count messages, by
     1.

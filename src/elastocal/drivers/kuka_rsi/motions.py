@@ -60,7 +60,7 @@ def free_move(cycle: Cycle, target: MoveTarget, q: FloatArray) -> Motion:
     cycle : Cycle
         State at the beginning; without a correction.
     target : MoveTarget
-        What the controller is told.
+        Target that is sent to the controller.
     q : ndarray, shape (joint,)
         The same in rad or m.
     """

@@ -135,7 +135,7 @@ def columns_of(texts: Sequence[str]) -> tuple[Column, ...]:
     Raises
     ------
     DeviceError
-        If a name or unit is not known, a unit or a coordinate is missing, a name stands twice.
+        If a name or unit is not known, a unit or a coordinate is missing, a name is repeated.
     """
     columns = tuple(map(_column, texts))
     names = [column.name for column in columns]

@@ -414,7 +414,7 @@ def _judge(
     Parameters
     ----------
     deflection : RowComparison, optional
-        Over the rows that matter; None: there are none.
+        Over the rows of interest; None: there are none.
     limit : float, optional
         Largest accepted change, in m.
     ground : CommonGround, optional
@@ -480,7 +480,7 @@ def _notes_on(
     Parameters
     ----------
     old, new : CalibratedModel
-        What is compared.
+        Models that are compared.
     same_springs : bool
         Whether the models have the same springs.
     outside : int

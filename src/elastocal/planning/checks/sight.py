@@ -1,8 +1,8 @@
 """Check ``sight``: some tracker station sees the marker (paper section 2.2).
 
 A station sees the marker when the marker faces it within its acceptance angle, the distance is
-within the tracker's range, and neither a mesh of the cell nor a link or the tool stands between
-them. `MovingSolids` describes why a tool does not hide the marker that it carries.
+within the tracker's range, and neither a mesh of the cell nor a link or the tool is between them.
+`MovingSolids` describes why a tool does not hide the marker that it carries.
 
 Postures are judged in contact. Unloaded readings are taken some 3 mm off the surface, which moves
 beam and tool by less than the accuracy of the shapes of links and tool.

@@ -21,7 +21,7 @@ _LARGE_POOL = 50_000
 _MANY_PICKS = 100
 """Candidates and picks from which on sorting the pool into cells pays for itself."""
 _CHOSEN = -1.0
-"""Stands for the distance of a chosen candidate, so that one at the same place comes first."""
+"""Distance of a chosen candidate, so that one at the same position comes first."""
 _CELL = 256
 """Candidates in a cell: smaller cells visit fewer candidates but cost more boxes a pick. Of 64,
 128, 256 and 512 the fastest for 10^6 -> 500 (docs/decisions/0010-pose-search.md)."""

@@ -420,7 +420,7 @@ EXPECTED_ERRORS = (ProcedureError, DeviceError, OSError)
 
 
 def as_fault(error: ProcedureError | DeviceError | OSError) -> FaultError:
-    """Return an error as the fault that it stands for."""
+    """Return an error as the fault that it represents."""
     if isinstance(error, FaultError):
         return error
     if isinstance(error, FileAccessError | ProcedureError):

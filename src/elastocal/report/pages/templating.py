@@ -35,7 +35,7 @@ _STYLES_SET_BY_RULE = """(() => {
   };
 })();
 """
-"""Stands before the drawing library, which writes some styles as attributes: a policy without
+"""Script before the drawing library, which writes some styles as attributes: a policy without
 ``unsafe-inline`` ignores those, and lets scripts set the same styles as properties."""
 
 _STYLE_OF_MAPS = re.compile(r"(e\.textContent=)'\.maplibregl(?:[^'\\]|\\.)*'")

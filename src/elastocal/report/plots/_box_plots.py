@@ -18,7 +18,7 @@ from elastocal.report.plots.style import Page, VariantStyle, literal, tint
 REACH = 1.5
 """Longest reach of a whisker, in heights of the box."""
 _LABEL = 0.26
-"""Room that the label of a number of training poses takes, in inches."""
+"""Width of the label of a number of training poses, in inches."""
 PALE = 0.55
 """Part of the colour in the outline of a hollow box."""
 _DECADES = 12.0

@@ -41,7 +41,7 @@ from elastocal.wording import counted, phrase
 ERROR_PANELS = {"mean": "Mean error", "max": "Maximum error"}
 _MM = 1e3
 _LEFT, _RIGHT, _BOTTOM, _GAP = 0.75, 0.2, 0.95, 0.2
-"""Room about and between the panels, in inches."""
+"""Margins of and between the panels, in inches."""
 _PANEL, _ROW = 2.9, 0.34
 """Heights of a panel and of a row of the saturation strip, in inches."""
 _HEADLINE, _STRIP_TITLE = 0.42, 0.22

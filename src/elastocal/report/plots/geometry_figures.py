@@ -20,7 +20,7 @@ from elastocal.wording import counted, mm, phrase
 
 _WIDTH = 10.5
 _TITLE = 0.62
-"""Room for a title and what is said below it, in inches."""
+"""Height of a title and the description below it, in inches."""
 _MAP, _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN = 2.6, 0.75, 0.8, 0.35, 0.5, 0.75
 """Height of a map, margins, and what is between rows of maps, in inches."""
 _GAPS = (0.4, 1.25)

@@ -243,7 +243,7 @@ def _unit(vector: FloatArray) -> FloatArray:
 
 
 _HEAD, _FOOT, _SIDE = 0.7, 1.95, 0.25
-"""Room above, below and beside the panels, in inches."""
+"""Margins above, below and beside the panels, in inches."""
 _FLATTEST, _TALLEST = 0.25, 1.3
 """Height of a panel as part of its width; a longer surface has space beside it."""
 _ROUNDS = 200

@@ -30,7 +30,7 @@ _WIDTH, _LEFT, _MIDDLE, _RIGHT = 7.5, 2.75, 0.25, 0.2
 _HEAD, _ROW, _BETWEEN, _ROWS, _FOOT = 1.0, 0.21, 0.7, 2.0, 1.0
 """Sizes in inches; `_ROW` is a spring, `_ROWS` the height of the change along the rows."""
 _TITLE = 0.62
-"""Room for a title and what is said below it, in inches."""
+"""Height of a title and the description below it, in inches."""
 _SHARE = 0.6
 """Part of the width beside the names that the compliances take."""
 _PER_MICRO, _MM = 1e6, 1e3
@@ -100,7 +100,7 @@ def spring_figure(springs: Sequence[SpringBar], title: str = "", about: str = ""
     figure = style.new_figure(9.0, bottom + (_TITLE if title else 0.0))
     if title:
         figure.add_title(title, 0.15, about=about)
-    # Room for the longest name.
+    # Width of the longest name.
     left = max(1.26, 0.2 + 0.067 * max(len(bar.name) for bar in springs))
     for unit, count in counts:
         bottom -= _BAR * count + _BAR_FOOT

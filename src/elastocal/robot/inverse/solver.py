@@ -217,7 +217,7 @@ def distinct(robot: Robot, q: FloatArray, tolerance: float) -> FloatArray:
     Parameters
     ----------
     robot : Robot
-        Tells which joints count modulo a turn.
+        Robot, whose joints may count modulo a turn.
     q : ndarray, shape (row, joint)
         Configurations in rad or m; all joints of the robot, or those of the arm.
     tolerance : float

@@ -59,7 +59,7 @@ class EmsconServer(TcpServer):
     told : Told
         Settings of the driver ``emscon``.
     initialize_time : float
-        How long the tracker takes to initialise, in s of the cell.
+        Time that the tracker takes to initialise, in s of the cell.
     """
 
     def __init__(self, live: LiveCell, told: Told, *, initialize_time: float = 0.5) -> None:

@@ -31,7 +31,7 @@ class LineStreamServer(TcpServer):
     told : Told
         Settings of the driver ``line_stream``.
     unit : str
-        What the header says that lengths are in; the numbers are in mm, whatever it says.
+        Unit of lengths in the header; the numbers are in mm in any case.
     silent : bool
         Whether a broken beam is shown by silence.
     offset, drift : float

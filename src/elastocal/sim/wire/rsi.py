@@ -685,7 +685,7 @@ def _free_port(address: str) -> int:
 
 @serves("kuka_rsi")
 def rsi_server(live: LiveCell, told: Told, context: RsiContext | None = None) -> RsiServer:
-    """Return the controller for a PC that listens where a cell file says.
+    """Return the controller for a PC that listens at the address in a cell file.
 
     Parameters
     ----------

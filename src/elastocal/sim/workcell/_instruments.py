@@ -308,7 +308,7 @@ class SimulatedTracker(_SimulatedInstrument):
         return marker, sigma
 
     def T_base_station(self, station: str) -> FloatArray:
-        """Return where a station truly stands now, shape (4, 4), in m."""
+        """Return the true present transform of a station, shape (4, 4), in m."""
         T = self._T_base_station[station].copy()
         for fault in self._plant.schedule.lasting("station_bumped", self._plant.visit):
             if fault.station in (None, station):

@@ -36,9 +36,9 @@ class ErrorDraws:
     marker: FloatArray
     """Shape (place, 1 + load, 3); the first is the unloaded reading."""
     sensor: FloatArray
-    """Likewise."""
+    """Shape (place, 1 + load, 3); the first is the unloaded reading."""
     stop: FloatArray
-    """Likewise."""
+    """Shape (place, 1 + load, 3); the first is the unloaded reading."""
     drift: FloatArray
     """Shape (place, 3)."""
     cross_talk: FloatArray

@@ -10,8 +10,7 @@ the tool (`elastocal.sim.workcell._contact`), the force on the robot solves
 by Newton's method from the force of the cycle before. The twist is *linearised* in the springs
 about the last exact equilibrium (`Quasistatics.loaded`), except for the six gears, whose laws and
 memory are evaluated in every cycle. The exact equilibrium is solved again when the force or the
-pose has moved away from it, and when the robot stands; a difference from the linearised one is
-faded in.
+pose has moved away from it, and at standstill; a difference from the linearised one is faded in.
 
 Assumptions: the tool's rotation does not influence the contact; the robot is at rest at every
 instant. Random values of each stop (error of the stop, point of attack, slip of the ring) change
