@@ -82,7 +82,7 @@ def taken_over(place: Path) -> Iterator[bool]:
     Raises
     ------
     OSError
-        If it is at work, gone, or a link.
+        If it is in use, missing, or a link.
     """
     if not POSIX:
         yield False

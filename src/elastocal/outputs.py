@@ -35,7 +35,7 @@ _Key = tuple[int, int] | str
 
 @dataclass
 class OutputRule:
-    """The rule of one command at work."""
+    """The rule for the outputs of the current command."""
 
     force: bool = False
     """Replace foreign files, too."""
@@ -112,14 +112,14 @@ _AT_WORK: ContextVar[OutputRule | None] = ContextVar("output_rule", default=None
 def ruled(
     rule: OutputRule, inputs: Iterable[Path] = (), outputs: Iterable[Path] = ()
 ) -> Iterator[None]:
-    """Hold a command to a rule, which its outputs are asked for before it begins.
+    """Apply a rule to a command; its outputs are checked before it begins.
 
     Parameters
     ----------
     rule : OutputRule
         The rule.
     inputs, outputs : iterable of Path
-        Places that the settings name.
+        Paths that the settings name.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def ruled(
 
 
 def current_rule() -> OutputRule | None:
-    """Return the rule of the command at work; None outside of one, as in a library's caller."""
+    """Return the rule of the current command; None outside of one, as in library use."""
     return _AT_WORK.get()
 
 

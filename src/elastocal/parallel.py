@@ -171,10 +171,10 @@ class ProcessPool:
 
 @contextmanager
 def process_pool(processes: int, prepare: Callable[[], object]) -> Iterator[ProcessPool]:
-    """Yield processes that get ready while the block runs.
+    """Yield processes that are prepared while the block runs.
 
-    An error of ours waits for them, since processes that are ended while they start complain;
-    Ctrl-C does not.
+    An error waits for them, since processes that are ended during their start print errors; Ctrl-C
+    does not.
 
     Parameters
     ----------

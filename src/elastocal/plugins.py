@@ -253,10 +253,9 @@ class Registry(Mapping[str, _T], Generic[_T]):
     kind : str
         Kind of `KINDS`.
     own : mapping, or callable that returns it
-        Those of elastocal; in place of one, its place ``module:name``, imported when it is asked
-        for.
+        Those of elastocal; a text ``module:name`` is imported when it is used.
     error : type
-        What is raised for a name that there is not.
+        Error for an unknown name.
     """
 
     def __init__(
@@ -314,21 +313,21 @@ class Registry(Mapping[str, _T], Generic[_T]):
         return {dist.name: dist.version for dist in others if dist}
 
     def named(self, name: str, beside: Sequence[str] = (), more: str = "") -> _T:
-        """Return the one of a name.
+        """Return the object of a name.
 
         Parameters
         ----------
         name : str
             Name.
         beside : sequence of str
-            Words that the caller takes as well, for the refusal of others.
+            Further names that the caller accepts, for the message.
         more : str
             What the caller also accepts, in words.
 
         Raises
         ------
         ElastocalError
-            If there is none, with the nearest and all that there are; of the kind's own type.
+            If there is none, with the nearest and all known names; of the kind's own type.
         PluginError
             If it is a plug-in that cannot be used.
         """

@@ -1,7 +1,7 @@
-"""Rigid solids: one set of them for collision (coal), for ray casts (trimesh), for pictures.
+"""Rigid solids for collision (coal), ray casts (trimesh) and figures.
 
 A straight line is inside a convex solid between two distances, which slabs and quadratics give in
-closed form (Ericson, Real-Time Collision Detection, 2005, section 5.3); a mesh is asked by rays.
+closed form (Ericson, Real-Time Collision Detection, 2005, section 5.3); a mesh is tested by rays.
 
 A new kind of solid is one class here, a line in `solid_of` and an entry in ``tests/shapes``.
 """

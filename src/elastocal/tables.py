@@ -108,9 +108,9 @@ class PackedColumn(Collection[str]):
 
 
 def plain_numbers(cells: Sequence[object], comma: str = "") -> FloatArray | None:
-    """Return the numbers of texts of nothing but finite ones; None: look at each cell.
+    """Return the numbers of texts if all are finite; None: check each cell.
 
-    ``comma`` is the decimal sign where it is no point.
+    ``comma`` states that the decimal sign is a comma.
     """
     try:
         text = _BETWEEN.join(cells)  # type: ignore[arg-type]

@@ -170,7 +170,7 @@ def parse_number(text: str) -> float:
     Raises
     ------
     ValueError
-        If it is none.
+        If it is not a number.
     """
     plain = text.strip()
     if not plain.isascii() or "_" in plain:

@@ -224,12 +224,12 @@ def check_exactly_one(**given: object) -> None:
     Parameters
     ----------
     **given : object
-        The keys with their values; None where there is none.
+        The keys with their values; None where a key is missing.
 
     Raises
     ------
     ValueError
-        With the keys that are there and those that could be.
+        With the given keys and the allowed ones.
     """
     found = [name for name, value in given.items() if value is not None]
     if len(found) != 1:

@@ -1,7 +1,7 @@
 """The identity of a calibration: what was calibrated with what, where, when and by whom.
 
-Everything is optional; a certificate names in one line what nobody entered. What a person states at
-the run or for the report goes before the cell file.
+Everything is optional; a certificate lists missing entries in one line. Statements at the run or
+for the report precede those of the cell file.
 """
 
 import re
@@ -81,7 +81,7 @@ ASKED = (
 
 
 def certificate_of(entry: CertificateEntry, *stated: Mapping[str, str]) -> CertificateEntry:
-    """Return an entry with what else was stated; later statements go before earlier ones.
+    """Return an entry with further statements; later ones precede earlier ones.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def certificate_of(entry: CertificateEntry, *stated: Mapping[str, str]) -> Certi
     Raises
     ------
     SchemaError
-        If there is no such key, or a value is none for it.
+        If there is no such key, or a value is invalid for it.
     """
     for each in stated:
         nested: dict[str, Any] = {}
@@ -134,7 +134,7 @@ def read_statements(texts: tuple[str, ...]) -> dict[str, str]:
     Raises
     ------
     SchemaError
-        If one is none, or names no key of a certificate.
+        If one is invalid, or names no key of a certificate.
     """
     stated = {}
     for text in texts:

@@ -194,5 +194,5 @@ class PathDriver(Driver, Protocol):
         Raises
         ------
         DeviceError
-            If the line cannot be had.
+            If the line is not available.
         """

@@ -289,7 +289,7 @@ class ProcedureSettings(StrictModel):
     """Settings of `elastocal run`. Joint moves go at the speeds of the section ``motion``."""
 
     cycle: Annotated[PositiveTime, Field(ge=1e-3, le=0.1)] = 0.04
-    """Time between two looks at the devices, in s."""
+    """Interval at which the devices are read, in s."""
     approach_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.25)] = 0.02
     """Between approach pose and near contact, and back, in m/s."""
     contact_speed: Annotated[PositiveSpeed, Field(ge=1e-4, le=0.02)] = 0.005

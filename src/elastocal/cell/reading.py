@@ -113,12 +113,12 @@ def three(values: FloatArray) -> Three | None:
 
 
 def polled_readings(found: "DeviceSet") -> Callable[[], tuple[DeviceReading, ...]]:
-    """Return the function that asks the devices of a set by their protocols, one after another.
+    """Return the function that polls the devices of a set by their protocols, one after another.
 
     Parameters
     ----------
     found : DeviceSet
-        Devices that nobody else reads.
+        Devices without another reader.
     """
     made: list[Iterator[DeviceReading]] = []
     if found.arm is not None:

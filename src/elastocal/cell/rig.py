@@ -120,7 +120,7 @@ class LocalPort(NamedTuple):
         Raises
         ------
         DeviceError
-            If the address is none of this machine, or the port is taken.
+            If the address does not belong to this machine, or the port is taken.
         """
         place = (self.address, self.port)
         try:
@@ -229,7 +229,7 @@ class RigContext:
         Raises
         ------
         DeviceError
-            If it is not bound yet and cannot be had.
+            If it is not bound yet and is taken.
         """
         bound = self.ports.get(port)
         return port.bind() if bound is None else bound.dup()
@@ -274,7 +274,7 @@ class Driver(Protocol):
     def connect(
         self, cell: "Cell", wanted: Mapping[str, DeviceSettings], context: RigContext
     ) -> DeviceSet:
-        """Make the devices that are wanted of it; called once a rig.
+        """Make the requested devices; called once for each rig.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ class Driver(Protocol):
         Raises
         ------
         DeviceError
-            If a device cannot be reached, or is not as it has to be.
+            If a device cannot be reached, or is in a wrong state.
         """
 
 

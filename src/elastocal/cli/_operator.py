@@ -216,14 +216,15 @@ def interruption() -> Iterator[Callable[[], bool]]:
 
 
 class TerminalOperator:
-    """Asks on the terminal, shows a line that moves, and takes Ctrl-C for a stop.
+    """Operator at a terminal: answers questions, sees the progress, and stops by Ctrl-C.
 
     Parameters
     ----------
     console : Console
-        Where the person looks.
+        Console of the operator.
     asks : bool
-        Whether the person is asked for what the certificate lacks, where there is a terminal.
+        Whether the operator is asked for missing entries of the certificate, if there is a
+        terminal.
     """
 
     def __init__(self, console: Console, asks: bool = False) -> None:

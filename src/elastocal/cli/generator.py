@@ -168,7 +168,7 @@ def _written(path: Path) -> None:
 
 
 class _Plugged(Command):
-    """A command of another package: its settings say what it is for."""
+    """Command of another package, described by its settings."""
 
     def fields(self) -> list[SettingsField]:
         """Return the fields; required ones keep their position."""

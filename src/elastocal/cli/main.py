@@ -36,7 +36,7 @@ _UNUSED_BY_HELP = {"rich.markdown": "Markdown", "rich.traceback": "Traceback"}
 
 
 class _Commands(TyperGroup):
-    """The commands, each made when it is asked for; help asks for their names and groups alone."""
+    """Commands, each imported when needed; help needs their names and groups alone."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - as click asks
         """Return the names of all commands, in the order of the work; those of others last."""
@@ -163,7 +163,7 @@ def run() -> None:
         with ended_cleanly():
             app()
     except KeyboardInterrupt:
-        # Before typer is at work, or after it.
+        # Before typer runs, or after it.
         sys.exit(130)
     except ElastocalError as error:
         _complain(str(error))
@@ -172,7 +172,7 @@ def run() -> None:
         _complain(f"not enough memory: {error}" if str(error) else "not enough memory")
         sys.exit(1)
     except OSError as error:
-        # Standard output that is full or gone; nearly every file of ours has its own refusal.
+        # Standard output is full or closed; nearly every file of elastocal has its own refusal.
         place = "cannot write output" if error.filename is None else f"cannot use {error.filename}"
         _complain(f"{place}: {error.strerror or error}")
         _drop_output()

@@ -52,7 +52,7 @@ def console(**options: Any) -> "Console":
     Parameters
     ----------
     **options : object
-        Of Rich's console, in place of ours.
+        Options of Rich's console, in place of the defaults.
     """
     from rich.console import Console
     from rich.text import Text

@@ -1,4 +1,4 @@
-"""How ``elastocal demo`` shows its chapters, and what their commands print."""
+"""Display of ``elastocal demo``: its chapters, and the output of their commands."""
 
 import io
 import time
@@ -22,7 +22,7 @@ _WIDTH = 100
 
 
 def shown(*, out: Path, **settings: Any) -> "DemoResult":
-    """Return the result of a demo whose chapters are shown while they are at work.
+    """Return the result of a demo, showing each chapter while it runs.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class _Display:
     out : Path
         Folder of the demo.
     show : callable
-        Makes a context in which a chapter is at work.
+        Makes a context for the work of a chapter.
     """
 
     def __init__(self, log: TextIO, out: Path, show: Callable[..., Any]) -> None:
@@ -78,7 +78,7 @@ def _log_console(file: TextIO) -> "Console":
 
 @contextmanager
 def _bars(console: "Console", story: "Sequence[Chapter]") -> Iterator[Callable[..., Any]]:
-    """Yield contexts that show a bar a chapter; the one at work moves."""
+    """Yield contexts that show a bar for each chapter; that of the current one moves."""
     from rich.progress import BarColumn, Progress as ProgressBars, TextColumn, TimeElapsedColumn
 
     bars = ProgressBars(

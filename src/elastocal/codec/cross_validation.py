@@ -293,7 +293,7 @@ def _train(
     taken = entrant.taken
     searched = taken
     if not technique(taken.variant.search).nested:
-        # A technique that looks at springs looks at those that its whole pool carries.
+        # A technique that uses springs uses those that its whole pool supports.
         searched = _chosen_springs(entrant, known, taken.can_train(split))
     chosen = _choices(searched, split, most, seed)
     compliance = _fit(taken, chosen)

@@ -244,9 +244,9 @@ def _steady_from(reached: BoolArray) -> IndexArray:
 def median_draws(values: FloatArray, overlap: Overlap, rng: Generator) -> FloatArray:
     """Return bootstrap draws of the median over verification sets, shape (draw, n).
 
-    Whole sets are drawn, so that all sizes of one set stay together. The draws are stretched
-    about the median to the variance and the quantile of `corrected_mean`, in logarithms, which
-    keeps errors positive. There are none where no spread is known.
+    Whole sets are drawn, so that all sizes of one set stay together. The draws are stretched about
+    the median to the variance and the quantile of `corrected_mean`, in logarithms, which keeps
+    errors positive. There are none where the spread is unknown.
 
     Parameters
     ----------

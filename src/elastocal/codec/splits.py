@@ -146,13 +146,13 @@ def make_campaign(
 ) -> Campaign:
     """Return the poses of a dataset, checked as `calibrate` checks them.
 
-    A reading is set aside when no model of the comparison can take it for a measurement, so
-    that all variants are trained and verified on the same readings.
+    A reading is set aside if it is a blunder for every model of the comparison, so that all
+    variants are trained and verified on the same readings.
 
     Parameters
     ----------
     models : sequence of ElasticModel
-        Those of the comparison, of one robot; the first has to explain signs and frames.
+        Models of the comparison, of one robot; the first must explain signs and frames.
     readings : Readings
         Measurements, joints in the robot's order.
     options : CodecOptions

@@ -43,8 +43,8 @@ class Variant:
     search: str = "cover"
     """Technique that chooses the training poses; one of `planning.search.TECHNIQUES`."""
     springs: str = AUTO
-    """As for `calibrate`: ``auto``, the name of a layout, ``gears``, or a YAML file. Where there is
-    a choice, each split makes it anew."""
+    """As for `calibrate`: ``auto``, the name of a layout, ``gears``, or a YAML file. A choice is
+    made again in each split."""
     load_cases: str = ALL_LOADS
     """Load cases to train with: ``all``, or names joined by ``+``, e.g. ``normal``."""
     solver: str = "bounded"

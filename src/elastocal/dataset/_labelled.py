@@ -1,7 +1,7 @@
 """Reading labelled arrays: dimensions and axes in order, quantities in SI units.
 
-Arrays that say what they hold are brought into the canonical form or refused by name. A stated
-unit that is not SI is converted, since nothing is guessed; a missing one is refused.
+Labelled arrays are brought into the canonical form or refused by name. A stated unit other than SI
+is converted; a missing one is refused, since nothing is guessed.
 """
 
 from collections.abc import Sequence

@@ -57,8 +57,8 @@ def minimise(
     if determined == 0:
         raise IdentificationError("the forces load no spring: nothing can be identified")
     s, y = s.copy(), y.copy()
-    # Undetermined directions are asked to be zero, with a weight too small to pull on the others:
-    # of all minima the bounded solver then finds the one of least norm.
+    # Undetermined directions are pulled to zero with a weight too small to affect the others: of
+    # all minima the bounded solver then finds the one of least norm.
     s[determined:], y[determined:] = _FLOOR * s[0], 0.0
     x = Vt.T @ (y / s)
     if not np.all((lower <= x) & (x <= upper)):

@@ -55,7 +55,7 @@ class ToolChange:
         Raises
         ------
         RobotError
-            If a length, an angle or the mass is none of a robot cell's.
+            If a length, an angle or the mass is impossible in a robot cell.
         """
         for what, dimension, values in (
             ("pose of the tool", "length", self.pose[:3]),

@@ -47,7 +47,7 @@ def displacement_blocks(
     ndarray, shape (reading, 3, parameter)
         In m per unit of each parameter.
     """
-    # A posture is evaluated once, whatever is asked of it: loads, sag, friction.
+    # A posture is evaluated once for loads, sag and friction.
     q = model.at(readings.joint_position)
     q_0 = model.at(reference_joints(model.robot, readings))
     loaded, reference = None, None

@@ -117,7 +117,7 @@ def frame_columns(
     Raises
     ------
     IdentificationError
-        If campaigns are asked for and the readings name none, or a session has too few poses.
+        If campaigns are requested and the readings name none, or a session has too few poses.
     """
     if free == "none":
         return FrameColumns((), np.zeros((len(readings), 3, 0)))

@@ -1,8 +1,8 @@
 """The error at a load level that no fit has seen, beside the noise of such a reading.
 
-A model that is fitted at full load and at a low one is asked for a load between them. The poses
-are those of the fit: what the check shows is how well the law of the springs holds between loads,
-not how well it holds between poses (`elastocal.identification.uncertainty` shows that).
+A model fitted at full load and at a low one is tested at a load between them. The poses are those
+of the fit: what the check shows is how well the law of the springs holds between loads, not how
+well it holds between poses (`elastocal.identification.uncertainty` shows that).
 """
 
 import numpy as np
@@ -41,12 +41,12 @@ def check_loads(
 ) -> LoadCheck | None:
     """Return the errors at readings that are kept out of every fit; None where there are none.
 
-    Nor is there a check beside free frames: the frame of a session is that of its own readings.
+    There is no check with free frames either: the frame of a session is that of its own readings.
 
     Parameters
     ----------
     calibration : Calibration
-        What the other readings gave; poses that it has not seen are left out.
+        Calibration from the other readings; poses that it has not seen are left out.
     readings : Readings
         From ``Dataset.readings(..., check=True)``.
     marker_offset : array_like, shape (3,), optional

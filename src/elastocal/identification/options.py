@@ -173,7 +173,7 @@ class FitSettings:
     """Seed of the bootstrap."""
 
     def __post_init__(self) -> None:
-        """Refuse bounds that are none.
+        """Refuse invalid bounds.
 
         Raises
         ------

@@ -1,10 +1,10 @@
-"""How sure a fit is: errors at poses that it has not seen, and intervals by resampling poses.
+"""Uncertainty of a fit: errors at left-out poses, and intervals by resampling poses.
 
-The type that carries an accuracy knows its split: it cannot be made from training residuals.
+The type of an accuracy contains its split, so that it cannot be made from training residuals.
 
 Bootstrap: whole poses are drawn with replacement (Efron and Tibshirani, *An Introduction to the
-Bootstrap*, 1993, section 8.6), since the readings at one pose share what the model gets wrong
-there. The draws are kept, so that every prediction anywhere gets an interval.
+Bootstrap*, 1993, section 8.6), since the readings at one pose share the model error there. The
+draws are kept, so that every prediction anywhere gets an interval.
 
 Widening: the percentile interval of a cluster bootstrap is too narrow with some tens of clusters;
 on simulated cells of 31 poses its "95 %" intervals of unseen deflections cover 91 %. The
@@ -38,14 +38,14 @@ no model of this arm: its bias, which no resampling sees, is larger than what it
 _READINGS = 2000
 """Readings whose predictions by all draws are in memory at once."""
 MOST_FOLDS = 100
-"""With more pose blocks than this, several are left out together."""
+"""Number of pose blocks above which several are left out together."""
 _RANGE, _ALIKE = (0.05, 0.95), 1.5
 """Quantiles of the deflections, and the largest ratio of the two for which they count as equal: the
 errors then do not show which part grows with the deflection."""
 _REWEIGHTED = 6
 """Rounds of weights, after which a split no longer changes."""
 _LEAST_VARIANCE = 1e-3
-"""Of the mean square: no reading counts more than this allows."""
+"""Least variance relative to the mean square: it limits the weight of a reading."""
 
 
 @brief_repr
@@ -123,7 +123,7 @@ class HeldOut:
     error: FloatArray
     """Norm of the prediction error of each reading, shape (reading,), in m."""
     fold: IndexArray
-    """Which refit predicted each reading, shape (reading,)."""
+    """Refit that predicted each reading, shape (reading,)."""
     compliance: FloatArray
     """Compliances of each refit, and free frames behind them, shape (fold, column)."""
     axis_error: FloatArray
@@ -133,7 +133,7 @@ class HeldOut:
 
     @property
     def misfit(self) -> Misfit:
-        """What 95 % of the errors along an axis stay below."""
+        """Bound on 95 % of the errors along an axis."""
         return Misfit.of(self.axis_error, self.size)
 
     @property
@@ -154,10 +154,10 @@ class HeldOut:
 
 @record()
 class IntervalCoverage:
-    """How often an interval that claims to cover did."""
+    """Nominal and measured coverage of an interval."""
 
     nominal: float
-    """What it claims."""
+    """Nominal coverage."""
     share: float | None
     """Share that lay inside; none where it is not known."""
     count: int

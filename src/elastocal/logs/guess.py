@@ -32,7 +32,7 @@ _OF_BOXES = {
     "n-m": ("N*m", 1.0), "nmm": ("N*mm", 1.0), "n-mm": ("N*mm", 1.0),
     "lbf-in": ("N*m", 0.11298483), "lbf-ft": ("N*m", 1.3558179),
 }  # fmt: skip
-"""Units of the boxes of sensors: ours, and how many of ours one of theirs is."""
+"""Units of the boxes of sensors: SI unit, and its number in one of theirs."""
 _STEP = re.compile(r"(?i)(step|reading|handshake|plateau|messpunkt)")
 _PLAIN_UNITS = {"°": "deg", "degrees": "deg", "nm": "N*m", "nmm": "N*mm", "sec": "s"}
 _LEAST_AXES = 5

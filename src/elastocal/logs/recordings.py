@@ -82,7 +82,7 @@ def read_bounded(path: Path, what: str, read: Callable[[], _Result]) -> _Result:
     LogError
         If it is damaged, or takes more time or memory than a file of its size may.
     ElastocalError
-        Whatever ``read`` raises of ours.
+        Any such error that ``read`` raises.
     """
     with readable(path):
         parts = [*path.iterdir()] if path.is_dir() else [path]
@@ -115,7 +115,7 @@ def _first(path: Path, count: int) -> bytes:
 
 @dataclass(frozen=True)
 class _Refusal:
-    """Why a file was not read: an error of ours, or in the words of a library."""
+    """Reason why a file was not read: an error of elastocal, or a library's message."""
 
     error: ElastocalError | None
     reason: str = ""
@@ -341,7 +341,7 @@ def _mcap(path: Path) -> Iterator[McapReader]:
 def _require_rosbags(path: Path) -> None:
     """Refuse a bag if rosbags is not installed; import it here, so that no child repeats it."""
     if Path(path).suffix.lower() == ".mcap":
-        return  # most of ours need none
+        return  # most of them need none
     try:
         import rosbags.highlevel  # noqa: F401
     except ImportError as error:

@@ -82,13 +82,13 @@ def require_possible_search(cell: Cell, compare: str | None = None) -> None:
     cell : Cell
         The cell.
     compare : str, optional
-        Search technique to lay beside the cell's own.
+        Search technique to compare with the cell's own.
 
     Raises
     ------
     PlanningError
-        If a technique is unknown, or an accuracy is wanted without a process; if the process
-        has no force, or fewer candidates are asked for than poses.
+        If a technique is unknown, or an accuracy is requested without a process; if the process has
+        no force, or fewer candidates are requested than poses.
     """
     search = cell.file.search
     technique(cell.technique)
@@ -298,7 +298,7 @@ def make_plan(
 
 
 def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:
-    """Require a pool that can give the poses wanted, or say what to move."""
+    """Require a pool with enough poses, or state what to move."""
     pool, wanted = sampled.pool, cell.file.search.poses or 1
     found = len(pool.postures)
     if found >= wanted:

@@ -160,15 +160,15 @@ REACH_ADVICE = phrase(
 """Advice to a user when most points are out of reach."""
 
 _NEAREST = 24
-"""Postures of a point that are asked, at most, those nearest to production."""
+"""Largest number of postures of a point that are tried, those nearest to production."""
 _ROUNDS = 6
-"""Postures of a point and branch that the slow checks are asked about, at most."""
+"""Largest number of postures of a point and branch for the slow checks."""
 
 
 @brief_repr
 @dataclass(frozen=True)
 class BasePlacement:
-    """A position of the external axes, and the branches that are asked there, the best first."""
+    """A position of the external axes, and the branches to try there, the best first."""
 
     external: tuple[float, ...] = ()
     """Positions of the external axes, in rad or m."""

@@ -42,7 +42,7 @@ from elastocal.robot.inverse import inverse_for
 from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere, solid_of
 
 _TILTED = np.radians(60.0)
-"""Angle in rad between tool and last axis from which on a user is asked about it."""
+"""Angle in rad between tool and last axis from which the user is asked to check it."""
 _NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
 

@@ -103,7 +103,7 @@ _NUMBERS = {
     "tag:yaml.org,2002:float": r"[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+][0-9]+)?$"
     r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$",
 }
-"""Numbers as people write them. YAML 1.1 has others: 1_000, octal 010, 0x1F, 190:20:30."""
+"""Numbers as written by people. YAML 1.1 has others: 1_000, octal 010, 0x1F, 190:20:30."""
 _UniqueKeyLoader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in known if tag not in _NUMBERS]
     for first, known in yaml.SafeLoader.yaml_implicit_resolvers.items()

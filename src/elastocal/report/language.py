@@ -1,8 +1,8 @@
 """Languages of the pages: one catalogue each, from English phrases to its own.
 
-Only phrases (`elastocal.wording.phrase`), findings among them, are words of ours; any other text is
-a name or a figure and stays as it is, but for the decimal sign. A sentence from a file that was no
-finding there stays English, and the page marks it as English.
+Only phrases (`elastocal.wording.phrase`), including findings, are translated; any other text is a
+name or a figure and stays unchanged, except for the decimal sign. A sentence of a file that is no
+finding stays English, and the page marks it as English.
 """
 
 import re

@@ -403,7 +403,7 @@ def leaf_links(root: ElementTree.Element) -> list[str]:
 def tip_links(root: ElementTree.Element) -> dict[str, int]:
     """Return the candidates for a tool centre point: leaf links that a serial chain moves.
 
-    In place of a gripper's fingers the link that carries them counts.
+    The link that carries a gripper's fingers replaces them.
 
     Returns
     -------

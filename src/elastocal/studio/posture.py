@@ -131,7 +131,7 @@ class CellView:
 
     @cached_property
     def scene(self) -> Scene:
-        """What is drawn of the cell."""
+        """Scene of the cell."""
         home = self.cell.home[None]
         return cell_scene(self.cell, self.surface, self.collisions, home, np.zeros((0, 3)))
 

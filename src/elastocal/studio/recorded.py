@@ -40,7 +40,7 @@ class RunEntry:
 
     folder: str
     state: str
-    """In words."""
+    """State in words."""
     live: bool
     """Whether its last session has not come to an end: it goes on, or its process has died."""
 

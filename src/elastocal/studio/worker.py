@@ -1,7 +1,7 @@
-"""Work that takes its time, in a process of its own: its progress, its end, and how it is stopped.
+"""Long work in a process of its own: progress, result, and stop.
 
-One work at a time. Planning is ended at once; a run is asked to stop, and brings the arm to safety
-first. A worker whose studio is gone takes that for the wish to stop.
+One work at a time. Planning ends at once; a run is asked to stop, and first brings the arm to
+safety. A worker whose studio has ended stops as well.
 """
 
 import contextlib

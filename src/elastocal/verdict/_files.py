@@ -236,7 +236,7 @@ def run_files(run: RunFolder) -> Iterator[Path]:
 
 
 def _files_of(path: Path) -> list[Path]:
-    """Return a file, or the files of a folder that a report reads; pictures are none of them."""
+    """Return a file, or the files of a folder that a report reads, without pictures."""
     if path.is_file():
         return [path]
     read = (ARRAYS, VERDICTS, TABLE, DEVIATIONS)

@@ -34,7 +34,7 @@ class Factor:
     Raises
     ------
     ValueError
-        If the text is none.
+        If the text is invalid.
     """
 
 
@@ -91,7 +91,8 @@ class Condition:
     """Load cases of the calibration: ``all``, or names joined by ``+``."""
     springs: str = "bearing"
     """As for `calibrate`: the name of a layout, ``gears``, ``auto``, or a YAML file. A choice is
-    made in each sample by its own readings, as on a real arm; it takes some three times as long."""
+    made in each sample from its own readings, as on a real arm, and takes some three times as
+    long."""
     tracker_noise: float = 1.0
     """Factor on the tracker's noise in the cell file."""
     force_noise: float = 1.0

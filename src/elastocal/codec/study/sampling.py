@@ -4,8 +4,8 @@ Every worker keeps its linear algebra to one thread: the systems are small, the 
 use all cores, and sums split over threads would be rounded otherwise. For the same reason nothing
 is simulated in the process of the command itself, whose linear algebra may use all cores.
 
-Dask's own client goes on trying and closing long after its timeout, and prints what it tries.
-So the scheduler is asked who it is first, by one message with one deadline.
+Dask's own client continues to try long after its timeout, and prints its attempts. So the scheduler
+is queried first, by one message with one deadline.
 """
 
 import asyncio

@@ -54,7 +54,7 @@ def tool_doubts(
     Parameters
     ----------
     postures : StaticPostures
-        That it was fitted to.
+        Fitted postures.
     fit : ToolFit
         Fit of these postures.
     known_mass : float, optional

@@ -13,7 +13,7 @@ from elastocal.units import SHOWN
 from elastocal.wording import phrase, phrases, plus_minus
 
 _UNITS = {"mass": "kg", "sensor": "deg", "force": "N", "centre": "mm", "moment": "N·m"}
-"""By the first word of an unknown."""
+"""Units by the first word of an unknown."""
 _AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 _DETERMINED = 0.75
 """Share of an entry's prior variance that is gone where the postures halve its deviation."""

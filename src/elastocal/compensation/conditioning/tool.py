@@ -32,7 +32,7 @@ class ToolResult(Result):
     force_bias: _Triple
     moment_bias: _Triple
     R_flange_sensor: tuple[_Triple, _Triple, _Triple]
-    """By rows."""
+    """Rotation from the sensor's to the flange frame, by rows."""
     sensor_origin: _Triple
     """In the flange frame; not identified, static postures do not see it."""
     gravity: _Triple
@@ -78,7 +78,7 @@ class ToolResult(Result):
         self.load_at(T_flange_sensor)
 
     def load_at(self, T_tcp_sensor: FloatArray) -> SensorLoad:
-        """Return the tool on a sensor at a place.
+        """Return the tool on a sensor at a position.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class ToolResult(Result):
         Raises
         ------
         CompensationError
-            If a value is none of a tool's.
+            If a value is impossible for a tool.
         """
         determined = not any(name.startswith("centre") for name in self.undetermined)
         return SensorLoad(

@@ -61,7 +61,7 @@ class PostureSetAside:
     """A posture that does not fit the others."""
 
     posture: int
-    """From 1, in the order of the file or run."""
+    """Number of the posture from 1, in the order of the file or run."""
     force: float
     """Distance of its force from what the others foretell, in N."""
     moment: float

@@ -80,7 +80,7 @@ class ToolModel:
 
     @property
     def free(self) -> BoolArray:
-        """Which of all unknowns are free, shape (55,): those of a tool, drift, matrix."""
+        """Mask of the free unknowns, shape (55,): those of a tool, drift, matrix."""
         free = np.ones(_ALL, dtype=bool)
         free[_ROTATION], free[_DRIFT], free[_MATRIX] = self.rotation, self.drift, self.has_matrix
         return free

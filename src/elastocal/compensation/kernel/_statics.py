@@ -548,7 +548,7 @@ class _Place:
     weight: tuple[Vector, Vector]
     """Force and moment about it of the arm's own weight; zero where no law asks for them."""
     axes: dict[int, tuple[SpringAxis, Frame]]
-    """By number, with the frame that each is fixed in."""
+    """Axes by number, with the frame in which each is fixed."""
     directions: dict[int, Vector] = field(default_factory=dict)
 
     @property

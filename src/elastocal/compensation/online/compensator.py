@@ -136,15 +136,15 @@ class Compensator:
     """Corrects the deflection that a model predicts from joints and measured wrench (Fig. 5).
 
     The length of the correction never exceeds its limit, and from one step to the next it never
-    moves farther than the rate allows, whatever the readings are. The C export does the same
-    arithmetic in the same order.
+    moves farther than the rate allows, for any readings. The C export uses the same arithmetic in
+    the same order.
 
     Parameters
     ----------
     numbers : Design
         Design of the compensator.
     functions : ModelFunctions, optional
-        What it asks of the model; by default the compiled kernel.
+        Functions of the model; by default the compiled kernel.
     """
 
     def __init__(self, numbers: Design, functions: ModelFunctions | None = None) -> None:

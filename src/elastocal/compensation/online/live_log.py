@@ -41,7 +41,7 @@ _AXES, _NUMBER = ("x", "y", "z"), {"type": "number"}
 
 
 class LiveLog:
-    """Writes cycles to a file; `put` is for the loop, all else for whoever watches it.
+    """Writes cycles to a file; `put` is for the loop, all else for its observers.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ class LiveLog:
     joint_names : sequence of str
         Joints, in the order of every cycle's ``q``.
     facts : mapping of str to str
-        What the file says of itself besides.
+        Further metadata of the file.
     most : int
-        Cycles that may wait.
+        Largest number of queued cycles.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ def read_live_log_facts(path: Path) -> LiveLogFacts:
     Raises
     ------
     SchemaError
-        If it is none of a known version, cut off or damaged.
+        If its version is unknown, or it is truncated or damaged.
     FileAccessError
         If it cannot be read.
     """

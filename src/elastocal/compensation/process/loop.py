@@ -166,7 +166,7 @@ class Controller:
 
     @property
     def readings(self) -> int:
-        """In a cycle."""
+        """Readings in a cycle."""
         return round(self.cycle / self.sample)
 
     @property
@@ -203,7 +203,7 @@ class Passage:
     """A course that is to be run."""
 
     course: Course
-    """With joints."""
+    """Course with joints."""
     air: FloatArray
     """See `air_shifts`, shape (row, 3), in m."""
     corrector: Corrector | None = None

@@ -310,7 +310,7 @@ def require_process(name: str) -> None:
     Raises
     ------
     CompensationError
-        If it is none.
+        If it is not.
     """
     if name not in PROCESSES:
         raise CompensationError(f"process {name!r} is not one of {', '.join(PROCESSES)}")

@@ -21,7 +21,7 @@ PROGRAM_WRITERS: Registry[ProgramWriter] = Registry(
 )
 """Writers of programs by their language."""
 NO_PROGRAM = "none"
-"""Asks for no program, where a language is asked for."""
+"""Name that requests no program, where a language is expected."""
 _LANGUAGES = {"KUKA": "krl", "ABB": "rapid", "FANUC": "fanuc", "Universal Robots": "urscript"}
 """Language of each maker."""
 
@@ -32,7 +32,7 @@ def writer_named(language: str) -> ProgramWriter:
     Raises
     ------
     PlanningError
-        If there is none, with those that there are.
+        If there is none, with the known ones.
     """
     return PROGRAM_WRITERS.named(language.casefold(), (NO_PROGRAM,))
 

@@ -1,4 +1,4 @@
-"""The protocol of a controller's program: what correcting one asks of its language.
+"""Protocol of a controller's program: what its correction needs of its language.
 
 A further controller (RAPID, LS, URScript) is a file or folder beside `krl` that reads its programs
 into a `ControllerProgram`, and its line in `correct.PROGRAM_READERS`.
@@ -14,11 +14,11 @@ from elastocal.results import brief_repr
 
 
 class ProgramPoint(Protocol):
-    """A position that a program moves to; its numbers are checked when they are asked for."""
+    """A position that a program moves to; its numbers are checked when they are used."""
 
     @property
     def name(self) -> str:
-        """As declared."""
+        """Name as declared."""
 
     @property
     def kind(self) -> str:

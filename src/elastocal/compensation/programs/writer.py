@@ -47,7 +47,7 @@ class StraightMove:
 
     name: str
     T_base_tcp: FloatArray
-    """Where it ends, shape (4, 4), in m."""
+    """Pose at its end, shape (4, 4), in m."""
     q: FloatArray
     """Joints there, shape (joint,), in rad or m."""
     speed: float
@@ -80,7 +80,7 @@ class Block:
     """Steps that belong together."""
 
     title: str
-    """For a person; empty: none."""
+    """Title for people; empty: none."""
     steps: tuple[Step, ...]
 
 
@@ -97,7 +97,7 @@ class RobotProgram:
     facts: tuple[str, ...]
     """Paragraphs that say where it comes from."""
     motions: tuple[str, ...]
-    """Paragraphs that say what it does."""
+    """Paragraphs that describe its motions."""
 
     @property
     def targets(self) -> tuple[AxisMove | StraightMove, ...]:
@@ -144,9 +144,9 @@ class ProgramWriter(ABC):
     """Writes programs in one language: what it allows, and how it says each step."""
 
     language: ClassVar[str]
-    """As an option names it."""
+    """Name as an option."""
     title: ClassVar[str]
-    """As a person does."""
+    """Name for people."""
     suffixes: ClassVar[tuple[str, ...]]
     """Suffixes of the files of a program, the main one first."""
     longest_name: ClassVar[int]
@@ -171,7 +171,7 @@ class ProgramWriter(ABC):
         program : RobotProgram
             A program that was checked.
         head : sequence of str
-            Comments that a person has to read first.
+            Comments that a person must read first.
         """
 
     @abstractmethod

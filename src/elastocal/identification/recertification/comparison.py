@@ -294,7 +294,7 @@ def compare_calibrated_poses(
 ) -> RowComparison | None:
     """Return the change over the readings of the new calibration that the old one covers.
 
-    None where there are none, or a model does not know where it was calibrated.
+    None where there are none, or a model does not state its domain.
     """
     if new.domain is None:
         return None
@@ -718,7 +718,7 @@ def _given_rows(
     moment: ArrayLike | None,
     rows: ComparedRows | None,
 ) -> ComparedRows | None:
-    """Return the rows that matter, or refuse them by shape or value; None: there are none."""
+    """Return the rows of a comparison, or refuse them by shape or value; None: there are none."""
     if rows is not None:
         q, force, moment = rows.q, rows.force, rows.moment
         if rows.arm is not None:

@@ -49,7 +49,7 @@ class PostureCheck(Check, Protocol):
     order: ClassVar[int]
     """Place among the checks, in tables and when a pose fails several: the lower the earlier."""
     slow: ClassVar[bool] = False
-    """Whether meshes are asked, so that only the most promising postures are judged."""
+    """Whether the check uses meshes, so that only the best postures are judged."""
 
     @classmethod
     def of(cls, cell: Cell, surface: Surface) -> Self | None:

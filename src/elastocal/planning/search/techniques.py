@@ -60,7 +60,7 @@ def growing_choices(
     Parameters
     ----------
     wanted : SearchTechnique
-        One that gives as many poses as it is asked for.
+        Technique that gives the requested number of poses.
     candidates : Candidates
         The pool.
     most : int

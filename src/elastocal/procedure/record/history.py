@@ -100,7 +100,7 @@ class HistoryEntry(StrictModel):
 def read_history(folder: Path, cell: str) -> tuple[HistoryEntry, ...]:
     """Return the runs of a cell by the history in a folder, in the order in which they began.
 
-    Lines that are none of ours are left out; where there is no history, there are no runs.
+    Foreign lines are left out; without a history, there are no runs.
     """
     path, found = folder / HISTORY, []
     if not path.is_file():

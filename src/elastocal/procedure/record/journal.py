@@ -111,7 +111,7 @@ class Entry(StrictModel):
     pose: int | None = None
     """Id in the plan; None between poses."""
     attempt: int | None = None
-    """At this pose, from 1."""
+    """Number of the attempt at this pose, from 1."""
     step: str | None = None
     """State of the procedure."""
     action: Action | None = None

@@ -352,7 +352,7 @@ def mark_message(text: str) -> bytes:
     return json.dumps({"text": text}).encode()
 
 
-# These texts hardly ever change from one look at a device to the next.
+# These texts hardly ever change between readings of a device.
 @lru_cache(maxsize=64)
 def _tail(**keys: object) -> str:
     """Return the end of a JSON object, from the comma on."""

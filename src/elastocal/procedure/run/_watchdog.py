@@ -102,7 +102,7 @@ class Watchdog:
 
     @property
     def sees(self) -> bool:
-        """Whether the beam held in the last cycle in which it had to."""
+        """Whether the beam held in the last cycle in which it was required."""
         return self._lost_at is None
 
     def check(self, seen: Snapshot, guard: Guard) -> bool:

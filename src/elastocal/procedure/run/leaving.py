@@ -127,7 +127,7 @@ class ForceTap:
 
 
 _LOOK = 0.04
-"""Time between two looks at arm and force, in s."""
+"""Interval at which arm and force are read, in s."""
 
 
 def leave_surface(

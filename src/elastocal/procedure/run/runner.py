@@ -544,7 +544,7 @@ def _attempt(supervisor: Supervisor, action: Action, motion: Callable[[], None])
 
 
 def _release(a: Attempt) -> None:
-    """Ramp the force to zero; nothing but the arm is asked whether it is."""
+    """Ramp the force to zero; only the arm is read."""
     s = a.supervisor
     arm = s.arm_state()
     if arm is None or arm.motion is not Motion.RELEASING:

@@ -76,11 +76,11 @@ def write_report(
     path : Path
         An HTML file.
     evidence : Evidence
-        Whatever is there.
+        Available evidence.
     sign : callable, optional
         Returns the signature of a hash, here of the manifest; by default there is none.
     language : Language
-        Language of its words; what other parts of the program said stays English.
+        Language of its words; texts of other parts of the program stay English.
     signer : str
         Public key of who signs it.
     beside : callable, optional

@@ -117,7 +117,7 @@ def pose_grid(
     poses : sequence of int
         Their labels.
     cases, check : sequence of str
-        Names of the load cases, and of those among them that no fit sees.
+        Names of the load cases, and of those kept out of every fit.
     """
     each = _HEAD + _CELL * len(cases)
     signs = {case: "–" if case in check else "×" for case in cases}

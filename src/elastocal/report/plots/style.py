@@ -74,7 +74,7 @@ _DARK = {
     "faint": "#5c6268", "band": "#1d2125", "after": "#56b4e9", "before": "#ff9a5c",
     "refused": "#a5a59f",
 }  # fmt: skip
-"""As the style sheet of pages has them."""
+"""Colours of the style sheet of pages."""
 _SCHEMES = (
     f":root{{{';'.join(f'--{name}:{colour}' for colour, name in _THEMED.items())}}}"
     "@media screen and (prefers-color-scheme:dark){"

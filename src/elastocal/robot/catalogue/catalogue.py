@@ -46,7 +46,7 @@ class Group(StrictModel):
     source: str | None = None
     """Source of the numbers."""
     assumption: str | None = None
-    """Why they are not to be taken as fact, or why there are none; None for sourced numbers."""
+    """Reason why they are assumptions, or why there are none; None for sourced numbers."""
 
     @model_validator(mode="after")
     def _require_origin(self) -> Self:
@@ -417,7 +417,7 @@ class _Arm:
     flange: tuple[Sequence[float], Sequence[float]]
     """xyz and rpy against the last link."""
     shapes: Mapping[str, Iterable[_Shape]]
-    """By link, in the frame of its joint."""
+    """Shapes by link, in the frame of its joint."""
 
 
 def _arm_of(entry: CatalogueEntry) -> _Arm:

@@ -82,7 +82,7 @@ class InverseKinematics(ABC):
 
     @abstractmethod
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
-        """Return arm configurations that reach the poses, whatever the limits.
+        """Return arm configurations that reach the poses, without regard to limits.
 
         Parameters
         ----------

@@ -78,7 +78,7 @@ class EmsconServer(TcpServer):
         self.weather = (20.0, 1013.0, 50.0)
         """Temperature in °C, pressure in mbar, humidity in %."""
         self.units_stay = False
-        """Whether it goes on in mm, whatever is asked for."""
+        """Whether it continues in mm, whatever units are requested."""
         self.mode = _STATIONARY
         self.start_anew()
 
@@ -114,7 +114,7 @@ class EmsconServer(TcpServer):
             self.drop(peer)
 
     def received(self, peer: Peer, data: bytes) -> None:
-        """Carry out what is asked."""
+        """Carry out the received command."""
         peer.rest += data
         while len(peer.rest) >= 12:
             size, kind, code = struct.unpack_from("<iii", peer.rest)

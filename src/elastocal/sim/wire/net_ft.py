@@ -324,7 +324,7 @@ class _PageHandler(http.server.BaseHTTPRequestHandler):
     timeout = 2.0
 
     def do_GET(self) -> None:
-        """Answer with the page, whatever index is asked for."""
+        """Answer with the page for any index."""
         if self.path.partition("?")[0] != "/netftapi2.xml":
             self.send_error(http.HTTPStatus.NOT_FOUND)
             return

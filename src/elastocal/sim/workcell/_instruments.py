@@ -84,7 +84,7 @@ class SampleBuffer:
 
 
 class NoiseStream:
-    """Noise by the number of the sample, whichever samples are asked for."""
+    """Noise by the number of the sample, independent of the order of access."""
 
     def __init__(self, draw: Draw, seed: int) -> None:
         """Draw blocks of shape (`BLOCK`, axis) by ``draw``."""

@@ -37,7 +37,7 @@ SPANS = (
 _COLLISION_RISE = 100_000
 """Time in which the force of a soft collision comes, in µs."""
 _DONE = 1.0 - 1e-3
-"""A change of force this far along counts as made when the gears' memory is asked."""
+"""Part of a change of force beyond which it counts as made for the gears' memory."""
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,7 @@ class TrueRobot:
         return self._tip(self.linkage, q), self._tip(self.built, q)
 
     def _tip(self, linkage: Linkage, q: FloatArray) -> FloatArray:
-        """Return T_base_tcp; one posture is asked for again and again, so the last is kept."""
+        """Return T_base_tcp; the last is kept, since one posture is evaluated repeatedly."""
         described, asked = linkage is self.linkage, q.tobytes()
         known = self._recent.get(described)
         if known is None or known[0] != asked or known[1].shape[:-2] != q.shape[:-1]:

@@ -121,7 +121,7 @@ class CampaignErrors:
         *,
         conditioned: bool = False,
     ) -> Readings:
-        """Return the truth as the instruments show it, places numbered from 0.
+        """Return the truth with the errors of the instruments, places numbered from 0.
 
         Parameters
         ----------
@@ -130,13 +130,13 @@ class CampaignErrors:
         draws : ErrorDraws
             Random errors of these places and load cases.
         scales : ErrorScales
-            How large the errors are.
+            Sizes of the errors.
         station : ndarray, shape (place, 3)
-            Tracker station that looks at each place, in base, in m.
+            Tracker station that measures each place, in base, in m.
         load_cases : tuple of str
             Names of the loads.
         conditioned : bool
-            Whether the first of them went before the reference.
+            Whether the first of them precedes the reference.
         """
         places, loads = settled.force.shape[:2]
         distance = np.linalg.norm(settled.marker - station, axis=1)[:, None, None]

@@ -4,13 +4,13 @@ Assumptions of the process, beside those of `elastocal.sim.workcell._quasistatic
 
 * the robot is at rest at every instant: the forces that it follows change within tenths of a
   second, its first mode lies above 8 Hz;
-* a ripple at hundreds of Hz reaches the sensor whole and moves the arm not at all: at 200 Hz an
-  arm with a mode at 10 Hz moves (10/200)² = 0.25 % of what it would at rest;
-* what counts is how far a path under force lies from the same path run in the air, as a tracker
-  on the tool measures it: sag under weight is in both;
-* the controller takes out a part of the sag as it was where the course began;
-* the path as a whole is off by the error of one stop, drawn anew for every course;
-* the path in the air is that of a cold arm, the process finds it warm;
+* a ripple at hundreds of Hz reaches the sensor fully and does not move the arm: at 200 Hz an arm
+  with a mode at 10 Hz moves (10/200)² = 0.25 % of what it would at rest;
+* the deviation is the distance of a path under force from the same path in the air, as a tracker on
+  the tool measures it: sag under weight is in both;
+* the controller compensates a part of the sag at the beginning of the course;
+* the whole path has the error of one stop, drawn for every course;
+* the path in the air is that of a cold arm, the process that of a warm one;
 * gears begin a course with strains that the free move before it has left; in the air they keep
   those (the way along the course twists no gear by more than the weight does);
 * a force reacts to where the tool is: along the surface's normal it falls by `process_stiffness`
@@ -297,11 +297,11 @@ def simulated_devices(cell: Cell, seed: int, start: float = 0.0) -> Devices:
     Parameters
     ----------
     cell : Cell
-        The cell; its sections ``simulation`` and ``faults`` say what is hidden in it.
+        The cell; its sections ``simulation`` and ``faults`` state the hidden truth.
     seed : int
         Seed of everything random.
     start : float
-        What the clock shows at the beginning, in s.
+        Initial time of the clock, in s.
 
     Raises
     ------
