@@ -236,6 +236,7 @@ def _probe_blocks(model: ElasticModel, marker_offset: ArrayLike | None = None) -
     """Return observation blocks of forces at many configurations, shape (row, 3, parameter)."""
     limits = model.robot.limits
     lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
+    # Random configurations are generic: enough of them reach the largest rank of any set.
     rng = np.random.default_rng(_PROBE_SEED)
     q = rng.uniform(lower, upper, (_PROBES, len(lower)))
     blocks = model.observation_blocks(q[:, None], np.eye(3), marker_offset=marker_offset)

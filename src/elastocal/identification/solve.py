@@ -69,6 +69,8 @@ def factor(problem: Problem) -> Factored:
     # With fewer rows than columns the triangle would not be square.
     if len(system) < n + 1:
         system = np.vstack([system, np.zeros((n + 1 - len(system), n + 1))])
+    # The right-hand side is the last column, so that its projection is in the triangle and Q is
+    # never formed.
     triangle = np.asarray(np.linalg.qr(system, mode="r"), dtype=float)
     U, s, Vt = np.linalg.svd(triangle[:n, :n])
     return Factored(s, Vt, U.T @ triangle[:n, n], scaled.scale)
@@ -93,6 +95,7 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
         weight = updated
         if settled:
             break
+    # Once more with the last weights, so that solution and weights belong together.
     final = _solve_linear(problem, weight)
     # The weights of exact data follow round-off for ever, which moves no spring.
     size = np.abs(final.compliance * final.factored.scale)
@@ -119,6 +122,7 @@ def normalised_residuals(
     """
     norms = np.linalg.norm(problem.residuals(compliance) * problem.weight, axis=1) / shrinkage
     sigma = np.median(norms) / MEDIAN_NORM
+    # Exact data have a median residual of zero.
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
     return np.asarray(norms / max(sigma, smallest))
 

@@ -67,10 +67,13 @@ def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArr
         comb(len(involved), k - 1), k - 1
     )
     _, s, Vt = np.linalg.svd(null_space[sets], full_matrices=True)
+    # Independent rows leave one vector; dependent ones leave a plane, whose sparsest vectors other
+    # sets give.
     unique = s[:, -1] > _ZERO if k > 1 else np.ones(len(sets), dtype=bool)
     seen: set[tuple[float, ...]] = set()
     for coefficients in Vt[unique, -1]:
         vector = _normalised(null_space @ coefficients)
+        # Many sets give the same vector.
         key = tuple(np.round(vector, 4))
         if key not in seen:
             seen.add(key)
@@ -96,6 +99,8 @@ def _eliminated(null_space: FloatArray) -> Iterator[FloatArray]:
 def _normalised(vector: FloatArray) -> FloatArray:
     vector = vector / np.abs(vector).max()
     vector[np.abs(vector) <= _ZERO] = 0.0
+    # Geometry makes most coefficients whole or half numbers; rounding errors would make them
+    # unreadable.
     rounded = np.round(vector * 2.0) / 2.0
     vector = np.where(np.abs(vector - rounded) < _ZERO, rounded, vector)
     return np.asarray(vector * np.sign(vector[np.flatnonzero(vector)[0]]))

@@ -245,6 +245,7 @@ def lead_section(time: float, sample: float) -> Section:
             f"lead {time:g} s must be above 0 and at most {_LONGEST_LEAD:g} s: for longer no slope"
             " of a force stays as it is"
         )
+    # y[k] = x[k] + ahead (x[k] - x[k-1]): extrapolation along the last difference.
     ahead = time / sample
     return 1.0 + ahead, -ahead, 0.0, 0.0, 0.0
 
@@ -261,6 +262,8 @@ def _sections(sos: FloatArray) -> tuple[Section, ...]:
     made = []
     for row in np.asarray(sos, dtype=float):
         b, (_, a1, a2) = row[:3], row[3:].tolist()
+        # The gain at rest is made exactly 1: every constant force would otherwise carry the
+        # rounding of the design.
         b0, b1, b2 = (b * ((1.0 + a1 + a2) / b.sum())).tolist()
         made.append((b0, b1, b2, a1, a2))
     return tuple(made)
@@ -269,6 +272,8 @@ def _sections(sos: FloatArray) -> tuple[Section, ...]:
 def _delay(polynomial: Sequence[float], z: FloatArray) -> FloatArray:
     p0, p1, p2 = polynomial
     value = p0 + p1 * z + p2 * z * z
+    # At a zero on the unit circle, such as the line of a notch, the phase jumps and there is no
+    # delay.
     gone = np.abs(value) < 1e-12 * (abs(p0) + abs(p1) + abs(p2))
     ratio = (p1 * z + 2.0 * p2 * z * z) / np.where(gone, 1.0, value)
     return np.where(gone, np.nan, ratio.real)

@@ -203,11 +203,14 @@ def _together(A: FloatArray, y: FloatArray) -> tuple[BoolArray, FloatArray]:
 
 def _majority(A: FloatArray, y: FloatArray) -> BoolArray:
     """Return the three quarters of the postures that go together best."""
+    # Seeded: the same postures always give the same choice.
     n, rng = len(A), np.random.default_rng(0)
     share = n - max(1, n // 4)
     best, kept = np.inf, np.ones(n, dtype=bool)
     size = np.maximum(np.abs(y - np.median(y, axis=0)).max(axis=0), _SMALL * (1 + np.abs(y).max()))
     for _ in range(_TRIALS):
+        # One posture more than the four unknowns of the law for each component. Two concentration
+        # steps, fits to the postures nearest to the last one, then approach the best subset.
         few = rng.choice(n, 5, replace=False)
         for _ in range(2):
             left = (((y - A @ np.linalg.pinv(A[few]) @ y[few]) / size) ** 2).sum(axis=1)

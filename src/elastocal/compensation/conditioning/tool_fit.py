@@ -223,6 +223,7 @@ def fit_tool(
     # yet.
     start = ToolModel(model.rotation, model.drift) if model.has_matrix else model
     found = _WeighedFit(postures, start, np.zeros(_ALL), R, np.ones(2))
+    # Each stage twice: the second fit has the weights that the scatter of the first gives.
     for stage in (start, start, model, model):
         found = replace(found, model=stage).descended()
         scatter = found.scatter()
@@ -284,6 +285,8 @@ class _WeighedFit:
             step = np.zeros(_ALL)
             step[free] = (vt[kept].T @ ((u[:, kept].T @ rows) / s[kept])) / scale
             values = fit.values + step
+            # The step in rotation goes into R, about which the next linearisation is made: rotation
+            # vectors do not add.
             values[_ROTATION] = 0.0
             turn = Rotation.from_rotvec(step[_ROTATION]).as_matrix()
             fit = replace(fit, values=values, R=fit.R @ turn)
@@ -304,6 +307,7 @@ class _WeighedFit:
         prior = np.eye(_ALL)[_MATRIX][free[_MATRIX]]
         J = np.vstack([J.reshape(-1, _ALL), prior])[:, free]
         scale = np.linalg.norm(J, axis=0)
+        # A column of rounding errors is not magnified to the size of the others.
         scale[scale <= _DEPENDENT * scale.max()] = scale.max()
         u, s, vt = np.linalg.svd(J / scale, full_matrices=False)
         return u, s, vt, scale, s > _DEPENDENT * s[0]
@@ -312,6 +316,8 @@ class _WeighedFit:
         """Return the standard deviations of what is left of force and moment components."""
         squares = (self.left().reshape(-1, 2, 3) ** 2).sum(axis=(0, 2))
         over = self.left_over()
+        # Half a degree of freedom is rounding of the leverages; with none left the scatter is
+        # unknown.
         return np.where(over > 0.5, np.sqrt(squares / np.maximum(over, 0.5)), np.nan)
 
     def left_over(self) -> FloatArray:

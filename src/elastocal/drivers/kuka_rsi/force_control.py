@@ -69,6 +69,7 @@ class ForceLaw:
         largest_speed : float
             In m/s.
         """
+        # A first-order filter delays a slow signal by its time constant.
         delay = motion_delay + 2.0 * cycle + _FILTER
         return cls(_PRODUCT / (stiffness * delay), delay, largest_speed, stiffness)
 
@@ -93,6 +94,7 @@ class ForceLaw:
             Force on the robot less the wanted one, tcp frame, in N.
         """
         wanted = self.gain * missing
+        # The norm is limited, not each axis: the motion keeps the direction of the missing force.
         size = float(np.linalg.norm(wanted))
         return wanted if size <= self.largest_speed else wanted * (self.largest_speed / size)
 
@@ -144,12 +146,16 @@ class ForceReader:
             sample, self._failure = self._feed.newest(), None
         except (DeviceError, OSError) as error:
             sample, self._failure = None, str(error) or type(error).__name__
+        # The cycle is faster than many sensors: the same sample, taken twice, would count double in
+        # filter and zero.
         if sample is None or sample.time == self._newest:
             return
         self._newest, self._status = sample.time, sample.status
         if sample.status is not SensorStatus.OK or not np.isfinite(sample.force).all():
             return
         self._good, self.raw = sample.time, sample.force
+        # From the first reading on, not from zero: a raw sensor's bias may be many newtons, through
+        # which the filter would otherwise have to rise.
         if self._smooth is None:
             self._smooth = sample.force
         self._smooth = self._smooth + self._share * (sample.force - self._smooth)
@@ -164,6 +170,8 @@ class ForceReader:
         """Return whether the zero is had; from then on the force counts from it."""
         if self._since is None:
             return True
+        # Both are required: a fast sensor has enough samples within one vibration, a slow one
+        # enough time with too few samples.
         if self._count < _TARE_SAMPLES or not now - self._since >= _TARE_TIME:
             return False
         self._zero, self._since = self._sums / self._count, None

@@ -240,6 +240,8 @@ def _controlled(cycle: Cycle, press: Press, pace: Pace, ends: float) -> Phase:
                 break  # in position control, from where it can be retracted without a force
             cycle = yield Step()
             continue
+        # The target starts at the present force and is ramped, so that force control begins without
+        # a jump.
         reference = _toward(reference, press.wanted, press.rate * pace.cycle)
         velocity = press.law.speed(reader.force_tcp - reference)
         left = float(np.linalg.norm(reader.force_tcp))
@@ -312,6 +314,8 @@ def _shift(
             left = goal - at
             distance = float(np.linalg.norm(left))
             gains = pace.acceleration * pace.cycle
+            # Fastest speed from which the tool still stops at the goal, but at least one step of
+            # the ramp, without which it would never start.
             brakes = max(math.sqrt(2.0 * pace.acceleration * distance), gains)
             now = min(speed, now + gains, brakes)
             piece = left if distance <= now * pace.cycle else left * (now * pace.cycle / distance)
@@ -324,6 +328,7 @@ def _shift(
             cycle = yield Step()
             if guard is not None:
                 guard.look(cycle)
+        # A lost answer has lost its part of the move, which the next try adds.
         missing = float(np.linalg.norm(goal - cycle.offset))
         if missing <= EXACT or (guard is not None and guard.felt):
             return cycle

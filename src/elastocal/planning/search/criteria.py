@@ -130,6 +130,8 @@ def log_determinant_gain(matrix: FloatArray, rows: FloatArray) -> FloatArray:
     ndarray, shape (pose,)
     """
     small = _small(matrix, rows)
+    # The determinant is the product of the pivots; the loop runs over the few rows, each operation
+    # over all poses.
     gain = np.log(small[0, 0])
     for j in range(len(small) - 1):
         _eliminate(small, j)

@@ -171,6 +171,7 @@ class Supervisor:
             If a device does not answer.
         """
         seen = self._read_devices()
+        # Shown before it is judged, so that a person sees the state that led to a fault.
         self._observers.report(seen)
         try:
             marker_lost = self.watchdog.check(seen, guard)
@@ -191,6 +192,7 @@ class Supervisor:
         It is used for the retreat after a fault: the other devices and the clock may be the cause,
         so they are ignored.
         """
+        # The time since the last cycle must not be refused now: the retreat has to go on.
         self.pause()
         with contextlib.suppress(*DEVICE_ERRORS):
             self._pass_time()
@@ -228,6 +230,7 @@ class Supervisor:
         return state
 
     def _read_sensor(self) -> WrenchBlock:
+        # Cleared first: if the sensor fails, its last samples must not count as new ones.
         self.wrenches = None
         block = self.devices.sensor.read()
         check_wrenches(block)
@@ -253,11 +256,13 @@ class Supervisor:
         FaultError
             If it takes longer than ``limit`` seconds; also see `cycle`.
         """
+        # Cycles are counted, too: a clock that runs slow must not make the wait endless.
         start, cycles = self.now, 2 * math.ceil(limit / self.settings.procedure.cycle) + 10
         for _ in range(cycles):
             seen = self.cycle(guard)
             if done(seen):
                 return seen
+            # Tested after the condition: what was done in the last cycle in time is no timeout.
             if not seen.time - start <= limit:
                 break
         raise FaultError(Fault.TIME_LIMIT, f"{what} is not done after {limit:.1f} s")
@@ -279,11 +284,14 @@ class Supervisor:
     def _pass_time(self) -> None:
         clock, procedure = self.devices.clock, self.settings.procedure
         before, longest = clock.now(), max(procedure.stale, procedure.cycle * 5)
+        # Whatever kept the program busy between two cycles (a disk, a suspended process), nobody
+        # supervised the arm meanwhile.
         if self._last_read is not None and not before - self._last_read <= longest:
             text = f"{before - self._last_read:.2f} s passed between two cycles"
             raise FaultError(Fault.CLOCK, text)
         clock.sleep(procedure.cycle)
         passed = clock.now() - before
+        # With a clock that has stopped, no limit in time would ever be reached.
         self._still = 0 if passed > 0.0 else self._still + 1
         if not self._still * procedure.cycle <= procedure.stale:
             raise FaultError(Fault.CLOCK, f"it stands at {before:.3f} s")

@@ -143,6 +143,8 @@ class Watchdog:
                 text = f"{block.source}: {first:.3f} s after {self._last_sample:.3f} s"
                 raise FaultError(Fault.CLOCK, text)
             self._sensor_time = self._last_sample = float(block.time[-1])
+            # A live sensor has noise. Values that stay equal to the last digit are those of a
+            # frozen stream, which new time stamps would hide.
             row = (*block.force[-1].tolist(), *block.moment[-1].tolist())
             if row != self._row:
                 self._row, self._changed = row, now
@@ -154,6 +156,7 @@ class Watchdog:
     def _check_force(self, force_tcp: FloatArray, limit: float) -> None:
         if not len(force_tcp):
             return
+        # A NaN passes through the maximum and then fails the comparison below.
         largest = float(np.sqrt((force_tcp * force_tcp).sum(axis=1).max()))
         if not largest <= limit:
             if np.isnan(largest):
@@ -163,6 +166,7 @@ class Watchdog:
     def _check_collision(self, seen: Snapshot) -> None:
         block, R_base_tcp = seen.wrenches, seen.arm.T_base_tcp[:3, :3]
         R_base_sensor = R_base_tcp @ self._R_tcp_sensor
+        # Samples are skipped so that a fast sensor, or a late cycle, does not prolong the cycle.
         for i in range(0, len(block), 1 + len(block) // _MOST_LOOKED_AT):
             hit = self.collisions.look(float(block.time[i]), block.force[i], R_base_sensor)
             if hit is not None:
@@ -176,6 +180,7 @@ class Watchdog:
                 self._point_time = float(block.time[-1])
             self._check_age(Fault.TRACKER_STALE, block.source, self._point_time, now)
             return False
+        # Without a beam there are no points: their age counts from its return.
         self._point_time = now
         if self._lost_at is None:
             self._lost_at, self._looked_at, self.breaks = now, now, self.breaks + 1
@@ -201,6 +206,7 @@ class Watchdog:
     def _check_age(self, fault: Fault, source: str, time: float, now: float) -> None:
         if not now - time <= self._stale:
             raise FaultError(fault, f"{source}: newest data are {now - time:.2f} s old")
+        # Data from the future mean that two clocks disagree, so that no age can be trusted.
         if not time - now <= self._stale:
             raise FaultError(Fault.CLOCK, f"{source}: its time is {time - now:.2f} s ahead")
 
