@@ -315,7 +315,7 @@ def _shift(
             distance = float(np.linalg.norm(left))
             gains = pace.acceleration * pace.cycle
             # Fastest speed from which the tool still stops at the goal, but at least one step of
-            # the ramp, without which it would never start.
+            # the ramp, or it would approach the goal ever more slowly.
             brakes = max(math.sqrt(2.0 * pace.acceleration * distance), gains)
             now = min(speed, now + gains, brakes)
             piece = left if distance <= now * pace.cycle else left * (now * pace.cycle / distance)
