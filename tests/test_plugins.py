@@ -12,18 +12,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from elastocal.cell import fingerprint, load_cell, write_example
 from elastocal.elastic import KINDS, ElasticModel, bearing, layout
 from elastocal.errors import ElastocalError, PlanningError, PluginError, SchemaError
 from elastocal.identification import LOSSES, CalibratedModel, Observability, read_model, write_model
+from elastocal.planning import CHECKS, Postures, cell_surface
+from elastocal.planning.checks import check_margins
+from elastocal.planning.pool import robot_checks
 from elastocal.planning.search import CRITERIA, TECHNIQUES
 from elastocal.plugins import KINDS as KINDS_OF_PLUGINS, Registry
 from elastocal.report.document import write_report
 from elastocal.report.language import language_of
+from elastocal.testing import CheckSuite
 from elastocal.verdict import Evidence
 from support import plugged, shown
 from support.cells import robot
 from support.cli import elastocal
 from support.pools import choice
+
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture
@@ -435,3 +442,69 @@ class TestASectionOfAPlugIn:
         with pytest.raises(PluginError, match=r"report section 'odd' of odd-things 1.0 cannot be"):
             write_report(tmp_path / "r.html", Evidence("2026-01-02T03:04:05Z"))
         assert not (tmp_path / "r.html").exists()
+
+
+class TestACheckOfAPlugIn:
+    """The one that the documentation shows."""
+
+    @pytest.fixture(autouse=True)
+    def installed(self, tmp_path, monkeypatch):
+        page = (ROOT / "docs" / "how-to" / "write-a-plug-in.md").read_text("utf-8")
+        shown = page.partition("## A check\n\n```python\n")[2].partition("```")[0]
+        source = (
+            "from dataclasses import dataclass\nfrom typing import ClassVar\n"
+            "import numpy as np\nfrom elastocal.planning.checks import PostureCheck\n"
+            "from elastocal.records import StrictModel\nfrom elastocal.wording import phrase\n"
+            f"{shown}\nTHING = ReachCheck\n"
+        )
+        offered(tmp_path, monkeypatch, source, "elastocal.checks", "reach")
+        write_example(tmp_path, "machining")
+
+    def cell(self, tmp_path, checks):
+        path = tmp_path / "cell.yaml"
+        text = path.read_text("utf-8")
+        assert "\nlimits:\n" in text
+        path.write_text(text.replace("\nlimits:\n", f"\nlimits:\n  checks: {checks}\n"), "utf-8")
+        return load_cell(path)
+
+    def test_it_judges_the_cell_that_asks_for_it(self, tmp_path):
+        cell = self.cell(tmp_path, "{reach: {most: 1.5}}")
+        made = {each.name: each for each in robot_checks(cell, cell_surface(cell)).all}
+        far, near = np.eye(4), np.eye(4)
+        far[:3, 3], near[:3, 3] = (1.6, 0.0, 0.0), (0.0, 0.6, 0.8)
+        places = Postures(
+            np.array([far, near]), np.zeros((2, 3)), np.zeros((2, 6)), np.zeros((2, 6)), [0, 1]
+        )
+        margins = check_margins([made["reach"]], places)
+        np.testing.assert_allclose(margins.margin, [[-0.1, 0.5]])
+        assert margins.passed.tolist() == [False, True]
+
+    def test_no_other_cell_is_judged_by_it(self, tmp_path):
+        cell = load_cell(tmp_path / "cell.yaml")
+        assert "reach" not in {each.name for each in robot_checks(cell, cell_surface(cell)).all}
+
+    def test_its_settings_belong_to_the_identity_of_the_cell(self, tmp_path):
+        before = fingerprint(load_cell(tmp_path / "cell.yaml"))
+        found = {before}
+        for k, checks in enumerate(("{reach: {most: 1.5}}", "{reach: {most: 1.6}}")):
+            write_example(tmp_path / str(k), "machining")
+            found.add(fingerprint(self.cell(tmp_path / str(k), checks)))
+        assert len(found) == 3
+
+    @pytest.mark.parametrize(
+        ("checks", "reason"),
+        [
+            ("{reich: {most: 1.5}}", r"unknown check 'reich'; did you mean 'reach'\?.*: reach\)"),
+            ("{reach: {moist: 1.5}}", "check reach: unknown key 'moist'"),
+            ("{reach: {most: far}}", "check reach: most"),
+        ],
+    )
+    def test_a_slip_of_the_pen_is_refused_when_the_cell_is_read(self, tmp_path, checks, reason):
+        with pytest.raises(ElastocalError, match=f"limits.checks.*{reason}"):
+            self.cell(tmp_path, checks)
+
+    def test_it_keeps_what_every_check_keeps(self):
+        made = CHECKS["reach"](1.5)
+        suite = CheckSuite()
+        suite.test_has_a_name_a_unit_and_advice(made)
+        suite.test_its_class_is_found_by_its_name(made)

@@ -77,6 +77,12 @@ KINDS = {
         "elastocal.planning.search:Criterion",
         True,
     ),
+    "check": Kind(
+        "elastocal.checks",
+        "elastocal.planning:CHECKS",
+        "elastocal.planning.checks:PostureCheck",
+        True,
+    ),
     "loss": Kind("elastocal.losses", "elastocal.identification:LOSSES", _FUNCTION),
     "driver": Kind(
         "elastocal.drivers", "elastocal.drivers:DRIVERS", "elastocal.cell:Driver"

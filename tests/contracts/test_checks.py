@@ -29,6 +29,7 @@ from elastocal.planning.pool import CHECKS, POINT_CHECKS, point_checks, robot_ch
 from elastocal.planning.surface import DiskFit, sample_uniform
 from elastocal.robot import Rail, Robot, on_rail
 from elastocal.shapes import Body, Box
+from elastocal.testing import CheckSuite
 from support.postures import FORCE_TCP, arm, postures
 
 OWN_JOINTS = ("travel_limits",)
@@ -95,24 +96,16 @@ def every_check(robot=None):
 
 
 @pytest.mark.parametrize("check", every_check(), ids=lambda check: check.name)
-class TestEveryCheck:
-    def test_gives_one_finite_margin_a_posture(self, check):
-        margin = check.margin(posed(check))
-        assert margin.shape == (len(postures()),)
-        assert np.all(np.isfinite(margin))
+class TestEveryCheck(CheckSuite):
+    @pytest.fixture
+    def postures(self, check):
+        return posed(check)
 
-    def test_judges_each_posture_by_itself(self, check):
-        chosen = np.array([7, 3, 11])
-        alone = check.margin(posed(check).take(chosen))
-        np.testing.assert_allclose(alone, check.margin(posed(check))[chosen], atol=1e-9)
 
-    def test_has_a_name_a_unit_and_advice(self, check):
-        assert check.name.isidentifier()
-        assert check.unit
-        assert len(check.advice.split()) > 3
-
-    def test_of_no_posture_is_empty(self, check):
-        assert check.margin(posed(check).take([])).shape == (0,)
+class TestACheckOfThePosturesThatTheSuiteMakesUp(CheckSuite):
+    @pytest.fixture
+    def check(self, robot):
+        return WristCheck(robot, 0.1)
 
 
 @pytest.mark.parametrize("number", range(len(every_check())))
@@ -127,7 +120,7 @@ def test_a_check_does_not_notice_a_rail_before_the_arm(number):
 
 
 def test_the_suite_holds_every_check_that_is_registered():
-    assert {type(check) for check in every_check()} == {*CHECKS, *POINT_CHECKS}
+    assert {type(check) for check in every_check()} == {*CHECKS.values(), *POINT_CHECKS}
 
 
 @pytest.mark.parametrize("like", EXAMPLES)
@@ -141,9 +134,9 @@ def test_every_check_of_the_examples_is_in_the_suite(like, tmp_path):
 
 
 def test_checks_are_asked_in_the_order_of_the_registry():
-    orders = [check.order for check in CHECKS]
-    assert orders == sorted(set(orders))
-    assert [check.slow for check in CHECKS] == sorted(check.slow for check in CHECKS)
+    kinds = sorted(CHECKS.values(), key=lambda kind: kind.order)
+    assert len({kind.order for kind in kinds}) == len(kinds)
+    assert [kind.slow for kind in kinds] == sorted(kind.slow for kind in kinds)
 
 
 def test_a_cell_makes_the_checks_that_it_has_numbers_for(tmp_path):

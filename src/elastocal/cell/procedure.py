@@ -6,7 +6,7 @@ for a machine.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -20,6 +20,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from elastocal import plugins
 from elastocal.arrays import FloatArray
 from elastocal.cell._quantities import (
     AngleBelowRight,
@@ -36,8 +37,8 @@ from elastocal.cell._quantities import (
     TranslationalCompliance,
     needed_for,
 )
-from elastocal.errors import UnitError
-from elastocal.records import StrictModel
+from elastocal.errors import UnitError, nearest
+from elastocal.records import StrictModel, validate
 from elastocal.units import parse_quantity
 
 DEFAULT_POSES = 31
@@ -235,6 +236,24 @@ class Limits(StrictModel):
     payload: PositiveMass | None = None
     """Largest mass that the flange may carry, in kg."""
     torque: TorqueLimits = TorqueLimits()
+    checks: Mapping[str, Any] | None = None
+    """Checks of other packages that every pose passes, too, by name: settings of each, of the class
+    that it names. One that is not named here does not judge."""
+
+    @field_validator("checks")
+    @classmethod
+    def _known_with_their_settings(cls, named: Mapping[str, Any] | None) -> Any:
+        return named and {name: _settings_of_check(name, each) for name, each in named.items()}
+
+
+def _settings_of_check(name: str, given: object) -> object:
+    """Return the settings of a plug-in's check, validated."""
+    known = plugins.entries("check")
+    if name not in known:
+        allowed = ", ".join(known) or "none is installed"
+        raise ValueError(f"unknown check {name!r}{nearest(name, known)} (allowed: {allowed})")
+    kind = plugins.load("check", name)
+    return validate({} if given is None else given, kind.settings, f"check {name}")
 
 
 def _torque_or_force(text: str) -> float:

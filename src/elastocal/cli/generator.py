@@ -25,6 +25,7 @@ from elastocal.options import (
     settings_fields,
     summary_of,
 )
+from elastocal.results import brief_repr
 
 if TYPE_CHECKING:
     from elastocal.blocks import Block
@@ -33,6 +34,7 @@ _NARROW = 20
 """Characters that help shows of what an option takes, where a terminal has 80 columns."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Given:
     """Values given to a command on the command line."""
@@ -44,6 +46,7 @@ class Given:
     as_json: bool
 
 
+@brief_repr
 @dataclass(frozen=True)
 class Command:
     """A command of the program."""

@@ -23,6 +23,7 @@ from .plan_result import (
     write_plan as write_plan,
 )
 from .pool import (
+    CHECKS as CHECKS,
     BasePlacement as BasePlacement,
     PoolBuilder as PoolBuilder,
     sample_pool as sample_pool,

@@ -37,6 +37,7 @@ import numpy as np
 from numpy.random import Generator
 from scipy.spatial import cKDTree
 
+from elastocal import plugins
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError
@@ -517,13 +518,12 @@ _LEAST_GAIN = 0.02
 """Share of the points that a further base placement must serve alone."""
 _EXPORTED = tuple(getattr(exported, name) for name in dir(exported))
 
-CHECKS: tuple[type[PostureCheck], ...] = tuple(
-    sorted(
-        (each for each in _EXPORTED if PostureCheck in getattr(each, "__mro__", ())[1:]),
-        key=lambda each: each.order,
-    )
+CHECKS = plugins.Registry[type[PostureCheck]](
+    "check",
+    {each.name: each for each in _EXPORTED if PostureCheck in getattr(each, "__mro__", ())[1:]},
+    PlanningError,
 )
-"""Every check of postures that `elastocal.planning.checks` exports, in order."""
+"""Every check of postures that `elastocal.planning.checks` exports, and those of other packages."""
 POINT_CHECKS: tuple[type[PointCheck], ...] = tuple(
     sorted(
         (each for each in _EXPORTED if PointCheck in getattr(each, "__mro__", ())[1:]),
@@ -547,8 +547,17 @@ def point_checks(cell: Cell, surface: Surface, points: SurfacePoints) -> tuple[P
 
 
 def robot_checks(cell: Cell, surface: Surface) -> Checks:
-    """Return the checks that postures decide, of all `CHECKS` that the cell has numbers for."""
-    made = [check for kind in CHECKS if (check := kind.of(cell, surface)) is not None]
+    """Return the checks that postures decide, in their order.
+
+    Those are elastocal's that the cell has numbers for, and those of other packages that the cell
+    file names.
+    """
+    kinds = {name: CHECKS[name] for name in (*CHECKS.own, *(cell.file.limits.checks or ()))}
+    found = (
+        plugins.used("check", name, partial(kind.of, cell, surface))
+        for name, kind in sorted(kinds.items(), key=lambda each: each[1].order)
+    )
+    made = [check for check in found if check is not None]
     quick = tuple(check for check in made if not check.slow)
     return Checks((), quick, tuple(check for check in made if check.slow))
 

@@ -1,3 +1,4 @@
+from .checks import CheckSuite as CheckSuite
 from .commands import (
     CommandOutput as CommandOutput,
     CommandSuite as CommandSuite,

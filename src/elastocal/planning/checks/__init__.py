@@ -1,7 +1,7 @@
 """Checks of calibration poses, one file for each thing that is watched.
 
 A new check is one file here, an export, and its limit as a field of `elastocal.cell.Limits`.
-`elastocal.planning.CHECKS` is all that are exported, in their order.
+`elastocal.planning.CHECKS` is all that are exported, and those of other packages.
 """
 
 import lazy_loader

@@ -12,15 +12,18 @@ singularity, wrist, torque or sight.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal import plugins
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.cell import Cell
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import Surface, SurfacePoints
+from elastocal.records import StrictModel
 from elastocal.results import brief_repr
 
 
@@ -50,6 +53,9 @@ class PostureCheck(Check, Protocol):
     """Place among the checks, in tables and when a pose fails several: the lower the earlier."""
     slow: ClassVar[bool] = False
     """Whether the check uses meshes, so that only the best postures are judged."""
+    settings: ClassVar[type[StrictModel]] = StrictModel
+    """Settings that a cell file gives a plug-in's check under ``limits.checks``; `of` finds them as
+    ``cell.file.limits.checks[name]``."""
 
     @classmethod
     def of(cls, cell: Cell, surface: Surface) -> Self | None:
@@ -132,7 +138,10 @@ class Margins:
 
 def check_margins(checks: Sequence[Check], postures: Postures) -> Margins:
     """Return the margins of postures under all checks."""
-    margins = [np.asarray(check.margin(postures), dtype=float) for check in checks]
+    margins = [
+        np.asarray(plugins.used("check", each.name, partial(each.margin, postures)), dtype=float)
+        for each in checks
+    ]
     return Margins(
         tuple(check.name for check in checks),
         tuple(check.unit for check in checks),

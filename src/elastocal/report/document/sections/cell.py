@@ -164,6 +164,8 @@ def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
             unknown = phrase("{key}, in SI units", key=key), "{:g}".format
             label, written = _LIMITS.get(key, unknown)
             yield label, written(value)
+    if file.limits.checks:
+        yield phrase("Checks of other packages"), ", ".join(file.limits.checks)
     known = np.isfinite(cell.torque_limits)
     pairs = zip(cell.robot.joint_names, cell.torque_limits, known, strict=True)
     torques = ", ".join(f"{name} {value:.0f}" for name, value, there in pairs if there)
