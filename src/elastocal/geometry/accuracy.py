@@ -1,9 +1,9 @@
-"""How accurate the arm is before and after: by axis, and by pose as ISO 9283 has it.
+"""Accuracy of the arm before and after calibration: by axis, and by pose according to ISO 9283.
 
-All errors are of poses that were left out of the fit. Pose accuracy and repeatability (ISO
-9283:1998, 7.2) are those of positions that were attained from visits of one commanded pose under
-one load: with ``r`` attained minus commanded, ``AP = |mean r|`` and, with the distances ``l`` of
-the visits from their barycentre, ``RP = mean l + 3 std l``.
+All errors are at poses left out of the fit. Pose accuracy and repeatability (ISO 9283:1998, 7.2)
+refer to the attained positions in several visits of one commanded pose under one load: with ``r``
+attained minus commanded, ``AP = |mean r|`` and, with the distances ``l`` of the visits from their
+barycentre, ``RP = mean l + 3 std l``.
 """
 
 from collections.abc import Iterator
@@ -81,7 +81,7 @@ class Blunder:
     """Counted from 1."""
     station: str
     distance: float
-    """From where the calibrated arm has it, in m."""
+    """Distance of the marker from its position by the calibrated arm, in m."""
 
 
 @brief_repr
@@ -94,7 +94,7 @@ class GeometryAccuracy:
     marker: IndexArray
     """Shape (position,)."""
     place: FloatArray
-    """Where the marker was measured, in base, shape (position, 3), in m."""
+    """Measured position of the marker, in base, shape (position, 3), in m."""
     registration: FloatArray
     """Measured minus expected of the nominal arm, in base, shape (position, 3), in m."""
     chosen: FloatArray

@@ -5,13 +5,13 @@ and three small turns ``r`` along and about the axes of that frame; the joint th
 
     q' = q + o + s q + a1 sin q + b1 cos q + a2 sin 2q + b2 cos 2q + c tau,
 
-its offset ``o``, transmission ``s``, errors of its gear once and twice a turn, and the turn by
-which it yields to the torque ``tau`` of weight, payload and process force. A turn of the placement
-about the joint's own axis is its offset and is not counted twice. Where the base stands and where a
-marker sits are further unknowns (`elastocal.geometry.problem`). This is the product of exponentials
-about the nominal frames (R. He et al., IEEE Transactions on Robotics 26(3), 2010): it needs no case
-for parallel axes, as Denavit and Hartenberg's parameters do; which numbers the positions do not
-tell apart is found from the derivatives themselves.
+its offset ``o``, transmission ``s``, errors of its gear once and twice a turn, and the rotation by
+its compliance under the torque ``tau`` of weight, payload and process force. A rotation of the
+placement about the joint's own axis is its offset and is not counted twice. The poses of the base
+and of the markers are further unknowns (`elastocal.geometry.problem`). This is the product of
+exponentials about the nominal frames (R. He et al., IEEE Transactions on Robotics 26(3), 2010): it
+needs no case for parallel axes, as Denavit and Hartenberg's parameters do; numbers that the
+positions do not determine are found from the derivatives themselves.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 KINDS = ("shift_x", "shift_y", "shift_z", "turn_x", "turn_y", "turn_z")
-"""Errors of a joint's place in the link before it."""
+"""Errors of a joint's pose in the link before it."""
 MOTION = ("offset", "scale", "sin", "cos", "sin2", "cos2", "compliance")
 """Errors of a joint's motion."""
 
@@ -35,7 +35,7 @@ class ArmErrors:
     """Geometric errors of a chain."""
 
     place: FloatArray
-    """Shape (joint, 6): shifts in m, turns in rad."""
+    """Shape (joint, 6): shifts in m, rotations in rad."""
     motion: FloatArray
     """Shape (joint, 7): in the order of `MOTION`; rad (m) of each unit term, rad/(N·m)."""
 
@@ -48,7 +48,7 @@ class ArmErrors:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class ArmFrames:
-    """Where the joints and the tcp of an arm are at some poses."""
+    """Frames of the joints and the tcp of an arm at some poses."""
 
     rotation: FloatArray
     """Frames of the joints before their motion, in base, shape (joint, pose, 3, 3)."""
@@ -109,7 +109,7 @@ def motion_terms(q: FloatArray, torque: FloatArray) -> FloatArray:
 
 
 def screws(robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray) -> FloatArray:
-    """Return how the tool moves by each error: a velocity at the base's origin, and a turn.
+    """Return the motion of the tool by each error: velocity at the base's origin, and rotation.
 
     A point ``p`` on the tool moves by ``v + w x p``; ``(v, w)`` is the error's instantaneous screw
     (K. M. Lynch, F. C. Park, "Modern Robotics", 2017, section 3.3).

@@ -8,8 +8,8 @@ A link goes from the axis of its joint to that of the next one by
 
 ``z`` along the joint's axis in the sense in which it turns. Base and tool are frames: the first
 link begins in the frame of the first joint as drawn, the last joint has its zero and the tool six
-numbers. The numbers are found from the lines of the axes, not fitted: they say the same as the
-shifts and turns of `elastocal.geometry.arm`.
+numbers. The numbers follow from the lines of the axes and are not fitted: they are equivalent to
+the shifts and rotations of `elastocal.geometry.arm`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ LINK_NUMBERS = ("theta", "d", "a", "alpha", "beta")
 TOOL_NUMBERS = ("x", "y", "z", "rz", "ry", "rx")
 """Numbers of the tool behind the last joint: lengths in m, then turns in rad, ``Rz Ry Rx``."""
 _PARALLEL = np.radians(5.0)
-"""Smaller angles between axes as drawn count as none: the common normal jumps there."""
+"""Angle between nominal axes below which they count as parallel, where the common normal jumps."""
 _NOTHING = 2e-6
 """Smaller changes, in m or rad, are rounding of the second order, not an error of the arm."""
 _MEET = 1e-6
@@ -48,14 +48,14 @@ class LinkNumber:
     nominal: float
     calibrated: float
     low: float | None
-    """Lower end of the 95 % interval of ``calibrated``; none where it is as drawn by convention, or
-    is not determined by the positions."""
+    """Lower end of the 95 % interval of ``calibrated``; None where the value is nominal by
+    convention, or is not determined by the positions."""
     high: float | None
 
 
 @dataclass(frozen=True)
 class _Way:
-    """How a link as drawn is described: a choice that the link as built follows."""
+    """Convention for a nominal link, which the calibrated link keeps."""
 
     parallel: bool
     sense: float = 1.0
@@ -67,14 +67,14 @@ class _Way:
 def link_table(problem: GeometryProblem, found: GeometryLadder) -> tuple[LinkNumber, ...]:
     """Return the numbers of an arm as drawn and as built, with the draws' intervals.
 
-    They are of the fit that has nothing but places and zeros of joints.
+    They belong to the fit with only poses and zeros of joints.
 
     Parameters
     ----------
     problem : GeometryProblem
-        What was fitted.
+        Fitted problem.
     found : GeometryLadder
-        What was found.
+        Fitted ladder.
     """
     robot, joints, chain = problem.robot, len(problem.robot.joint_names), found.chain
     ways = tuple(_ways(robot))
@@ -111,9 +111,9 @@ def link_numbers(robot: Robot, errors: ArmErrors, ways: Sequence[_Way] | None = 
     robot : Robot
         The arm as drawn.
     errors : ArmErrors
-        Its errors; places and zeros count.
+        Its errors; poses and zeros of joints are used.
     ways : sequence, optional
-        How each link is described; by default as suits the arm as drawn.
+        Convention of each link; by default that of the nominal arm.
 
     Returns
     -------

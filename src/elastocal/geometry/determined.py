@@ -1,4 +1,4 @@
-"""Which unknowns some positions determine, and with what the others go together."""
+"""Unknowns that some positions determine, and the combinations of the others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,16 +10,17 @@ from elastocal.geometry.problem import RUNGS, GeometryProblem
 from elastocal.wording import phrase
 
 _RESOLVED = 3e-7
-"""Movement of the markers, root mean square in m, that an error of likely size has to make beside
-those before it. A tenth of what a tracker resolves: rounded angles of a drawing (1.571 for a
-quarter turn) make two errors differ by some tenths of a micrometre that are alike on the arm."""
+"""Movement of the markers, root mean square in m, that an error of likely size must cause
+independently of those before it. A tenth of what a tracker resolves: rounded angles of a drawing
+(1.571 for a quarter turn) make two errors differ by some tenths of a micrometre that are alike on
+the arm."""
 _MOST_ROWS = 3000
 """Largest number of positions that decide which unknowns are independent."""
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """An unknown that the positions do not tell apart from others."""
+    """An unknown that the positions do not determine separately."""
 
     name: str
     why: str
@@ -30,15 +31,15 @@ def told_apart(
 ) -> tuple[IndexArray, list[Fixed]]:
     """Return the unknowns of a rung that are determined, and why the others are not.
 
-    Unknowns are taken in the order of the ladder; one that, at its likely size, moves no marker
-    measurably that a combination of those before does not move alike is fixed at zero, and named
-    with them. The derivatives are to be those of the nominal arm: small errors turn what cannot be
-    told apart into what hardly can.
+    Unknowns are taken in the order of the ladder; one whose effect at its likely size equals,
+    within the resolution, that of a combination of those before is fixed at zero, and named with
+    them. The derivatives must be those of the nominal arm: small errors make exact dependences
+    inexact.
     """
     rungs = RUNGS[: RUNGS.index(rung) + 1]
     order = [i for r in rungs for i, u in enumerate(problem.unknowns) if u.rung == r]
     size = np.array([u.size for u in problem.unknowns])
-    # Positions of every station and marker, evenly; all of them tell no more.
+    # An even selection of the positions of every station and marker; all of them show no more.
     some = np.unique(np.linspace(0, len(J) - 1, _MOST_ROWS).astype(np.intp))
     flat = J[some].reshape(-1, J.shape[2])[:, order] * size[order]
     R: FloatArray = np.asarray(np.linalg.qr(flat, mode="r")) / np.sqrt(len(some))

@@ -90,7 +90,7 @@ def geometry_model(
 
 
 def _chain(found: GeometryLadder, known: FloatArray | None) -> ChainErrors:
-    """Return what a URDF expresses of the arm."""
+    """Return the part of the arm that a URDF can express."""
     at = found.chain.fit.state
     return ChainErrors(
         rung=found.chain.rung,

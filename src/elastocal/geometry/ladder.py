@@ -1,4 +1,4 @@
-"""Which errors of the arm the positions speak for: a ladder, judged at poses that were left out.
+"""Ladder of geometric models, judged at left-out poses.
 
 All rungs and folds share one linearisation: errors of a millimetre and a milliradian make the
 problem linear to a micrometre. The normal equations are sums over blocks of consecutive poses, so
@@ -23,7 +23,7 @@ FOLDS = 5
 _BLOCKS = 100
 """Most blocks of consecutive poses."""
 _NOISE_STEPS = 3
-"""Times that a rung is fitted to find what it leaves."""
+"""Number of fits of a rung for the estimate of its residual noise."""
 
 
 @brief_repr
@@ -35,7 +35,7 @@ class RungErrors:
     residual: FloatArray
     """Measured minus expected of each position that is no blunder, in base, shape (point, 3), m."""
     free: int
-    """Unknowns that the positions tell apart."""
+    """Unknowns that the positions determine."""
 
     @property
     def distance(self) -> FloatArray:
@@ -65,9 +65,9 @@ class GeometryLadder:
     whole: FittedRung
     """The one that was chosen."""
     chain: FittedRung
-    """The best that has nothing but places and zeros of joints, fitted anew: all that a URDF or a
-    table of links can express. Without its harmonics a fit of more is worse than the arm as drawn,
-    for shifts, zeros and harmonics stand in for one another."""
+    """Best rung with only poses and zeros of joints, fitted separately: what a URDF or a table of
+    links can express. A larger fit without its harmonics would be worse than the nominal arm, since
+    shifts, zeros and harmonics partly replace one another."""
 
     @property
     def chosen(self) -> str:
@@ -104,7 +104,7 @@ def climb(
     start = register(problem)
     progress("geometry", 1, 4)
     nominal = problem.linearise(start)[1]
-    # Unknowns are taken rung by rung, so that the richest tells of those below it, too.
+    # Unknowns are taken rung by rung, so that the richest rung decides for those below it, too.
     apart = told_apart(nominal, problem, RUNGS[-1])
     free = {rung: _up_to(rung, problem, *apart) for rung in RUNGS}
     reference = fit(problem, free["weight"], start)
@@ -143,7 +143,7 @@ def climb(
 def _up_to(
     rung: str, problem: GeometryProblem, free: IndexArray, fixed: Sequence[Fixed]
 ) -> tuple[IndexArray, list[Fixed]]:
-    """Return which unknowns of a rung are free and which fixed, by those of the richest."""
+    """Return the free and the fixed unknowns of a rung, by those of the richest."""
     kept = RUNGS[: RUNGS.index(rung) + 1]
     names = {each.name for each in problem.unknowns if each.rung in kept}
     chosen = [index for index in free.tolist() if problem.unknowns[index].name in names]
@@ -197,7 +197,7 @@ class _Sums:
         b, h = self.b - self.A @ back, self.h - self.G @ back
         residual, ridge = b.reshape(-1, 3), prior_weight(self.problem, self.about.sigma)
         for _ in range(_NOISE_STEPS):
-            # The noise beside which a rung's prior counts is what that rung leaves.
+            # The noise relative to which a rung's prior is weighted is the residual of that rung.
             x = _solved(self.G.sum(axis=0), h.sum(axis=0), free, ridge)
             residual = (b - self.A[:, free] @ x).reshape(-1, 3)
             ridge = prior_weight(self.problem, noise(residual))
@@ -211,7 +211,7 @@ class _Sums:
         return RungErrors(rung, residual, len(free))
 
     def draws(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return how far draws of blocks take the unknowns from the fit, (draw, unknown)."""
+        """Return the deviations of block draws of the unknowns from the fit, (draw, unknown)."""
         free, ridge = self.about.free, prior_weight(self.problem, self.about.sigma)
         there = np.unique(self.block)
         # At the fit the positions pull as much away from zero as the prior pulls back.

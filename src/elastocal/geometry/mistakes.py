@@ -1,4 +1,4 @@
-"""What people and trackers do wrong with some of the positions, found from what a fit leaves."""
+"""Blunders and moved stations among positions, found from the residuals of a fit."""
 
 from itertools import combinations
 
@@ -10,14 +10,14 @@ from elastocal.geometry.problem import GeometryProblem
 from elastocal.geometry.solve import GeometryFit
 
 _NEAR = 0.02
-"""Farther positions, in m, are broken beams and say nothing of where a station stands."""
+"""Positions farther away, in m, are broken beams and do not show the position of a station."""
 _LEAST_ROWS = 6
 """Positions before and after a move of a station."""
 _STRONG = 40.0
 """Value of F from which a station is said to have moved: the best of all splits is far lower
 where none has."""
 _SHIFT = 2.0
-"""Shift in standard deviations of a coordinate below which nobody needs to know of it."""
+"""Shift in standard deviations of a coordinate below which it is not reported."""
 _SIGMAS = 7.0
 """Distance within which a swapped marker is where another one is expected."""
 _MOST_NAMED = 8
@@ -50,7 +50,7 @@ def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[Finding, ...]:
 
 
 def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:
-    """Return which markers were taken for one another, by rows whose positions were left out."""
+    """Return the markers that were exchanged, by rows whose positions were left out."""
     at, sigma, seen = fit.state, fit.sigma, problem.data.seen
     measured = np.full((*seen.shape, 3), np.nan)
     expected = measured.copy()
@@ -72,11 +72,11 @@ def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[Finding
 
 
 def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:
-    """Return which stations stood elsewhere from some row on.
+    """Return the stations that moved at some row.
 
-    What is left of the fit is explained by one rigid motion of the station, or by two with the
-    best split between them; F says by how much better two are (E. S. Page, "A test for a change in
-    a parameter occurring at an unknown point", Biometrika 42, 1955).
+    The residuals are explained by one rigid motion of the station, or by two with the best split
+    between them; F compares the two (E. S. Page, "A test for a change in a parameter occurring at
+    an unknown point", Biometrika 42, 1955).
     """
     notes: list[Finding] = []
     for index, name in enumerate(problem.data.stations):
@@ -94,7 +94,7 @@ def _moved_stations(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]
 def _best_split(
     problem: GeometryProblem, fit: GeometryFit, points: IndexArray
 ) -> tuple[int, float, float]:
-    """Return where a station's positions part best, F, and the shift between the parts, in m."""
+    """Return the best split of a station's positions, F, and the shift between the parts, in m."""
     columns = slice(6 * problem.station[points[0]], 6 * problem.station[points[0]] + 6)
     A, r = fit.J[points, :, columns], fit.residual[points]
     G = np.cumsum(np.einsum("nki,nkj->nij", A, A), axis=0)

@@ -59,7 +59,7 @@ class GeometryRung:
 
     rung: str
     unknowns: int
-    """How many the positions tell apart."""
+    """Number of unknowns that the positions determine."""
     held_out: DistanceFigures
     chosen: bool
 
@@ -79,7 +79,7 @@ class GeometryParameter:
 
 @record()
 class FixedParameter:
-    """What the positions do not tell apart from others; it counts as 0."""
+    """An unknown that the positions do not determine separately; it counts as 0."""
 
     name: str
     why: str
@@ -119,7 +119,7 @@ class GeometryModel:
     """The nominal arm."""
     tcp: str
     place: FloatArray
-    """Errors of the joints' places: shifts in m and turns in rad, shape (joint, 6)."""
+    """Errors of the joints' poses: shifts in m and rotations in rad, shape (joint, 6)."""
     motion: FloatArray
     """Errors of their motion, shape (joint, 7): `elastocal.geometry.MOTION`."""
     stations: dict[str, FloatArray]
@@ -136,12 +136,13 @@ class GeometryModel:
     """Positions of markers, blunders included."""
     provenance: str
     findings: tuple[Finding, ...] = ()
-    """What a person should know of the positions, a sentence each."""
+    """Notes on the positions for the user, a sentence each."""
     T_tcp_built: FloatArray | None = None
-    """The tcp as built in the tcp as described, shape (4, 4), in m; none where nobody knew where on
-    the tool the markers are."""
+    """The calibrated tcp in the nominal tcp, shape (4, 4), in m; None where the positions of the
+    markers on the tool are unknown."""
     chain: ChainErrors | None = None
-    """What a URDF expresses, fitted anew; none in files of before, which leave the rest out."""
+    """Part that a URDF expresses, fitted separately; None in older files, which leave the rest
+    out."""
 
     @property
     def robot(self) -> Robot:
@@ -155,12 +156,12 @@ class GeometryModel:
         return ArmErrors(self.place.copy(), self.motion.copy())
 
     def predict(self, data: Positions) -> FloatArray:
-        """Return where the markers are expected, in the frames of their stations, (row, marker, 3).
+        """Return the expected markers in the frames of their stations, (row, marker, 3).
 
         Parameters
         ----------
         data : Positions
-            Joints, loads and stations; its markers are not looked at.
+            Joints, loads and stations; its markers are not used.
         """
         robot = self.robot
         T = frames(robot, data.q, joint_torques(robot, data), self.errors).T_base_tcp
@@ -169,14 +170,14 @@ class GeometryModel:
         return np.asarray(S[:, None, :3, 3] + np.einsum("nij,nmj->nmi", S[:, :3, :3], points))
 
     def tool_of(self, robot: Robot, payload: Payload | None = None) -> Callable[..., FloatArray]:
-        """Return the function that gives the tool's place of the same arm without process force.
+        """Return the function that gives the tool's position of the same arm without process force.
 
         Parameters
         ----------
         robot : Robot
             The same arm, perhaps with another tool behind this model's tcp.
         payload : Payload, optional
-            What the tool weighs beyond the model's description.
+            Mass of the tool beyond the model's description.
 
         Returns
         -------
@@ -208,7 +209,7 @@ class GeometryModel:
         Parameters
         ----------
         robot : Robot
-            The same arm as drawn, which comes back as it is, or as built by `as_built`.
+            The same nominal arm, which is returned unchanged, or the one made by `as_built`.
 
         Raises
         ------
@@ -223,9 +224,9 @@ class GeometryModel:
         return Robot.from_urdf(with_tool(own.urdf, own.tip, _DRAWN_TOOL, T_own_tool), _DRAWN_TOOL)
 
     def as_built(self, robot: Robot) -> Robot:
-        """Return an arm with joints where they stand, and with the tcp as built where it is known.
+        """Return an arm with calibrated joint poses, and with the calibrated tcp where it is known.
 
-        Errors of gears and compliances have no place in a URDF: it is of the fit without them
+        A URDF cannot express errors of gears and compliances, so the fit without them is used
         (`chain`). An error of the tcp is left out where that is the link of a moving joint.
 
         Parameters
@@ -272,7 +273,7 @@ class GeometryModel:
         return np.asarray(chain.markers @ T[:3, :3].T + T[:3, 3])
 
     def _expressed(self) -> ChainErrors:
-        """Return what a URDF expresses."""
+        """Return the part that a URDF expresses."""
         if self.chain is not None:
             return self.chain
         rung, figures = next(each.rung for each in self.ladder if each.chosen), self.held_out.chosen
@@ -280,7 +281,7 @@ class GeometryModel:
         return ChainErrors(rung, self.place, offset, self.markers, figures, self.T_tcp_built)
 
     def _way_to(self, robot: Robot) -> FloatArray:
-        """Return a tool of the same arm, as drawn or as built, in the tcp, shape (4, 4)."""
+        """Return a tool of the same nominal or calibrated arm, in the tcp, shape (4, 4)."""
         own = self.robot
         if not same_joints(own, robot):
             raise GeometryError(
@@ -300,7 +301,7 @@ class GeometryModel:
 
 
 def _correction(errors: ArmErrors, index: int, joint: ChainJoint) -> FloatArray:
-    """Return where a joint stands in its frame as drawn, its zero included, shape (4, 4)."""
+    """Return the calibrated pose of a joint in its nominal frame, with its zero, shape (4, 4)."""
     T, place = np.eye(4), errors.place[index]
     T[:3, 3] = place[:3]
     T[:3, :3] = Rotation.from_rotvec(place[3:]).as_matrix()

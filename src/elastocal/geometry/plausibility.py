@@ -1,18 +1,17 @@
-"""Whether what a fit found can be an arm; if not, which mistake in the positions explains it.
+"""Whether a fit is plausible for an arm; if not, the mistake in the positions that explains it.
 
-An arm leaves what its geometry does not explain: gears, heat, the tracker. Published ones leave
-0.03 % of their reach after calibration. An ABB IRB 1600 of 1.45 m goes from 0.97 to 0.36 mm in the
-mean, 2.2 to 0.7 mm at most (A. Nubiola, I. A. Bonev, Robotics and Computer-Integrated Manufacturing
-29(1), 2013). Positions that leave many times as much are not of this arm as it is described: the
-mistake is looked for by undoing each one that people, controllers and trackers make, and comparing
-what poses that are left out then miss by.
+The residuals of an arm are due to gears, heat and the tracker. Published ones are 0.03 % of the
+reach after calibration. An ABB IRB 1600 of 1.45 m goes from 0.97 to 0.36 mm in the mean, 2.2 to 0.7
+mm at most (A. Nubiola, I. A. Bonev, Robotics and Computer-Integrated Manufacturing 29(1), 2013).
+Positions with residuals many times as large do not belong to this arm as described: each mistake
+that people, controllers and trackers make is undone in turn, and the errors at left-out poses are
+compared.
 
 Nothing here depends on how the fit is done.
 
 Mistakes of people, controllers and trackers with absolute positions, each with its undoing.
 
-What a mistake did to the positions can be undone without knowing whether it was made: whoever
-compares what an arm then leaves with what it left before finds out.
+Comparing the residuals before and after the undoing shows which mistake was made.
 """
 
 from collections.abc import Callable, Iterator
@@ -36,9 +35,9 @@ from elastocal.wording import counted, listed
 LENGTHS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}
 _ANGLES = {"deg": float(np.radians(1.0)), "rad": 1.0}
 _FACTORS = (0.5, 2.0, 0.75, 1.35)
-"""What a joint is multiplied by in looking for its scale; the best is then refined."""
+"""Factors of a joint that are tried in the search for its scale; the best is then refined."""
 _ZEROS = tuple(np.radians([-135, -90, -45, -10, 10, 45, 90, 135, 180]).tolist())
-"""What is added to a joint in looking for its zero."""
+"""Offsets of a joint that are tried in the search for its zero."""
 _WHOLE = 6.0
 """A zero within so many degrees of a quarter turn is taken for it."""
 _RATIO = 0.02
@@ -48,7 +47,7 @@ _PARTS = 10
 """Parts of a campaign between which a station or a tool may have changed."""
 
 Score = Callable[["Undone"], float]
-"""How far an arm as drawn is from positions, in m."""
+"""Distance of a nominal arm from positions, in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class Undone:
     """Positions with a mistake undone."""
 
     mistake: str
-    """What was done wrong and what to do about it, a sentence without its end."""
+    """Mistake and remedy, a sentence without its end."""
     robot: Robot
     data: Positions
 
@@ -170,12 +169,12 @@ def _shifted_zero(robot: Robot, data: Positions, score: Score) -> Undone:
 
 
 def ratios(units: dict[str, float]) -> tuple[float, ...]:
-    """Return how many times larger one unit is than another, for each pair of units."""
+    """Return the ratio of two units, for each pair of units."""
     return tuple(units[a] / units[b] for a, b in permutations(units, 2))
 
 
 def unit_mistake(factor: float, units: dict[str, float]) -> str:
-    """Return which unit a column is in that a factor undoes; nothing where it is none."""
+    """Return the true unit of a column that differs by a factor; None if there is none."""
     for real, heading in permutations(units, 2):
         if abs(factor * units[heading] / units[real] - 1.0) < 1e-6:
             return f"is in {real}, but its heading says {heading}"
@@ -297,7 +296,7 @@ times what published ones leave, and more than a heavy one sags that has no mass
 _SUSPICIOUS = 5e-4
 """The same from which mistakes are looked for, and refused where undoing one is far better."""
 _FAR_BETTER = 0.2
-"""Part of the error that undoing a mistake has to leave at most."""
+"""Largest part of the error that undoing a mistake may leave."""
 _MOST_BLUNDERS = 1.0 / 3.0
 """Part of the positions; a fit finds up to a quarter of blunders among good ones."""
 _LARGEST = {
@@ -309,17 +308,17 @@ _LARGEST = {
 """Errors that no arm has: three times the zero of a motor that was just exchanged, ten times the
 links of a bad arm; in rad and m."""
 _NOT_DRAWN = 4e-3
-"""Median error of an arm as drawn, over its length, that none has: twice what is left of one."""
+"""Median error of a nominal arm, over its length, that is impossible."""
 _NAMED_FROM = 7
-"""Positions from which on a mistake is told from others by the arm as drawn: many mistakes explain
-fewer."""
+"""Number of positions from which the nominal arm separates one mistake from others; fewer fit many
+mistakes."""
 _TRIED = 6
-"""Mistakes whose undoing is fitted, the likeliest by the arm as drawn first."""
+"""Number of mistakes whose undoing is fitted, the likeliest by the nominal arm first."""
 _TIE = 1.5
-"""Two mistakes whose undoing leaves nearly the same are not distinguished."""
+"""Two mistakes whose undoing leaves nearly equal residuals are not distinguished."""
 _TOOL, _TOOL_TURN = 0.02, 0.1
-"""How far a marker on a tool may be from where it is stated, in m, and beside it in rad about the
-tcp: the zero of a last joint turns it."""
+"""Largest distance of a marker on a tool from its stated position, in m, and with it in rad about
+the tcp, since the zero of the last joint rotates it."""
 _MOST_ORDERS = 24
 """Orders of markers that are tried."""
 _ROWS = 60
@@ -327,7 +326,7 @@ _ROWS = 60
 _ROBUST_STEPS = 6
 """Steps of least absolute distances."""
 _STILL = 0.25
-"""Part of the rows in which a column must stand still to be named."""
+"""Part of the rows in which a column must be constant to be named."""
 
 
 def plausible_ladder(
@@ -373,11 +372,11 @@ def plausible_ladder(
 
 
 def position_mistake(robot: Robot, data: Positions) -> str | None:
-    """Return why an arm as drawn does not carry its marker to some positions; None: it does.
+    """Return why a nominal arm does not carry its marker to some positions; None: it does.
 
-    For a few positions, none of which can be left out: mistakes are judged by the arm as drawn.
-    Each position is a mean of joints and markers at one time, so that no row is late, and whoever
-    asks finds stations that moved.
+    For a few positions, none of which can be left out: mistakes are judged by the nominal arm. Each
+    position is a mean of joints and markers at one time, so no row is late; the caller finds
+    stations that moved.
 
     Parameters
     ----------
@@ -414,14 +413,14 @@ def arm_length(robot: Robot) -> float:
 
 
 def implausible(problem: GeometryProblem, found: GeometryLadder) -> str | None:
-    """Return why what was found can be no arm; None where it can.
+    """Return why a fit is impossible for an arm; None if it is possible.
 
     Parameters
     ----------
     problem : GeometryProblem
-        What was fitted.
+        Fitted problem.
     found : GeometryLadder
-        What was found.
+        Fitted ladder.
     """
     length, left = arm_length(problem.robot), _left_out(found)
     if not left <= MOST_LEFT_OUT * length:
@@ -488,7 +487,7 @@ def _left_out(found: GeometryLadder) -> float:
 
 
 def _as_drawn(robot: Robot, data: Positions) -> float:
-    """Return how far the arm as drawn is from positions, median, in m."""
+    """Return the median distance of the nominal arm from positions, in m."""
     some = np.unique(np.linspace(0, len(data) - 1, _ROWS).astype(np.intp))
     kept = data.rows(some)
     if not kept.seen.any(axis=0).all():
@@ -498,10 +497,11 @@ def _as_drawn(robot: Robot, data: Positions) -> float:
 
 
 def _in_any_frame(robot: Robot, data: Positions) -> float:
-    """Return the same as `_as_drawn` of a tracker whose frame may be mirrored, sheared and scaled.
+    """Return the same as `_as_drawn` for a tracker frame that may be mirrored, sheared and scaled.
 
-    What a marker's coordinates then are is linear in place and rotation of the tool, so that it
-    takes a hundredth of the time; joints are told from one another by it, not from trackers.
+    A marker's coordinates are then linear in position and rotation of the tool, which takes a
+    hundredth of the time; this separates mistakes of joints from one another, not from those of
+    trackers.
     """
     left, T = [], robot.forward(data.q)
     design = np.column_stack([np.ones(len(T)), T[:, :3, :].reshape(len(T), 12)])
@@ -521,7 +521,7 @@ def _in_any_frame(robot: Robot, data: Positions) -> float:
 
 
 def _explanations(problem: GeometryProblem, limit: float) -> list[tuple[str, float]]:
-    """Return mistakes whose undoing leaves an arm, with what it misses by, the best first."""
+    """Return mistakes whose undoing gives a possible arm, with their errors, the best first."""
 
     def joints(each: Undone) -> float:
         return _in_any_frame(each.robot, each.data)

@@ -1,11 +1,11 @@
-"""Poses in free space at which a tracker tells the geometry of an arm best.
+"""Poses in free space from which a tracker determines the geometry of an arm best.
 
-Postures are drawn from the whole range of the joints; kept are those that a station sees, free of
-collision with the clearance that the cell asks for. Of them a search technique chooses by the
-derivatives of the arm's errors (`elastocal.geometry.problem`), as it chooses contact poses by
-their observation rows: `i_optimal` makes the mean variance of predicted positions over all of
-the pool least (G. E. P. Box, N. R. Draper, JASA 54, 1959), `ioops` the volume of the errors'
-confidence ellipsoid (D. Daney et al., IJRR 24, 2005), `cover` spreads the marker in space.
+Postures are drawn from the whole range of the joints; those that a station sees and that keep the
+cell's clearance are kept. A search technique chooses among them by the derivatives of the arm's
+errors (`elastocal.geometry.problem`), as it chooses contact poses by their observation rows:
+`i_optimal` makes the mean variance of predicted positions over all of the pool least (G. E. P. Box,
+N. R. Draper, JASA 54, 1959), `ioops` the volume of the errors' confidence ellipsoid (D. Daney et
+al., IJRR 24, 2005), `cover` spreads the marker in space.
 """
 
 from collections import Counter
@@ -67,13 +67,13 @@ class PositionPose:
     """A pose in free space, where the marker is to be measured."""
 
     id: int
-    """From 0, in visiting order."""
+    """Number from 0, in visiting order."""
     joints: Joints
     """In rad or m."""
     tcp_position: Vector
     """In base, in m."""
     station: str
-    """Which one is to measure it."""
+    """Station that is to measure it."""
 
 
 @record()
@@ -100,26 +100,26 @@ class PositionPlan:
     drawn: int
     """Postures that were drawn."""
     pool: int
-    """Those of them that may be measured."""
+    """Number of them that may be measured."""
     refused: dict[str, int]
-    """How many were refused by sight and collision."""
+    """Number refused by sight and collision."""
     errors: int
-    """Errors of the arm that the poses tell apart."""
+    """Errors of the arm that the poses determine."""
     fixed: dict[str, str]
-    """What they do not tell apart, and why."""
+    """Errors that they do not determine, with reasons."""
     expected: tuple[PosesNeeded, ...]
-    """What a quarter, half and all of the poses give, taken in the order of the search."""
+    """Expected accuracy with a quarter, half and all of the poses, in the order of the search."""
     findings: tuple[Finding, ...]
 
     def show(self) -> Iterator[Block]:
-        """Yield where positions are to be measured, and what they will tell."""
+        """Yield the poses to measure, and the expected accuracy."""
         from elastocal.geometry.show import show_position_plan
 
         return show_position_plan(self)
 
     @property
     def travel_time(self) -> float:
-        """Estimated time on the way, in s."""
+        """Estimated time of the moves, in s."""
         return sum(move.duration for move in self.moves)
 
 
@@ -134,7 +134,7 @@ class _FreePool:
     refused: dict[str, int]
 
     def postures(self, cell: Cell, index: IndexArray) -> Postures:
-        """Return some of them; a way off leads against the tool's axis."""
+        """Return some of them; a retreat moves against the tool's axis."""
         q = self.q[index]
         T = cell.robot.forward(q)
         return Postures(T, -T[:, :3, 2], q, q, np.arange(len(q)))
@@ -237,15 +237,15 @@ def _free_pool(
 
 @dataclass(frozen=True, eq=False)
 class _Knowledge:
-    """What each posture of a pool says of the arm."""
+    """Information about the arm in each posture of a pool."""
 
     marker: FloatArray
     """Marker in base, shape (posture, 3), in m."""
     rows: FloatArray
-    """Derivatives of the marker by what the pool tells apart, each in its likely size, shape
-    (posture, 3, unknown), in m."""
+    """Derivatives of the marker by the unknowns that the pool determines, each in its likely size,
+    shape (posture, 3, unknown), in m."""
     errors: int
-    """How many of them are errors of the arm."""
+    """Number of them that are errors of the arm."""
     fixed: dict[str, str]
 
     @classmethod
@@ -288,7 +288,7 @@ def _choose(
     search: tuple[SearchTechnique, int, np.random.Generator],
     motion: tuple[Mover, Progress],
 ) -> tuple[IndexArray, Route]:
-    """Return the postures of the best poses that free ways lead to, and the round through them."""
+    """Return the postures of the best poses with free paths, and the round through them."""
     (wanted, count, rng), (mover, progress) = search, motion
     left: IndexArray = np.arange(len(pool.q))
     for _ in range(_REPLACEMENTS):

@@ -35,7 +35,7 @@ class Positions:
     markers: FloatArray
     """Markers in the frame of the row's station, shape (row, marker, 3), in m; NaN where hidden."""
     station: NDArray[np.str_]
-    """Where the tracker stood, shape (row,)."""
+    """Tracker station of each row, shape (row,)."""
     pose: IndexArray
     """Label of the pose, shape (row,): rows of one pose are kept together."""
     campaign: NDArray[np.str_]
@@ -47,11 +47,11 @@ class Positions:
     force: FloatArray
     """Process force on the robot at the tcp, in base, shape (row, 3), in N."""
     lines: tuple[int, ...] = ()
-    """Line of the file that each row stands on."""
+    """Line of the file of each row."""
 
     @classmethod
     def unloaded(cls, q: FloatArray, payload: Payload) -> "Positions":
-        """Return poses at which nobody looks and nothing presses, with a payload."""
+        """Return poses without measurement or contact, with a payload."""
         rows = len(q)
         return cls(
             q=q,

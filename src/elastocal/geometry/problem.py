@@ -14,9 +14,9 @@ from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, ChainJoint, Robot
 
 RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics")
-"""From the frames alone to errors of the gears; each has all of those before."""
+"""Rungs from the frames alone to errors of the gears; each includes all before."""
 CHAIN_RUNGS = RUNGS[:3]
-"""Those that have nothing but places and zeros of joints: what a URDF can express."""
+"""Rungs with only poses and zeros of joints: what a URDF can express."""
 _SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3}
 """Likely sizes in m, rad: a column is weighed by its parameter's."""
 PRIOR_WIDTH = 3.0
@@ -26,8 +26,8 @@ _COARSEST = 1e-3
 _FRAME_WIDTH = 30.0
 """The same of frames and markers, about where they are."""
 _YIELD = {True: 3e-3, False: 1e-3}
-"""What a joint that turns (slides) yields under the load that it carries in its class, in rad (m):
-a KR 210's main axes 1 to 2 mrad, a UR10's 8, an iiwa's with torque sensors 6 to 14."""
+"""Rotation (shift) of a joint that turns (slides) under the load of its class, in rad (m): a KR
+210's main axes 1 to 2 mrad, a UR10's 8, an iiwa's with torque sensors 6 to 14."""
 _MASS = 15.0
 """Least mass of an arm, whatever its description has, in kg over the square of its length in m: a
 UR10 has 13, a KR 210 100."""
@@ -94,7 +94,7 @@ class GeometryProblem:
             f"the fit of {len(self)} positions, {stations} stations and {markers} markers",
         )
         joints = robot.chain.joints
-        # Joint and kind of each error of place and of motion, in the order of their columns.
+        # Joint and kind of each error of pose and of motion, in the order of their columns.
         self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)
         self._moving = tuple(np.array(_moving(joints), dtype=np.intp).T)
         # The same of both, counted as `screws` does.
@@ -106,9 +106,9 @@ class GeometryProblem:
         return len(self.row)
 
     def residual(self, at: State) -> FloatArray:
-        """Return how far markers were measured from where they are expected, shape (point, 3), m.
+        """Return measured minus expected markers, shape (point, 3), in m.
 
-        In base, as all derivatives are; distances are the stations'.
+        They are in base, as all derivatives are; distances are the stations'.
         """
         return self._expected(at)[0]
 
@@ -139,7 +139,7 @@ class GeometryProblem:
         return np.einsum("nji,nj->ni", R, self.measured - t) - points, arm, points, R
 
     def _arm_columns(self, arm: ArmFrames, points: FloatArray) -> FloatArray:
-        """Return how the points move by errors of the arm, shape (point, 3, error)."""
+        """Return the motion of the points by errors of the arm, shape (point, 3, error)."""
         joint, kind = self._errors
         twist = screws(self.robot, arm, self.data.q, self.torque)[:, :, joint, kind]
         x, y, z = points.T
@@ -173,9 +173,9 @@ class GeometryProblem:
 
 
 def _placed(joints: Sequence[ChainJoint]) -> list[tuple[int, int]]:
-    """Return joint and kind of the errors of place: all but a turn about the joint's own axis.
+    """Return joint and kind of the errors of pose, without a rotation about the joint's own axis.
 
-    The first joint's place is that of the base, which the stations' frames say.
+    The first joint's pose is that of the base, which the stations' frames determine.
     """
     found = []
     for index, joint in enumerate(joints):
@@ -236,14 +236,14 @@ def compliance_sizes(robot: Robot) -> FloatArray:
 def prior_weight(problem: GeometryProblem, sigma: float) -> FloatArray:
     """Return the weight of the prior beside squares of positions, shape (unknown,), in m².
 
-    By likely sizes: ``sigma² / width²``. What a fit leaves before it has found the arm is no
-    noise, which would make the prior so strong that it never finds it. Frames and markers have next
-    to no prior: it only keeps those finite that left-out poses leave open.
+    It is ``sigma² / width²`` with the likely sizes. The residuals of a fit that has not converged
+    are no noise: as ``sigma`` they would make the prior too strong. Frames and markers have hardly
+    any prior: it only keeps those finite that left-out poses do not determine.
 
     Parameters
     ----------
     problem : GeometryProblem
-        Whose unknowns.
+        Problem with the unknowns.
     sigma : float
         Standard deviation of a coordinate, in m.
     """

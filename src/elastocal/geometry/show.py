@@ -32,14 +32,14 @@ _SHOWN = {
 
 
 def show_geometry(model: GeometryModel, accuracy: GeometryAccuracy) -> Iterator[Block]:
-    """Yield the tables that a person asks of a calibrated geometry.
+    """Yield the tables of a calibrated geometry.
 
     Parameters
     ----------
     model : GeometryModel
         The geometry.
     accuracy : GeometryAccuracy
-        Its errors at poses that were left out of the fit.
+        Its errors at left-out poses.
     """
     yield axis_table(accuracy)
     yield rung_table(model)
@@ -61,7 +61,7 @@ def show_geometry(model: GeometryModel, accuracy: GeometryAccuracy) -> Iterator[
 
 
 def show_position_plan(plan: PositionPlan) -> Iterator[Block]:
-    """Yield where positions are to be measured, and what they will tell.
+    """Yield the poses to measure, and the expected accuracy.
 
     Parameters
     ----------

@@ -101,22 +101,22 @@ def fit(
     """Return the fit of a rung by least squares, blunders left out.
 
     Steps are Levenberg's and Marquardt's (D. W. Marquardt, SIAM Journal on Applied Mathematics
-    11(2), 1963), with derivatives taken anew at each but the first: near-dependent unknowns are
-    told from one another by differences of derivatives that a step of a millimetre changes
-    altogether. A step is taken only if it lowers the sum of squares, and the fit ends where the
-    best one would lower it by less than the noise does by chance (`_DONE`).
+    11(2), 1963), with new derivatives at each but the first: near-dependent unknowns are separated
+    by differences of derivatives that a step of a millimetre changes completely. A step is taken
+    only if it lowers the sum of squares, and the fit ends when the best step would lower it by less
+    than noise does by chance (`_DONE`).
 
     Parameters
     ----------
     problem : GeometryProblem
-        What is fitted.
+        Fitted problem.
     chosen : tuple
-        What is free and what is fixed, by `told_apart`.
+        Free and fixed unknowns, by `told_apart`.
     start : State
         From `register`, or of another rung.
     used : ndarray of bool, shape (point,), optional
-        Positions to use; by default the first steps weigh by Huber's loss, and what is then more
-        than 7 standard deviations away is left out, again after each step.
+        Positions to use; by default the first steps use Huber's loss, and positions more than 7
+        standard deviations away are then left out, again after each step.
 
     Raises
     ------

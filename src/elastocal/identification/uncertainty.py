@@ -302,13 +302,12 @@ def widening_factor(
 
 
 def doubt(difference: FloatArray, standard_error: FloatArray, apart: FloatArray) -> float:
-    """Return the mean square by which the choice of a model may have moved a prediction, in m².
+    """Return the mean square change of a prediction by the choice of a model, in m².
 
-    A choice is not known to be right: had the poses been others, another model would have been
-    taken. Each of those to choose from counts with the weight ``exp(-z^2 / 2)`` of how far it is
-    behind the best, ``z`` being the difference in standard errors; 1 if it predicts better (S. T.
-    Buckland, K. P. Burnham, N. H. Augustin, "Model selection: an integral part of inference",
-    Biometrics 53, 1997).
+    With other poses, another model might have been chosen. Each allowed model has the weight
+    ``exp(-z^2 / 2)``, with its distance ``z`` from the best in standard errors; 1 if it predicts
+    better (S. T. Buckland, K. P. Burnham, N. H. Augustin, "Model selection: an integral part of
+    inference", Biometrics 53, 1997).
 
     Parameters
     ----------
@@ -346,10 +345,10 @@ def doubt_factor(
 def distrust_factor(
     problem: Problem, compliance: FloatArray, draws: FloatArray, held_out: HeldOut
 ) -> float:
-    """Return the factor at which the draws spread as far as the errors at left-out poses.
+    """Return the factor by which the draws spread as far as the errors at left-out poses.
 
-    For a model that leaves most unexplained: how much it changes from campaign to campaign says
-    nothing of how wrong it is.
+    It is for a model that leaves most unexplained: its variation between campaigns does not show
+    its error.
 
     Parameters
     ----------
