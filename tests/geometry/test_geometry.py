@@ -36,7 +36,9 @@ def ladder(measured, draws=100):
     return problem, climb(problem, draws, np.random.default_rng(1), silent)
 
 
-def test_screws_are_those_of_finite_differences():
+@pytest.mark.parametrize("error", [0.0, 0.05])
+def test_screws_are_those_of_finite_differences(error):
+    """Also of an arm with errors, which turn the axes of those behind them."""
     robot, rng, step = kuka(), np.random.default_rng(2), 1e-6
     q, torque = rng.uniform(-1.0, 1.0, (3, 6)), rng.normal(0.0, 1.0, (3, 6))
 
@@ -44,7 +46,8 @@ def test_screws_are_those_of_finite_differences():
         T = frames(robot, q, torque, errors).T_base_tcp
         return T[:, :3, 3] + T[:, :3, :3] @ np.array([0.1, 0.2, 0.3])
 
-    nominal = ArmErrors.none(6)
+    motion = error * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+    nominal = ArmErrors(error * rng.normal(size=(6, 6)), motion * rng.normal(size=(6, 7)))
     found = screws(robot, frames(robot, q, torque, nominal), q, torque)
     for which, columns in (("place", found[..., :6]), ("motion", found[..., 6:])):
         for index in np.ndindex(*columns.shape[2:]):

@@ -13,6 +13,7 @@ from elastocal.report.document.section import Content
 FIGURES = SimpleNamespace(bias=1e-4, mean=2e-4, rms=3e-4, p95=4e-4, max=5e-4)
 HELD_OUT = SimpleNamespace(mean=2e-4, p95=4e-4, max=5e-4)
 MODEL = SimpleNamespace(
+    chain=None,
     ladder=(SimpleNamespace(rung="links", unknowns=24, held_out=HELD_OUT, chosen=True),),
     parameters=(
         GeometryParameter("link 2 along x", 4.2e-8, "m/N", 3.1e-8, 5.3e-8, True),

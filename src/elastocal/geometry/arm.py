@@ -52,6 +52,10 @@ class ArmFrames:
 
     rotation: FloatArray
     """Frames of the joints before their motion, in base, shape (joint, pose, 3, 3)."""
+    shifts: FloatArray
+    """Directions of their shifts in base, shape (joint, pose, 3, 3): of the frame as drawn."""
+    turns: FloatArray
+    """Axes about which an increment of their turns turns them in base, likewise."""
     origin: FloatArray
     """Their origins, shape (joint, pose, 3), in m."""
     axis: FloatArray
@@ -76,7 +80,7 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
     """
     count, joints = len(q), robot.chain.joints
     R, p = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
-    rotation, origin, axis = [], [], []
+    rotation, origin, axis, shifts, turns = [], [], [], [], []
     moved = q + np.einsum("pjm,jm->pj", motion_terms(q, torque), errors.motion)
     for index, joint in enumerate(joints):
         place = errors.place[index]
@@ -84,7 +88,9 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
         p = p + R @ T[:3, 3]
         R = R @ T[:3, :3]
         p = p + R @ place[:3]
+        shifts.append(R)
         R = R @ Rotation.from_rotvec(place[3:]).as_matrix()
+        turns.append(R @ _increments(place[3:]))
         rotation.append(R)
         origin.append(p)
         axis.append(R @ joint.axis)
@@ -97,7 +103,28 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
     tip[:, 3, 3] = 1.0
     tip[:, :3, :3] = R @ T_tip[:3, :3]
     tip[:, :3, 3] = p + R @ T_tip[:3, 3]
-    return ArmFrames(np.array(rotation), np.array(origin), np.array(axis), tip)
+    return ArmFrames(
+        rotation=np.array(rotation),
+        shifts=np.array(shifts),
+        turns=np.array(turns),
+        origin=np.array(origin),
+        axis=np.array(axis),
+        T_base_tcp=tip,
+    )
+
+
+def _increments(turn: FloatArray) -> FloatArray:
+    """Return how increments of a turn's vector turn a frame about its own axes, shape (3, 3).
+
+    The right Jacobian of the rotations (G. S. Chirikjian, "Stochastic Models, Information Theory,
+    and Lie Groups" 2, 2012, section 10.8); its second term by its series, as turns are small.
+    """
+    x, y, z = turn
+    angle = float(np.linalg.norm(turn))
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    first = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    second = 1.0 / 6.0 - angle**2 / 120.0 + angle**4 / 5040.0
+    return np.asarray(np.eye(3) - first * K + second * K @ K)
 
 
 def motion_terms(q: FloatArray, torque: FloatArray) -> FloatArray:
@@ -128,9 +155,9 @@ def screws(robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray) -> Fl
     ndarray, shape (pose, 6, joint, 13)
         By shifts and turns of the joints' places (`KINDS`), then errors of their motion (`MOTION`).
     """
-    origin, axes = at.origin[..., None], at.rotation
-    turns = np.concatenate([np.cross(origin, axes, axis=2), axes], axis=2)
-    shifts = np.concatenate([axes, np.zeros_like(axes)], axis=2)
+    origin = at.origin[..., None]
+    turns = np.concatenate([np.cross(origin, at.turns, axis=2), at.turns], axis=2)
+    shifts = np.concatenate([at.shifts, np.zeros_like(at.shifts)], axis=2)
     revolute = np.array([joint.revolute for joint in robot.chain.joints])[:, None, None]
     turned = np.concatenate([np.cross(at.origin, at.axis), at.axis], axis=2)
     pushed = np.concatenate([at.axis, np.zeros_like(at.axis)], axis=2)

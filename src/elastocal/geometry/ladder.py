@@ -2,7 +2,7 @@
 
 All rungs and folds share one linearisation: errors of a millimetre and a milliradian make the
 problem linear to a micrometre. The normal equations are sums over blocks of consecutive poses, so
-that a fold, or a draw of the bootstrap, is a sum of some of them.
+that a fold is a sum of some of them.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,14 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import GeometryError
 from elastocal.geometry.determined import Fixed, told_apart
-from elastocal.geometry.problem import CHAIN_RUNGS, RUNGS, GeometryProblem, State, prior_weight
+from elastocal.geometry.problem import (
+    CHAIN_RUNGS,
+    RUNGS,
+    GeometryProblem,
+    State,
+    prior_weight,
+    prior_width,
+)
 from elastocal.geometry.solve import GeometryFit, fit, noise, register
 from elastocal.identification import Overlap, judge_models
 from elastocal.progress import Progress
@@ -22,6 +29,8 @@ from elastocal.results import brief_repr
 FOLDS = 5
 _BLOCKS = 100
 """Most blocks of consecutive poses."""
+_BLOCKS_THAT_TELL = 20
+"""Fewer blocks scatter by chance."""
 _NOISE_STEPS = 3
 """Number of fits of a rung for the estimate of its residual noise."""
 
@@ -53,7 +62,7 @@ class FittedRung:
     values: FloatArray
     """Value of each unknown, shape (unknown,); 0 of what is fixed."""
     draws: FloatArray
-    """Bootstrap over blocks of poses, shape (draw, unknown)."""
+    """By the noise and the prior, shape (draw, unknown)."""
 
 
 @brief_repr
@@ -89,7 +98,7 @@ def climb(
     problem : GeometryProblem
         What is fitted.
     draws : int
-        Draws of the bootstrap.
+        Draws of noise and prior.
     rng : Generator
         For it.
     progress : Progress
@@ -176,6 +185,7 @@ class _Sums:
         self.problem, self.about = problem, about
         self.size = np.array([u.size for u in problem.unknowns])
         self.values = problem.values(about.state) / self.size
+        self.width = prior_width(problem)
         used = np.flatnonzero(about.used)
         self.block = block[used]
         self.count = int(block.max()) + 1
@@ -211,18 +221,46 @@ class _Sums:
         return RungErrors(rung, residual, len(free))
 
     def draws(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Return the deviations of block draws of the unknowns from the fit, (draw, unknown)."""
-        free, ridge = self.about.free, prior_weight(self.problem, self.about.sigma)
-        there = np.unique(self.block)
-        # At the fit the positions pull as much away from zero as the prior pulls back.
-        prior = ridge * self.values
+        """Return how far noise and prior take the unknowns from the fit, shape (draw, unknown).
+
+        Each draw is the fit to noise on every coordinate, of the size that is left and with as many
+        degrees of freedom (Student's t of few poses), about errors that are drawn from the prior:
+        what the positions do not tell is as wide as the prior, not as narrow as their scatter. An
+        unknown that blocks of poses scatter more than such noise does (gears, heat: errors of one
+        pose after the other are alike) is stretched to that scatter, each block weighed as if it
+        had been left out (R. M. Bell, D. F. McCaffrey, Survey Methodology 28(2), 2002).
+        """
+        free, ridge = self.about.free, prior_weight(self.problem, self.about.sigma)[self.about.free]
+        G = self.G.sum(axis=0)[np.ix_(free, free)]
+        H_inverse = np.linalg.inv(G + np.diag(ridge))
+        freedom = len(self.b) - float(np.trace(H_inverse @ G))
+        sigma = float(np.linalg.norm(self.b)) / np.sqrt(max(freedom, 1.0))
+        values, vectors = np.linalg.eigh(G)
+        root = H_inverse @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+        stretch = self._block_scatter(free, H_inverse) / (sigma * np.linalg.norm(root, axis=1))
+        noise = rng.normal(size=(count, len(free))) @ root.T * np.maximum(stretch, 1.0)
+        chi = np.sqrt(rng.chisquare(max(freedom, 1.0), (count, 1)) / max(freedom, 1.0))
+        of_prior = rng.normal(size=(count, len(free))) * self.width[free]
         found = np.zeros((count, len(self.size)))
-        for draw in found:
-            chosen = rng.choice(there, len(there))
-            h = self.h[chosen].sum(axis=0) - prior
-            x = _solved(self.G[chosen].sum(axis=0), h, free, ridge)
-            draw[free] = x * self.size[free]
-        return found
+        found[:, free] = sigma * noise / chi + of_prior @ (ridge[:, None] * H_inverse)
+        return np.asarray(found * self.size)
+
+    def _block_scatter(self, free: IndexArray, H_inverse: FloatArray) -> FloatArray:
+        """Return by how much blocks of poses move each free unknown, root of their sum of squares.
+
+        0 where there are too few to tell.
+        """
+        there = np.unique(self.block)
+        if len(there) < _BLOCKS_THAT_TELL:
+            return np.zeros(len(free))
+        one = np.eye(len(free))
+        scores = np.array(
+            [
+                np.linalg.solve(one - self.G[k][np.ix_(free, free)] @ H_inverse, self.h[k][free])
+                for k in there
+            ]
+        )
+        return np.asarray(np.linalg.norm(scores @ H_inverse, axis=0))
 
 
 def _solved(G: FloatArray, h: FloatArray, free: IndexArray, ridge: FloatArray) -> FloatArray:

@@ -339,7 +339,7 @@ def plausible_ladder(
     problem : GeometryProblem
         What is fitted.
     draws : int
-        Draws of the bootstrap.
+        Draws of noise and prior.
     rng : Generator
         For it.
     progress : Progress

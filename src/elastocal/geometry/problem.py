@@ -248,8 +248,17 @@ def prior_weight(problem: GeometryProblem, sigma: float) -> FloatArray:
         Standard deviation of a coordinate, in m.
     """
     arm = np.array([each.rung != "registration" for each in problem.unknowns])
-    width = np.where(arm, PRIOR_WIDTH, _FRAME_WIDTH)
+    width = np.where(arm, prior_width(problem), _FRAME_WIDTH)
     return np.asarray((min(sigma, _COARSEST) / width) ** 2)
+
+
+def prior_width(problem: GeometryProblem) -> FloatArray:
+    """Return the standard deviation of the prior of each unknown, in its likely sizes, (unknown,).
+
+    0 of frames and markers, which have none.
+    """
+    arm = np.array([each.rung != "registration" for each in problem.unknowns])
+    return np.where(arm, PRIOR_WIDTH, 0.0)
 
 
 def _motion_unknown(joint: ChainJoint, kind: str, compliance: float) -> Unknown:

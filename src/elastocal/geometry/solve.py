@@ -134,7 +134,7 @@ def fit(
     (r, J), damping = problem.linearise(at), 0.0
     for step in range(_STEPS):
         robust, returns = step < first_plain, step <= _RETURNS
-        weight, now, sigma = _weights(r, keep, used, robust=robust, returns=returns)
+        weight, now, sigma = _weights(r, len(free), keep, used, robust=robust, returns=returns)
         same, keep = bool((now == keep).all()), now
         squares = _Squares(problem, free, weight, sigma)
         found = squares.lowered(at, r, J, damping)
@@ -157,10 +157,17 @@ def noise(residual: FloatArray) -> float:
 
 
 def _weights(
-    r: FloatArray, keep: BoolArray, used: BoolArray | None, *, robust: bool, returns: bool
+    r: FloatArray,
+    unknowns: int,
+    keep: BoolArray,
+    used: BoolArray | None,
+    *,
+    robust: bool,
+    returns: bool,
 ) -> tuple[FloatArray, BoolArray, float]:
     """Return the weight of each position, which are no blunders, and the noise of a coordinate."""
-    distance, sigma = np.linalg.norm(r, axis=1), noise(r[keep])
+    distance, count = np.linalg.norm(r, axis=1), 3 * int(keep.sum())
+    sigma = noise(r[keep]) * np.sqrt(count / max(count - unknowns, 0.1 * count))
     if robust:
         return np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)), keep, sigma
     if used is not None:
@@ -228,4 +235,4 @@ class _Squares:
                 calm = damping / 10.0 if fall > 0.5 * promised else damping
                 return _Step(there, left, calm if calm > _DONE else 0.0, best, most)
             damping = max(10.0 * damping, 1e-4)
-        return _Step(at, r, damping, best if best > _ROUNDING * now else 0.0, most)
+        return _Step(at, r, 0.0, best if best > _ROUNDING * now else 0.0, most)

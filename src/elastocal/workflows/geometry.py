@@ -65,9 +65,9 @@ class GeometrySettings:
     """Position of each marker on the tool, ``"x, y, z"`` in the tcp with units, where known: an
     error of the tcp is then estimated, too."""
     draws: Annotated[int, Option(least=40, most=100_000)] = 200
-    """Draws of the bootstrap over blocks of poses."""
+    """Draws of noise and prior, for the intervals."""
     seed: Annotated[int, Option(least=0)] = 0
-    """Seed of the draws of the bootstrap."""
+    """Seed of the draws."""
     force: bool = False
     """Replace a file that this command did not write."""
     language: Annotated[str, Option(choices="page language")] = "en"
