@@ -60,7 +60,7 @@ def test_every_spring_of_a_rich_model_has_one_line_of_80_columns():
         "joint_a1.bend-normal",
         "joint_a5.x",
     ]
-    assert rows[3].rstrip().endswith("rigid  below 0.115")
+    assert rows[3].rstrip().endswith("above 8.696  below 0.115")
     assert rows[4].rstrip().endswith("in group 1")
 
 

@@ -15,10 +15,11 @@ from elastocal.progress import silent
 from elastocal.records import write_json
 from elastocal.robot import Robot, of_one_arm, tcp_gap, with_joint_origins, with_tool
 from support.cli import elastocal
+from support.loaded_arms import SPRINGS, acquire, tooled
 from support.measured_arms import MARKERS, Measured, kuka, measure
 
-SPRINGS = np.array([2e-7, 4e-7, 5e-7, 9e-7, 1e-6, 2e-6])
-"""Of the joints, in rad/(N·m)."""
+BELIEVED = MARKERS[0] + [0.004, -0.003, 0.005]
+"""Where the cell has the marker, in m."""
 ERROR = 5e-3
 """Ten times what arms have, so that it shows."""
 
@@ -26,44 +27,25 @@ ERROR = 5e-3
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory) -> tuple[Measured, GeometryModel, Path]:
     """Return an arm, its geometry, and a folder with it and with readings under load."""
-    measured = measure(kuka(), 100, noise=0.0, error=ERROR)
+    measured = measure(tooled(), 100, noise=0.0, error=ERROR)
     problem = GeometryProblem(measured.robot, measured.data)
     found = climb(problem, 40, np.random.default_rng(1), silent)
     model = geometry_model(problem, found, "made of a--file.csv", MARKERS)
     folder = tmp_path_factory.mktemp("elastic")
     write_json(folder / "geometry.json", model)
-    write(readings(measured, model), folder / "data.nc")
+    write(readings(measured), folder / "data.nc")
     return measured, model, folder
 
 
-def readings(measured: Measured, model: GeometryModel) -> Dataset:
-    """Return what a tracker sees of the true arm under load, in the base that it was given."""
-    rng, robot = np.random.default_rng(3), measured.robot
-    q = measured.data.q[:30]
-    R = model.stations["s0"][:3, :3].T @ measured.T_station_base[0][:3, :3]
-    # Light forces: the arm under load stands no way off, so that all is linear.
-    force = rng.normal(0.0, 50.0, (len(q), 3))
-    torque = np.einsum("nij,ni->nj", measured.truth.jacobian(q).translation, force)
-    free, loaded = (
-        T[:, :3, 3] + T[:, :3, :3] @ MARKERS[0]
-        for T in map(measured.truth.forward, (q, q + SPRINGS * torque))
-    )
-    return Dataset.from_arrays(
-        joint_position=q[:, None],
-        force=(force @ R.T)[:, None],
-        controller_displacement=np.zeros((len(q), 1, 3)),
-        marker_displacement=((loaded - free) @ R.T)[:, None],
-        joint_names=robot.joint_names,
-        load_cases=("normal",),
-        robot_urdf=robot.urdf,
-        tcp_frame=robot.tip,
-        marker=tuple((MARKERS[0] + [0.004, -0.003, 0.005]).tolist()),
-    )
+def readings(measured: Measured, **given: object) -> Dataset:
+    """Return what a cell records of the true arm, light forces, so that all is linear."""
+    noiseless = {"press": 60.0, "tracker": 0.0, "sensor": 0.0, "marker": BELIEVED}
+    return acquire(measured, **(noiseless | given))
 
 
 def spring_error(result: CalibrateResult) -> float:
-    """Return the largest relative error; a force at the flange does not turn the last joint."""
-    return float(np.abs(result.calibrated.compliance / SPRINGS - 1.0)[:5].max())
+    """Return the largest relative error."""
+    return float(np.abs(result.calibrated.compliance / SPRINGS - 1.0).max())
 
 
 def test_springs_are_those_of_the_arm_as_built(campaign, tmp_path):
@@ -76,7 +58,7 @@ def test_springs_are_those_of_the_arm_as_built(campaign, tmp_path):
     assert spring_error(built) < 3e-4
     assert spring_error(drawn) > 1e-2
     assert "on the arm as built of" in built.calibrated.provenance
-    assert built.calibration.settings.marker != pytest.approx(tuple(MARKERS[0] + 0.004), abs=1e-3)
+    assert built.calibration.settings.marker == pytest.approx(tuple(MARKERS[0]), abs=1e-4)
 
 
 def test_the_arm_as_built_reaches_where_the_true_one_does(campaign):
@@ -116,7 +98,8 @@ def test_paths_are_corrected_alike_by_a_model_of_the_arm_as_built(campaign, tmp_
         assert elastocal("compensate", model, rows, "--out", out, "--force", *built).code == 0
         text = out.read_text(encoding="utf-8").splitlines()[1]
         found.append(np.array([float(cell) for cell in text.split(",")[:6]]))
-    assert np.abs(found[0] - found[1]).max() < 5e-5
+    # The springs of the arm as drawn, ten times as wrong as arms are, are a third off.
+    assert np.abs(found[0] - found[1]).max() < 3e-4
     assert np.abs(found[0] - [0.1, -1, 1, 0.2, 0.5, 0]).max() > 1e-3
 
 

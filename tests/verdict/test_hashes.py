@@ -2,12 +2,16 @@
 
 import hashlib
 import json
+from dataclasses import replace
 
 import pytest
 
 from elastocal import dataset
 from elastocal.verdict import BYTES
 from elastocal.verdict._files import CONTENT, content_hash
+from elastocal.verdict.chain import changed_reading
+from support.loaded_arms import acquire, tooled
+from support.measured_arms import measure
 
 
 def written(path, data):
@@ -52,3 +56,11 @@ def test_a_damaged_file_is_hashed_as_it_is(tmp_path):
         path = tmp_path / name
         path.write_bytes(b"{")
         assert content_hash(path) == (hashlib.sha256(b"{").hexdigest(), BYTES)
+
+
+def test_readings_made_before_the_places_of_the_marker_were_recorded_are_not_called_changed():
+    found = acquire(measure(tooled(), 3))
+    before = replace(found, marker_position=None)
+    assert changed_reading(before, found, old=False, source="streams") == ""
+    moved = replace(found, marker_position=found.marker_position + 1e-3)
+    assert "marker_position of pose" in changed_reading(moved, found, old=False, source="streams")

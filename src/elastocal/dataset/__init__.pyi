@@ -5,6 +5,7 @@ from ._layout import (
     read_made_from as read_made_from,
     require_joint_names as require_joint_names,
     require_labels as require_labels,
+    write_vector as write_vector,
 )
 from ._store import (
     content_sha256 as content_sha256,

@@ -6,6 +6,7 @@ variables are those of the paper's Procedure 1: ``P^c``, ``P^m``, ``F^m`` and ``
 
 import contextlib
 import difflib
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -55,6 +56,10 @@ SI_JOINT_UNITS = {"angle": "rad", "length": "m"}
 MADE_FROM = "made_from"
 """Attribute with the SHA-256 of each file that a dataset was made from, as JSON."""
 
+STATIONS = "stations"
+"""Attribute with the poses that each station of the tracker measured, as JSON: a station that moved
+counts as another one from there on."""
+
 ATTRIBUTES = (
     "schema",
     "robot_name",
@@ -63,6 +68,7 @@ ATTRIBUTES = (
     "marker",
     "gravity",
     "check",
+    STATIONS,
     "provenance",
     MADE_FROM,
 )
@@ -149,6 +155,15 @@ JOINT_VARIABLES = (JOINT_POSITION, REFERENCE_JOINT_POSITION, LINK_JOINT_POSITION
 JOINT_PREFIXES = {"reference_": REFERENCE_JOINT_POSITION, "link_": LINK_JOINT_POSITION}
 """Prefix of a joint's name in the CSV column of a variable."""
 
+MARKER_POSITION = Variable(
+    "marker_position",
+    ("pose", "axis"),
+    "length",
+    "m",
+    "marker that the tracker measures when the zero of both displacements is read, in base",
+    schema=SCHEMA_2,
+)
+
 VECTORS = (
     Variable("force", _READING, "force", "N", "force on the robot at the TCP, in base", True),
     Variable("moment", _READING, "moment", "N m", "moment on the robot at the TCP, in base"),
@@ -181,6 +196,7 @@ VECTORS = (
         broadcast=True,
     ),
     Variable("tcp_position", ("pose", "axis"), "length", "m", "unloaded TCP position in base"),
+    MARKER_POSITION,
     Variable(
         "reference_force",
         ("pose", "axis"),
@@ -333,6 +349,8 @@ def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
             read_vector(name, {name: value})
         if name == MADE_FROM:
             read_made_from({name: value})
+        if name == STATIONS:
+            read_stations({name: value})
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
 
@@ -393,6 +411,35 @@ def read_made_from(attributes: Mapping[str, str]) -> dict[str, str]:
         if isinstance(found, dict) and all(isinstance(each, str) for each in found.values()):
             return found
     raise DatasetError(f"attribute {MADE_FROM!r} is {text!r:.60}: it must be SHA-256s as JSON")
+
+
+def read_stations(attributes: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
+    """Return the poses that each station measured, by its name; none: not stated.
+
+    Raises
+    ------
+    DatasetError
+        If it is not JSON of lists of whole numbers.
+    """
+    text = attributes.get(STATIONS, "{}")
+    with contextlib.suppress(SchemaError):
+        found = parse_json(text, STATIONS)
+        if isinstance(found, dict) and all(map(_is_poses, found.values())):
+            return {name: tuple(poses) for name, poses in found.items()}
+    raise DatasetError(f"attribute {STATIONS!r} is {text!r:.60}: it must be lists of poses as JSON")
+
+
+def write_stations(stations: Mapping[str, Sequence[int]]) -> str:
+    """Return the text of the poses that each station measured.
+
+    >>> write_stations({"left": [0, 2]})
+    '{"left": [0, 2]}'
+    """
+    return json.dumps({name: [int(pose) for pose in poses] for name, poses in stations.items()})
+
+
+def _is_poses(value: object) -> bool:
+    return isinstance(value, list) and all(type(each) is int for each in value)
 
 
 def _storable(text: str) -> bool:

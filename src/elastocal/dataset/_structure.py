@@ -15,6 +15,7 @@ from elastocal.dataset._layout import (
     MADE_FROM,
     SCHEMA,
     SCHEMA_2,
+    STATIONS,
     STATUS,
     STATUSES,
     VARIABLE_NAMES,
@@ -160,9 +161,8 @@ def _news(names: Collection[str], attributes: Mapping[str, object]) -> list[str]
     late = [each.name for each in (*VARIABLES, *INTEGERS) if each.schema != SCHEMA]
     news = [f"variable {name!r}" for name in late if name in names]
     news += ["coordinate 'campaign'"] if "campaign" in names else []
-    news += [
-        f"attribute {name!r}" for name in ("gravity", "check", MADE_FROM) if name in attributes
-    ]
+    late_attributes = ("gravity", "check", STATIONS, MADE_FROM)
+    news += [f"attribute {name!r}" for name in late_attributes if name in attributes]
     conditioned = attributes.get("history") == CONDITIONED
     return news + ([f"attribute 'history' {CONDITIONED!r}"] if conditioned else [])
 

@@ -35,12 +35,14 @@ from elastocal.dataset._layout import (
     JOINT_POSITION,
     JOINT_VARIABLES,
     LINK_JOINT_POSITION,
+    MARKER_POSITION,
     MISSING,
     OK,
     REFERENCE_JOINT_POSITION,
     SCHEMA,
     SCHEMA_2,
     SEQUENCE,
+    STATIONS,
     STATUSES,
     VARIABLES,
     Arrays,
@@ -53,7 +55,9 @@ from elastocal.dataset._layout import (
     Vector,
     canonical_attributes,
     freeze,
+    read_stations,
     read_vector,
+    write_stations,
     write_vector,
 )
 from elastocal.dataset._structure import assemble, check_names, check_structure, needed_schema
@@ -342,6 +346,9 @@ class Dataset(Result):
     """Standard deviation of the marker displacement, shape (pose, load_case, 3), in m."""
     tcp_position: FloatArray | None = None
     """Unloaded TCP position in base, shape (pose, 3), in m."""
+    marker_position: FloatArray | None = None
+    """Marker position by the tracker when the zero of both displacements was read, in base, shape
+    (pose, 3), in m: the stations can be registered anew by it (`stations`)."""
     sequence: IntArray | None = None
     """Place of each reading in time among those of its pose, shape (pose, load_case); None: the
     order of the load cases."""
@@ -397,6 +404,7 @@ class Dataset(Result):
         force_sigma: ArrayLike | None = None,
         marker_sigma: ArrayLike | None = None,
         tcp_position: ArrayLike | None = None,
+        marker_position: ArrayLike | None = None,
         sequence: ArrayLike | None = None,
         reference_joint_position: ArrayLike | None = None,
         reference_force: ArrayLike | None = None,
@@ -410,6 +418,7 @@ class Dataset(Result):
         gravity: Vector | None = None,
         conditioned: bool = False,
         check: Sequence[str] = (),
+        stations: Mapping[str, Sequence[int]] | None = None,
         provenance: str = "",
     ) -> "Dataset":
         """Return the dataset of plain arrays in SI units, if it is plausible.
@@ -419,7 +428,7 @@ class Dataset(Result):
         joint_position, force, controller_displacement, marker_displacement : array_like
             As the fields of these names. Displacements are those of the TCP, or both of the marker
             where ``marker`` is given; the tracker's is left out where there was no metrology.
-        moment, tcp_position, sequence : array_like, optional
+        moment, tcp_position, marker_position, sequence : array_like, optional
         reference_joint_position, reference_force, link_joint_position : array_like, optional
             As the fields of these names.
         joint_names, load_cases : sequence of str
@@ -444,6 +453,8 @@ class Dataset(Result):
             Whether each pose began with a full press, made before the reference was read.
         check : sequence of str
             Load cases that are kept out of every fit.
+        stations : mapping, optional
+            Poses that each station of the tracker measured, by its name.
 
         Raises
         ------
@@ -460,6 +471,7 @@ class Dataset(Result):
             "force_sigma": force_sigma,
             "marker_sigma": marker_sigma,
             "tcp_position": tcp_position,
+            MARKER_POSITION.name: marker_position,
             "sequence": sequence,
             "reference_joint_position": reference_joint_position,
             "reference_force": reference_force,
@@ -474,6 +486,7 @@ class Dataset(Result):
             "gravity": None if gravity is None else write_vector(gravity, "m/s2"),
             "check": ", ".join(check) or None,
             "history": CONDITIONED if conditioned else None,
+            STATIONS: None if stations is None else write_stations(stations),
             "provenance": provenance,
         }
         labels = {"pose": poses, "load_case": load_cases, "joint": joint_names}
@@ -549,6 +562,11 @@ class Dataset(Result):
     def arrays(self) -> dict[str, FloatArray]:
         """The quantities that are present, by name: all variables but status and sequence."""
         return {each.name: v for each in VARIABLES if (v := getattr(self, each.name)) is not None}
+
+    @property
+    def stations(self) -> dict[str, tuple[int, ...]]:
+        """The poses that each station of the tracker measured, by its name; none: not known."""
+        return read_stations(self.attributes)
 
     @property
     def _variables(self) -> dict[str, np.ndarray]:

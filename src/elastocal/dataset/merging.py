@@ -11,8 +11,10 @@ from elastocal.dataset._layout import (
     INTEGERS,
     LINK_JOINT_POSITION,
     MADE_FROM,
+    MARKER_POSITION,
     MISSING,
     SEQUENCE,
+    STATIONS,
     VARIABLES,
     FloatArray,
     IntArray,
@@ -67,17 +69,22 @@ def merge(
         _check_poses_differ(datasets)
     cases = tuple(dict.fromkeys(case for dataset in datasets for case in dataset.load_cases))
     poses = tuple(pose for dataset in datasets for pose in dataset.poses)
-    names = dict.fromkeys(name for dataset in datasets for name in dataset.arrays)
+    present = dict.fromkeys(name for dataset in datasets for name in dataset.arrays)
+    # Stations of different campaigns are different ones, though their names may be the same.
+    dropped = _OF_ONE_CAMPAIGN if len(datasets) > 1 else ()
+    names = [name for name in present if name not in dropped]
     joined: dict[str, np.ndarray] = {name: _joined(datasets, name, cases) for name in names}
+    first = replace(datasets[0], marker_position=None) if dropped else datasets[0]
     sources = [dataset.provenance for dataset in datasets if dataset.provenance]
     provenance = "; ".join(dict.fromkeys(sources))
     # What the first was made from, the others were not.
-    stated = {name: each for name, each in datasets[0].attributes.items() if name != MADE_FROM}
+    own = datasets[0].attributes.items()
+    stated = {name: each for name, each in own if name != MADE_FROM and name not in dropped}
     return replace(
-        datasets[0],
+        first,
         # Said again for the type checker: the arrays by name are none of these.
-        joint_names=datasets[0].joint_names,
-        joint_units=datasets[0].joint_units,
+        joint_names=first.joint_names,
+        joint_units=first.joint_units,
         poses=tuple(range(len(poses))) if relabel else poses,
         load_cases=cases,
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
@@ -123,6 +130,8 @@ def _campaigns(datasets: Sequence["Dataset"], named: Sequence[str] | None) -> tu
 
 _DIMS = {variable.name: variable.dims for variable in (*VARIABLES, *INTEGERS)}
 _ZERO_BY_DEFAULT = "reference_force"
+_OF_ONE_CAMPAIGN = (MARKER_POSITION.name, STATIONS)
+"""What is left out where campaigns are put together."""
 
 
 def selected(
@@ -183,7 +192,7 @@ def usable_readings(
     flat: dict[str, np.ndarray] = {}
     for variable in VARIABLES:
         values = dataset.arrays.get(variable.name)
-        if values is not None and variable != LINK_JOINT_POSITION:
+        if values is not None and variable not in (LINK_JOINT_POSITION, MARKER_POSITION):
             rows = values[pose, case] if "load_case" in variable.dims else values[pose]
             flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
     presses = _unusable_presses(dataset, order)
@@ -272,7 +281,8 @@ def _check_compatible(first: "Dataset", other: "Dataset", index: int) -> None:
             f"datasets 0 and {index} have different histories: {_history(first)} and"
             f" {_history(other)}"
         )
-    for variable in sorted((set(first.arrays) ^ set(other.arrays)) - {_ZERO_BY_DEFAULT}):
+    allowed = {_ZERO_BY_DEFAULT, *_OF_ONE_CAMPAIGN}
+    for variable in sorted((set(first.arrays) ^ set(other.arrays)) - allowed):
         lacking = index if variable in first.arrays else 0
         raise DatasetError(
             f"dataset {lacking} has no variable {variable!r}, dataset {index - lacking} has:"

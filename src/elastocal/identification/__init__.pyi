@@ -22,6 +22,9 @@ from .conventions import (
     check_conventions as check_conventions,
     check_joints as check_joints,
 )
+from .displacement import (
+    reference_joints as reference_joints,
+)
 from .domain import (
     LEVEL_REACH as LEVEL_REACH,
     CalibratedLoads as CalibratedLoads,

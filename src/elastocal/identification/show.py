@@ -191,7 +191,7 @@ def _spring_cells(spring: SpringSummary) -> tuple[Cell, ...]:
     return (
         f"{value:.4f}{unit}",
         f"{low:.3f} … {high:.3f}",
-        _stiffness(value, shown),
+        _stiffness(value, high, shown),
         _known(value, low, high, spring),
     )
 
@@ -202,11 +202,14 @@ def _hidden(spring: SpringSummary) -> Cell:
     return Graded(text, "fair")
 
 
-def _stiffness(value: float, unit: Unit) -> str:
-    if not value > 0.0:
-        return phrase("rigid") if value == 0.0 else ""
+def _stiffness(value: float, high: float, unit: Unit) -> str:
     name = "" if unit == _USUAL_UNIT else f" {unit.stiffness}"
-    return f"{1.0 / value:.3f}{name}" if unit.stiffness else ""
+    if value == 0.0:
+        # A bound says that it is rigid, the readings only how soft it is at most.
+        if not (high > 0.0 and unit.stiffness):
+            return phrase("rigid")
+        return phrase("above {bound}", bound=f"{1.0 / high:.3f}{name}")
+    return f"{1.0 / value:.3f}{name}" if unit.stiffness and value > 0.0 else ""
 
 
 def _known(value: float, low: float, high: float, spring: SpringSummary) -> Cell:
@@ -260,7 +263,7 @@ def show_unseen(
         total=total,
         condition=f"{float(f'{condition:.3g}'):.0f}",
     )
-    yield Paragraph(phrase("{rank} {meaning}", rank=text, meaning=_meaning(groups, ranks)))
+    yield Paragraph(phrase("{rank} {meaning}", rank=text, meaning=_meaning(springs, groups, ranks)))
     if groups:
         numbered = enumerate(map(describe_briefly, groups), start=1)
         yield Bullets(
@@ -285,11 +288,23 @@ def show_unseen(
         )
 
 
-def _meaning(groups: Sequence[Sequence[Term]], ranks: tuple[int, int, int]) -> str:
+def _meaning(
+    springs: Sequence[SpringSummary],
+    groups: Sequence[Sequence[Term]],
+    ranks: tuple[int, int, int],
+) -> str:
     rank, attainable, total = ranks
     if not groups:
         if rank < total:
             return phrase("What the readings leave open, the bounds of the springs settle.")
+        bound = [each.name for each in springs if each.at_bound]
+        if bound:
+            return phrase(
+                "The readings tell every spring apart, but a bound decides the value of {springs}:"
+                " {names}.",
+                springs=counted(len(bound), "spring"),
+                names=", ".join(bound),
+            )
         return phrase("Every spring is observable.")
     if attainable <= rank:
         return phrase(

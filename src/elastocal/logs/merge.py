@@ -610,9 +610,7 @@ def _dataset(
     cases = [case for case in log_map.load_cases or dict.fromkeys(found) if case in had]
     arm = MeasuredArm(site.robot, site.urdf, site.gravity, check=log_map.check)
     names = ", ".join(path.name for path in files)
-    return dataset_of(
-        poses, rows, cases, arm, registration.lever_arm, site.sensor, f"{IMPORTED} {names}"
-    )
+    return dataset_of(poses, rows, cases, arm, registration, site.sensor, f"{IMPORTED} {names}")
 
 
 def _warnings(

@@ -2,6 +2,7 @@ from .derive import (
     PoseReadings as PoseReadings,
     RunSummary as RunSummary,
     derive_run as derive_run,
+    on_arm_as_built as on_arm_as_built,
     read_run as read_run,
     read_summary as read_summary,
     rehearse_derivation as rehearse_derivation,

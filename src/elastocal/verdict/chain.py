@@ -42,6 +42,8 @@ _SAME = 1e-4
 machines round differently, and what is smaller changes no verdict."""
 _SAME_PLACE = 1e-6
 """The same for the position of the marker, which is stored as a text."""
+_LATER = ("marker_position",)
+"""What datasets have had only since they stated their hashes."""
 _FRACTION = re.compile(r"[-+]?\d+\.\d+(?:e[-+]?\d+)?")
 
 
@@ -87,7 +89,7 @@ def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> 
             return f"its {name.replace('_', ' ')} are others"
     mine, again = stated.to_labelled(), found.to_labelled()
     for name, array in again.variables.items():
-        if array.values.dtype.kind not in "iuf" or (name not in mine and old):
+        if array.values.dtype.kind not in "iuf" or (name not in mine and (old or name in _LATER)):
             continue
         if name not in mine:
             return f"it has no {name}"

@@ -37,6 +37,7 @@ from elastocal.procedure import (
     RunFolder,
     check_plan,
     file_sha256,
+    on_arm_as_built,
     read_journal,
     read_summary,
 )
@@ -258,12 +259,21 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
     if calibrated is None or evidence.dataset is None:
         return evidence
     try:
-        reproduction = reproduce_calibration(calibrated.model, calibrated.figures, evidence.dataset)
+        reproduction = reproduce_calibration(
+            calibrated.model, calibrated.figures, _as_calibrated(evidence.dataset, calibrated)
+        )
     except ElastocalError as error:
         reason = " ".join(str(error).split())
         reader.note_missing("calibration made again", reason, damaged=True)
         return evidence
     return replace(evidence, reproduction=reproduction)
+
+
+def _as_calibrated(dataset: Dataset, found: ModelEvidence) -> Dataset:
+    """Return the readings as they were calibrated: on the arm as built, where one was known."""
+    settings = found.figures.settings if found.figures else None
+    marker = settings.marker if settings else None
+    return on_arm_as_built(dataset, found.model.model.robot, marker).dataset
 
 
 def _calibrated(path: Path, dataset: Dataset | None) -> ModelEvidence:

@@ -106,8 +106,10 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     made_from = {str(path): content_sha256(each) for path, each in found}
     measured, source = _measured(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
+    unbuilt: tuple[Finding, ...] = ()
     if settings.geometry is not None:
         arm, settings = _as_built(settings, arm, measured)
+        measured, unbuilt = _rebuilt(found, arm, settings)
         source = f"{source}, on the arm as built of {settings.geometry}"
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
@@ -135,7 +137,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         coverage, doubt = _on_production(path, calibration.calibrated)
         warnings = (*figures.warnings, *(doubt.warnings if doubt else ()))
         figures = replace(figures, production=coverage, doubt=doubt, warnings=warnings)
-    figures = replace(figures, warnings=(*figures.warnings, *unknown))
+    figures = replace(figures, warnings=(*figures.warnings, *unknown, *unbuilt))
     found_model = replace(calibration.calibrated, on_production=figures.doubt)
     result = replace(CalibrateResult.of(found_model, figures), made_from=made_from)
     if settings.out is not None:
@@ -162,6 +164,18 @@ def _as_built(
             x, y, z = markers[apart.argmin()].tolist()
             settings = replace(settings, marker=(x, y, z))
     return built, settings
+
+
+def _rebuilt(
+    found: Sequence[tuple[Path, Dataset]], arm: Robot, settings: CalibrateSettings
+) -> tuple[Dataset, tuple[Finding, ...]]:
+    """Return the readings of all campaigns worked out with the arm as built, and what is not."""
+    from elastocal.procedure import on_arm_as_built
+
+    rebuilt = [on_arm_as_built(each, arm, settings.marker) for _, each in found]
+    paths = (path for path, _ in found)
+    measured, _ = _measured(list(zip(paths, (each.dataset for each in rebuilt), strict=True)))
+    return measured, tuple(dict.fromkeys(note for each in rebuilt for note in each.findings))
 
 
 PRODUCTION_UNKNOWN = Kind(

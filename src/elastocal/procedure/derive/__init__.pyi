@@ -2,6 +2,9 @@ from ._rows import (
     LoadRow as LoadRow,
     load_rows as load_rows,
 )
+from .as_built import (
+    on_arm_as_built as on_arm_as_built,
+)
 from .derivation import (
     MeasuredArm as MeasuredArm,
     dataset_of as dataset_of,

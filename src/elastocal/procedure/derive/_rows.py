@@ -181,6 +181,28 @@ def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: SensorLoad) -> Lo
     )
 
 
+def seen_markers(
+    poses: Sequence[PoseReadings], labels: Sequence[int], registration: Registration
+) -> FloatArray:
+    """Return where the tracker saw the marker at the zero of each pose, given by its label.
+
+    Returns
+    -------
+    ndarray, shape (pose, 3)
+        In base, in m; NaN where no registered station saw it.
+    """
+    seen = np.full((len(labels), 3), np.nan)
+    for pose in poses:
+        zero = pose.zero
+        if zero is None or zero.marker is None or zero.window.station is None:
+            continue
+        fit = registration.station_of(zero.window.station, pose.pose)
+        if fit is not None and pose.pose in labels:
+            T = fit.T_base_tracker
+            seen[labels.index(pose.pose)] = T[:3, :3] @ zero.marker.value + T[:3, 3]
+    return seen
+
+
 class UnloadedReferences(NamedTuple):
     """References of the displacements of each pose; NaN where unknown."""
 

@@ -44,7 +44,13 @@ from elastocal.errors import DatasetError, FileAccessError, ProcedureError, Sche
 from elastocal.findings import Finding, Kind, as_number
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive import summary
-from elastocal.procedure.derive._rows import LoadRow, LoadValues, load_rows, unloaded_references
+from elastocal.procedure.derive._rows import (
+    LoadRow,
+    LoadValues,
+    load_rows,
+    seen_markers,
+    unloaded_references,
+)
 from elastocal.procedure.derive.readings import (
     PoseReadings,
     felt_windows,
@@ -652,7 +658,7 @@ def derive_poses(
     # The press before the reference stays, usable or not: the others' friction begins with it.
     cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
     arm = measured_arm(cell)
-    dataset = dataset_of(poses, rows, cases, arm, registration.lever_arm, tool, provenance)
+    dataset = dataset_of(poses, rows, cases, arm, registration, tool, provenance)
     ranges = None if cell.file.sensor is None else cell.file.sensor.ranges
     estimate = estimate_tool(tool_readings(poses, tool), tool.mass, ranges)
     found = RunFindings(poses, rows, registration, tool, estimate, dataset, plan, entries)
@@ -723,12 +729,23 @@ def _by_pose_and_case(
     return status, arrays
 
 
+def _stations(registration: Registration) -> dict[str, tuple[int, ...]]:
+    """Return the poses of each station by its name; one that moved is another from there on."""
+    named = Counter(each.station for each in registration.stations)
+    return {
+        each.station if named[each.station] == 1 else f"{each.station} from {each.poses[0]}": (
+            each.poses
+        )
+        for each in registration.stations
+    }
+
+
 def dataset_of(
     poses: Sequence[PoseReadings],
     rows: Sequence[LoadRow],
     load_cases: Sequence[str],
     arm: MeasuredArm,
-    lever: FloatArray,
+    registration: Registration,
     sensor: SensorLoad,
     provenance: str,
 ) -> Dataset:
@@ -744,8 +761,8 @@ def dataset_of(
         In order in time.
     arm : MeasuredArm
         What they were taken with.
-    lever : ndarray, shape (3,)
-        Marker in the tcp frame, in m.
+    registration : Registration
+        Stations and marker.
     sensor : SensorLoad
         The tool on its sensor.
     provenance : str
@@ -786,13 +803,15 @@ def dataset_of(
         status=status,
         sequence=places_in_time(poses, labels, load_cases),
         tcp_position=zero.tcp,
+        marker_position=None if is_unseen else seen_markers(poses, labels, registration),
+        stations=None if is_unseen else _stations(registration),
         reference_joint_position=zero.q,
         # As all forces counted from where the tool was off the surface: none, or light contact.
         reference_force=zero.force,
         robot_name=robot.name,
         robot_urdf=arm.urdf,
         tcp_frame=robot.tip,
-        marker=tuple(lever.tolist()),
+        marker=tuple(registration.lever_arm.tolist()),
         gravity=arm.gravity,
         conditioned=arm.conditioned,
         check=[case for case in load_cases if case == arm.check],

@@ -17,6 +17,7 @@ from elastocal.procedure.derive.derivation import dataset_of, measured_arm, run_
 from elastocal.procedure.derive.readings import Mean, PoseReadings, Reading, ToolState
 from elastocal.procedure.derive.tool import sensor_load
 from elastocal.procedure.record import PoseLog, ReadingStatus, RunFolder, RunRecord, Window
+from elastocal.procedure.registration import Registration, StationFit
 from elastocal.records import netcdf_image
 
 _COMPLIANCE = 1e-6
@@ -54,12 +55,24 @@ def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record:
         rows,
         list(dict.fromkeys(row.load_case for row in rows)),
         measured_arm(cell),
-        np.zeros(3) if marker is None else marker.position_tcp,
+        _registration(plan, np.zeros(3) if marker is None else marker.position_tcp),
         sensor_load(cell),
         run_provenance(folder, record, None),
     )
     dataset.require_plausible()
     netcdf_image(dataset.to_labelled())
+
+
+def _registration(plan: PlanResult, lever: FloatArray) -> Registration:
+    """Return stations that stand at the base and saw what the plan has them see."""
+    none, stations = np.zeros(3), dict[str, list[int]]()
+    for pose in plan.poses:
+        stations.setdefault(str(pose.seen_by), []).append(pose.id)
+    fits = tuple(
+        StationFit(name, tuple(poses), np.eye(4), 0.0, none, np.zeros((len(poses), 3)), 0.0)
+        for name, poses in stations.items()
+    )
+    return Registration(fits, lever, none, lever, (), 0.0, 0.0, (), (), {})
 
 
 def _readings(pose: PoseRecord, load_cases: list[str]) -> PoseReadings:
