@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from elastocal.cell import fingerprint, load_cell, write_example
+from elastocal.compensation import read_settings
+from elastocal.compensation.conditioning import FILTERS, FilterChain
 from elastocal.elastic import KINDS, ElasticModel, bearing, layout
 from elastocal.errors import ElastocalError, PlanningError, PluginError, SchemaError
 from elastocal.identification import LOSSES, CalibratedModel, Observability, read_model, write_model
@@ -23,7 +25,7 @@ from elastocal.planning.search import CRITERIA, TECHNIQUES
 from elastocal.plugins import KINDS as KINDS_OF_PLUGINS, Registry
 from elastocal.report.document import write_report
 from elastocal.report.language import language_of
-from elastocal.testing import CheckSuite
+from elastocal.testing import CheckSuite, FilterSuite
 from elastocal.verdict import Evidence
 from support import plugged, shown
 from support.cells import robot
@@ -78,7 +80,8 @@ def test_every_kind_has_a_registry_of_its_own_and_a_class_that_is_expected(kind)
         return
     assert isinstance(registry, Registry)
     assert registry.kind == kind
-    assert len(registry) >= len(registry.own) > 0
+    assert len(registry) >= len(registry.own)
+    assert registry.own or kind == "filter"  # those of elastocal have keys of their own
 
 
 def model_with_a_spring_of_another_package(path: Path) -> CalibratedModel:
@@ -508,3 +511,55 @@ class TestACheckOfAPlugIn:
         suite = CheckSuite()
         suite.test_has_a_name_a_unit_and_advice(made)
         suite.test_its_class_is_found_by_its_name(made)
+
+
+class TestAFilterOfAPlugIn:
+    """The one that the documentation shows."""
+
+    @pytest.fixture(autouse=True)
+    def installed(self, tmp_path, monkeypatch):
+        page = (ROOT / "docs" / "how-to" / "write-a-plug-in.md").read_text("utf-8")
+        shown = page.partition("## A filter\n\n```python\n")[2].partition("```")[0]
+        source = (
+            "import math\nfrom typing import Literal\n"
+            "from elastocal.compensation.conditioning import Duration, WrenchFilter\n"
+            f"{shown}\nTHING = Lag\n"
+        )
+        offered(tmp_path, monkeypatch, source, "elastocal.filters", "lag")
+
+    def settings(self, tmp_path, text):
+        file = tmp_path / "settings.yaml"
+        chosen = f"filter: {{low_pass: null, median: 1, others: [{text}]}}"
+        file.write_text(f"schema: elastocal.compensator/1\n{chosen}\n", "utf-8")
+        return read_settings(file)
+
+    def test_it_is_among_the_filters_and_survives_a_file(self, tmp_path):
+        found = self.settings(tmp_path, "{kind: lag, time: 20 ms}")
+        chain = found.chain
+        assert len(chain.sections) == 1
+        # A slope is followed late by the time of the lag, less half a reading of the steps.
+        assert float(chain.delay()) == pytest.approx(0.020 - 0.5 * 0.004, abs=1e-4)
+        assert found.filter.model_dump()["others"] == ({"kind": "lag", "time": 0.02},)
+        assert not found.filter.off().chain(0.004).sections
+
+    @pytest.mark.parametrize(
+        ("text", "reason"),
+        [
+            ("{kind: leg, time: 20 ms}", r"unknown kind 'leg' \(allowed: lag\)"),
+            ("{time: 20 ms}", r"unknown kind None \(allowed: lag\)"),
+            ("{kind: lag, time: 20}", "lag: time"),
+            ("{kind: lag, time: 20 ms, order: 2}", "unknown key 'order'"),
+        ],
+    )
+    def test_a_slip_of_the_pen_is_refused(self, tmp_path, text, reason):
+        with pytest.raises(ElastocalError, match=f"filter.others.*{reason}"):
+            self.settings(tmp_path, text)
+
+    def test_it_keeps_what_every_filter_keeps(self):
+        made = FILTERS["lag"](time="20 ms")
+        chain, suite = FilterChain(0.004, 1, made.sections(0.004)), FilterSuite()
+        suite.test_its_class_is_found_by_its_kind(made)
+        suite.test_a_constant_passes_unchanged(chain)
+        suite.test_it_is_stable(chain)
+        suite.test_nothing_is_amplified(chain)
+        suite.test_it_says_by_how_much_it_delays_a_slow_wrench(chain)

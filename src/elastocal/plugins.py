@@ -84,6 +84,12 @@ KINDS = {
         True,
     ),
     "loss": Kind("elastocal.losses", "elastocal.identification:LOSSES", _FUNCTION),
+    "filter": Kind(
+        "elastocal.filters",
+        "elastocal.compensation.conditioning:FILTERS",
+        "elastocal.compensation.conditioning:WrenchFilter",
+        True,
+    ),
     "driver": Kind(
         "elastocal.drivers", "elastocal.drivers:DRIVERS", "elastocal.cell:Driver"
     ),

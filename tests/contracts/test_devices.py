@@ -12,10 +12,8 @@ import pytest
 from elastocal import drivers
 from elastocal.cell import (
     KINDS,
-    LOOPBACK,
     SIMULATED,
     DeviceSet,
-    DeviceSettings,
     polled_readings,
 )
 from elastocal.cell.devices import BeamState, Devices, Motion, SensorStatus
@@ -23,8 +21,9 @@ from elastocal.drivers import DRIVERS
 from elastocal.drivers.net_ft.driver import NetFtSensor
 from elastocal.drivers.net_ft.protocol import CountScale
 from elastocal.errors import DeviceError, ElastocalError
-from elastocal.records import to_data, validate
+from elastocal.records import to_data
 from elastocal.sim.wire.net_ft import NetFtBox
+from elastocal.testing import DriverSuite
 from support.simulated import CYCLE, Place, Session, example_cell, places
 
 PRESS = np.array([0.0, 0.0, -300.0])
@@ -65,23 +64,8 @@ def test_every_package_of_drivers_is_one():
 
 
 @pytest.mark.parametrize("name", DRIVERS)
-class TestEveryDriver:
-    def test_it_says_what_it_makes_and_whether_it_can_hurt(self, name):
-        driver = DRIVERS[name]
-        assert driver.kinds
-        assert driver.kinds <= set(KINDS)
-        assert isinstance(driver.real, bool)
-        assert driver.real or "arm" not in driver.kinds or name == SIMULATED
-
-    def test_its_settings_are_strict_and_on_this_machine_by_default(self, name):
-        driver = DRIVERS[name]
-        for kind in driver.kinds:
-            settings = driver.settings(kind)
-            assert issubclass(settings, DeviceSettings)
-            with pytest.raises(ElastocalError, match="unknown key 'adress'"):
-                validate({"adress": "10.0.0.1"}, settings, "devices")
-            address = settings.model_fields.get("address")
-            assert address is None or address.default == LOOPBACK
+class TestEveryDriver(DriverSuite):
+    """Each of them, before it connects to anything."""
 
 
 @pytest.fixture(params=RIGS)

@@ -12,6 +12,7 @@ from elastocal.robot import Robot
 from elastocal.sim.arm import (
     Linkage,
 )
+from elastocal.testing import LayoutSuite
 from support.virtual_chain import ARMS, configurations, numerical_column
 
 
@@ -45,15 +46,14 @@ def arm(name: str) -> tuple[Robot, Linkage]:
 
 @pytest.mark.parametrize("arm_name", ARMS)
 @pytest.mark.parametrize("case", CASES)
-class TestEveryLayout:
-    def test_names_are_unique_and_begin_with_the_joint(self, case, arm_name):
-        springs = CASES[case](arm(arm_name)[0])
-        assert len({spring.name for spring in springs}) == len(springs)
-        assert all(spring.name.startswith(f"{spring.joint}.") for spring in springs)
+class TestEveryLayout(LayoutSuite):
+    @pytest.fixture
+    def layout(self, case):
+        return CASES[case]
 
-    def test_axes_are_unit_vectors(self, case, arm_name):
-        axes = np.array([spring.axis for spring in CASES[case](arm(arm_name)[0])])
-        np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-15)
+    @pytest.fixture
+    def robot(self, arm_name):
+        return arm(arm_name)[0]
 
     def test_axial_springs_come_first_in_the_order_of_the_joints(self, case, arm_name):
         robot = arm(arm_name)[0]
@@ -82,23 +82,3 @@ class TestEveryLayout:
             translation, rotation = np.moveaxis(columns, 0, -1)
             np.testing.assert_allclose(found.translation, translation, atol=2e-9)
             np.testing.assert_allclose(found.rotation, rotation, atol=2e-9)
-
-    def test_cartesian_compliance_is_symmetric_and_positive_semidefinite(self, case, arm_name):
-        robot, linkage = arm(arm_name)
-        model = ElasticModel(robot, CASES[case](robot))
-        c = np.random.default_rng(2).uniform(1e-7, 1e-5, len(model.springs))
-        found = model.cartesian_compliance(c, configurations(linkage, 5))
-        whole = np.block(
-            [[found.translation, found.coupling], [found.coupling.swapaxes(1, 2), found.rotation]]
-        )
-        np.testing.assert_allclose(whole, whole.swapaxes(1, 2), atol=1e-20)
-        eigenvalues = np.linalg.eigvalsh(whole)
-        assert np.all(eigenvalues >= -1e-14 * eigenvalues.max())
-
-    def test_the_compliance_is_linear_in_each_spring(self, case, arm_name):
-        robot, linkage = arm(arm_name)
-        model = ElasticModel(robot, CASES[case](robot))
-        q, force = configurations(linkage, 3), np.array([100.0, -200.0, 300.0])
-        c = np.random.default_rng(2).uniform(1e-7, 1e-5, len(model.springs))
-        alone = [model.deflection(row, q, force) for row in np.diag(c)]
-        np.testing.assert_allclose(np.sum(alone, axis=0), model.deflection(c, q, force), rtol=1e-9)

@@ -4,6 +4,9 @@ from .commands import (
     CommandSuite as CommandSuite,
     run_command as run_command,
 )
+from .drivers import DriverSuite as DriverSuite
+from .filters import FilterSuite as FilterSuite
+from .layouts import LayoutSuite as LayoutSuite
 from .losses import LossSuite as LossSuite
 from .searches import CriterionSuite as CriterionSuite, TechniqueSuite as TechniqueSuite
 from .sections import SectionSuite as SectionSuite

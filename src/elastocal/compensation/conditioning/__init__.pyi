@@ -1,8 +1,11 @@
 from .filters import (
+    FILTERS as FILTERS,
     Duration as Duration,
     FilterChain as FilterChain,
     FilterSettings as FilterSettings,
+    Section as Section,
     Speed as Speed,
+    WrenchFilter as WrenchFilter,
 )
 from .mistakes import (
     SENSOR_TURNED as SENSOR_TURNED,

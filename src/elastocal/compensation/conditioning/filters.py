@@ -10,24 +10,26 @@ Every section is scaled to pass a constant unchanged. Last may come a lead,
     y = x + lead / sample (x - x1),
 
 which goes ahead along the slope of what was filtered, by as much as filters and controller are
-late. A further linear filter is a settings class
-with a method ``sections`` here, and its key in `FilterSettings`: compensator and C export run
-whatever sections there are.
+late. A further linear filter is a `WrenchFilter` here, and its key in `FilterSettings`, or one of
+another package: compensator and C export run whatever sections there are.
 """
 
 import math
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import AfterValidator, BeforeValidator, SerializeAsAny
 from scipy import signal
 
+from elastocal import plugins
 from elastocal.arrays import FloatArray
 from elastocal.errors import CompensationError
-from elastocal.records import StrictModel
+from elastocal.records import StrictModel, validate
 from elastocal.results import brief_repr
 from elastocal.units import parse_quantity
 
@@ -108,7 +110,30 @@ class FilterChain:
         return passed
 
 
-class LowPass(StrictModel):
+class WrenchFilter(StrictModel, ABC):
+    """Settings of a linear filter; those of another package have a field ``kind``, their name."""
+
+    @abstractmethod
+    def sections(self, sample: float) -> tuple[Section, ...]:
+        """Return its sections for a sampling time in s, each of which passes a constant."""
+
+
+FILTERS = plugins.Registry[type[WrenchFilter]]("filter", {}, CompensationError)
+"""Filters of other packages; those of elastocal have keys of their own in the settings."""
+
+
+def _made(given: object) -> object:
+    """Return a filter of another package from what a file says of it."""
+    if isinstance(given, WrenchFilter):
+        return given
+    kind = given.get("kind") if isinstance(given, Mapping) else None
+    if not isinstance(kind, str) or kind not in FILTERS:
+        allowed = ", ".join(FILTERS) or "none is installed"
+        raise ValueError(f"unknown kind {kind!r} (allowed: {allowed})")
+    return validate(given, FILTERS[kind], kind)
+
+
+class LowPass(WrenchFilter):
     """Settings of a Butterworth low-pass."""
 
     cutoff: Frequency
@@ -119,7 +144,7 @@ class LowPass(StrictModel):
         return low_pass(self.cutoff, self.order, sample)
 
 
-class Notch(StrictModel):
+class Notch(WrenchFilter):
     """Settings of a notch for one line."""
 
     frequency: Frequency
@@ -137,6 +162,8 @@ class FilterSettings(StrictModel):
     """Time between two readings, in s; the cycle by default."""
     median: Literal[1, 3, 5] = 3
     notches: tuple[Notch, ...] = ()
+    others: tuple[Annotated[SerializeAsAny[WrenchFilter], BeforeValidator(_made)], ...] = ()
+    """Filters of other packages, between the notches and the low-pass."""
     low_pass: LowPass | None = LowPass.model_construct(cutoff=15.0)
     lead: Duration | None = None
     """Time to go ahead along the slope of the filtered wrench, in s: the delay of these filters and
@@ -144,7 +171,8 @@ class FilterSettings(StrictModel):
 
     def off(self) -> "FilterSettings":
         """Return the same settings without any filter; readings come as often."""
-        return self.model_copy(update={"median": 1, "notches": (), "low_pass": None, "lead": None})
+        none = {"median": 1, "notches": (), "others": (), "low_pass": None, "lead": None}
+        return self.model_copy(update=none)
 
     def chain(self, cycle: float) -> FilterChain:
         """Return the filters; new objects at every call.
@@ -162,6 +190,9 @@ class FilterSettings(StrictModel):
         """
         sample = self.sample or cycle
         sections = tuple(section for each in self.notches for section in each.sections(sample))
+        for other in self.others:
+            name = str(getattr(other, "kind", ""))
+            sections += plugins.used(FILTERS.kind, name, partial(other.sections, sample))
         if self.low_pass is not None:
             sections += self.low_pass.sections(sample)
         if self.lead is not None:
