@@ -8,6 +8,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
+from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.verdict.evidence import Evidence
 from elastocal.wording import Phrase, counted, phrase
@@ -16,6 +17,7 @@ _LEVEL = 0.5
 """Forces nearer to 0 than this, in N, are shown as none."""
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class FittedReadings:
     """The readings that the calibration rests on."""
