@@ -14,6 +14,7 @@ from elastocal.compensation.programs.plan_program import TOUCH_SPEED, plan_progr
 from elastocal.errors import FileAccessError, PathError, PlanningError
 from elastocal.identification import write_model
 from elastocal.robot import Robot, catalogue
+from elastocal.testing import ProgramSuite
 from support import plans, urdfs
 from support.paths import euler_columns, force_columns, made_up, read_csv, write_csv
 from support.program_readers import READERS
@@ -174,11 +175,10 @@ def test_names_of_people_cannot_break_out_of_a_comment(case, read, plan, tmp_pat
     assert found.steps == read.steps
 
 
-@pytest.mark.parametrize("name", ["", "2nd", "a b", "naïve", "a.b", "../x", "$x", "a" * 40, "CON"])
-def test_a_name_that_the_controller_does_not_allow_is_refused(case, plan, name, tmp_path):
-    with pytest.raises(PlanningError, match=f"cannot name a {writer_named(case[0]).title} program"):
-        write_plan_program(tmp_path, plan, writer_named(case[0]), name)
-    assert not list(tmp_path.iterdir())
+class TestEveryWriter(ProgramSuite):
+    @pytest.fixture
+    def writer(self, case):
+        return writer_named(case[0])
 
 
 def test_an_arm_with_three_joints_is_refused(case):
@@ -187,15 +187,6 @@ def test_an_arm_with_three_joints_is_refused(case):
     assert not writer.takes(robot)
     with pytest.raises(PlanningError, match=f"cannot be programmed in {writer.title}: its arm"):
         writer.require_robot(robot)
-
-
-def test_the_program_is_the_same_again(case, plan, tmp_path):
-    writer = writer_named(case[0])
-    texts = []
-    for folder in (tmp_path / "a", tmp_path / "b"):
-        folder.mkdir()
-        texts.append([p.read_bytes() for p in write_plan_program(folder, plan, writer)])
-    assert texts[0] == texts[1]
 
 
 class TestChoice:
