@@ -443,6 +443,8 @@ def _geometry(given: Given) -> None:
     figures = {key: getattr(result.model, key) for key in kept}
     more = {"axes": result.accuracy.axes, "iso_9283": result.accuracy.poses}
     more["urdf"] = result.expressed
+    if result.test is not None:
+        more["test"] = result.test
     _show(given, figures | more, result.show())
 
 

@@ -16,6 +16,9 @@ from .model import (
     GeometryParameter as GeometryParameter,
     read_geometry as read_geometry,
 )
+from .other_positions import (
+    errors_at as errors_at,
+)
 from .plausibility import (
     plausible_ladder as plausible_ladder,
     position_mistake as position_mistake,

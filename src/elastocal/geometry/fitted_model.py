@@ -65,7 +65,9 @@ def geometry_model(
         if index in free and each.rung != "registration"
     )
     rungs = tuple(
-        GeometryRung(each.rung, each.free, _figures(each.distance), each.rung == found.chosen)
+        GeometryRung(
+            each.rung, each.free, DistanceFigures.of(each.distance), each.rung == found.chosen
+        )
         for each in found.rungs
     )
     chosen = next(each for each in rungs if each.chosen)
@@ -97,7 +99,7 @@ def _chain(found: GeometryLadder, known: FloatArray | None) -> ChainErrors:
         place=at.errors.place,
         offset=at.errors.motion[:, MOTION.index("offset")],
         markers=at.markers,
-        held_out=_figures(found.errors(found.chain.rung).distance),
+        held_out=DistanceFigures.of(found.errors(found.chain.rung).distance),
         T_tcp_built=_tcp_as_built(at.markers, known),
     )
 
@@ -113,9 +115,3 @@ def _tcp_as_built(fitted: FloatArray, known: FloatArray | None) -> FloatArray | 
         T[:3, :3] = Rotation.align_vectors(fitted - there, known - here)[0].as_matrix()
     T[:3, 3] = there - T[:3, :3] @ here
     return T
-
-
-def _figures(distance: FloatArray) -> DistanceFigures:
-    return DistanceFigures(
-        float(distance.mean()), float(np.percentile(distance, 95)), float(distance.max())
-    )

@@ -43,6 +43,12 @@ class DistanceFigures:
     p95: float
     max: float
 
+    @classmethod
+    def of(cls, distance: FloatArray) -> "DistanceFigures":
+        """Return the figures of distances, shape (position,), in m."""
+        p95 = float(np.percentile(distance, 95))
+        return cls(float(distance.mean()), p95, float(distance.max()))
+
 
 @record()
 class HeldOutFigures:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from elastocal.blocks import Block, Facts, Paragraph, Row, Table
 from elastocal.geometry.accuracy import GeometryAccuracy, PoseAccuracy
-from elastocal.geometry.model import GeometryModel
+from elastocal.geometry.model import DistanceFigures, GeometryModel
 from elastocal.geometry.position_plan import PositionPlan
 from elastocal.wording import counted, duration, listed, mm, phrase, phrases, point
 
@@ -31,7 +31,9 @@ _SHOWN = {
 """Factor, unit and digits in which numbers are shown."""
 
 
-def show_geometry(model: GeometryModel, accuracy: GeometryAccuracy) -> Iterator[Block]:
+def show_geometry(
+    model: GeometryModel, accuracy: GeometryAccuracy, test: DistanceFigures | None = None
+) -> Iterator[Block]:
     """Yield the tables of a calibrated geometry.
 
     Parameters
@@ -40,6 +42,8 @@ def show_geometry(model: GeometryModel, accuracy: GeometryAccuracy) -> Iterator[
         The geometry.
     accuracy : GeometryAccuracy
         Its errors at left-out poses.
+    test : DistanceFigures, optional
+        Its errors at the positions of another table.
     """
     yield axis_table(accuracy)
     yield rung_table(model)
@@ -56,6 +60,10 @@ def show_geometry(model: GeometryModel, accuracy: GeometryAccuracy) -> Iterator[
     if model.T_tcp_built is not None:
         off = point(model.T_tcp_built[:3, 3].tolist(), digits=3)
         facts.append((phrase("tcp"), phrase("{off} mm from where it is described", off=off)))
+    if test is not None:
+        values = {name: mm(each) for name, each in vars(test).items()}
+        text = phrase("{mean} mean, {p95} at 95 %, {max} at most", **values)
+        facts.append((phrase("error at the positions of the other table"), text))
     facts.append((phrase("errors not told apart from others"), str(len(model.fixed))))
     yield Facts(tuple(facts))
 

@@ -18,6 +18,7 @@ from elastocal.geometry import (
     GeometryProblem,
     LinkNumber,
     accuracy_figures,
+    errors_at,
     geometry_model,
     link_table,
     plausible_ladder,
@@ -64,6 +65,9 @@ class GeometrySettings:
     markers: Annotated[tuple[str, ...], Option("--marker")] = ()
     """Position of each marker on the tool, ``"x, y, z"`` in the tcp with units, where known: an
     error of the tcp is then estimated, too."""
+    test: Path | None = None
+    """Another table of positions, to judge the model by: frames and markers of a station or
+    campaign that the first table does not have are fitted to it, and nothing else."""
     draws: Annotated[int, Option(least=40, most=100_000)] = 200
     """Draws of noise and prior, for the intervals."""
     seed: Annotated[int, Option(least=0)] = 0
@@ -81,6 +85,8 @@ class GeometryResult(Result):
     model: GeometryModel
     accuracy: GeometryAccuracy
     """Errors of every position before and after, at poses that were left out."""
+    test: DistanceFigures | None = None
+    """Errors at the positions of the other table."""
 
     @property
     def expressed(self) -> DistanceFigures:
@@ -91,20 +97,25 @@ class GeometryResult(Result):
         """Return the main facts, a label and a text each."""
         model = self.model
         before, after = model.held_out.registration, model.held_out.chosen
-        known = sum(each.known for each in model.parameters)
+        known, urdf = sum(each.known for each in model.parameters), self.expressed
         return (
             ("positions", f"{model.positions}, {counted(len(model.blunders), 'blunder')} left out"),
             ("nominal arm", _phrase(before.mean, before.p95, before.max)),
             ("calibrated", _phrase(after.mean, after.p95, after.max)),
             ("model", next(each.rung for each in model.ladder if each.chosen)),
-            ("as a URDF", _phrase(*vars(self.expressed).values())),
+            ("as a URDF", _phrase(urdf.mean, urdf.p95, urdf.max)),
+            *(
+                (("other table", _phrase(self.test.mean, self.test.p95, self.test.max, "")),)
+                if self.test
+                else ()
+            ),
             ("errors of the arm", f"{known} known of {len(model.parameters)} fitted"),
             *(("warning", each) for each in model.findings),
         )
 
     def show(self) -> Iterator[Block]:
         """Yield the tables of a calibrated geometry, and its warnings."""
-        return show_geometry(self.model, self.accuracy)
+        return show_geometry(self.model, self.accuracy, self.test)
 
     def plot(self) -> Any:
         """Return maps of the errors before and after, as a Matplotlib figure."""
@@ -143,6 +154,7 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     path = Path(settings.positions)
     robot = find_robot(settings.robot, settings.tcp, None)
     problem = GeometryProblem(robot, read_positions(path, robot))
+    other = None if settings.test is None else read_positions(settings.test, robot)
     found = plausible_ladder(
         problem, settings.draws, np.random.default_rng(settings.seed), progress
     )
@@ -156,7 +168,9 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
         write_json(settings.out, model)
     if settings.urdf is not None:
         write_text(settings.urdf, model.calibrated_urdf())
-    accuracy = accuracy_figures(problem, found)
+    accuracy, test = accuracy_figures(problem, found), None
+    if other is not None:
+        test = DistanceFigures.of(errors_at(model, problem.data, other))
     if settings.report_file is not None or settings.table is not None:
         links = link_table(problem, found)
         if settings.table is not None:
@@ -165,7 +179,7 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
             write_geometry_page(
                 settings.report_file, GeometryFindings(model, accuracy, links), language
             )
-    return GeometryResult(model, accuracy)
+    return GeometryResult(model, accuracy, test)
 
 
 def _check_suffixes(settings: GeometrySettings) -> None:
@@ -198,5 +212,5 @@ def _cells(row: LinkNumber) -> tuple[object, ...]:
     return (row.joint, row.number, unit, *shown)
 
 
-def _phrase(mean: float, p95: float, largest: float) -> str:
-    return f"{mm(mean)} mean, {mm(p95)} at 95 %, {mm(largest)} at most, at poses left out"
+def _phrase(mean: float, p95: float, largest: float, where: str = ", at poses left out") -> str:
+    return f"{mm(mean)} mean, {mm(p95)} at 95 %, {mm(largest)} at most{where}"
