@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 from unittest import mock
 
 import pytest
@@ -24,6 +25,7 @@ from elastocal.options import (
     REQUIRED,
 )
 from elastocal.planning.search import TECHNIQUES
+from elastocal.procedure import Warmth
 from elastocal.report.language import LANGUAGES
 from elastocal.robot import catalogue
 from elastocal.testing import CommandSuite
@@ -36,7 +38,7 @@ from support.cli import elastocal
 GROUP = typer.main.get_command(app)
 ELSEWHERE = {
     "codec", "demo", "live", "measure-delay", "plan", "release", "run", "simulate-process",
-    "studio", "study",
+    "studio", "study", "touch",
 }  # fmt: skip
 """They take long, or need a device: what they print is tested beside what they do."""
 
@@ -159,6 +161,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "target": EXPORT_TARGETS,
         "page language": tuple(LANGUAGES),
         "purpose": ("elasticity", "geometry", "both"),
+        "warmth": get_args(Warmth),
     } == CHOICES
 
 

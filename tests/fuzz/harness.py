@@ -216,6 +216,7 @@ PLAIN = {
     "krc-config": "krc-config {s}/kuka.yaml --out {o}",
     "measure-delay": "measure-delay {s}/kuka.yaml --out {o}.json",
     "release": "release {s}/cell.yaml",
+    "touch": "touch {s}/cell.yaml --cold {s}/run --out {o}.json",
     "watch": "watch {s}/cell.yaml --for=0.5s",
     "live": "live {s}/kuka.yaml --model {s}/model.json --duration 1",
     "simulate": "simulate {s}/cell.yaml --devices net_ft --ports {o}.json",

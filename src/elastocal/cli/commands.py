@@ -340,6 +340,16 @@ def _run(given: Given) -> None:
 
 
 @command("Measure")
+def _touch(given: Given) -> None:
+    from elastocal.cli._operator import TerminalOperator
+
+    asks = not (given.settings["confirmed"] or given.as_json)
+    operator = TerminalOperator(output.console(), asks=asks)
+    result = workflows.touch(**given.settings, operator=operator)
+    _show(given, result, result.show())
+
+
+@command("Measure")
 def _release(given: Given) -> None:
     from elastocal.cli._operator import TerminalOperator
 

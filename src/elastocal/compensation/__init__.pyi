@@ -1,3 +1,10 @@
+from .growth import (
+    ArmGrowth as ArmGrowth,
+    Touches as Touches,
+    arm_growth as arm_growth,
+    read_arm_growth as read_arm_growth,
+    write_arm_growth as write_arm_growth,
+)
 from .posture_choice import (
     PathPostures as PathPostures,
     PostureChoice as PostureChoice,

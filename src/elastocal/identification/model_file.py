@@ -39,6 +39,23 @@ class RobotRecord:
     gravity: tuple[float, float, float] | None = None
     """Acceleration in base, in m/s²; None: the base is upright."""
 
+    @classmethod
+    def of(cls, robot: Robot) -> "RobotRecord":
+        """Return the record of a robot."""
+        gravity = None if robot.gravity == GRAVITY else robot.gravity
+        return cls(robot.name, robot.urdf, robot.urdf_hash, robot.base, robot.tip, gravity)
+
+    def read(self) -> Robot:
+        """Return the robot.
+
+        Raises
+        ------
+        RobotError
+            If the URDF has no such frames.
+        """
+        robot = Robot.from_urdf(self.urdf, self.tcp, self.base)
+        return robot if self.gravity is None else replace(robot, gravity=self.gravity)
+
 
 @record("elastocal.model/1", eq=False, sealed=True)
 class CalibrateResult(Result):
@@ -129,12 +146,8 @@ class CalibrateResult(Result):
         cls, calibrated: CalibratedModel, calibration: CalibrationSummary | None = None
     ) -> "CalibrateResult":
         """Return the record of a calibrated model."""
-        robot = calibrated.model.robot
-        gravity = None if robot.gravity == GRAVITY else robot.gravity
         return cls(
-            robot=RobotRecord(
-                robot.name, robot.urdf, robot.urdf_hash, robot.base, robot.tip, gravity
-            ),
+            robot=RobotRecord.of(calibrated.model.robot),
             needs=KINDS.sources(spring.kind for spring in calibrated.model.springs),
             springs=calibrated.model.springs,
             compliance=calibrated.compliance,
@@ -159,9 +172,7 @@ class CalibrateResult(Result):
         SchemaError
             If the domain has poses of another number of joints.
         """
-        robot = Robot.from_urdf(self.robot.urdf, self.robot.tcp, self.robot.base)
-        if self.robot.gravity is not None:
-            robot = replace(robot, gravity=self.robot.gravity)
+        robot = self.robot.read()
         joints = len(robot.joint_names)
         if self.domain is not None and self.domain.joint_position.shape[1] != joints:
             raise SchemaError(f"domain.joint_position must have {joints} joints a pose")

@@ -5,6 +5,7 @@ from .derive import (
     on_arm_as_built as on_arm_as_built,
     read_run as read_run,
     read_summary as read_summary,
+    read_touches as read_touches,
     rehearse_derivation as rehearse_derivation,
     write_derived as write_derived,
 )
@@ -18,6 +19,7 @@ from .record import (
     PoseRecorder as PoseRecorder,
     RunFolder as RunFolder,
     RunRecord as RunRecord,
+    Warmth as Warmth,
     cell_path_in_run as cell_path_in_run,
     check_plan as check_plan,
     commits as commits,

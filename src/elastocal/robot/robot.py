@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import RobotError
@@ -228,6 +229,35 @@ class Robot:
         """
         q = self.check_positions(q)
         return evaluate_jacobian(self._rigid, q, self._rigid.joint_columns)
+
+    def foot(self, q: ArrayLike) -> FloatArray:
+        """Return where the arm stands: the origin of its first joint in base, external axes moved.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+
+        Returns
+        -------
+        ndarray, shape (..., 3)
+            In m.
+        """
+        q = self.check_positions(q)
+        before, first = (
+            self.chain.joints[: self.external_axes],
+            self.chain.joints[self.external_axes],
+        )
+        place = np.broadcast_to(first.placement[:3, 3], (*q.shape[:-1], 3))
+        for number, joint in reversed(list(enumerate(before))):
+            travel = q[..., number, None] * joint.axis
+            if joint.revolute:
+                turn = Rotation.from_rotvec(travel.reshape(-1, 3)).as_matrix()
+                place = (turn @ place.reshape(-1, 3, 1)).reshape(place.shape)
+            else:
+                place = place + travel
+            place = place @ joint.placement[:3, :3].T + joint.placement[:3, 3]
+        return np.array(place)
 
     @property
     def has_masses(self) -> bool:

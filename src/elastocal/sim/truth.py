@@ -467,6 +467,9 @@ class Thermal(StrictModel):
     drift: Distance = kind_default("thermal.drift")
     """Drift of the tool at HOME between cold and warm, away from the foot, in m. In a visit of the
     calibration the arm is in between; in a process it is warm."""
+    warmth: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] | None = None
+    """How warm every visit finds the arm, from 0 to 1; None: somewhere between, drawn anew for each
+    visit. A run of touches has it as cold or as warm as it is said to be."""
 
 
 class Simulation(StrictModel):

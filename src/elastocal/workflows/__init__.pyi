@@ -26,6 +26,7 @@ __all__ = [
     "studio",
     "study",
     "tool",
+    "touch",
     "verify",
     "watch",
 ]  # the commands: what the package itself exports of these
@@ -188,6 +189,11 @@ from .tool import (
     ToolResult as ToolResult,
     ToolSettings as ToolSettings,
     tool as tool,
+)
+from .touch import (
+    ArmGrowth as ArmGrowth,
+    TouchSettings as TouchSettings,
+    touch as touch,
 )
 from .verify import (
     VerifyResult as VerifyResult,

@@ -6,6 +6,7 @@ The module also checks that a model fits the cell, and its coverage.
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation import ArmGrowth, read_arm_growth
 from elastocal.dataset import Dataset, require_joint_names
 from elastocal.errors import (
     CompensationError,
@@ -49,7 +51,7 @@ from elastocal.wording import listed
 
 _LONGEST_TOOL = 10.0
 """In m: no tool of a robot is longer; a longer one was meant in mm."""
-ROBOT_SUFFIXES = (".urdf", ".xml", ".xacro", ".srdf")
+ROBOT_SUFFIXES: tuple[str, ...] = (".urdf", ".xml", ".xacro", ".srdf")
 """Names of robot descriptions; a template of xacro is refused with the command that expands it, an
 SRDF as what it is."""
 _TOOL_LINK = "tcp"
@@ -202,6 +204,31 @@ class ArmAsBuilt:
         x, y, z = (0.0,) * 3 if self.payload_centre is None else parse_point(self.payload_centre)
         found = read_geometry(self.geometry)
         return found.as_drawn(robot), found.tool_of(robot, Payload(mass, (x, y, z)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TouchedArm:
+    """Settings of every command that may know how far the arm has grown."""
+
+    arm_state: Annotated[Path | None, Option(metavar="STATE.json")] = None
+    """State of the arm by `touch`: its growth is corrected too."""
+
+    def growth(self, robot: Robot) -> ArmGrowth | None:
+        """Return how far the arm has grown; None where nobody has touched.
+
+        Raises
+        ------
+        CompensationError
+            If the state is of another arm.
+        SchemaError, FileAccessError
+            If the file is no state, was changed by hand, or cannot be read.
+        """
+        return None if self.arm_state is None else read_arm_growth(self.arm_state, robot)
+
+    def growth_notes(self, robot: Robot) -> tuple[str, ...]:
+        """Return what a person should know of a correction that counts the state in."""
+        found = self.growth(robot)
+        return () if found is None else found.notes(datetime.now(UTC))
 
 
 def _require_near(what: str, point: ArrayLike, origin: str) -> None:

@@ -118,6 +118,11 @@ _JSON_KINDS: dict[str, _Describe] = {
     "elastocal.ports": kinds.record_file(
         "ports of simulated devices", lambda: workflows.Ports, "address", "ports"
     ),
+    "elastocal.arm-state": kinds.record_file(
+        "state of an arm",
+        lambda: workflows.ArmGrowth,
+        *("cell", "cold", "warm", "share", "offset"),
+    ),
     "elastocal.stiffness": kinds.record_file(
         "stiffness along a path",
         lambda: workflows.StiffnessSummary,

@@ -8,11 +8,13 @@ from typing import Annotated
 import numpy as np
 
 from elastocal.arrays import FloatArray
+from elastocal.compensation import ArmGrowth
 from elastocal.compensation.offline import (
     LARGEST_DEFLECTION,
     CorrectionFigures,
     CorrectionSettings,
     CorrectionSummary,
+    Unloaded,
     compensate_path,
 )
 from elastocal.compensation.programs import (
@@ -35,6 +37,7 @@ from elastocal.units import quantity
 from elastocal.workflows._inputs import (
     ArmAsBuilt,
     NewTool,
+    TouchedArm,
     coverage_notes,
     parse_frame,
     parse_posture,
@@ -49,7 +52,7 @@ _PROGRAM_MARKS = ("NOT TRIED ON A ROBOT", "DECL E6AXIS XBEFORE=")
 
 
 @dataclass(frozen=True)
-class CompensateSettings(NewTool, ArmAsBuilt):
+class CompensateSettings(NewTool, ArmAsBuilt, TouchedArm):
     """Settings of a correction: the model and the path."""
 
     model: Annotated[str | PathLike[str], Option(argument=True)]
@@ -163,7 +166,8 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     start = parse_posture(robot, settings.start)
     usual = None if is_program or start is not None else _usual_posture(calibrated)
     start = start if usual is None else usual
-    controller, unloaded = settings.unloaded(robot)
+    controller, built = settings.unloaded(robot)
+    unloaded = _grown(settings.growth(robot), controller, built)
     how = CorrectionSettings(start, settings.largest, unloaded, controller)
     if is_program:
         if forces is None:
@@ -182,11 +186,29 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     return CompensateResult(
         **{each.name: getattr(figures, each.name) for each in fields(figures)},
         tool=calibrated.tool_name,
-        notes=(*_built(settings), *coverage_notes(calibrated), *notes, *further),
+        notes=(
+            *_built(settings),
+            *settings.growth_notes(robot),
+            *coverage_notes(calibrated),
+            *notes,
+            *further,
+        ),
         coverage=summary.coverage,
         doubt=summary.doubt,
         program=() if program is None else _written(program, settings),
     )
+
+
+def _grown(state: ArmGrowth | None, controller: Robot, built: Unloaded | None) -> Unloaded | None:
+    """Return where the unloaded tool stands when the arm has grown as well; None: as programmed."""
+    if state is None or not state.corrects:
+        return built
+
+    def unloaded(q: FloatArray) -> FloatArray:
+        cold = controller.forward(q)[:, :3, 3] if built is None else built(q)
+        return cold + state.shift(controller, q)
+
+    return unloaded
 
 
 def _program_of(

@@ -24,6 +24,7 @@ from elastocal.robot import Robot
 from elastocal.units import quantity
 from elastocal.workflows._inputs import (
     NewTool,
+    TouchedArm,
     coverage_notes,
     require_model_of_arm,
     require_same_robot,
@@ -38,7 +39,7 @@ EXPORT_TARGETS = ("linux",)
 
 
 @dataclass(frozen=True)
-class ExportSettings(NewTool):
+class ExportSettings(NewTool, TouchedArm):
     """Settings of an export: the model and the compensator."""
 
     model: Annotated[str | PathLike[str], Option(argument=True)]
@@ -137,7 +138,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         chosen = settings_within(settings.compensator, *around[1:])
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     try:
-        numbers = design(calibrated, chosen, load)
+        numbers = design(calibrated, chosen, load, settings.growth(calibrated.model.robot))
     except CompensationError as error:
         raise CompensationError(f"{model}: {error}") from error
     on_production = calibrated.on_production
@@ -157,6 +158,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
             *(coverage_notes(calibrated) if calibrated.tool is not None else ()),
             *(on_production.warnings if on_production else ()),
             *((_NO_TOOL,) if settings.tool is None else ()),
+            *settings.growth_notes(calibrated.model.robot),
         ),
         on_production=on_production,
     )

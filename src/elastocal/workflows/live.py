@@ -24,6 +24,7 @@ from elastocal.results import Result
 from elastocal.units import in_unit, quantity
 from elastocal.workflows._inputs import (
     NewTool,
+    TouchedArm,
     coverage_notes,
     require_model_of_arm,
     require_same_robot,
@@ -45,7 +46,7 @@ _FADE = 0.005
 
 
 @dataclass(frozen=True)
-class LiveSettings(NewTool):
+class LiveSettings(NewTool, TouchedArm):
     """Settings of a live compensation: cell, model and observers."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
@@ -208,7 +209,7 @@ def _prepare(settings: LiveSettings) -> Prepared:
     chosen = settings_within(settings.compensator, limits, cell)
     load = read_sensor_load(settings.tool, calibrated.model.robot) or sensor_load(cell)
     try:
-        numbers = design(calibrated, chosen, load)
+        numbers = design(calibrated, chosen, load, settings.growth(calibrated.model.robot))
     except CompensationError as error:
         raise CompensationError(f"{settings.model}: {error}") from error
     return Prepared(
@@ -220,7 +221,10 @@ def _prepare(settings: LiveSettings) -> Prepared:
         numbers=numbers,
         duration=duration,
         tares=settings.tool is None,
-        notes=_notes(settings, cell, calibrated),
+        notes=(
+            *_notes(settings, cell, calibrated),
+            *settings.growth_notes(calibrated.model.robot),
+        ),
     )
 
 

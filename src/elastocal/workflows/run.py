@@ -8,7 +8,7 @@ import contextlib
 import threading
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
@@ -29,10 +29,19 @@ from elastocal.cell import (
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
 from elastocal.findings import group_alike
-from elastocal.options import Option, Statements
+from elastocal.options import CHOICES, Option, Statements
 from elastocal.planning import PLAN, PlanResult, read_plan
 from elastocal.planning.export import pose_lines
-from elastocal.procedure import Event, Journal, LastKnown, RunEnd, RunFolder, RunSummary, Session
+from elastocal.procedure import (
+    Event,
+    Journal,
+    LastKnown,
+    RunEnd,
+    RunFolder,
+    RunSummary,
+    Session,
+    Warmth,
+)
 from elastocal.procedure.run import PlannedStep
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -95,6 +104,9 @@ class RunSettings:
     state: Statements = field(default_factory=dict)
     """Statements for the certificate, in addition to the cell file's: see
     `elastocal.cell.read_statements`."""
+    touch: Annotated[Warmth | None, Option(choices="warmth")] = None
+    """Only touch the tooling, for `touch`, in light contact and without a load case. The arm
+    is ``cold`` or ``warm``; a simulated arm is made so."""
     arming: Arming | None = None
     """Arming by a person who agreed before: the cell file must be unchanged since."""
 
@@ -145,6 +157,8 @@ class RunResult(Result):
     """Summary of the derived run; None where nothing was derived."""
     problem: ElastocalError | None
     """Why nothing was derived of a run that is done."""
+    touches: bool = False
+    """Whether the tooling was touched only: there is nothing to derive."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
@@ -162,7 +176,7 @@ class RunResult(Result):
         """Yield the end in a sentence, the warnings, and the next steps."""
         found = self.figures
         counts = found.counts() or "no readings"
-        derived = "" if found.dataset else ", not derived"
+        derived = "" if found.dataset or self.touches else ", not derived"
         yield Paragraph(
             f"{found.state}: {found.committed} of {found.poses} poses committed"
             f" ({counts}{derived}), {found.seconds / 60.0:.1f} min,"
@@ -338,6 +352,8 @@ def _prepare(settings: RunSettings) -> _Job:
     folder = plan if plan.is_dir() else plan.parent
     key = None if settings.sign is None else verdict.read_private_key(settings.sign)
     seed = truth_of(loaded).seed if settings.seed is None else settings.seed
+    if settings.touch not in (None, *CHOICES["warmth"]):
+        raise ProcedureError(f"--touch {settings.touch!r} is not one of cold, warm")
     stated = procedure.run_record(
         loaded,
         read,
@@ -347,22 +363,34 @@ def _prepare(settings: RunSettings) -> _Job:
         started=_now(),
         signer=verdict.public_key(key) if key else None,
         stated=dict(settings.state),
-    )
+    ).model_copy(update={"touch": settings.touch})
     certificate_of(loaded.file.certificate, stated.stated)
     procedure.check_compatible(read, loaded)
-    carried_out, place = procedure.run_settings(loaded, read), RunFolder(Path(settings.out))
+    touches, place = settings.touch is not None, RunFolder(Path(settings.out))
+    carried_out = procedure.run_settings(loaded, read, touches=touches)
     procedure.rehearse_derivation(loaded, read, place, stated)
     return _Job(
         loaded,
         read,
         folder,
         carried_out,
-        rig_of(loaded),
+        rig_of(_as_warm(loaded, settings.touch)),
         stated,
         place,
         procedure.registration_warnings(read),
         key,
     )
+
+
+def _as_warm(cell: Cell, touch: Warmth | None) -> Cell:
+    """Return the cell whose simulated arm is as warm as it is said to be."""
+    if touch is None:
+        return cell
+    simulation = truth_of(cell)
+    warmth = 1.0 if touch == "warm" else 0.0
+    thermal = simulation.thermal.model_copy(update={"warmth": warmth})
+    changed = simulation.model_copy(update={"thermal": thermal})
+    return replace(cell, file=cell.file.model_copy(update={"simulation": changed}))
 
 
 def _identified(job: _Job, operator: Operator) -> procedure.RunRecord:
@@ -401,13 +429,14 @@ def _derived(job: _Job, result: procedure.SessionResult) -> RunResult:
     """Derive the dataset of a run that is done; what keeps it from that is no end of the run."""
     summary: RunSummary | None = None
     problem: ElastocalError | None = None
-    if result.end is RunEnd.DONE:
+    if result.end is RunEnd.DONE and job.record.touch is None:
         try:
             derived = procedure.derive_run(job.folder.path)
             summary = procedure.write_derived(job.folder.path, derived).summary
         except ElastocalError as error:
             problem = error
-    return RunResult(_figures(job, result, summary, problem), result.end, summary, problem)
+    figures = _figures(job, result, summary, problem)
+    return RunResult(figures, result.end, summary, problem, job.record.touch is not None)
 
 
 def _figures(

@@ -17,7 +17,13 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, SensorLoad, load_cell
-from elastocal.compensation import CompensatorSettings, process, read_settings
+from elastocal.compensation import (
+    ArmGrowth,
+    CompensatorSettings,
+    process,
+    read_arm_growth,
+    read_settings,
+)
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.online import Compensator
 from elastocal.compensation.process import Course, CourseRun, ProcessRun, SimulateProcessResult
@@ -55,6 +61,8 @@ class ProcessTrial:
     """None: the cell file's tool, and a bias measured in the air."""
     settings: CompensatorSettings
     seed: int
+    state: ArmGrowth | None = None
+    """How far the arm has grown; None: nobody has touched."""
     controller: process.Controller = field(default_factory=process.Controller)
     jobs: int | None = None
     """Processes; by default all cores."""
@@ -299,7 +307,7 @@ def _perfect(settings: CompensatorSettings) -> process.Corrector:
 
 def _compensator(trial: ProcessTrial, truth: ProcessCell, zeroed_at: FloatArray) -> Compensator:
     load = trial.load or _zeroed(trial.cell, truth, zeroed_at)
-    return Compensator.of(trial.model, trial.settings, load)
+    return Compensator.of(trial.model, trial.settings, load, trial.state)
 
 
 def _zeroed(cell: Cell, truth: ProcessCell, q: FloatArray) -> SensorLoad:
@@ -368,6 +376,8 @@ class SimulateProcessSettings(NewTool):
     """Further shares of the force to run the same courses under; see `process.at_load`."""
     tools: tuple[Path, ...] = ()
     """Tool files; as ``models``. None: the cell's tool, and a sensor zeroed in the air."""
+    arm_states: Annotated[tuple[Path, ...], Option("--arm-state", metavar="STATE.json")] = ()
+    """States of the arm by `touch`; as ``models``. None: the arm counts as when it was cold."""
     posture: Annotated[str, Option(choices="posture", default="programmed")] = PROGRAMMED
     """``programmed``, or ``stiffest``: the tool turned about its axis as the first model says."""
     seeds: Annotated[tuple[int, ...], Option("--seed", least=0)] = (0,)
@@ -431,12 +441,20 @@ def _runs(settings: SimulateProcessSettings) -> tuple[ProcessRun, ...]:
         raise CompensationError(f"--seed {', '.join(map(str, seeds))}: each seed counts once")
     models = _one_for_each("--model", settings.models, seeds)
     tools = _one_for_each("--tool", settings.tools or (None,), seeds)
+    states = _one_for_each("--arm-state", settings.arm_states or (None,), seeds)
     hashes: dict[Path | None, str] = {
-        path: sha256(read_text(path)) for path in (*models, *tools) if path is not None
+        path: sha256(read_text(path)) for path in (*models, *tools, *states) if path is not None
     }
+
+    def named(path: Path | None) -> str | None:
+        return None if path is None else str(path)
+
     return tuple(
-        ProcessRun(seed, str(model), hashes[model], str(tool) if tool else None, hashes.get(tool))
-        for seed, model, tool in zip(seeds, models, tools, strict=True)
+        ProcessRun(
+            *(seed, str(model), hashes[model], named(tool), hashes.get(tool)),
+            *(named(state), hashes.get(state)),
+        )
+        for seed, model, tool, state in zip(seeds, models, tools, states, strict=True)
     )
 
 
@@ -687,4 +705,7 @@ def _trial(
     robot = calibrated.model.robot
     require_same_robot(robot, cell.robot, (run.model, cell.name))
     load = read_sensor_load(Path(run.tool) if run.tool else None, robot)
-    return ProcessTrial(cell, calibrated, load, compensator, run.seed, jobs=settings.jobs)
+    state = None if run.arm_state is None else read_arm_growth(Path(run.arm_state), robot)
+    return ProcessTrial(
+        cell, calibrated, load, compensator, run.seed, state=state, jobs=settings.jobs
+    )

@@ -10,12 +10,14 @@ from typing import ClassVar, Literal
 import numpy as np
 import pytest
 
+from elastocal.compensation import ArmGrowth
 from elastocal.compensation.export import write_c
 from elastocal.compensation.online import Compensator, Reading, Status, design
 from elastocal.elastic import OneAxisSpring, Parameter, Unit, unit_of
 from elastocal.elastic.layouts import SpringEntry, custom
 from elastocal.elastic.springs.hinge import axial
 from elastocal.errors import CompensationError
+from elastocal.identification import RobotRecord
 from elastocal.records import record
 from elastocal.robot import Robot
 from support import compensated, exported
@@ -181,6 +183,32 @@ def test_steps_are_those_of_python_and_clean_under_the_sanitizers(
     for row, got in zip(rows.tolist(), found, strict=True):
         reading = Reading(row[0], row[1 : n + 1], row[n + 1 : n + 4], row[n + 4 : n + 7], row[-1])
         state, told = compensator.step(state, reading)
+        expected = [*told.correction, *told.deflection, told.half_width, told.status]
+        np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["hinges", "gears"])
+def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
+    model = geared() if name == "gears" else compensated.arm("on a rail")
+    robot = RobotRecord.of(model.model.robot)
+    date = "2026-11-02T06:00:00+00:00"
+    state = ArmGrowth(
+        *("cell", robot, date, date, 160.0, 0.2e-3, (1e-4, -2e-4, 3e-4), 1e-6, (1e-5,) * 3),
+        *((), 2e-5, 1e-4, 3e-5, 2e-5),
+    )
+    numbers = design(model, compensated.settings(), compensated.load(), state)
+    executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
+    assert executable.selftest() == 0
+    rows, n = course(np.random.default_rng(5), numbers.joints), numbers.joints
+    found = executable.numbers("steps", rows)
+    assert np.linalg.norm(found[:, :3], axis=1).max() <= numbers.settings.limits.correction * (
+        1.0 + 1e-12
+    )
+    compensator = Compensator(numbers)
+    step = compensator.start()
+    for row, got in zip(rows.tolist(), found, strict=True):
+        reading = Reading(row[0], row[1 : n + 1], row[n + 1 : n + 4], row[n + 4 : n + 7], row[-1])
+        step, told = compensator.step(step, reading)
         expected = [*told.correction, *told.deflection, told.half_width, told.status]
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
 

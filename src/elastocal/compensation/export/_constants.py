@@ -176,6 +176,7 @@ def _model(numbers: Design) -> list[Constant]:
         **numbers.deflection.constants,
         **numbers.block.constants,
         **numbers.rest.constants,
+        **(numbers.growth.constants if numbers.growth else {}),
     }
     return [
         *(_one(name.upper(), number, comments.get(name, "")) for name, number in named.items()),

@@ -9,7 +9,7 @@ too.
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -39,7 +39,6 @@ from elastocal.compensation.online import Compensator, Design, Reading
 from elastocal.elastic import ElasticModel, SpringLoad
 from elastocal.errors import CompensationError
 from elastocal.files import filling
-from elastocal.identification import CalibratedModel
 
 
 def template(name: str) -> str:
@@ -47,18 +46,26 @@ def template(name: str) -> str:
     return (resources.files(__package__) / "templates" / name).read_text(encoding="utf-8")
 
 
-def filled(name: str, values: dict[str, str], remembers: bool = False) -> str:
+def filled(name: str, values: dict[str, str], remembers: bool = False, grown: bool = False) -> str:
     """Return a template with its places filled.
 
     Lines that begin with ``@FRICTION@`` are for models that remember friction only, those with
-    ``@PLAIN@`` for the others.
+    ``@PLAIN@`` for the others; those with ``@GROWN@`` for arms that have grown, with ``@COLD@`` for
+    the others.
     """
-    kept, dropped = ("@FRICTION@", "@PLAIN@") if remembers else ("@PLAIN@", "@FRICTION@")
-    lines = template(name).splitlines(keepends=True)
-    text = "".join(line.removeprefix(kept) for line in lines if not line.startswith(dropped))
+    marks = {"@FRICTION@": remembers, "@PLAIN@": not remembers, "@GROWN@": grown}
+    text = "".join(_meant(template(name), marks | {"@COLD@": not grown}))
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
     return text
+
+
+def _meant(text: str, marks: dict[str, bool]) -> Iterator[str]:
+    """Yield the lines of a text without their mark, but those whose mark is not meant."""
+    for line in text.splitlines(keepends=True):
+        mark = next((each for each in marks if line.startswith(each)), "")
+        if not mark or marks[mark]:
+            yield line.removeprefix(mark)
 
 
 _VECTORS = {"f": "force", "m": "moment"}
@@ -130,13 +137,13 @@ def c_files(numbers: Design) -> dict[str, str]:
         If what would be exported does not agree with the model.
     """
     values = _values(numbers)
-    remembers = bool(numbers.deflection.memory)
+    remembers, grown = bool(numbers.deflection.memory), numbers.growth is not None
     constants = constants_of(numbers)
     data = selftest_tables(numbers)
     mixing = "\n".join(line for constant in constants for line in constant.mixing())
     values |= data | {"MIXING": mixing, "CHECKSUM": str(checksum(constants))}
     head, sin_cos, arc, condition, correct, selftest = (
-        filled(part, values, remembers) for part in _PARTS
+        filled(part, values, remembers, grown) for part in _PARTS
     )
     definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
     model = "".join(
@@ -152,7 +159,7 @@ def c_files(numbers: Design) -> dict[str, str]:
         ]
     )
     values |= _readme_values(numbers)
-    beside = {name: filled(name, values, remembers) for name in _BESIDE}
+    beside = {name: filled(name, values, remembers, grown) for name in _BESIDE}
     return {"elastocal_model.c": model} | beside
 
 
@@ -250,11 +257,21 @@ def _routines(numbers: Design) -> str:
             "",
             "/* Rotation of the tool centre point in base, by rows. */",
             _function(head, numbers.orientation, rotation, inputs[:1], joints),
+            *_growth(numbers),
             *begins,
             _function(total, numbers.deflection, deflection, inputs, joints),
             _function(columns, of_block, block, inputs, joints),
         )
     )
+
+
+def _growth(numbers: Design) -> Iterator[str]:
+    """Yield the function of how far the arm has grown, where that is known."""
+    if numbers.growth is not None:
+        yield "/* How far the warm arm has grown, base, m. */"
+        head = "static void growth(const double q[], double shift[3])"
+        outputs = [f"shift[{i}]" for i in range(3)]
+        yield _function(head, numbers.growth, outputs, ("q",), numbers.joints)
 
 
 def _function(
@@ -316,7 +333,7 @@ def selftest_tables(numbers: Design) -> dict[str, str]:
     CompensationError
         If the statements that are to be exported do not agree with the model.
     """
-    exported, model = numbers.functions(), _from_model(numbers.calibrated)
+    exported, model = numbers.functions(), _from_model(numbers)
     loads = _load_cases(numbers, model)
     memory = model.rest(loads[0].q)
     for load in loads:
@@ -353,9 +370,11 @@ class _Episode:
     status: int
 
 
-def _from_model(calibrated: CalibratedModel) -> ModelFunctions:
+def _from_model(numbers: Design) -> ModelFunctions:
     """Return the functions that a compensator needs, answered by the model itself."""
+    calibrated, state = numbers.calibrated, numbers.state
     model, c = calibrated.model, calibrated.compliance
+    growth = None if state is None else lambda q: _floats(state.shift(model.robot, q))
     if len(model.friction):
         remembering = _Remembering(model, c)
         return ModelFunctions(
@@ -363,12 +382,14 @@ def _from_model(calibrated: CalibratedModel) -> ModelFunctions:
             rest=remembering.rest,
             deflection=remembering.deflection,
             block=remembering.block,
+            growth=growth,
         )
     return ModelFunctions(
         orientation=lambda q: _floats(model.robot.forward(q)[:3, :3]),
         rest=lambda _: (),
         deflection=lambda q, force, moment: _floats(model.deflection(c, q, force, moment)),
         block=lambda q, force, moment: _floats(model.observation_blocks(q, force, moment)),
+        growth=growth,
     )
 
 
@@ -465,6 +486,8 @@ def _check_statements(
         ("deflection", found[:3], expected[:3]),
         ("observation block", block[:size], expected_block[:size]),
     ]
+    if exported.growth is not None and model.growth is not None:
+        compared.append(("growth", exported.growth(load.q), model.growth(load.q)))
     if memory:
         compared += [
             ("unknown friction", block[size : size + 3], expected_block[size : size + 3]),

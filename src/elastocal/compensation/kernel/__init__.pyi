@@ -1,5 +1,6 @@
 from ._statics import (
     deflection as deflection,
+    growth as growth,
     observation_block as observation_block,
     orientation as orientation,
     rest as rest,

@@ -424,6 +424,17 @@ def orientation(model: ElasticModel) -> Routine:
     return _routine(program, [value for row in tcp.rotation for value in row])
 
 
+def growth(robot: Robot, share: float, offset: Sequence[float]) -> Routine:
+    """Return the program of how far an arm has grown, ``s (p_tcp - p_foot) + o``, in base, in m."""
+    program = Program()
+    chain = write_chain(program, robot.chain)
+    foot = chain.joints[robot.external_axes].proximal.origin
+    s = program.quantity("growth_share", share)
+    rest = program.constant_vector("growth_offset", np.asarray(offset, dtype=float))
+    terms = [(s, chain.tcp.origin), (-s, foot), (ONE, rest)]
+    return _routine(program, program.weighted_sum("growth", terms))
+
+
 def deflection(model: ElasticModel, compliance: Sequence[float]) -> Routine:
     """Return the program of the deflection at joints ``q`` under a force and a moment.
 

@@ -46,6 +46,8 @@ class ModelFunctions:
     """``(q, force, moment, memory)``: observation block by rows, in m per unit of each parameter;
     with friction also how far an unknown start may move each component, in m, and the memory after
     the load."""
+    growth: Function | None = None
+    """``(q)``: how far a warm arm has grown, in base, in m; None: nothing is known of it."""
 
 
 def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:

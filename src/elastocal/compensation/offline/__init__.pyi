@@ -1,6 +1,7 @@
 from .correct import (
     LARGEST_DEFLECTION as LARGEST_DEFLECTION,
     PathCorrection as PathCorrection,
+    Unloaded as Unloaded,
     correct_rows as correct_rows,
 )
 from .path_file import (

@@ -11,6 +11,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import SensorLoad
+from elastocal.compensation.growth import ArmGrowth
 from elastocal.compensation.kernel import Function, ModelFunctions
 from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design, design
 from elastocal.compensation.online.state import Correction, Reading, State, Status, Triple
@@ -153,6 +154,7 @@ class Compensator:
         self._conditioner = Conditioner(numbers, functions.orientation)
         self._deflection, self._block = functions.deflection, functions.block
         self._orientation, self._rest = functions.orientation, functions.rest
+        self._growth = functions.growth
         self._spread = np.ascontiguousarray(numbers.spread)
         compliance = numbers.calibrated.compliance
         self._weighted = np.ascontiguousarray(np.column_stack([compliance, numbers.spread]))
@@ -171,9 +173,10 @@ class Compensator:
         calibrated: CalibratedModel,
         settings: CompensatorSettings | None = None,
         load: SensorLoad | None = None,
+        state: ArmGrowth | None = None,
     ) -> "Compensator":
         """Return the compensator of a model; see `elastocal.compensation.online.design.design`."""
-        return cls(design(calibrated, settings, load))
+        return cls(design(calibrated, settings, load, state))
 
     def start(self) -> State:
         """Return the state before the first reading: no correction, filters at rest."""
@@ -225,7 +228,8 @@ class Compensator:
             deflection, half_width, friction, unloaded = self._remembering(q, load, state)
         else:
             (deflection, half_width), friction, unloaded = self._predicted(q, load), (), self._free
-        target, status = self._target(deflection, rotation)
+        off = deflection if self._growth is None else _sum(deflection, self._growth(q))
+        target, status = self._target(off, rotation)
         if half_width > self._uncertain:
             status |= Status.UNCERTAIN.value
         # The rate limit is last, from the correction before: whatever the model, the deadband or
@@ -277,9 +281,9 @@ class Compensator:
             unloaded = min(state.unloaded + 1, self._free)
         return (dx, dy, dz), half_width, friction, unloaded
 
-    def _target(self, deflection: Triple, rotation: tuple[float, ...]) -> tuple[Triple, int]:
-        """Return minus the deflection in the correction's frame, within deadband and limit."""
-        dx, dy, dz = deflection
+    def _target(self, off: Triple, rotation: tuple[float, ...]) -> tuple[Triple, int]:
+        """Return minus what the tool is off by in the correction's frame, in deadband and limit."""
+        dx, dy, dz = off
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         # From none at the deadband to all at twice it: no jump at its edge.
         share = (length - self._deadband) * self._slope
@@ -353,6 +357,12 @@ def _in_base(rotation: tuple[float, ...], wrench: tuple[float, ...]) -> _Load:
             rzx * nx + rzy * ny + rzz * nz,
         ),
     )
+
+
+def _sum(deflection: Triple, growth: Sequence[float]) -> Triple:
+    """Return how far the tool is off: what the load bends, and what the arm has grown."""
+    (dx, dy, dz), (gx, gy, gz) = deflection, growth
+    return dx + gx, dy + gy, dz + gz
 
 
 def _squares(rows: FloatArray) -> list[float]:

@@ -8,11 +8,13 @@ from scipy.special import ndtri
 from elastocal.arrays import FloatArray
 from elastocal.cell import SENSOR_CORRECTED, SensorLoad
 from elastocal.compensation.conditioning import FilterChain
+from elastocal.compensation.growth import ArmGrowth
 from elastocal.compensation.kernel import (
     ModelFunctions,
     Routine,
     compiled,
     deflection,
+    growth,
     observation_block,
     orientation,
     rest,
@@ -62,6 +64,10 @@ class Design:
     """Origin of the sensor in the tcp frame, shape (3,), in m."""
     frame: FloatArray
     """R_base_frame of the correction, shape (3, 3); the identity where it is the tcp's."""
+    state: ArmGrowth | None = None
+    """How far the arm has grown; None: nothing is known of it, or there is nothing to correct."""
+    growth: Routine | None = None
+    """The program of it; None likewise."""
 
     @property
     def joints(self) -> int:
@@ -75,6 +81,9 @@ class Design:
             rest=compiled(self.rest, self.joints, loaded=False),
             deflection=compiled(self.deflection, self.joints),
             block=compiled(self.block, self.joints),
+            growth=None
+            if self.growth is None
+            else compiled(self.growth, self.joints, loaded=False),
         )
 
     @property
@@ -127,6 +136,7 @@ def design(
     calibrated: CalibratedModel,
     settings: CompensatorSettings | None = None,
     load: SensorLoad | None = None,
+    state: ArmGrowth | None = None,
 ) -> Design:
     """Work out a compensator.
 
@@ -139,6 +149,8 @@ def design(
     load : SensorLoad, optional
         Tool weight, bias and place of the sensor; by default wrenches are taken as measured at
         the tool centre point with both removed.
+    state : ArmGrowth, optional
+        How far the arm has grown; by default it is as when its path was taught.
 
     Raises
     ------
@@ -151,6 +163,7 @@ def design(
     filters = settings.chain
     frame = settings.R_base_frame
     model = calibrated.model
+    grown = state is not None and state.corrects
     return Design(
         calibrated=calibrated,
         settings=settings,
@@ -166,6 +179,8 @@ def design(
         gravity=load.gravity,
         sensor_origin=load.T_tcp_sensor[:3, 3],
         frame=np.eye(3) if frame is None else frame,
+        state=state if grown else None,
+        growth=growth(model.robot, state.share, state.offset) if state and grown else None,
     )
 
 

@@ -60,6 +60,9 @@ class ProcessRun:
     tool: str | None
     """File; none where the cell's tool was used and the sensor was zeroed in the air."""
     tool_sha256: str | None
+    arm_state: str | None = None
+    """File of the state of the arm; none: nothing was known of it."""
+    arm_state_sha256: str | None = None
 
 
 @record("elastocal.process/1", sealed=True)

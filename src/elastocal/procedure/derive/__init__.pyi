@@ -30,3 +30,4 @@ from .summary import (
 from .tool import (
     sensor_load as sensor_load,
 )
+from .touches import read_touches as read_touches

@@ -581,6 +581,10 @@ def derive_run(run: Path, sensor: SensorLoad | None = None, tool: Path | None = 
         If no reading is usable.
     """
     found = read_run(run)
+    if found.record.touch is not None:
+        raise ProcedureError(
+            f"{run} holds touches, which press no load case: `elastocal touch` reads them"
+        )
     files = [found.folder.journal, *([tool] if tool is not None else [])]
     made_from = {file.name: file_sha256(file) for file in files}
     provenance = run_provenance(found.folder, found.record, sensor)
@@ -647,7 +651,7 @@ def derive_poses(
     DatasetError
         If no reading is usable.
     """
-    tool, lever = sensor or sensor_load(cell), _lever_arm(cell)
+    tool, lever = sensor or sensor_load(cell), marker_in_tcp(cell)
     seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
     registration = register(seen, lever)
     conditioned = cell.file.procedure.conditioning
@@ -689,7 +693,14 @@ def _streams(folder: RunFolder, log: PoseLog, cell: Cell) -> Streams:
     return streams
 
 
-def _lever_arm(cell: Cell) -> FloatArray:
+def marker_in_tcp(cell: Cell) -> FloatArray:
+    """Return where the cell file has the marker, in the tcp frame, shape (3,), in m.
+
+    Raises
+    ------
+    ProcedureError
+        If the cell has no metrology.
+    """
     if cell.file.marker is None or not cell.file.trackers:
         raise ProcedureError(
             f"cell {cell.name!r} has no metrology (keys 'marker' and 'trackers'): without it there"

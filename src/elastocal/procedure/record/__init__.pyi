@@ -16,6 +16,7 @@ from .history import (
     HISTORY as HISTORY,
     EarlierRun as EarlierRun,
     RunRecord as RunRecord,
+    Warmth as Warmth,
     note_run as note_run,
     read_history as read_history,
 )

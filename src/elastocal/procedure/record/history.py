@@ -8,6 +8,7 @@ that is wrongly presented as the newest, and one that was repeated.
 import contextlib
 import os
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
@@ -16,6 +17,8 @@ from elastocal.files import read_text
 from elastocal.records import StrictModel, from_data, json_sha256, parse_json
 
 JOURNAL_SCHEMA = "elastocal.journal/1"
+Warmth = Literal["cold", "warm"]
+"""How warm an arm is when it touches the tooling, as a person says."""
 HISTORY = "runs.jsonl"
 """Name of the history, in the folder in which the folders of runs are."""
 
@@ -66,6 +69,8 @@ class RunRecord(StrictModel):
     journals."""
     earlier_runs: tuple[EarlierRun, ...] = ()
     """The runs of its cell before it, the last at the end."""
+    touch: Warmth | None = None
+    """How warm the arm was said to be in a run of touches; None: a run of load cases."""
 
     @property
     def identity(self) -> str:

@@ -223,6 +223,7 @@ def check_same_run(record: RunRecord, wanted: RunRecord, where: str) -> None:
         "cell": "set the cell file back, which is in its folder cell",
         "seed": f"give --seed {record.seed}",
         "signer": "give --sign with its key" if record.signer else "leave --sign out",
+        "touch": f"give --touch {record.touch}" if record.touch else "leave --touch out",
     }
     for key, remedy in remedies.items():
         found, asked = getattr(record, key), getattr(wanted, key)

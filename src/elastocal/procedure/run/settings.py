@@ -88,7 +88,7 @@ class RunSettings:
         return CollisionWatch(self.weight_base, limit, largest, _COLLISION_WINDOW)
 
 
-def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
+def run_settings(cell: Cell, plan: PlanResult, *, touches: bool = False) -> RunSettings:
     """Return the settings of a run.
 
     Parameters
@@ -97,6 +97,8 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
         The cell.
     plan : PlanResult
         Its plan.
+    touches : bool
+        Whether the tooling is only touched: light contact, between two readings off the surface.
 
     Raises
     ------
@@ -127,8 +129,14 @@ def run_settings(cell: Cell, plan: PlanResult) -> RunSettings:
         weight_base=cell.file.tool.mass * cell.gravity_base,
         near_contact=plan.contact.near_contact,
         approach_distance=plan.contact.approach_distance,
-        loads=loads,
+        loads=_touching(cell) if touches else loads,
     )
+
+
+def _touching(cell: Cell) -> tuple[tuple[str, FloatArray], ...]:
+    """Return the presses of a touch, by name, as force on the robot in the tcp frame, in N."""
+    light = cell.file.procedure.contact_force
+    return ((LIGHT_CONTACT, np.array([0.0, 0.0, -light])),)
 
 
 def refusal_of_forces(cell: Cell) -> str | None:

@@ -205,7 +205,9 @@ class Plant:
 
     def begin_journey(self, target: FloatArray) -> None:
         """Set out for a posture: stop errors and slips are those that belong to it."""
-        self.key = posture_key(target)
+        stated = self.statics.stated_warmth
+        # Cold and warm are two occasions: nothing random is the same in both.
+        self.key = posture_key(target) + ("" if stated is None else f", warm by {stated:g}")
         self._draw()
         self._restart_instruments("on the way to")
 

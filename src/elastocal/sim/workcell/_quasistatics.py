@@ -41,6 +41,8 @@ class Quasistatics:
     """Thermal state of the arm, from 0 to 1, shape () or (posture,)."""
     strain: FloatArray | None = None
     """Strains that friction keeps while the robot is free, shape (..., gear, stop), in rad."""
+    stated_warmth: float | None = None
+    """How warm every visit finds the arm; None: as its random numbers say."""
 
     @classmethod
     def of(cls, cell: Cell, robot: TrueRobot) -> "Quasistatics":
@@ -58,13 +60,16 @@ class Quasistatics:
         error = (ends[0] - ends[1]) @ robot.linkage.T_base_tip[:3, :3]
         weight = cell.file.tool.mass * cell.gravity_base
         compensation = simulation.controller.gravity_compensation
-        return cls(robot, compensation, marker, weight, error, growth)
+        warmth = simulation.thermal.warmth
+        return cls(robot, compensation, marker, weight, error, growth, stated_warmth=warmth)
 
     def visited(self, chance: VisitChance, warmth: FloatArray | None = None) -> "Quasistatics":
         """Return the statics in a visit, or many; ``warmth`` in place of the visit's own."""
-        warm = chance.warmth if warmth is None else warmth
+        if warmth is None:
+            stated = self.stated_warmth
+            warmth = chance.warmth if stated is None else np.full(chance.warmth.shape, stated)
         strain = self.robot.springs.gears.strain(chance.stroke)
-        return replace(self, warmth=warm, strain=strain)
+        return replace(self, warmth=warmth, strain=strain)
 
     def heavier(self, mass: float) -> "Quasistatics":
         """Return the same with an additional mass in kg on the tool, unknown to the controller.

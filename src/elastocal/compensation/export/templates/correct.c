@@ -52,7 +52,7 @@ static unsigned int move(double correction[3], const double target[3], double st
     return late;
 }
 
-/* Minus the deflection in the correction's frame, within deadband and limit. */
+/* Minus what the tool is off by, in the correction's frame, within deadband and limit. */
 static unsigned int aim(const double d[3], const double rotation[9], double target[3])
 {
     const double length = sqrt((d[0] * d[0]) + (d[1] * d[1]) + (d[2] * d[2]));
@@ -99,6 +99,7 @@ static unsigned int follow(elastocal_state *state, const double q[])
     double force[3];
     double moment[3];
     double target[3];
+@GROWN@    double off[3];
     unsigned int status;
     int i;
     orientation(q, r);
@@ -116,7 +117,12 @@ static unsigned int follow(elastocal_state *state, const double q[])
 @FRICTION@    elastocal_deflection(q, force, moment, state->memory, state->deflection);
 @FRICTION@    state->half_width = elastocal_half_width(q, force, moment, state->memory);
 @FRICTION@    watch(state);
-    status = aim(state->deflection, r, target);
+@COLD@    status = aim(state->deflection, r, target);
+@GROWN@    growth(q, off);
+@GROWN@    for (i = 0; i < 3; i++) {
+@GROWN@        off[i] = state->deflection[i] + off[i];
+@GROWN@    }
+@GROWN@    status = aim(off, r, target);
     if (state->half_width > UNCERTAIN_ABOVE) {
         status |= ELASTOCAL_UNCERTAIN;
     }

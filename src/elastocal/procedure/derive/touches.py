@@ -1,0 +1,160 @@
+"""Touches of the tooling: where the tool stood at points of it, cold and warm, and what was seen.
+
+The same points are touched twice, cold and warm, on commanded joints that hardly differ. Off the
+surface, before the contact and after it, with the marker at ``p`` in the tracker's frame and the
+controller's tool frame at ``(x, R)``, the tool has moved against what its controller believes by
+
+    d = R_base_tracker (p_warm - p_cold) - [(x + R r)_warm - (x + R r)_cold],
+
+``r`` the marker in the tool frame; the mean of both readings counts. In contact the disk would hold
+the tool aside. The tracker stands where it stood, and is registered by the cold run alone: a
+registration of its own would take a part of the growth up. The tooling itself is a second witness,
+along its normal ``n``: where it stands still, in contact ``n . d = -n . (x_warm - x_cold)``.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.cell import Cell
+from elastocal.errors import ProcedureError
+from elastocal.planning import PlanResult
+from elastocal.procedure.derive.derivation import CommittedRun, marker_in_tcp, read_run
+from elastocal.procedure.derive.readings import (
+    Mean,
+    PoseReadings,
+    Reading,
+    ToolState,
+    marker_readings,
+)
+from elastocal.procedure.record import ReadingStatus, RunRecord
+from elastocal.procedure.registration import register
+from elastocal.results import brief_repr
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class TouchedShifts:
+    """How far the tool has moved against its controller, cold to warm, at points of the tooling."""
+
+    cell: Cell
+    plan: PlanResult
+    pose: IndexArray
+    """Ids in the plan, shape (touch,)."""
+    q: FloatArray
+    """Joints of the warm touch, shape (touch, joint), in rad or m."""
+    shift: FloatArray
+    """By the tracker, in base, shape (touch, 3), in m."""
+    normal: FloatArray
+    """Outward unit normals of the surface, in base, shape (touch, 3)."""
+    by_contact: FloatArray
+    """The shift along the normal as the tooling shows it, shape (touch,), in m."""
+    cold: RunRecord
+    warm: RunRecord
+    seconds: float
+    """How long the warm touches took, from the first entry of the journal to the last."""
+    lost: tuple[int, ...]
+    """Poses of the plan that were not touched in both runs."""
+
+
+def read_touches(cold: Path, warm: Path) -> TouchedShifts:
+    """Return how far the tool moved between two runs of touches.
+
+    Parameters
+    ----------
+    cold, warm : Path
+        Folders of the runs (`elastocal run --touch`), of one plan.
+
+    Raises
+    ------
+    ProcedureError
+        If a run is none of touches, the two are not of one plan and robot, no pose was touched in
+        both, or the tracker of the cold run cannot be registered.
+    SchemaError, FileAccessError
+        If a file of a run is damaged or cannot be read.
+    """
+    before, after = _touched(cold, "cold"), _touched(warm, "warm")
+    if before.record.plan != after.record.plan:
+        raise ProcedureError(f"{warm} and {cold} are of two plans: touch the same points warm")
+    lever = marker_in_tcp(before.cell)
+    seen = marker_readings(before.poses, before.cell.robot, before.cell.gravity_base, lever)
+    registration = register(seen, lever)
+    rows = []
+    first = {pose.pose: pose for pose in before.poses}
+    for pose in after.poses:
+        old = first.get(pose.pose)
+        fit = None if old is None else registration.station_of(_station(old), pose.pose)
+        if old is not None and fit is not None and _station(old) == _station(pose):
+            pair = _pair(old, pose, fit.T_base_tracker[:3, :3], registration.lever_arm)
+            rows += [] if pair is None else [(pose.pose, *pair)]
+    if not rows:
+        why = "; ".join(f"{name}: {text}" for name, text in registration.unregistered.items())
+        raise ProcedureError(f"{warm}: no pose was touched in both runs{why and f' ({why})'}")
+    touched, q, shift, moved = (np.array(column) for column in zip(*rows, strict=True))
+    normal = np.array([before.plan.poses[number].normal for number in touched.tolist()])
+    return TouchedShifts(
+        before.cell,
+        before.plan,
+        touched,
+        q,
+        shift,
+        normal,
+        -np.einsum("ti,ti->t", normal, moved),
+        before.record,
+        after.record,
+        after.entries[-1].time - after.entries[0].time,
+        tuple(each.id for each in before.plan.poses if each.id not in touched),
+    )
+
+
+def _touched(folder: Path, warmth: str) -> CommittedRun:
+    found = read_run(folder)
+    if found.record.touch != warmth:
+        said = found.record.touch or "a run of load cases"
+        raise ProcedureError(
+            f"{folder} is {said}: the {warmth} touches are wanted, of"
+            f" `elastocal run CELL --plan DIR --touch {warmth}`"
+        )
+    return found
+
+
+def _station(pose: PoseReadings) -> str:
+    zero = pose.zero
+    return "" if zero is None else str(zero.window.station)
+
+
+def _pair(
+    cold: PoseReadings, warm: PoseReadings, R_base_tracker: FloatArray, lever: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return joints, shift by the tracker and way of the controller; None: a reading is lost."""
+    light = [_usable(each.light) for each in (cold, warm)]
+    off = [
+        [found for each in (pose.reference, pose.released) if (found := _usable(each)) is not None]
+        for pose in (cold, warm)
+    ]
+    if light[0] is None or light[1] is None or not (off[0] and off[1]):
+        return None
+    seen, commanded = (
+        [np.mean([place(each) for each in readings], axis=0) for readings in off]
+        for place in (lambda each: each[1].value, lambda each: _at(each[0].T_base_tcp, lever))
+    )
+    shift = R_base_tracker @ (seen[1] - seen[0]) - (commanded[1] - commanded[0])
+    places = [each[0].T_base_tcp[:3, 3] for each in light if each is not None]
+    return light[1][0].q, shift, places[1] - places[0]
+
+
+def _usable(reading: Reading | None) -> tuple[ToolState, Mean] | None:
+    """Return tool and marker of a reading; None where one of them is not known."""
+    if reading is None or reading.window.status is not ReadingStatus.OK:
+        return None
+    if reading.tool is None or reading.marker is None:
+        return None
+    return reading.tool, reading.marker
+
+
+def _at(T_base_tcp: FloatArray, lever: FloatArray) -> FloatArray:
+    """Return where the controller has the marker, in base, shape (3,), in m."""
+    place: FloatArray = T_base_tcp[:3, 3] + T_base_tcp[:3, :3] @ lever
+    return place

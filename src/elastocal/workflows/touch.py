@@ -1,0 +1,121 @@
+"""``touch``: how far the arm has grown since it was cold, by touching the tooling again."""
+
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Annotated
+
+from elastocal.cell import Arming
+from elastocal.compensation import ArmGrowth, Touches, arm_growth, write_arm_growth
+from elastocal.errors import ProcedureError
+from elastocal.options import Option, Statements
+from elastocal.procedure import RunEnd, RunFolder, read_touches
+from elastocal.progress import Progress
+from elastocal.records import schema_of
+from elastocal.results import brief_repr
+from elastocal.workflows._operator_and_devices import Operator, Unattended
+from elastocal.workflows._workflow import workflow
+from elastocal.workflows.run import RunSettings, run
+
+__all__ = ["ArmGrowth", "TouchSettings", "touch"]
+
+
+@brief_repr
+@dataclass(frozen=True)
+class TouchSettings:
+    """Which cell is touched warm, and where it was touched cold."""
+
+    cell: Annotated[str | PathLike[str], Option(argument=True)]
+    """Cell file, ``.yaml``."""
+    cold: Annotated[Path, Option(metavar="RUN")]
+    """Folder of the cold touches, of `run --touch cold`; the same points are touched again."""
+    out: Annotated[Path, Option(metavar="STATE.json")]
+    """File to write the state into."""
+    warm: Annotated[Path | None, Option(metavar="RUN")] = None
+    """Folder of the warm touches; a run that is in it already is read, not made again. By default
+    beside the state, with its name and ``-run``."""
+    resume: bool = False
+    """Go on with the run that is in that folder."""
+    confirmed: Annotated[bool, Option("--yes")] = False
+    """A person has looked at the cell: do not ask. On real devices this arms the arm."""
+    seed: Annotated[int | None, Option(least=0)] = None
+    """Seed of simulated devices; by default the cell's."""
+    operator: Operator = field(default_factory=Unattended)
+    state: Statements = field(default_factory=dict)
+    """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
+    arming: Arming | None = None
+    """Arming by a person who agreed before: the cell file must still be the same, to the byte."""
+    force: bool = False
+    """Replace a state that is there."""
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the warm run."""
+        return self.warm or self.out.with_name(f"{self.out.stem}-run")
+
+
+@workflow(TouchSettings, marks=(schema_of(ArmGrowth),))
+def touch(settings: TouchSettings, progress: Progress) -> ArmGrowth:
+    """Touch the tooling warm where it was touched cold, and write how far the arm has grown.
+
+    Parameters
+    ----------
+    settings : TouchSettings
+        Or its ``cell``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    ProcedureError
+        As `run`; or if the two runs are not of the same points.
+    CompensationError
+        If the touches are too few, or say what is no arm's growth.
+    ElastocalError
+        If cell, run, a file or a device cannot be used.
+    """
+    _touch_warm(settings, progress)
+    found = read_touches(settings.cold, settings.folder)
+    touches = Touches(
+        tuple(found.pose.tolist()),
+        found.q,
+        found.shift,
+        found.normal,
+        found.by_contact,
+        found.lost,
+    )
+    state = arm_growth(
+        found.cell.robot,
+        touches,
+        cell=found.cell.name,
+        times=(found.cold.started, found.warm.started, found.seconds),
+    )
+    write_arm_growth(settings.out, state)
+    return state
+
+
+def _touch_warm(settings: TouchSettings, progress: Progress) -> None:
+    """Make the warm run, unless it has been made."""
+    folder, given = RunFolder(settings.folder), settings.warm is not None
+    if given and folder.journal.is_file() and not settings.resume:
+        return
+    finished = run(
+        RunSettings(
+            settings.cell,
+            RunFolder(settings.cold).plan,
+            settings.folder,
+            resume=settings.resume,
+            confirmed=settings.confirmed,
+            seed=settings.seed,
+            operator=settings.operator,
+            state=settings.state,
+            touch="warm",
+            arming=settings.arming,
+        ),
+        progress,
+    )
+    if finished.end is not RunEnd.DONE:
+        raise ProcedureError(
+            f"{settings.folder}: {finished.figures.message or finished.figures.state}: `--resume`"
+            " goes on"
+        )

@@ -1,0 +1,109 @@
+"""``touch`` on the simulated cell: cold and warm runs, the state, and what corrects by it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from elastocal.cell import load_cell
+from elastocal.errors import ProcedureError
+from elastocal.procedure import read_journal, read_touches
+from elastocal.sim import truth_of
+from elastocal.workflows import check, derive, run, touch
+from support.cli import elastocal
+from support.run_cells import planned_cell
+
+POSES = 8
+
+
+@pytest.fixture(scope="module")
+def touched(tmp_path_factory):
+    """A cell that was touched cold and warm, with the state."""
+    folder = tmp_path_factory.mktemp("touched")
+    made = planned_cell(folder, POSES, "afp", (r"\n  technique: .*", "\n  technique: cover"))
+    text = made.cell.read_text(encoding="utf-8").replace("preset: kind", "preset: typical")
+    made.cell.write_text(text, encoding="utf-8")
+    run(made.cell, plan=made.plan, out=folder / "cold", touch="cold", confirmed=True)
+    done = elastocal(
+        *("touch", made.cell, "--cold", folder / "cold", "--out", folder / "state.json"),
+        *("--yes", "--json"),
+    )
+    assert done.code == 0, done.err
+    return folder, made, json.loads(done.out)
+
+
+def truth(cell, q):
+    """Return how far the tool of the warm arm is from that of the cold one, by the simulator."""
+    drift, robot = truth_of(cell).thermal.drift, cell.robot
+    at_home = robot.forward(cell.home)[:3, 3] - robot.foot(cell.home)
+    share = drift / np.linalg.norm(at_home)
+    return share * (robot.forward(q)[..., :3, 3] - robot.foot(q))
+
+
+def test_the_state_is_what_the_simulated_arm_has_grown(touched):
+    folder, made, data = touched
+    cell, found = load_cell(made.cell), read_touches(folder / "cold", folder / "state-run")
+    state = touch(made.cell, cold=folder / "cold", out=folder / "s.json", warm=folder / "state-run")
+    assert state.share == data["share"]
+    assert len(state.points) == POSES
+    true = truth(cell, found.q)
+    assert np.linalg.norm(true, axis=1).mean() > 40e-6
+    off = state.shift(cell.robot, found.q) - true
+    assert np.linalg.norm(off, axis=1).mean() < 0.6 * np.linalg.norm(true, axis=1).mean()
+    assert np.abs(off).max() < 2.0 * state.half_width
+    # Nothing random of the cold run comes back in the warm one.
+    assert 5e-6 < state.noise < 60e-6
+
+
+def test_only_the_contact_force_is_pressed_with(touched):
+    folder, made, _ = touched
+    limit = load_cell(made.cell).file.procedure.contact_force
+    held = {
+        entry.target
+        for entry in read_journal(folder / "cold" / "journal.jsonl")
+        if entry.action is not None and entry.action.value == "hold" and entry.target
+    }
+    assert held == {"light_contact"}
+    assert limit < 100.0
+
+
+def test_a_finished_warm_run_is_read_and_not_made_again(touched):
+    folder, made, data = touched
+    journal = folder / "state-run" / "journal.jsonl"
+    before = journal.read_bytes()
+    touch(made.cell, cold=folder / "cold", out=folder / "t.json", warm=folder / "state-run")
+    assert journal.read_bytes() == before
+    assert json.loads((folder / "t.json").read_text())["share"] == data["share"]
+    assert check(folder / "t.json").kind == "state of an arm"
+
+
+@pytest.mark.parametrize(
+    ("cold", "warm", "message"),
+    [
+        ("state-run", "state-run", "is warm: the cold touches are wanted"),
+        ("cold", "cold", "is cold: the warm touches are wanted"),
+    ],
+)
+def test_runs_of_the_wrong_kind_are_refused(touched, cold, warm, message):
+    folder, made, _ = touched
+    with pytest.raises(ProcedureError, match=message):
+        touch(made.cell, cold=folder / cold, out=folder / "u.json", warm=folder / warm)
+    assert not (folder / "u.json").exists()
+
+
+def test_touches_have_no_dataset(touched):
+    folder, _, _ = touched
+    with pytest.raises(ProcedureError, match="holds touches, which press no load case"):
+        derive(folder / "cold")
+
+
+def test_a_run_that_is_resumed_stays_what_it_is(touched):
+    folder, made, _ = touched
+    with pytest.raises(ProcedureError, match=r"its touch is cold, not None.*give --touch cold"):
+        run(made.cell, plan=made.plan, out=folder / "cold", resume=True, confirmed=True)
+
+
+def test_a_word_for_how_warm_it_is_must_be_one_of_two(touched):
+    folder, made, _ = touched
+    with pytest.raises(ProcedureError, match="--touch 'hot' is not one of cold, warm"):
+        run(made.cell, plan=made.plan, out=folder / "hot", touch="hot", confirmed=True)
