@@ -406,9 +406,11 @@ def _springs_of(robot: Robot, file: "SpringFile") -> list[tuple[Spring, "SpringE
             raise SpringError(f"spring {spring.name!r} is listed twice")
         listed[spring] = entry
     # An entry that states prior knowledge of an included spring is no second spring.
-    told = {spring: entry for spring, entry in listed.items() if entry.knows}
-    found = [(spring, told.get(spring)) for spring in included]
-    return found + [(s, entry) for s, entry in listed.items() if s not in included or s not in told]
+    knowledge = {spring: entry for spring, entry in listed.items() if entry.knows}
+    found = [(spring, knowledge.get(spring)) for spring in included]
+    return found + [
+        (s, entry) for s, entry in listed.items() if s not in included or s not in knowledge
+    ]
 
 
 def _words(known: Callable[[], Iterable[str]]) -> BeforeValidator:

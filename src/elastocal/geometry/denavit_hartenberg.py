@@ -95,9 +95,11 @@ def link_table(problem: GeometryProblem, found: GeometryLadder) -> tuple[LinkNum
     low, high = interval(draws)
     rows = []
     for index, (joint, name) in enumerate(_names(robot)):
-        told = max(high[index] - low[index], abs(calibrated[index] - nominal[index])) > _NOTHING
-        ends = (float(low[index]), float(high[index])) if told else (None, None)
-        values = float(nominal[index]), float((calibrated if told else nominal)[index])
+        determined = (
+            max(high[index] - low[index], abs(calibrated[index] - nominal[index])) > _NOTHING
+        )
+        ends = (float(low[index]), float(high[index])) if determined else (None, None)
+        values = float(nominal[index]), float((calibrated if determined else nominal)[index])
         rows.append(LinkNumber(joint, name, _unit(name), *values, *ends))
     is_used = [_is_used(row, ways, robot.joint_names) for row in rows]
     return tuple(row for row, used in zip(rows, is_used, strict=True) if used)

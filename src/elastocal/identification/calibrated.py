@@ -355,8 +355,10 @@ class CalibratedModel:
         for start in range(0, len(q), _CHUNK):
             rows = slice(start, start + _CHUNK)
             m = None if moment is None else moment[rows]
-            borne = None if friction is None else friction[rows]
-            blocks = self.model.observation_blocks(q[rows], force[rows], m, friction=borne)
+            friction_torque = None if friction is None else friction[rows]
+            blocks = self.model.observation_blocks(
+                q[rows], force[rows], m, friction=friction_torque
+            )
             result[0, rows] = blocks @ self.compliance
             result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
         deflection, low, high = result

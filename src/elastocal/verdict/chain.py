@@ -49,8 +49,8 @@ _FRACTION = re.compile(r"[-+]?\d+\.\d+(?:e[-+]?\d+)?")
 
 def changed_text(stated: Dataset, found: Dataset) -> str:
     """Return the first text of a dataset that differs from the derived one; empty if none does."""
-    told = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
-    for name in told:
+    attributes = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
+    for name in attributes:
         mine, again = stated.attributes.get(name), found.attributes.get(name)
         # The marker's place alone is fitted; what is copied comes back to the letter.
         if mine != again and not (name == "marker" and _is_same_text(mine, again)):
@@ -323,8 +323,8 @@ def _logged(evidence: Evidence) -> Link:
     return _whole("logs", f"{found} and their map: those that the dataset names, by their SHA-256")
 
 
-def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> Iterator[Link]:
-    """Yield dataset and summary, derived again; reasons in ``told`` are not repeated."""
+def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -> Iterator[Link]:
+    """Yield dataset and summary, derived again; reasons in ``reported`` are not repeated."""
     dataset, summary = evidence.dataset, evidence.summary
     if dataset is None:
         return
@@ -335,7 +335,7 @@ def _derived(evidence: Evidence, files: ChainFiles, told: Collection[str]) -> It
     except ElastocalError as error:
         text, reason = f"the dataset cannot be made again from the {source}", files.plain(error)
         again_told = Link("dataset", LinkState.UNSTATED, f"{text}, see above")
-        yield again_told if reason in told else _broken("dataset", f"{text}: {reason}")
+        yield again_told if reason in reported else _broken("dataset", f"{text}: {reason}")
         return
     text = f"the dataset is not what the {source} give"
     if difference := changed_reading(dataset, again, old, source):

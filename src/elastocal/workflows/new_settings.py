@@ -309,8 +309,8 @@ class NewSettings:
         levers = np.array([sum(behind[i:]) for i in range(len(joints))])
         bends = slice(1, max(2, len(joints) - 3))  # shoulder and elbow
         effort = np.array([each.effort for each in joints])
-        borne = effort[bends] / levers[bends]
-        most = min([self._size[1], *borne[np.isfinite(borne)]])
+        possible = effort[bends] / levers[bends]
+        most = min([self._size[1], *possible[np.isfinite(possible)]])
         power = 10.0 ** math.floor(math.log10(most))
         return max(step for step in _ROUND if step * power <= most * (1.0 + 1e-9)) * power
 

@@ -207,9 +207,11 @@ def _run(
         if each.damaged or each.name in _OF_A_RUN
     ]
     links += evidence.chain
-    told = {link.text for link in links}
+    reported = {link.text for link in links}
     links += [
-        Link("whole run", LinkState.BROKEN, text) for text in evidence.doubts if text not in told
+        Link("whole run", LinkState.BROKEN, text)
+        for text in evidence.doubts
+        if text not in reported
     ]
     record = evidence.run_record
     links += _expected(None if record is None else record.identity, expect)

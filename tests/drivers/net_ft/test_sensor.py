@@ -228,7 +228,7 @@ def test_whatever_comes_is_taken_or_refused(datagrams):
 
 def test_a_stream_that_was_silent_has_a_hole_for_a_run_and_goes_on_for_a_correction(stream):
     stream.send()
-    stream.sensor.leave_hole("no record for 0.25 s")
+    stream.sensor.leave_gap("no record for 0.25 s")
     assert stream.sensor.newest().time == pytest.approx(5.001), "as old as it is"
     stream.clock.sleep(1.0)
     stream.send()

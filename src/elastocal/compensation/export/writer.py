@@ -412,24 +412,24 @@ class _Remembering:
 
     def deflection(self, q: Sequence[float], *given: Sequence[float]) -> tuple[float, ...]:
         force, moment, _ = given
-        borne, after = self._loaded(q, *given)
-        found = self.model.deflection(self.compliance, q, force, moment, friction=borne)
+        friction_torque, after = self._loaded(q, *given)
+        found = self.model.deflection(self.compliance, q, force, moment, friction=friction_torque)
         return (*_floats(found), *after)
 
     def block(self, q: Sequence[float], *given: Sequence[float]) -> tuple[float, ...]:
         force, moment, _ = given
-        borne, after = self._loaded(q, *given)
+        friction_torque, after = self._loaded(q, *given)
 
         # Each friction element alone moves the deflection by the torque that it may bear.
         limit, axes = self.model.friction.limit, self._axes
         low, high = np.reshape(after[len(limit) : len(limit) + 2 * len(axes)], (2, -1))
         spanned = dict(zip(axes, high - low, strict=True))
         ranges = np.array([spanned[axis] for axis in self.model.friction.axis.tolist()])
-        found = self.model.observation_blocks(q, force, moment, friction=borne)
+        found = self.model.observation_blocks(q, force, moment, friction=friction_torque)
         unknown = self._turned(q, 0.5 * np.clip(2.0 * limit - ranges, 0.0, limit))
         return (*_floats(found), *_floats(2.0 * unknown), *after)
 
-    def _turned(self, q: Sequence[float], borne: FloatArray) -> FloatArray:
+    def _turned(self, q: Sequence[float], friction_torque: FloatArray) -> FloatArray:
         """Return the sum of the norms by which friction elements alone move an unloaded tcp."""
         model, moved = self.model, np.zeros(3)
         J = model.spring_jacobian(q).translation
@@ -439,7 +439,7 @@ class _Remembering:
             model.springs, starts, counts, strict=False
         ):
             still = (np.zeros(()),) * axes
-            for one in np.diag(borne[element : element + elements]):
+            for one in np.diag(friction_torque[element : element + elements]):
                 angles = np.array(spring.angles(SpringLoad(still, (), tuple(map(np.asarray, one)))))
                 turned = angles @ self.compliance[parameter : parameter + parameters]
                 moved += np.abs(J[:, axis : axis + axes] @ turned)
@@ -457,16 +457,16 @@ class _Remembering:
         load = model.load_torques(q, force, moment)
         total = load + model.weight_torques(q)
         way = np.stack([np.zeros_like(total), total])
-        borne = model.friction.path(way, np.array(memory[:n]))[1]
+        friction_torque = model.friction.path(way, np.array(memory[:n]))[1]
         low, high = np.reshape(memory[n : n + 2 * len(axes)], (2, -1))
         seen = total[axes]
         kept = (
-            borne - total[model.friction.axis],
+            friction_torque - total[model.friction.axis],
             np.minimum(low, seen),
             np.maximum(high, seen),
             load[axes],
         )
-        return borne, _floats(np.concatenate(kept))
+        return friction_torque, _floats(np.concatenate(kept))
 
 
 def _floats(array: FloatArray) -> tuple[float, ...]:

@@ -160,15 +160,15 @@ class Laws:
         program, first = self._program, self._loads[self._axes[s][0]]
         a = self.memory.axes.index(first.number) + 1
         torque = program.total(f"total{a}", [(first.torque,), (first.weight,)])
-        borne = {}
+        friction_torque = {}
         for e in self._elements[s]:
             pulled = program.total(f"pulled{e + 1}", [(torque,), (Value(1, f"u{e + 1}"),)])
-            borne[e] = program.clipped(f"borne{e + 1}", pulled, self._limit(e))
-            self._states[e] = program.total(f"kept{e + 1}", [(borne[e],), (-torque,)])
+            friction_torque[e] = program.clipped(f"borne{e + 1}", pulled, self._limit(e))
+            self._states[e] = program.total(f"kept{e + 1}", [(friction_torque[e],), (-torque,)])
         low = program.call(f"lowest{a}", "min", Value(1, f"low{a}"), torque)
         high = program.call(f"highest{a}", "max", Value(1, f"high{a}"), torque)
         self._ranges[first.number] = low, high, first.torque
-        return borne
+        return friction_torque
 
     def _width(self, e: int, low: Value, high: Value) -> Value:
         """Write ``(r + |2 r - R| - |r - R|) / 2``: ``r`` up to ``R = r``, then less, then 0."""

@@ -169,7 +169,7 @@ def correct_rows(  # noqa: PLR0913 (what goes on from block to block is one more
     commanded[:, :3, 3] = reached[:, :3, 3]
     _check_size(reached[:, :3, 3] - T_base_tcp[:, :3, 3], deflection, largest, where)
     residual = reached[:, :3, 3] + off - T_base_tcp[:, :3, 3]
-    predicted = calibrated.predict(q, *wrench, friction=load.borne)
+    predicted = calibrated.predict(q, *wrench, friction=load.friction_torque)
     return PathCorrection(
         q,
         commanded,
@@ -194,7 +194,7 @@ class _Load:
     """Friction memory of the rows before the first."""
     unloaded: Unloaded | None = None
     """True tcp position without process force."""
-    borne: FloatArray | None = None
+    friction_torque: FloatArray | None = None
     """Torque of each friction element in each row, in N·m."""
     after: FloatArray = field(default_factory=lambda: np.zeros(0))
     """Friction memory after the last row."""
@@ -216,16 +216,18 @@ class _Load:
         with np.errstate(over="ignore", invalid="ignore"):
             load = model.load_torques(q, self.force, self.moment)
             visit = np.cumsum(in_the_air)
-            borne, after = model.friction.visits(model.weight_torques(q), load, visit, memory)
-        return replace(self, borne=borne, after=after)
+            friction_torque, after = model.friction.visits(
+                model.weight_torques(q), load, visit, memory
+            )
+        return replace(self, friction_torque=friction_torque, after=after)
 
     def deflection(self, q: FloatArray, rows: IndexArray) -> FloatArray:
         model, c = self.calibrated.model, self.calibrated.compliance
         moment = None if self.moment is None else self.moment[rows]
         # What overflows is refused by its size.
         with np.errstate(over="ignore", invalid="ignore"):
-            borne = None if self.borne is None else self.borne[rows]
-            return model.deflection(c, q, self.force[rows], moment, borne)
+            friction_torque = None if self.friction_torque is None else self.friction_torque[rows]
+            return model.deflection(c, q, self.force[rows], moment, friction_torque)
 
     def misplaced(self, q: FloatArray, T_base_tcp: FloatArray) -> FloatArray:
         """Return the deviation of the unloaded tool from nominal at some joints, (row, 3)."""

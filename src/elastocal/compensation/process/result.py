@@ -260,8 +260,8 @@ def _write_deviations(path: Path, courses: Sequence[CourseDeviation]) -> None:
         for time, row in zip(course.time.tolist(), (1e3 * lengths).tolist(), strict=True):
             numbers = [f"{value:.6f}" for value in row]
             rows.append([course.seed, course.course, f"{time:.6f}", *numbers])
-    told = all(course.spatial is not None for course in courses)
-    write_table(path, _HEADER if told else _OLD_HEADER, rows)
+    has_spatial = all(course.spatial is not None for course in courses)
+    write_table(path, _HEADER if has_spatial else _OLD_HEADER, rows)
 
 
 def _read_deviations(path: Path) -> tuple[CourseDeviation, ...]:

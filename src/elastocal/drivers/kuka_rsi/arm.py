@@ -85,18 +85,18 @@ def adopt(cycle: Cycle, number: int) -> Motion:
     DeviceError
         If the controller does not do it, or the arm is somewhere else after it.
     """
-    told, before = cycle.time, cycle.T_base_tcp[:3, 3]
+    ordered, before = cycle.time, cycle.T_base_tcp[:3, 3]
     taken = False
     while cycle.command != number:
         taken |= cycle.state == ProgramState.MOVING
-        if not taken and cycle.time - told > ANSWERS:
+        if not taken and cycle.time - ordered > ANSWERS:
             raise DeviceError(
                 f"the arm stands {1e3 * float(np.linalg.norm(cycle.offset)):.1f} mm from the"
                 " programmed place, which may be the surface, and the program on the controller"
                 " cannot take the present place for it: move the arm off by the pendant, or load"
                 " the new elcal_run (`elastocal krc-config`)"
             )
-        if not cycle.time - told <= ADOPTS:
+        if not cycle.time - ordered <= ADOPTS:
             raise DeviceError(f"the controller did not switch RSI off and on in {ADOPTS:g} s")
         cycle = yield Step(order=Order.ADOPT, target=MoveTarget(number))
     cycle = yield from guided(cycle)
@@ -439,9 +439,9 @@ class KukaArm:
             self._number += 1
             percent = min(max(1.0, 100.0 * speed), float(self._settings.ptp_percent))
             axes, external = self._postures.as_told(target)
-            told = MoveTarget(self._number, axes, external, percent)
+            order = MoveTarget(self._number, axes, external, percent)
             self._contact.forget_place()
-            motion = partial(motions.free_move, target=told, q=target)
+            motion = partial(motions.free_move, target=order, q=target)
             self._start(_Task(MotionState.MOVING, motion, self._contact.arrived))
 
     def adopt_position(self) -> None:

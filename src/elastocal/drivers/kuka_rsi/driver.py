@@ -136,10 +136,10 @@ class KukaListener:
     def _problem(self) -> str:
         silent, found, settings = self._link.silent, self._link.statistics(), self._settings
         if silent is None:
-            told = refused_telegrams(found.malformed, found.refused, found.foreign)
+            refused = refused_telegrams(found.malformed, found.refused, found.foreign)
             return (
                 f"nothing heard yet from {settings.robot} at {settings.address} port"
-                f" {self._link.port} ({told})"
+                f" {self._link.port} ({refused})"
             )
         if silent > _SILENT:
             unanswered = ", which stops by its Timeout: watch answers no compensation"
@@ -159,11 +159,11 @@ class KukaListener:
         if self._link.silent is None:
             return f"mode {self._settings.mode}"
         known = [text for each, text in _STATES.items() if each == state]
-        told = known[0] if known else "program states nothing"
+        stated = known[0] if known else "program states nothing"
         effect = (
             "" if cycle is None else f", correction {1e3 * np.linalg.norm(cycle.offset):.3f} mm"
         )
-        return f"mode {self._settings.mode}: {told}{effect}"
+        return f"mode {self._settings.mode}: {stated}{effect}"
 
 
 _TO_THE_LOOP = 1.0

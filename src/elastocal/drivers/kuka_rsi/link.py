@@ -105,9 +105,9 @@ class Pace:
 
 def guided(cycle: Cycle) -> Phase:
     """Wait until corrections act."""
-    told = cycle.time
+    ordered = cycle.time
     while cycle.state != ProgramState.GUIDED:
-        if not cycle.time - told <= ANSWERS:
+        if not cycle.time - ordered <= ANSWERS:
             raise does_not_answer("RSI_MOVECORR", cycle)
         cycle = yield Step()
     return cycle

@@ -65,9 +65,9 @@ def free_move(cycle: Cycle, target: MoveTarget, q: FloatArray) -> Motion:
         The same in rad or m.
     """
     cycle = yield from guided(cycle)
-    told = cycle.time
+    ordered = cycle.time
     while cycle.command != target.number or cycle.state not in _OVER:
-        if cycle.state != ProgramState.MOVING and cycle.time - told > ANSWERS:
+        if cycle.state != ProgramState.MOVING and cycle.time - ordered > ANSWERS:
             raise does_not_answer("PTP", cycle)
         cycle = yield Step(order=Order.MOVE, target=target)
     if cycle.state == ProgramState.BRAKED:

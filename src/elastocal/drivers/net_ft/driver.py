@@ -80,7 +80,7 @@ class NetFtSensor:
     Datagrams arrive by `received`, from any thread. A fault of the stream is raised at the next
     `read` and at all later ones, since unreliable forces end a run. `newest` refuses only a stream
     with a permanent fault (`fail`: the box was restarted, or its counts have another unit); a bad
-    status is a bad sample, and invalid or repeated datagrams are missing samples (`leave_hole`).
+    status is a bad sample, and invalid or repeated datagrams are missing samples (`leave_gap`).
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class NetFtSensor:
         self._saturated = False
         self._newest: tuple[float, tuple[int, ...], SensorStatus] | None = None
         self._failure: str | None = None
-        self.hole = ""
+        self.gap = ""
         """Why samples are missing, or bad; empty as long as none are."""
         self._last: RdtRecord | None = None
         self._time = self._arrived = -np.inf
@@ -129,7 +129,7 @@ class NetFtSensor:
             self.malformed += 1
             self._malformed_now += 1
             if self._malformed_now > _MOST_MALFORMED:
-                self.leave_hole(f"what it sends are no RDT records: {error}")
+                self.leave_gap(f"what it sends are no RDT records: {error}")
             return
         self._malformed_now = 0
         for record in records:
@@ -140,14 +140,14 @@ class NetFtSensor:
         with self._lock:
             self._failure = self._failure or why
 
-    def leave_hole(self, why: str) -> None:
+    def leave_gap(self, why: str) -> None:
         """Refuse the next `read`: samples are missing in the stream, or bad.
 
         `newest` continues, with the age of its sample. If the stream returns, the correction of a
         process goes on, whereas the readings of a procedure end with the refusal.
         """
         with self._lock:
-            self.hole = self.hole or why
+            self.gap = self.gap or why
 
     @property
     def failed(self) -> bool:
@@ -164,7 +164,7 @@ class NetFtSensor:
             self._states.add(record.status)
         self._time = self._time_of(now)
         if status is SensorStatus.FAULT:
-            self.leave_hole(f"status {status_names(record.status)}")
+            self.leave_gap(f"status {status_names(record.status)}")
             self._newest = self._time, record.counts, status
             return
         with self._lock:
@@ -195,7 +195,7 @@ class NetFtSensor:
             return False
         self._standing = 0 if ahead else self._standing + 1
         if self._standing >= _STANDING:
-            self.leave_hole(f"it repeats sample {record.ft_sequence}: it has stalled")
+            self.leave_gap(f"it repeats sample {record.ft_sequence}: it has stalled")
             return False
         self._count += step
         self._count_lost(step - 1)
@@ -215,7 +215,7 @@ class NetFtSensor:
         self._window, self._window_lost = self._window + lost + 1, self._window_lost + lost
         # Not at the end of the window only: of a stream that thins out it is said at once.
         if self._window_lost > _MOST_LOST * _WINDOW:
-            self.leave_hole(f"{self._window_lost} of {self._window} records were lost on the way")
+            self.leave_gap(f"{self._window_lost} of {self._window} records were lost on the way")
         if self._window >= _WINDOW or self._window_lost > _MOST_LOST * _WINDOW:
             self._window = self._window_lost = 0
 
@@ -248,10 +248,10 @@ class NetFtSensor:
         """
         self._require()
         with self._lock:
-            hole, self.hole = self.hole, ""
-            if hole:
+            gap, self.gap = self.gap, ""
+            if gap:
                 self._rows.clear()
-                raise DeviceError(f"{self.source}: {hole}")
+                raise DeviceError(f"{self.source}: {gap}")
             rows, saturated = list(self._rows), self._saturated
             self._rows.clear()
             self._saturated = False
@@ -282,8 +282,8 @@ class NetFtSensor:
             state = f"status {status_names(present(self._last, 'last record').status)}"
             if newest.status is not SensorStatus.OK:
                 state, problem = "not to be trusted", state
-            elif self.hole:
-                state = f"{state}; a run would have ended: {self.hole}"
+            elif self.gap:
+                state = f"{state}; a run would have ended: {self.gap}"
         return DeviceReading(
             kind="sensor",
             device=self.source,
@@ -441,7 +441,7 @@ class BoxLine:
             try:
                 self.sensor.received(self._socket.recv(MOST_PAGE))
             except TimeoutError:
-                if not self.sensor.hole:
+                if not self.sensor.gap:
                     self._end_or_go_on()
             except OSError as error:
                 self.sensor.fail(f"{error.strerror or error}")
@@ -453,7 +453,7 @@ class BoxLine:
             self.sensor.received(self._socket.recv(MOST_PAGE))
         except TimeoutError:
             if not self._closed.is_set():
-                self.sensor.leave_hole(why)
+                self.sensor.leave_gap(why)
 
     def _why_silent(self) -> str:
         return f"{_NO_RECORD}{_TAKEN if self._answers() else _OFF}"

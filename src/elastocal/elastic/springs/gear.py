@@ -127,11 +127,11 @@ class Gear(OneAxisSpring):
     def angles(self, load: SpringLoad[Quantity]) -> Angles[Quantity]:
         """Return the angle of one unit of each parameter."""
         (t,) = load.torque
-        borne = load.friction or tuple(0.0 * t for _ in self.slips)
-        turning = t - borne[0] if self.plays and borne else t
+        friction_torque = load.friction or tuple(0.0 * t for _ in self.slips)
+        turning = t - friction_torque[0] if self.plays and friction_torque else t
         row: list[Quantity] = [t]
         row.extend(self._softness(load, turning, T) for T in self.knees)
-        row.extend(t - s if self.plays else -1.0 * s for s in borne)
+        row.extend(t - s if self.plays else -1.0 * s for s in friction_torque)
         return (tuple(row),)
 
     @staticmethod

@@ -145,14 +145,14 @@ def _marker(robot: Robot, q: FloatArray, offset: FloatArray) -> FloatArray:
 def _apart(robot: Robot, readings: Readings, offset: FloatArray) -> float:
     """Return the distance between the marker's motion by the joints and by the controller, in m."""
     moved = _moved(robot, readings, offset)
-    told = _counted(readings.controller_displacement, readings)
-    return np.inf if moved is None else median_norm(moved - told)
+    controller = _counted(readings.controller_displacement, readings)
+    return np.inf if moved is None else median_norm(moved - controller)
 
 
 def _relative(robot: Robot, readings: Readings, offset: FloatArray) -> float:
     """Return the same over what the controller says."""
-    told = median_norm(_counted(readings.controller_displacement, readings))
-    return _apart(robot, readings, offset) / told if told > 0.0 else np.inf
+    controller = median_norm(_counted(readings.controller_displacement, readings))
+    return _apart(robot, readings, offset) / controller if controller > 0.0 else np.inf
 
 
 JointRead = Callable[[FloatArray], FloatArray]

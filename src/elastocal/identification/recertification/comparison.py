@@ -208,7 +208,7 @@ def _row_blocks(
         shown = [displacement_blocks(each, rows.readings)[number] for each in models]
         return lambda part: (shown[0][part], shown[1][part])
     some, friction = rows.taken(number), [rows.friction(each) for each in models]
-    borne = [None if each is None else each[number] for each in friction]
+    friction_torque = [None if each is None else each[number] for each in friction]
 
     def blocks_of(part: slice) -> _Blocks:
         m = None if some.moment is None else some.moment[part]
@@ -216,7 +216,7 @@ def _row_blocks(
             each.observation_blocks(
                 some.q[part], some.force[part], m, friction=None if held is None else held[part]
             )
-            for each, held in zip(models, borne, strict=True)
+            for each, held in zip(models, friction_torque, strict=True)
         )
         return first, second
 
