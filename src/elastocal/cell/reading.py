@@ -59,8 +59,8 @@ class DeviceReading:
     delay: int | None = None
     """``Delay D`` of a KUKA, the largest: answers that came too late, as the controller counts."""
     offset: float | None = None
-    """Its time less the PC's, in s. Of a driver: less the rig's; `elastocal watch` makes it that
-    against the PC's time of day, from 1970-01-01 UTC."""
+    """Time of its clock minus that of the PC, in s. A driver states it relative to the rig's clock;
+    `elastocal watch` converts it to the PC's time of day, from 1970-01-01 UTC."""
     drift: float | None = None
     """Rate of its clock relative to the PC's, minus 1, dimensionless; None: too early to
     estimate."""

@@ -396,7 +396,7 @@ def _derive(given: Given) -> None:
 @dataclass(frozen=True)
 class _Import:
     map: Annotated[Path, Option("--map")]
-    """What the columns are (.yaml); --guess writes one."""
+    """Map of the columns (.yaml); --guess writes one."""
     out: Path | None = None
     """Dataset (.nc or .csv) to write."""
     guess: bool = False

@@ -376,7 +376,7 @@ read_dataset = read
 
 @dataclass(frozen=True)
 class _Grid:
-    """Where each row belongs among poses and load cases, both in order of first appearance."""
+    """Position of each row among poses and load cases, both in order of first appearance."""
 
     poses: list[int]
     load_cases: list[str]

@@ -131,7 +131,7 @@ def _campaigns(datasets: Sequence["Dataset"], named: Sequence[str] | None) -> tu
 _DIMS = {variable.name: variable.dims for variable in (*VARIABLES, *INTEGERS)}
 _ZERO_BY_DEFAULT = "reference_force"
 _OF_ONE_CAMPAIGN = (MARKER_POSITION.name, STATIONS)
-"""What is left out where campaigns are put together."""
+"""Fields left out when campaigns are combined."""
 
 
 def selected(

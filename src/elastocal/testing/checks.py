@@ -1,4 +1,4 @@
-"""What every check of a calibration pose keeps."""
+"""Contract of every check of a calibration pose."""
 
 import numpy as np
 import pytest

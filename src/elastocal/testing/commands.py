@@ -1,4 +1,4 @@
-"""What every command keeps, and how a test runs one."""
+"""Contract of every command, and a runner for tests."""
 
 import contextlib
 import dataclasses
@@ -24,7 +24,7 @@ from elastocal.options import OWN, REQUIRED, settings_fields
 
 @dataclass(frozen=True)
 class CommandOutput:
-    """What a command left behind."""
+    """Output of a command."""
 
     code: int
     """Its exit code."""

@@ -1,4 +1,4 @@
-"""What every driver keeps before it connects to anything."""
+"""Contract of every driver before it connects."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What every filter of the wrench keeps."""
+"""Contract of every filter of the wrench."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What every spring layout keeps."""
+"""Contract of every spring layout."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What every section of the report keeps: it copes with every subset of the parts."""
+"""Contract of every section of the report: it accepts every subset of the parts."""
 
 import re
 from collections.abc import Collection

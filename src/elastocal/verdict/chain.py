@@ -43,7 +43,7 @@ machines round differently, and what is smaller changes no verdict."""
 _SAME_PLACE = 1e-6
 """The same for the position of the marker, which is stored as a text."""
 _LATER = ("marker_position",)
-"""What datasets have had only since they stated their hashes."""
+"""Attributes that only datasets with hashes have."""
 _FRACTION = re.compile(r"[-+]?\d+\.\d+(?:e[-+]?\d+)?")
 
 

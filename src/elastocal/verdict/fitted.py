@@ -1,4 +1,4 @@
-"""What was tested, by the readings alone: a plan or a cell file says what was meant to be."""
+"""Tested poses and loads by the readings alone, since plan and cell file state intentions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -44,7 +44,7 @@ class RebuiltReadings:
 
     dataset: Dataset
     findings: tuple[Finding, ...] = ()
-    """What is still of the arm as drawn."""
+    """Parts that are still nominal."""
 
 
 def is_of_arm_as_drawn(dataset: Dataset, robot: Robot) -> bool:
