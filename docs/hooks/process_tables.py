@@ -2,7 +2,8 @@
 
 The figures stand in ``gallery/process_figures.json``, which ``make process-figures`` measures; the
 paper's row comes from the report's own copy of it. ``<!-- process campaigns: afp -->`` becomes the
-table of shorter campaigns, ``<!-- process summary: typical -->`` the sentences that the README has,
+table of shorter campaigns, ``<!-- process touched: afp -->`` that of touches before production,
+``<!-- process summary: typical -->`` the sentences that the README has,
 ``<!-- process demos: typical -->`` what every example cell reaches on a truth (``all``: on each).
 """
 
@@ -20,11 +21,15 @@ if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
 _QUOTED = Path(__file__).parent / "gallery" / "process_figures.json"
-_MARK = re.compile(r"<!-- process (table|campaigns|summary|short|demos): (\S+) -->")
+_MARK = re.compile(r"<!-- process (table|campaigns|touched|summary|short|demos): (\S+) -->")
 _HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
          "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
 _CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out error, µm",
               "left of the mean, µm", "reduction", "seeds")  # fmt: skip
+_TOUCHED = ("truth", "correction", "minutes before production", "reduction of the mean",
+            "3-D", "at half load", "seeds")  # fmt: skip
+TOUCHED = "touched"
+"""Name of the campaign whose growth was touched."""
 _README = Path(__file__).parents[2] / "README.md"
 _NAMES = {"afp": "fibre placement", "machining": "roughing"}
 TRUTHS = ("kind", "typical", "harsh")
@@ -51,7 +56,7 @@ DEMOS = {
 def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: ARG001 (mkdocs')
     """Return the page with the tables in place of their marks."""
     made: dict[str, Callable[[str], str]] = {
-        "table": table, "campaigns": campaigns, "summary": summary, "short": short,
+        "table": table, "campaigns": campaigns, "touched": touched, "summary": summary, "short": short,
         "demos": demos,
     }  # fmt: skip
     return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
@@ -81,7 +86,7 @@ _INTERVALS = (
 
 def campaigns(kind: str) -> str:
     """Return what shorter campaigns reach on the typical truth, on the seeds that all have."""
-    found = _of(quoted(), kind, "typical")
+    found = [each for each in _of(quoted(), kind, "typical") if each["campaign"] != TOUCHED]
     seeds_of: dict[str, set[int]] = {}
     for each in found:
         seeds_of.setdefault(each["campaign"], set()).add(each["case"]["seed"])
@@ -100,6 +105,33 @@ def campaigns(kind: str) -> str:
             _mean([_reduction(each["mean"]) for each in lateral], ".1%"), str(len(seeds)),
         ))  # fmt: skip
     return _markdown(_CAMPAIGNS, rows)
+
+
+def touched(kind: str) -> str:
+    """Return what touches before production bring, on the seeds that were run with and without."""
+    rows = []
+    for truth in TRUTHS:
+        pairs = [
+            {each["case"]["seed"]: each for each in _of(quoted(), kind, truth, **which)}
+            for which in ({"campaign": "template", "springs": "auto"}, {"campaign": TOUCHED})
+        ]
+        seeds = sorted(pairs[0].keys() & pairs[1].keys())
+        for name, found in zip(("springs alone", "touched"), pairs, strict=True):
+            some = [found[seed] for seed in seeds]
+            minutes = {each.get("touch_minutes") or 0.0 for each in some}
+            cells = [
+                _mean([_reduction(_measure(each, which, load)["mean"]) for each in some], ".1%")
+                for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
+            ]
+            if some:
+                rows.append((truth, name, _span(minutes, ".1f"), *cells, str(len(some))))
+    return _markdown(_TOUCHED, rows)
+
+
+def _measure(figures: Figures, which: int, load: float) -> Figures:
+    """Return the component that counts (0) or the 3-D deviation (1), at a load."""
+    found: Figures = [each for each in figures["deviations"] if each["load"] == load][which]
+    return found
 
 
 def demos(preset: str) -> str:

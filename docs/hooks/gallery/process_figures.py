@@ -7,8 +7,9 @@ where it ended. ``docs/hooks/process_tables.py`` makes the tables and the README
 A case is an example cell with a preset and a seed. The procedure is run, calibrated with each
 layout of springs, the tool is weighed, and the process simulated at the programmed, half and turned
 load, as `elastocal simulate-process` does. On `typical` the same is done, at the programmed load,
-with shorter campaigns and with that of the paper. Of `ur20`, an example without a process, the
-deflection at left-out poses is measured, and what its prediction leaves of it.
+with shorter campaigns and with that of the paper; on every truth with the growth of the arm that is
+touched before production. Of `ur20`, an example without a process, the deflection at left-out poses
+is measured, and what its prediction leaves of it.
 """
 
 import argparse
@@ -17,13 +18,13 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from process_tables import renew_readme
 
 from elastocal.cell import PROCESS_FILE, SensorLoad, load_cell
-from elastocal.compensation import process
+from elastocal.compensation import ArmGrowth, process
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.process import DeviationComparison
 from elastocal.errors import CompensationError
@@ -31,7 +32,7 @@ from elastocal.identification import CalibrateResult
 from elastocal.progress import silent
 from elastocal.records import from_data, record, to_data
 from elastocal.robot import Robot
-from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_loads, tool
+from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_loads, tool, touch
 
 QUOTED = Path(__file__).with_name("process_figures.json")
 KINDS = (*process.PROCESSES, "ur20")
@@ -48,6 +49,8 @@ class Campaign:
     search: dict[str, str]
     """Keys of ``search`` that differ from the cell file."""
     springs: tuple[str, ...]
+    points: int = 0
+    """Points that are touched cold and warm, so that the growth of the arm is corrected too."""
 
 
 TEMPLATE = Campaign("template", {}, ("bearing", "auto"))
@@ -56,6 +59,8 @@ SHORTER = (
     Campaign("i_optimal 8", {"poses": "8"}, ("auto",)),
     Campaign("i_optimal 6", {"poses": "6"}, ("auto",)),
 )
+
+TOUCHED = Campaign("touched", {}, ("auto",), points=12)
 
 
 @record()
@@ -96,6 +101,8 @@ class ProcessFigures:
     left_out: float
     """Mean error at left-out poses, in m, noise of the readings in it."""
     deviations: tuple[Deviation, ...]
+    touch_minutes: float | None = None
+    """Time of the touches before production; none where nothing is touched."""
 
 
 def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
@@ -114,6 +121,10 @@ def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
     for seed in SEEDS[1:]:
         for kind in process.PROCESSES:
             yield Case(kind, TYPICAL, seed), SHORTER
+    for preset in (TYPICAL, *OTHERS):
+        for seed in SEEDS:
+            for kind in process.PROCESSES:
+                yield Case(kind, preset, seed), (TOUCHED,)
 
 
 def quoted() -> list[ProcessFigures]:
@@ -139,6 +150,8 @@ class _Model:
     result: CalibrateResult
     trial: ProcessTrial | None
     """None of a cell without a process."""
+    state: ArmGrowth | None = None
+    """Growth of the arm by touches."""
     deviations: list[Deviation] = field(default_factory=list)
 
     def figures(self, case: Case) -> ProcessFigures:
@@ -149,6 +162,7 @@ class _Model:
         return ProcessFigures(
             case, self.campaign.name, self.springs, taken[0] if taken else self.springs,
             self.poses, self.minutes, _rounded(found.held_out.mean), tuple(self.deviations),
+            None if self.state is None else round(self.state.seconds / 60.0, 2),
         )  # fmt: skip
 
 
@@ -200,10 +214,21 @@ class Measurement:
         ended = run(cell, plan=cell.parent / "plan", out=made / "run", seed=case.seed)
         poses, minutes = ended.figures.committed, round(ended.figures.seconds / 60.0, 2)
         path = cell.parent / PROCESS_FILE if case.kind in process.PROCESSES else None
+        state = self._touched(case, cell, campaign, made) if campaign.points else None
         for springs in campaign.springs:
             result = calibrate(made / "run" / "dataset.nc", springs=springs, process=path)
             trial = self._trial(case, cell, result, made) if path else None
-            yield _Model(campaign, springs, poses, minutes, result, trial)
+            if trial is not None:
+                trial = replace(trial, state=state)
+            yield _Model(campaign, springs, poses, minutes, result, trial, state)
+
+    def _touched(self, case: Case, cell: Path, campaign: Campaign, made: Path) -> ArmGrowth:
+        """Touch the tooling cold and warm at points that presets share."""
+        points = cell.parent / "points"
+        if not points.is_dir():
+            plan(cell, out=points, poses=campaign.points, compare="none")
+        run(cell, plan=points, out=made / "cold", seed=case.seed, touch="cold")
+        return touch(cell, cold=made / "cold", out=made / "state.json", seed=case.seed)
 
     def _trial(self, case: Case, cell: Path, result: CalibrateResult, made: Path) -> ProcessTrial:
         file = made / "tool.json"
@@ -280,7 +305,7 @@ def measure(seeds: int, kinds: list[str], anew: bool) -> None:
             missing = tuple(each for each in campaigns if (case, each.name) not in done)
             if not missing or case.kind not in kinds or case.seed > seeds:
                 continue
-            loads = _LOADS if missing[0] == TEMPLATE else _LOADS[:1]
+            loads = _LOADS if missing[0] in (TEMPLATE, TOUCHED) else _LOADS[:1]
             figures += measurement.of(case, missing, loads)
             write(figures)
             renew_readme()
