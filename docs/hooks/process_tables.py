@@ -56,8 +56,8 @@ DEMOS = {
 def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: ARG001 (mkdocs')
     """Return the page with the tables in place of their marks."""
     made: dict[str, Callable[[str], str]] = {
-        "table": table, "campaigns": campaigns, "touched": touched, "summary": summary, "short": short,
-        "demos": demos,
+        "table": table, "campaigns": campaigns, "touched": touched, "summary": summary,
+        "short": short, "demos": demos,
     }  # fmt: skip
     return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
 
