@@ -144,3 +144,7 @@ from .uncertainty import (
     interval as interval,
     leave_poses_out as leave_poses_out,
 )
+from .update import (
+    draws_factor as draws_factor,
+    update_springs as update_springs,
+)

@@ -19,6 +19,7 @@ from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
 from elastocal.identification.uncertainty import UNKNOWN_MISFIT, Misfit
+from elastocal.identification.update import SpringUpdate
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import GRAVITY, Robot, parse_urdf
@@ -84,6 +85,8 @@ class CalibrateResult(Result):
     made_from: dict[str, str] = field(default_factory=dict)
     """SHA-256 of what each dataset says (`elastocal.dataset.content_sha256`), by its file; empty
     in files before it was written."""
+    update: SpringUpdate | None = None
+    """What tracked production has made of the springs; none: they are those of the calibration."""
     needs: dict[str, str] = field(default_factory=dict)
     """Distributions besides elastocal that define its springs, with the versions that made it;
     readers require them first (`elastocal.plugins.require_distributions`)."""
@@ -94,8 +97,9 @@ class CalibrateResult(Result):
 
         if self.calibration is None:
             return super().show()
+        updated = () if self.update is None else (Facts(tuple(self.update.facts())),)
         warnings = (("warning", text) for text in group_alike(self.calibration.warnings))
-        return (*show_calibration(self.calibration), Facts(tuple(warnings)))
+        return (*updated, *show_calibration(self.calibration), Facts(tuple(warnings)))
 
     def __post_init__(self) -> None:
         """Refuse parts that contradict one another.
@@ -201,6 +205,7 @@ class CalibrateResult(Result):
                 f" {sum(seen.observable)} known alone",
             ),
         ]
+        facts += [] if self.update is None else self.update.facts()
         if figures is not None and figures.settings is not None:
             taken = [rung.springs for rung in figures.ladder if rung.chosen]
             facts.append(

@@ -12,7 +12,7 @@ from elastocal import identification
 from elastocal.cell import ProcessFile, ProductionPath, read_production
 from elastocal.dataset import Dataset, content_sha256, merge, read, without
 from elastocal.elastic import known_springs
-from elastocal.errors import DatasetError, ElastocalError, present
+from elastocal.errors import DatasetError, ElastocalError, IdentificationError, present
 from elastocal.findings import Finding, Kind
 from elastocal.identification import (
     CalibratedModel,
@@ -25,11 +25,12 @@ from elastocal.identification import (
     choose_model,
     error_budget,
     summary,
+    update_springs,
     with_knowledge,
 )
 from elastocal.options import Option, ToolFrame
 from elastocal.progress import Progress
-from elastocal.records import write_json
+from elastocal.records import read_json, write_json
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, same_joints
 from elastocal.robot.inverse import nearest_zero_posture
@@ -59,6 +60,10 @@ class CalibrateSettings(FitSettings):
     """Link at the tool centre point; by default the dataset's."""
     tool_frame: ToolFrame = None
     """Tcp behind that link, ``"x, y, z, a, b, c"`` with units (Z-Y'-X'')."""
+    update: Annotated[Path | None, Option(metavar="MODEL.json")] = None
+    """Model file to bring up to date by tracked production, whose campaigns are its courses: the
+    springs move within what the calibration doubted, and only if courses that are left out are
+    predicted better for it."""
     geometry: Path | None = None
     """Model file of `geometry` of the same arm: springs are fitted on the arm as built, with the
     marker where it was found."""
@@ -101,6 +106,8 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     FileAccessError
         If a file cannot be read or written, or ``out`` is an input, or another's file.
     """
+    if settings.update is not None:
+        return _updated(settings, settings.update)
     options = settings.options()
     found = [(path, read(path)) for path in settings.files]
     made_from = {str(path): content_sha256(each) for path, each in found}
@@ -140,6 +147,43 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     figures = replace(figures, warnings=(*figures.warnings, *unknown, *unbuilt))
     found_model = replace(calibration.calibrated, on_production=figures.doubt)
     result = replace(CalibrateResult.of(found_model, figures), made_from=made_from)
+    if settings.out is not None:
+        write_json(settings.out, result)
+    return result
+
+
+_NOT_WITH_UPDATE = ("robot", "tcp", "tool_frame", "geometry", "process", "budget")
+
+
+def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
+    """Return a model brought up to date by tracked production.
+
+    Raises
+    ------
+    IdentificationError
+        If production has too few courses, or an option asks for a calibration.
+    """
+    for name in _NOT_WITH_UPDATE:
+        if getattr(settings, name):
+            flag = "tool" if name == "tool_frame" else name
+            raise IdentificationError(f"--{flag} goes with a calibration, not with --update")
+    before = read_json(file, CalibrateResult)
+    found = [(path, read(path)) for path in settings.files]
+    measured, source = _measured(found)
+    calibrated = before.calibrated
+    readings = measured.readings(calibrated.model.robot.joint_names)
+    readings = without(readings, settings.exclude)
+    marker = measured.marker if settings.marker is None else settings.marker
+    rng = np.random.default_rng(settings.seed)
+    moved, worth = update_springs(calibrated, readings, rng, marker)
+    result = replace(
+        before,
+        compliance=moved.compliance,
+        draws=moved.draws,
+        update=worth,
+        provenance=f"{before.provenance}; updated by {source}",
+        made_from=before.made_from | {str(path): content_sha256(each) for path, each in found},
+    )
     if settings.out is not None:
         write_json(settings.out, result)
     return result

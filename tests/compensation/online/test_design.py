@@ -6,9 +6,9 @@ import pytest
 
 from elastocal.cell import SENSOR_CORRECTED
 from elastocal.compensation.online import Compensator, Reading, design
-from elastocal.compensation.online.design import draws_factor
 from elastocal.elastic import ElasticModel
 from elastocal.errors import CompensationError
+from elastocal.identification import draws_factor
 from elastocal.robot import Robot
 from support.compensated import arm, load
 

@@ -22,7 +22,7 @@ from elastocal.compensation.kernel import (
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.elastic import require_possible
 from elastocal.errors import CompensationError, SpringError
-from elastocal.identification import CalibratedModel
+from elastocal.identification import CalibratedModel, draws_factor
 from elastocal.results import brief_repr
 
 LONG_AGO = -1.0e300
@@ -31,8 +31,6 @@ JOINT_RANGE = 1000.0
 """Positions beyond it are no joint's, in rad or m."""
 _PUSHING = 1e-12
 """Compliance below its smallest by which rounding may have brought it there, in SI."""
-_NEGLIGIBLE = 1e-9
-"""Share of the largest standard deviation below which a direction of the draws is left out."""
 _NOTHING = 1e-9
 """Smaller deflections, in m, are rounding."""
 _Z = float(ndtri(0.975))
@@ -182,30 +180,6 @@ def design(
         state=state if grown else None,
         growth=growth(model.robot, state.share, state.offset) if state and grown else None,
     )
-
-
-def draws_factor(draws: FloatArray) -> FloatArray:
-    """Return ``L`` with ``L L^T`` the covariance of bootstrap draws.
-
-    The variance of a predicted deflection ``O c`` is then the squared length of the rows of
-    ``O L``: a fixed number of products, where percentiles would need a sort.
-
-    Parameters
-    ----------
-    draws : ndarray, shape (draw, spring)
-        In rad/(N·m) or m/N.
-
-    Returns
-    -------
-    ndarray, shape (spring, direction)
-        At least one direction.
-    """
-    centred = (draws - draws.mean(axis=0)) / np.sqrt(max(len(draws) - 1, 1))
-    _, s, vt = np.linalg.svd(centred, full_matrices=False)
-    kept = s > _NEGLIGIBLE * s[0]
-    kept[0] = True
-    factor: FloatArray = vt[kept].T * s[kept]
-    return factor
 
 
 def _require_same_sensor(calibrated: CalibratedModel, load: SensorLoad) -> None:

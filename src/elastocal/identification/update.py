@@ -1,0 +1,220 @@
+"""Springs brought up to date by production that a tracker has watched.
+
+A calibrated model is the prior: ``c = c_0 + L z`` with ``L L^T`` the covariance of its draws and
+``z`` standard normal. Each course of production has a constant of its own, the place that its
+marker is counted from, so rows and deflections count from their means over the course. With rows
+``O`` and deflections ``d`` so centred, and their noise ``s``,
+
+    min |O (c_0 + L z) - d|^2 / (s^2 g) + |z|^2,    |z_k| <= 3.
+
+What the springs cannot explain changes slowly along a course: readings of one course are not
+independent, and count by ``g = (1 + r) / (1 - r)`` less, ``r`` the correlation of neighbouring
+residuals (Bayley and Hammersley 1946). The springs move only as far as the calibration doubted
+them, and only if courses that were left out are predicted better for it. Draws are moved alike,
+each with noise of its own (randomised maximum a posteriori).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike
+from scipy.optimize import lsq_linear
+
+from elastocal.arrays import FloatArray, IndexArray
+from elastocal.dataset import Readings
+from elastocal.errors import IdentificationError
+from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.displacement import displacement_blocks
+from elastocal.records import record
+from elastocal.results import brief_repr
+from elastocal.wording import mm
+
+LEAST_COURSES = 2
+"""One to learn from, and one to see what that is worth."""
+_FARTHEST = 3.0
+"""Largest move of a direction of the draws, in standard deviations."""
+_MOST_CORRELATED = 0.99
+_NEGLIGIBLE = 1e-9
+"""Share of the largest standard deviation below which a direction of the draws is left out."""
+
+
+@brief_repr
+@record()
+class SpringUpdate:
+    """What tracked production has made of a model; lengths in m."""
+
+    readings: int
+    courses: tuple[str, ...]
+    before: float
+    """Mean distance between measured and predicted deflection at left-out courses, each counted
+    from its own mean, with the springs as they were."""
+    after: float
+    """The same with the springs of the other courses."""
+    farthest: float
+    """Largest move of a direction of the draws, in its standard deviations; 0 where none is."""
+
+    @property
+    def taken(self) -> bool:
+        """Whether the springs were moved."""
+        return self.farthest > 0.0
+
+    def facts(self) -> Iterator[tuple[str, str]]:
+        """Yield the main facts, a label and a text each."""
+        yield "updated by", f"{self.readings} readings on {len(self.courses)} courses"
+        yield (
+            "at left-out courses",
+            f"{mm(self.before)} mean with the springs as they were, {mm(self.after)} with those of"
+            " the other courses",
+        )
+        moved = f"by {self.farthest:.1f} standard deviations at most"
+        yield "springs", moved if self.taken else "left as they were: nothing is gained"
+
+
+def draws_factor(draws: FloatArray) -> FloatArray:
+    """Return ``L`` with ``L L^T`` the covariance of bootstrap draws.
+
+    The variance of a predicted deflection ``O c`` is then the squared length of the rows of
+    ``O L``: a fixed number of products, where percentiles would need a sort.
+
+    Parameters
+    ----------
+    draws : ndarray, shape (draw, spring)
+        In rad/(N·m) or m/N.
+
+    Returns
+    -------
+    ndarray, shape (spring, direction)
+        At least one direction.
+    """
+    centred = (draws - draws.mean(axis=0)) / np.sqrt(max(len(draws) - 1, 1))
+    _, s, vt = np.linalg.svd(centred, full_matrices=False)
+    kept = s > _NEGLIGIBLE * s[0]
+    kept[0] = True
+    factor: FloatArray = vt[kept].T * s[kept]
+    return factor
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Centred rows of tracked courses, in the directions of the draws."""
+
+    A: FloatArray
+    """Shape (reading, 3, direction), in m."""
+    r: FloatArray
+    """Deflection less that of the model, shape (reading, 3), in m."""
+    course: IndexArray
+
+    def take(self, rows: IndexArray) -> "_Rows":
+        return _Rows(self.A[rows], self.r[rows], self.course[rows])
+
+    def weight(self, z: FloatArray) -> float:
+        """Return ``1 / (s^2 g)`` of the residuals that a move leaves, in 1/m²."""
+        left = self.r - self.A @ z
+        variance = float((left**2).sum()) / max(3 * (len(left) - len(np.unique(self.course))), 1)
+        pairs = np.flatnonzero(self.course[1:] == self.course[:-1])
+        along = float((left[pairs] * left[pairs + 1]).sum())
+        r = along / max(float((left[pairs] ** 2).sum()), np.finfo(float).tiny)
+        r = min(max(r, 0.0), _MOST_CORRELATED)
+        return (1.0 - r) / ((1.0 + r) * max(variance, np.finfo(float).tiny))
+
+    def moved(self) -> tuple[FloatArray, float]:
+        """Return how far the directions move, in standard deviations, and the weight of a row."""
+        z, k = np.zeros(self.A.shape[2]), self.A.shape[2]
+        A, r = self.A.reshape(-1, k), self.r.ravel()
+        for _ in range(3):
+            root = np.sqrt(self.weight(z))
+            rows = np.concatenate([root * A, np.eye(k)])
+            target = np.concatenate([root * r, np.zeros(k)])
+            z = lsq_linear(rows, target, (-_FARTHEST, _FARTHEST)).x
+        return z, self.weight(z)
+
+
+def update_springs(
+    calibrated: CalibratedModel,
+    readings: Readings,
+    rng: Generator,
+    marker_offset: ArrayLike | None = None,
+) -> tuple[CalibratedModel, SpringUpdate]:
+    """Return a model that tracked production has brought up to date, and what that is worth.
+
+    Parameters
+    ----------
+    calibrated : CalibratedModel
+        The model as it is.
+    readings : Readings
+        Of production; their campaigns are the courses, in the order of time.
+    rng : Generator
+        Source of the noise of the draws.
+    marker_offset : array_like, shape (3,), optional
+        Marker in the tcp frame, in m.
+
+    Raises
+    ------
+    IdentificationError
+        If there are fewer than `LEAST_COURSES`.
+    """
+    names = readings.campaign
+    courses = tuple(dict.fromkeys(names.tolist())) if names is not None else ()
+    if names is None or len(courses) < LEAST_COURSES:
+        raise IdentificationError(
+            f"{len(courses) or 1} course of production (coordinate campaign): at least"
+            f" {LEAST_COURSES} are needed, one of them to be left out"
+        )
+    model, c = calibrated.model, calibrated.compliance
+    course = np.array([courses.index(name) for name in names.tolist()], dtype=np.intp)
+    blocks = _centred(displacement_blocks(model, readings, marker_offset), course)
+    L = draws_factor(calibrated.draws)
+    rows = _Rows(blocks @ L, _centred(readings.deflection, course) - blocks @ c, course)
+    z, weight = rows.moved()
+    before, after = [], []
+    for number in range(len(courses)):
+        own = course == number
+        others, _ = rows.take(np.flatnonzero(~own)).moved()
+        move = blocks[own] @ (_springs(calibrated, c + L @ others) - c)
+        before.append(np.linalg.norm(rows.r[own], axis=1))
+        after.append(np.linalg.norm(rows.r[own] - move, axis=1))
+    known = SpringUpdate(
+        readings=len(readings),
+        courses=courses,
+        before=float(np.concatenate(before).mean()),
+        after=float(np.concatenate(after).mean()),
+        farthest=float(np.abs(z).max()),
+    )
+    if not known.after < known.before:
+        return calibrated, replace(known, farthest=0.0)
+    draws = _draws(calibrated, rows, L, weight, rng)
+    return replace(calibrated, compliance=_springs(calibrated, c + L @ z), draws=draws), known
+
+
+def _centred(values: FloatArray, course: IndexArray) -> FloatArray:
+    """Return values less their mean over each course, along the first axis."""
+    centred = np.array(values, dtype=float)
+    for number in np.unique(course):
+        own = course == number
+        centred[own] -= centred[own].mean(axis=0)
+    return centred
+
+
+def _springs(calibrated: CalibratedModel, compliance: FloatArray) -> FloatArray:
+    """Return compliances, shape (..., parameter), none of them below what a spring can have."""
+    lower = np.array([parameter.lower for parameter in calibrated.model.parameters])
+    possible: FloatArray = np.maximum(compliance, lower)
+    return possible
+
+
+def _draws(
+    calibrated: CalibratedModel, rows: _Rows, L: FloatArray, weight: float, rng: Generator
+) -> FloatArray:
+    """Return the draws moved alike, each from where it was and with noise of its own."""
+    k = L.shape[1]
+    A = rows.A.reshape(-1, k)
+    before = (calibrated.draws - calibrated.compliance) @ np.linalg.pinv(L).T
+    noise = rng.standard_normal((len(before), k))
+    H = weight * A.T @ A
+    # A^T e of noise e has the covariance A^T A / weight: drawn as such, not row by row.
+    root = np.linalg.cholesky(H + _NEGLIGIBLE * np.trace(H) / k * np.eye(k))
+    target = weight * A.T @ rows.r.ravel() + noise @ root.T + before
+    z = np.clip(np.linalg.solve(H + np.eye(k), target.T).T, -2 * _FARTHEST, 2 * _FARTHEST)
+    return _springs(calibrated, calibrated.compliance + z @ L.T)

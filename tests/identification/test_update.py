@@ -1,0 +1,164 @@
+"""Springs brought up to date by tracked production, on a simulated arm of other equations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal.dataset import write
+from elastocal.errors import IdentificationError
+from elastocal.identification import calibrate, update_springs
+from elastocal.workflows import calibrate as calibrate_files
+from support import problems
+from support.cells import Cell, linear_truth, unseen
+from support.cli import elastocal
+
+COURSES = 6
+
+
+def readings_of(poses, seed):
+    return problems.campaign(poses, seed)
+
+
+def production(seed=1, softer=1.0, shift=0.2e-3, noise=10e-6):
+    """Return readings of an arm in six courses, each counted from a place of its own."""
+    readings, rng = readings_of(31, seed), np.random.default_rng(seed)
+    order = np.argsort(readings.joint_position[:, 0], kind="stable")
+    readings = readings.take(order)
+    course = np.arange(len(readings)) * COURSES // len(readings)
+    place = shift * rng.normal(size=(COURSES, 3))[course]
+    deflection = softer * readings.deflection + place + noise * rng.normal(size=(len(readings), 3))
+    return replace(
+        readings,
+        marker_displacement=readings.controller_displacement + deflection,
+        campaign=np.array([f"course {number}" for number in course]),
+    )
+
+
+@pytest.fixture(scope="module")
+def few():
+    """A model of five poses, which doubts much."""
+    model = problems.elastic("bearing")
+    return calibrate(model, readings_of(5, 0), np.random.default_rng(0)).calibrated
+
+
+def error(calibrated, readings):
+    found = calibrated.predict(readings.joint_position, readings.force).deflection
+    return float(np.linalg.norm(found - readings.deflection, axis=1).mean())
+
+
+def worn_unseen(softer):
+    """Return readings without noise at poses that nothing has seen, of an arm that got softer."""
+    readings = unseen(linear_truth())
+    marker = readings.controller_displacement + softer * readings.deflection
+    return replace(readings, marker_displacement=marker)
+
+
+@pytest.mark.parametrize("poses", [5, 31])
+def test_an_arm_that_got_softer_is_followed_at_poses_that_nothing_has_seen(poses):
+    model = problems.elastic("bearing")
+    old = calibrate(model, readings_of(poses, 0), np.random.default_rng(0)).calibrated
+    there = worn_unseen(1.1)
+    for seed in (1, 2, 3, 4):
+        moved, worth = update_springs(old, production(seed, 1.1), np.random.default_rng(1))
+        assert worth.taken
+        assert worth.after < worth.before
+        assert error(moved, there) < 0.7 * error(old, there)
+        assert np.all(moved.compliance >= 0.0)
+        assert moved.draws.shape == old.draws.shape
+        assert np.all(moved.draws >= 0.0)
+
+
+def test_what_is_known_better_has_tighter_intervals(few):
+    there = worn_unseen(1.1)
+    moved, _ = update_springs(few, production(1, 1.1), np.random.default_rng(1))
+    old, new = (
+        float((each.high - each.low).mean())
+        for each in (c.predict(there.joint_position, there.force) for c in (few, moved))
+    )
+    assert new < old
+
+
+def test_springs_that_would_predict_left_out_courses_worse_stay_as_they_were(few):
+    moved, worth = update_springs(few, production(), np.random.default_rng(1))
+    assert not worth.taken
+    assert moved is few
+    assert dict(worth.facts())["springs"] == "left as they were: nothing is gained"
+
+
+def test_the_place_that_a_course_is_counted_from_does_not_matter(few):
+    near, far = (
+        update_springs(few, production(1, 1.1, shift), np.random.default_rng(1))[0].compliance
+        for shift in (0.0, 5e-3)
+    )
+    np.testing.assert_allclose(near, far, rtol=1e-6, atol=1e-12)
+
+
+def test_springs_move_no_farther_than_the_calibration_doubted():
+    model = problems.elastic("bearing")
+    sure = calibrate(model, readings_of(31, 0), np.random.default_rng(0)).calibrated
+    _, worth = update_springs(sure, production(softer=3.0), np.random.default_rng(1))
+    assert worth.farthest <= 3.0
+
+
+def test_noise_alone_moves_nothing_or_next_to_nothing(few):
+    readings = production(noise=0.0)
+    rng = np.random.default_rng(3)
+    predicted = few.predict(readings.joint_position, readings.force).deflection
+    kept = 0
+    for _ in range(10):
+        noise = 0.3e-3 * rng.normal(size=predicted.shape)
+        told = replace(
+            readings, marker_displacement=readings.controller_displacement + predicted + noise
+        )
+        moved, worth = update_springs(few, told, rng)
+        kept += not worth.taken
+        off = moved.predict(readings.joint_position, readings.force).deflection - predicted
+        assert np.linalg.norm(off, axis=1).mean() < 0.2e-3
+    assert kept >= 3
+
+
+@pytest.mark.parametrize("name", [None, "only"])
+def test_one_course_is_not_enough(few, name):
+    readings = production()
+    campaign = None if name is None else np.full(len(readings), name)
+    with pytest.raises(IdentificationError, match="1 course of production"):
+        update_springs(few, replace(readings, campaign=campaign), np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Datasets of one arm on three days, and a model of the first."""
+    folder = tmp_path_factory.mktemp("update")
+    for name, seed in (("old", 0), ("monday", 1), ("tuesday", 2)):
+        write(Cell(linear_truth(), poses=12, seed=seed).measure(), folder / f"{name}.nc")
+    calibrate_files(folder / "old.nc", springs="bearing", draws=40, out=folder / "model.json")
+    return folder
+
+
+class TestTheCommand:
+    def test_files_are_courses_and_the_model_says_what_it_was_made_of(self, files):
+        result = calibrate_files(
+            [files / "monday.nc", files / "tuesday.nc"], update=files / "model.json"
+        )
+        assert result.update.courses == ("monday", "tuesday")
+        assert "updated by" in result.provenance
+        assert len(result.made_from) == 3
+        assert "left-out courses" in str(result)
+        done = elastocal(
+            *("calibrate", files / "monday.nc", files / "tuesday.nc", "--update"),
+            *(files / "model.json", "--out", files / "new.json"),
+        )
+        assert done.code == 0, done.err
+        assert "at left-out courses" in done.err
+        assert elastocal("check", files / "new.json").code == 0
+
+    @pytest.mark.parametrize("option", [("--budget",), ("--robot", "UR20"), ("--tcp", "tcp")])
+    def test_options_of_a_calibration_are_refused(self, files, option):
+        done = elastocal(
+            *("calibrate", files / "monday.nc", "--update", files / "model.json"),
+            *("--out", files / "no.json", *option),
+        )
+        assert done.code == 1
+        assert f"{option[0]} goes with a calibration, not with --update" in done.err
+        assert not (files / "no.json").exists()
