@@ -116,8 +116,6 @@ def ruled(
 
     Parameters
     ----------
-    rule : OutputRule
-        The rule.
     inputs, outputs : iterable of Path
         Paths that the settings name.
 

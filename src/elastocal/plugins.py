@@ -329,8 +329,6 @@ class Registry(Mapping[str, _T], Generic[_T]):
 
         Parameters
         ----------
-        name : str
-            Name.
         beside : sequence of str
             Further names that the caller accepts, for the message.
         more : str

@@ -161,8 +161,6 @@ class TableRows:
 
         Parameters
         ----------
-        column : Column
-            The column.
         parse : callable, optional
             Reads a cell that is not an ordinary number; its `ValueError` says what the cell is.
             Finite numbers only by default.

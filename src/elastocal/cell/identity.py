@@ -38,11 +38,6 @@ def fingerprint(cell: Cell) -> str:
     the place of the folder, optional keys that are not given, or the sections that say how a plan
     is carried out (`RUN_SECTIONS`).
 
-    Parameters
-    ----------
-    cell : Cell
-        The cell.
-
     Returns
     -------
     str

@@ -278,8 +278,6 @@ class Driver(Protocol):
 
         Parameters
         ----------
-        cell : Cell
-            The cell.
         wanted : mapping
             Settings by kind, as `settings` has checked them.
         context : RigContext

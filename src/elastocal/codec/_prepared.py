@@ -204,8 +204,6 @@ def prepared_variants(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     readings : Readings
         Those that the codec was made from.
     data : CodecData

@@ -83,8 +83,6 @@ def cross_validate(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     readings : Readings
         Measurements, joints in the robot's order; from `Dataset.readings`.
     variants : sequence of Variant
@@ -282,8 +280,6 @@ def _train(
         The variant.
     known : dict
         Springs by the training poses that carry them; springs chosen here are added.
-    split : Split
-        The split.
     most : int
         Largest number of training poses.
     seed : int

@@ -196,11 +196,6 @@ def cell_constraints(cell: Cell) -> tuple[PostureConstraint, ...]:
     """Return the constraints of a cell: joint margin, singularity, collision with its solids.
 
     The tool is in contact: it is not checked against the surface that it works on.
-
-    Parameters
-    ----------
-    cell : Cell
-        The cell.
     """
     robot, limits = cell.robot, cell.file.limits
     scene = collision_scene(cell, cell_surface(cell))

@@ -281,8 +281,6 @@ def require_labels(kind: str, labels: Iterable[object]) -> None:
     ----------
     kind : str
         What they name: load case, campaign, station; for the message.
-    labels : iterable
-        The labels.
 
     Raises
     ------

@@ -280,8 +280,6 @@ def bearing_joint(robot: Robot, distal: bool = False) -> tuple[Spring, ...]:
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     distal : bool
         Put the virtual springs behind each joint's motion instead of in the bearing housing.
     """
@@ -358,8 +356,6 @@ def layout(robot: Robot, name: str, beside: Sequence[str] = ()) -> tuple[Spring,
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     name : str
         Name or path.
     beside : sequence of str

@@ -69,13 +69,7 @@ def show_geometry(
 
 
 def show_position_plan(plan: PositionPlan) -> Iterator[Block]:
-    """Yield the poses to measure, and the expected accuracy.
-
-    Parameters
-    ----------
-    plan : PositionPlan
-        The plan.
-    """
+    """Yield the poses to measure, and the expected accuracy."""
     seen = Counter(pose.station for pose in plan.poses)
     yield Paragraph(
         phrase(

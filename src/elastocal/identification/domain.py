@@ -83,8 +83,6 @@ class CalibrationDomain:
 
         Parameters
         ----------
-        robot : Robot
-            The robot.
         readings : Readings
             Those that entered the fit.
         block : ndarray, shape (reading,)

@@ -105,8 +105,6 @@ def frame_columns(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     readings : Readings
         With joints in the robot's order.
     free : str

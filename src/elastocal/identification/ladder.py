@@ -134,8 +134,6 @@ def choose_model(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     readings : Readings
         Measurements, joints in the robot's order.
     springs : str
@@ -203,8 +201,6 @@ def climb(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     readings : Readings
         Without blunders.
     rungs : sequence of Rung

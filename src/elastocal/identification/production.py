@@ -301,8 +301,6 @@ def near_postures(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     q, poses : ndarray, shapes (row, joint) and (pose, joint)
         Rows and postures, in rad or m.
     reaches : float
@@ -321,8 +319,6 @@ def poses_in_company(robot: Robot, q: FloatArray, pose: IndexArray) -> BoolArray
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     q, pose : ndarray, shapes (reading, joint) and (reading,)
         Joint positions of readings in rad or m, and the poses that they are of.
     """

@@ -113,8 +113,6 @@ def normalised_residuals(
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
     compliance : ndarray, shape (spring,)
         Where residuals are taken.
     shrinkage : ndarray, shape (reading,), or float

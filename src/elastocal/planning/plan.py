@@ -79,8 +79,6 @@ def require_possible_search(cell: Cell, compare: str | None = None) -> None:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     compare : str, optional
         Search technique to compare with the cell's own.
 
@@ -230,8 +228,6 @@ def make_plan(
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     compare : str, optional
         Search technique that is to choose as many poses from the same pool, for comparison.
     jobs : int, optional

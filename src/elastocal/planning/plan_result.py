@@ -332,8 +332,6 @@ def check_plan(plan: PlanResult, what: str = "plan") -> None:
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     what : str
         How the message names it.
 

@@ -149,8 +149,6 @@ def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     data : PoolData
         The pool that lies beside it.
     what : str

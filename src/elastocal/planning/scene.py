@@ -240,8 +240,6 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     surface : Surface
         Its surface.
     rng : Generator

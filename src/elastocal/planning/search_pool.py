@@ -128,8 +128,6 @@ class SearchPool:
 
         Parameters
         ----------
-        cell : Cell
-            The cell.
         left : ndarray of int, shape (candidate,)
             Candidates that may be chosen.
         rng : Generator

@@ -161,8 +161,6 @@ def find_meshes(urdf: str, folder: Path) -> tuple[tuple[str, Path], ...]:
 
     Parameters
     ----------
-    urdf : str
-        The URDF.
     folder : Path
         Its folder. Relative names are relative to it; ``package://NAME/REST`` is ``NAME/REST``
         in it or in the nearest folder above, else ``REST`` in it or in the one above;

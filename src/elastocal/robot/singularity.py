@@ -27,11 +27,6 @@ def characteristic_length(robot: Robot) -> float:
     Source: J. Angeles, *Fundamentals of Robotic Mechanical Systems*, 4th ed., Springer 2014,
     chapter 5 (kinetostatic performance indices of positioning and orienting manipulators).
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
     Raises
     ------
     RobotError
@@ -63,8 +58,6 @@ def scaled_singular_values(robot: Robot, q: ArrayLike, length: float | None = No
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     q : array_like, shape (..., joint)
         Joint positions in rad or m.
     length : float, optional

@@ -394,8 +394,6 @@ def region_around(cell: Cell, points: FloatArray) -> RegionForm:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     points : ndarray, shape (point, 3)
         In base, in m.
     """

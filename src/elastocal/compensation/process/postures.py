@@ -323,8 +323,6 @@ def process_courses(name: str, cell: Cell, seed: int, count: int | None) -> tupl
     ----------
     name : str
         One of `PROCESSES`.
-    cell : Cell
-        The cell.
     seed : int
         Seed of the forces.
     count : int, optional
@@ -349,8 +347,6 @@ def with_postures(cell: Cell, courses: tuple[Course, ...]) -> tuple[Course, ...]
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     courses : tuple of Course
         Without joints.
 
@@ -417,8 +413,6 @@ def stiffest_posture(
     ----------
     calibrated : CalibratedModel
         Calibrated model of the cell's robot.
-    cell : Cell
-        The cell.
     courses : tuple of Course
         With joints.
 

@@ -50,8 +50,6 @@ def write_plan_program(
     ----------
     folder : Path
         Where to write.
-    plan : PlanResult
-        The plan.
     writer : ProgramWriter
         Writer of the language.
     name : str
@@ -89,8 +87,6 @@ def plan_program(plan: PlanResult, writer: ProgramWriter, name: str = "calib") -
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     writer : ProgramWriter
         Whose words its head uses.
     name : str

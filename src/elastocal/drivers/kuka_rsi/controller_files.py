@@ -200,8 +200,6 @@ def controller_files(cell: Cell, settings: RsiSettings) -> dict[str, bytes]:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     settings : RsiSettings
         Those of its arm.
 
@@ -234,8 +232,6 @@ def check_controller_file(text: str, cell: Cell, settings: RsiSettings) -> None:
     ----------
     text : str
         Contents of the file; its root element gives its kind.
-    cell : Cell
-        The cell.
     settings : RsiSettings
         Those of its arm.
 

@@ -361,8 +361,6 @@ class CorrectedKuka:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     settings : RsiSettings
         Settings of its arm, in mode ``compensation``.
     context : RigContext

@@ -62,8 +62,6 @@ class KukaListener:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     settings : RsiSettings
         Settings of its arm.
     context : RigContext

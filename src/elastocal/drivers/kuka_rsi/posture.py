@@ -69,8 +69,6 @@ class PostureReader:
 
         Parameters
         ----------
-        message : RobMessage
-            The message.
         now : float
             When it came, in s of the clock.
         mode : str

@@ -242,8 +242,6 @@ def joint_mistakes(robot: Robot, left: Callable[[JointRead], float]) -> Iterator
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     left : callable
         What stays unexplained with the joints read otherwise; by it the zero of each joint is
         estimated.
@@ -287,8 +285,6 @@ def name_joint_mistake(robot: Robot, left: Callable[[JointRead], float], enough:
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     left : callable
         What stays unexplained with the joints read otherwise.
     enough : float

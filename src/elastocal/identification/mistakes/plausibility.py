@@ -170,8 +170,6 @@ def find_implausible(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     readings : Readings
         With joints in the robot's order.
     marker_offset : array_like, shape (3,), optional

@@ -569,8 +569,6 @@ def find_undone(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     readings : Readings
         With joints in the robot's order.
     marker_offset : array_like, shape (3,), optional

@@ -52,8 +52,6 @@ def pose_lines(plan: PlanResult, seconds: Mapping[int, float] | None = None) -> 
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     seconds : mapping of int to float, optional
         Time of each pose, by its id, in s; by default the plan's own.
 

@@ -232,8 +232,6 @@ def mover_for(cell: Cell, scene: CollisionScene) -> Mover:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     scene : CollisionScene
         Its robot and tool among tooling and fixtures.
     """

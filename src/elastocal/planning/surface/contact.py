@@ -76,8 +76,6 @@ def fit_disk(surface: Surface, points: SurfacePoints, radius: float) -> DiskFit:
 
     Parameters
     ----------
-    surface : Surface
-        The surface.
     points : SurfacePoints
         Centres of the disks, on that surface.
     radius : float

@@ -34,8 +34,6 @@ def distance_to_boundary(surface: Surface, points: SurfacePoints) -> FloatArray:
 
     Parameters
     ----------
-    surface : Surface
-        The surface.
     points : SurfacePoints
         On that surface.
 
@@ -129,8 +127,6 @@ def geodesic_distance(
 
     Parameters
     ----------
-    surface : Surface
-        The surface.
     points : SurfacePoints
         On that surface.
     spacing : float, optional

@@ -100,13 +100,7 @@ OF_WRONG_MESHES = frozenset(kind.name for kind in (TINY, SOLID_TINY, INCHES, INS
 
 
 def mesh_findings(surface: Surface) -> tuple[Finding, ...]:
-    """Return the oddities of the mesh itself. None of them stops the work.
-
-    Parameters
-    ----------
-    surface : Surface
-        The surface.
-    """
+    """Return the oddities of the mesh itself. None of them stops the work."""
     mesh = surface.mesh
     odd = (
         (DEGENERATE, mesh.degenerate),
@@ -125,8 +119,6 @@ def placement_findings(
 
     Parameters
     ----------
-    surface : Surface
-        The surface.
     first_joints : ndarray, shape (place, 3)
         Where the arm's first joint can be, in base, in m: one row without a rail.
     reach : float
@@ -151,8 +143,6 @@ def tiny_finding(surface: Surface, reach: float) -> tuple[Finding, ...]:
 
     Parameters
     ----------
-    surface : Surface
-        The surface.
     reach : float
         Reach of the arm with its tool, in m.
     """
@@ -227,8 +217,6 @@ def inverted_finding(surface: Surface, reachable: Reachable, rng: Generator) -> 
 
     Parameters
     ----------
-    surface : Surface
-        The surface.
     reachable : callable
         The robot; see `Reachable`.
     rng : Generator
@@ -273,8 +261,6 @@ def first_joint_positions(robot: Robot, external: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     external : ndarray, shape (combination, external axis)
         Positions of its external axes in rad or m.
     """

@@ -633,8 +633,6 @@ def derive_poses(
     ----------
     poses : sequence of PoseReadings
         In the order of time.
-    cell : Cell
-        The cell.
     plan : PlanResult
         The plan; its load cases are the dataset's.
     entries : sequence of Entry

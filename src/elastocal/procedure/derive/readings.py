@@ -320,8 +320,6 @@ def robot_errors(robot: Robot, q: FloatArray, gravity: FloatArray, lever: FloatA
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     q : ndarray, shape (pose, joint)
         In rad or m.
     gravity : ndarray, shape (3,)

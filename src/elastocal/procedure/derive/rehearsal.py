@@ -31,8 +31,6 @@ def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record:
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     plan : PlanResult
         Its plan.
     folder : RunFolder

@@ -98,8 +98,6 @@ def fill_folder(folder: RunFolder, cell: Cell, plan: Path) -> None:
     ----------
     folder : RunFolder
         Made if it is not there.
-    cell : Cell
-        The cell.
     plan : Path
         Folder with the plan.
 

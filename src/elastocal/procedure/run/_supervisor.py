@@ -60,8 +60,6 @@ class Supervisor:
 
     Parameters
     ----------
-    devices : Devices
-        The devices.
     settings : RunSettings
         The run's figures.
     logbook : Logbook

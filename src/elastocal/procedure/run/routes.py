@@ -84,8 +84,6 @@ def route(plan: PlanResult, start: int, end: int) -> tuple[Joints, ...]:
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     start, end : int
         Numbers of stops.
     """
@@ -128,8 +126,6 @@ def home_route(
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     q : ndarray, shape (joint,)
         Present joint positions, in rad or m.
     T_base_tcp : ndarray, shape (4, 4)
@@ -217,8 +213,6 @@ def itinerary(plan: PlanResult, settings: RunSettings) -> tuple[PlannedStep, ...
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     settings : RunSettings
         Figures of the run.
     """

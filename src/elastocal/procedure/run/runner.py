@@ -629,8 +629,6 @@ class Runner:
     ----------
     session : Session
         What is to be done.
-    devices : Devices
-        The devices.
     journal : Journal
         Open, with its first entry written.
     hooks : SessionHooks

@@ -93,8 +93,6 @@ def run_settings(cell: Cell, plan: PlanResult, *, touches: bool = False) -> RunS
 
     Parameters
     ----------
-    cell : Cell
-        The cell.
     plan : PlanResult
         Its plan.
     touches : bool
@@ -204,8 +202,6 @@ def check_compatible(plan: PlanResult, cell: Cell) -> None:
 
     Parameters
     ----------
-    plan : PlanResult
-        The plan.
     cell : Cell
         The cell; the plan carries its fingerprint.
 
@@ -222,11 +218,6 @@ def check_compatible(plan: PlanResult, cell: Cell) -> None:
 
 def registration_warnings(plan: PlanResult) -> tuple[Finding, ...]:
     """Return a warning for each station that sees too few poses to be registered.
-
-    Parameters
-    ----------
-    plan : PlanResult
-        The plan.
 
     Raises
     ------

@@ -185,8 +185,6 @@ def _tool_path(cell: Cell, plan: PlanResult, steps: int = 12) -> FloatArray:
     ----------
     cell : Cell
         Whose robot moves.
-    plan : PlanResult
-        The plan.
     steps : int
         Points on each straight piece.
     """

@@ -68,8 +68,6 @@ def spring_bars(model: CalibratedModel, settings: FitSettings | None = None) -> 
 
     Parameters
     ----------
-    model : CalibratedModel
-        The model.
     settings : FitSettings, optional
         Settings of its fit; see `spring_summaries`.
     """

@@ -41,8 +41,6 @@ def arm_base(robot: Robot, external: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     external : ndarray, shape (..., external axis)
         Positions of its external axes in rad or m.
 

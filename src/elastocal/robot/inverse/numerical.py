@@ -54,11 +54,6 @@ class ParallelInverse(InverseKinematics):
     and 6 are parallel only the sum of joints counts: joint 6 is at zero, or as near as its limits
     allow.
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
     Raises
     ------
     NotParallelError

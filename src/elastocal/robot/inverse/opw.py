@@ -111,11 +111,6 @@ class OpwInverse(InverseKinematics):
     Where such a choice takes another joint outside its limits, other members of the family may be
     inside: they are not searched.
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
     Raises
     ------
     NotOrthoParallelError

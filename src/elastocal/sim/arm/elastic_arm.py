@@ -221,8 +221,6 @@ def with_link_bending(
 
     Parameters
     ----------
-    arm : ElasticArm
-        The arm.
     stiffness : mapping
         Bending stiffness in N·m/rad by the name of the joint in front of the link.
     fraction : float
