@@ -1,10 +1,14 @@
 """``import elastocal as ec``: every command, the nouns, the readers; nothing before it is used."""
 
+import inspect
 import subprocess
 import sys
 
+import pytest
+
 import elastocal as ec
 from elastocal.cli.commands import COMMANDS
+from elastocal.elastic import Hinge
 
 OTHERWISE = {"import": "import_logs"}
 """Commands whose name is a word of Python."""
@@ -26,8 +30,71 @@ def test_a_package_that_bears_the_name_of_a_command_does_not_hide_it():
 
     assert CodecOptions.__module__.startswith("elastocal.codec")
     assert callable(write_plan_page)
-    assert ec.codec.__module__ == "elastocal.workflows.codec"
-    assert ec.report.__module__ == "elastocal.workflows.report"
+    import elastocal.codec as package
+
+    assert package is ec.codec
+    assert package.CodecOptions is CodecOptions
+    assert next(iter(inspect.signature(ec.codec).parameters)) == "data"
+    assert next(iter(inspect.signature(ec.report).parameters)) == "run"
+    with pytest.raises(TypeError, match=r"codec\(\) needs 'data'"):
+        ec.codec()
+
+
+def test_packages_are_completed_and_found_without_being_imported():
+    code = "import elastocal as ec; print(ec.identification.calibrate.__name__, *dir(ec))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    shown = done.stdout.split()
+    assert shown[0] == "calibrate"
+    assert {"codec", "datasets", "elastic", "geometry", "identification", "robot"} < set(shown)
+    assert not [name for name in shown if name.startswith("_") and name != "__version__"]
+
+
+def test_every_field_of_the_settings_stands_in_help_and_in_the_signature():
+    for name in ("calibrate", "plan", "run", "codec", "report", "import_logs", "simulate_process"):
+        command = getattr(ec.workflows, name)
+        text, parameters = inspect.getdoc(command), inspect.signature(command).parameters
+        missing = [each for each in parameters if f"\n{each} : " not in text]
+        assert missing == [], name
+        assert "settings :" not in text
+        assert "\nReturns\n-------\n" in text
+        assert "Annotated" not in str(inspect.signature(command))
+
+
+def test_what_has_no_default_may_be_given_by_place():
+    assert [*inspect.signature(ec.compare).parameters][:3] == ["old", "new", "progress"]
+    with pytest.raises(TypeError, match=r"compare\(\) needs 'new'"):
+        ec.compare("a.json")
+    with pytest.raises(TypeError, match=r"multiple values for 'old'"):
+        ec.compare("a.json", old="b.json", new="c.json")
+    with pytest.raises(TypeError, match="takes 2 arguments without a name"):
+        ec.compare("a.json", "b.json", print, "c.json")
+
+
+@pytest.fixture(scope="module")
+def readings():
+    return ec.datasets.fanuc_r2000ic()
+
+
+def test_calibrate_takes_datasets_and_springs_as_objects(readings, tmp_path):
+    springs = tuple(Hinge(f"joint_{n}.axial", f"joint_{n}", axis=(0, 0, 1)) for n in range(1, 5))
+    found = ec.calibrate(readings, springs=iter(springs), out=tmp_path / "model.json")
+    assert found.springs == springs
+    assert found.calibration.settings.springs == "given"
+    again = ec.read_model(tmp_path / "model.json")
+    assert again.model.springs == springs
+    named = ec.calibrate([readings, readings], springs="actuated")
+    assert [*named.made_from] == ["dataset 1", "dataset 2"]
+    assert named.calibration.readings == 2 * len(readings.poses)
+
+
+def test_models_are_taken_as_objects(readings, tmp_path):
+    old = ec.calibrate(readings, springs="actuated", out=tmp_path / "old.json")
+    new = ec.calibrate(readings, springs="actuated", exclude=("0", "1"), out=tmp_path / "new.json")
+    by_objects = ec.compare(old, new.calibrated)
+    by_files = ec.compare(tmp_path / "old.json", tmp_path / "new.json")
+    assert by_objects.summary.springs == by_files.summary.springs
+    with pytest.raises(ec.errors.IdentificationError, match="one and the same model"):
+        ec.compare(old, old)
 
 
 def test_what_the_face_names_is_there():

@@ -14,8 +14,11 @@ imported when they are first used.
 """
 
 import ast
+import importlib
+import os
 import sys
 import types
+from collections.abc import Callable
 
 import lazy_loader
 
@@ -33,20 +36,52 @@ _exports = {
 # The stub exports all commands by "*"; `lazy_loader` needs their names.
 _commands = next(s for s in _statements("workflows/__init__.pyi") if isinstance(s, ast.Assign))
 _exports["workflows"] = ast.literal_eval(_commands.value)
-__getattr__, __dir__, __all__ = lazy_loader.attach(__name__, submod_attrs=_exports)
+_attribute, _, __all__ = lazy_loader.attach(__name__, submod_attrs=_exports)
+_PACKAGES = sorted(
+    entry.name.removesuffix(".py")
+    for entry in os.scandir(__path__[0])
+    if not entry.name.startswith(("_", "options", "outputs"))
+    and (entry.is_dir() or entry.name.endswith(".py"))
+)
+"""Subpackages and modules; ``codec``, ``geometry``, ``report`` and ``studio`` are commands too."""
+
+
+def __getattr__(name: str) -> object:
+    if name in _PACKAGES:
+        return importlib.import_module(f"{__name__}.{name}")
+    return _attribute(name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, *_PACKAGES})
+
+
+class _Command(types.ModuleType):
+    """A package that bears the name of a command, and is called as it."""
+
+    @property
+    def __wrapped__(self) -> Callable[..., object]:
+        """The command; `inspect.signature` asks for it."""
+        workflows = importlib.import_module(f"{__package__}.workflows")
+        return getattr(workflows, self.__name__.rpartition(".")[2])
+
+    def __call__(self, *given: object, **options: object) -> object:
+        """Carry out the command."""
+        return self.__wrapped__(*given, **options)
 
 
 class _Face(types.ModuleType):
-    """Keeps the commands `codec` and `report` in sight of the packages that bear their names.
+    """Makes packages with the name of a command callable: ``ec.codec(...)`` is the command.
 
-    Python sets a package's attribute when a subpackage is imported; ``ec.codec(...)`` is to stay
-    the command. ``from elastocal.codec import ...`` finds the package as ever.
+    Python sets a package's attribute when a subpackage is imported; ``import elastocal.codec`` and
+    ``from elastocal.codec import ...`` find the package as ever.
     """
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Set an attribute, but no subpackage under the name of a command."""
-        if not (name in __all__ and isinstance(value, types.ModuleType)):
-            super().__setattr__(name, value)
+        """Set an attribute; a subpackage that bears the name of a command is called as it."""
+        if name in __all__ and isinstance(value, types.ModuleType):
+            value.__class__ = _Command
+        super().__setattr__(name, value)
 
 
 sys.modules[__name__].__class__ = _Face

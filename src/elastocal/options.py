@@ -204,13 +204,20 @@ def _own_fields(node: ast.ClassDef) -> Iterator[SettingsField]:
         kind, option = _option(each.annotation)
         default: Any = REQUIRED
         if each.value is not None:
-            try:
-                default = ast.literal_eval(each.value)
-            except ValueError:
-                default = OWN
+            default = _default(each.value)
         text = after.value if isinstance(after, ast.Expr) else None
         doc = str(text.value) if isinstance(text, ast.Constant) else ""
         yield SettingsField(each.target.id, kind, default, _plain(doc), option)
+
+
+def _default(value: ast.expr) -> Any:
+    """Return a default by its source, that of ``field(default=...)`` too."""
+    if isinstance(value, ast.Call):
+        value = next((word.value for word in value.keywords if word.arg == "default"), value)
+    try:
+        return ast.literal_eval(value)
+    except ValueError:
+        return OWN
 
 
 def _option(annotation: ast.expr) -> tuple[str, Option]:

@@ -57,6 +57,7 @@ from .ladder import (
 from .load_check import LoadCheck as LoadCheck, check_loads as check_loads
 from .model_file import (
     CalibrateResult as CalibrateResult,
+    ModelSource as ModelSource,
     RobotRecord as RobotRecord,
     read_model as read_model,
     write_model as write_model,

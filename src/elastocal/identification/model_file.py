@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import field, replace
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -243,8 +244,12 @@ def write_model(
     write_json(path, CalibrateResult.of(calibrated, calibration))
 
 
-def read_model(path: Path) -> CalibratedModel:
-    """Return the calibrated model of a file.
+ModelSource = str | PathLike[str] | CalibrateResult | CalibratedModel
+"""A model, or the file that holds it."""
+
+
+def read_model(source: ModelSource) -> CalibratedModel:
+    """Return the calibrated model of a file; a model is returned as it is.
 
     Raises
     ------
@@ -255,4 +260,8 @@ def read_model(path: Path) -> CalibratedModel:
     FileAccessError
         If it cannot be read.
     """
-    return read_json(path, CalibrateResult).calibrated
+    if isinstance(source, CalibratedModel):
+        return source
+    if isinstance(source, CalibrateResult):
+        return source.calibrated
+    return read_json(Path(source), CalibrateResult).calibrated

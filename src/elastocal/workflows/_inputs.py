@@ -26,6 +26,7 @@ from elastocal.errors import (
 from elastocal.identification import (
     MOST_UNEXPLAINED,
     CalibratedModel,
+    ModelSource,
     attainable_rank,
     describe_briefly,
     read_model,
@@ -146,7 +147,7 @@ class NewTool:
     tool_centre: str | None = None
     """Centre of that mass in the new tcp's frame, ``"x, y, z"`` with units."""
 
-    def read_model(self, path: Path) -> CalibratedModel:
+    def read_model(self, source: ModelSource) -> CalibratedModel:
         """Return the calibrated model of a file, at the tool that is meant.
 
         Raises
@@ -156,7 +157,7 @@ class NewTool:
         SchemaError, FileAccessError
             If the file is not a model, or cannot be read.
         """
-        calibrated = read_model(path)
+        calibrated = read_model(source)
         if self.tool_frame is None:
             if self.tool_mass is not None or self.tool_centre is not None:
                 raise RobotError("a tool's mass needs its tcp: give --tool 'x, y, z, a, b, c'")

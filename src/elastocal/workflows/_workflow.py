@@ -6,11 +6,13 @@ Each runs under the rule for its outputs (`elastocal.outputs`), made from its se
 import dataclasses
 import functools
 import inspect
+import itertools
 import types
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import (
+    Annotated,
     Any,
     Protocol,
     TypeVar,
@@ -26,6 +28,7 @@ from elastocal.errors import nearest
 from elastocal.files import remove_leftovers, require_place
 from elastocal.outputs import OutputRule, ruled
 from elastocal.progress import Progress, silent
+from elastocal.workflows._documented import documented
 
 S = TypeVar("S", contravariant=True)
 R = TypeVar("R", covariant=True)
@@ -40,6 +43,10 @@ class Workflow(Protocol[S, R]):
     def __call__(self, settings: S, /, progress: Progress = ...) -> R: ...
     @overload
     def __call__(self, source: Any = ..., /, progress: Progress = ..., **options: Any) -> R: ...
+    @overload
+    def __call__(
+        self, source: Any, other: Any, /, progress: Progress = ..., **options: Any
+    ) -> R: ...
 
 
 def workflow(
@@ -51,8 +58,8 @@ def workflow(
 ) -> Callable[[Callable[[S, Progress], R]], Workflow[S, R]]:
     """Let a function of settings and progress also be called with the fields of its settings.
 
-    Files may be given as texts, and a single item instead of a list; `inspect.signature` shows the
-    fields.
+    Files may be given as texts, and one item instead of several. Fields without a default may be
+    given by place. `inspect.signature` and `help` show the fields (`documented`).
 
     Parameters
     ----------
@@ -68,25 +75,17 @@ def workflow(
         Field with the folder of a run whose record is written; no other workflow may.
     """
     fields = inspect.signature(settings).parameters
-    first = next(name for name, each in fields.items() if each.kind is not each.KEYWORD_ONLY)
-    required = fields[first].default is inspect.Parameter.empty
+    placed = [name for name, each in fields.items() if each.kind is not each.KEYWORD_ONLY]
+    needed = [name for name in placed if fields[name].default is inspect.Parameter.empty]
+    by_place = needed or placed[:1]
 
     def mark(function: Callable[[S, Progress], R]) -> Workflow[S, R]:
         @functools.wraps(function)
         def call(*given: Any, progress: Progress = silent, **options: Any) -> R:
-            source, hears = given[:1], given[1:]
-            if len(hears) > 1:
-                raise TypeError(f"{function.__name__}() takes one argument without a name")
-            _require_known(function.__name__, options, fields)
-            if source and isinstance(source[0], settings):
-                chosen: Any = dataclasses.replace(source[0], **options)  # type: ignore[type-var]
-            elif required and not source and first not in options:
-                raise TypeError(f"{function.__name__}() needs {first!r}")
-            else:
-                chosen = settings(*source, **options)
+            chosen, hears = _chosen(function.__name__, settings, by_place, given, options)
             chosen = _as_hinted(chosen)
-            places = _places(chosen)
-            written = [path for name in (*outputs, record) for path in places.pop(name, ())]
+            files = _places(chosen)
+            written = [path for each in (*outputs, record) for path in files.pop(each, ())]
             for path in written:
                 remove_leftovers(path)
                 if marks:  # a file; folders are made
@@ -97,18 +96,77 @@ def workflow(
                 folder=next(iter(written), None),
                 record=written[0] if record else None,
             )
-            with ruled(rule, (path for paths in places.values() for path in paths), written):
+            with ruled(rule, (path for paths in files.values() for path in paths), written):
                 return function(chosen, *(hears or (progress,)))
 
-        shown = [each.replace(kind=each.KEYWORD_ONLY) for each in fields.values()]
-        shown.sort(key=lambda each: each.name != first)
-        shown[0] = shown[0].replace(kind=inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        follows = inspect.signature(function).parameters["progress"].replace(default=silent)
-        signature = inspect.Signature([shown[0], follows, *shown[1:]])
+        signature = _signature(function, fields, by_place)
         call.__signature__ = signature  # type: ignore[attr-defined]
+        call.__doc__ = documented(function, settings)
         return cast("Workflow[S, R]", call)
 
     return mark
+
+
+def _chosen(
+    name: str,
+    settings: type[Any],
+    by_place: Sequence[str],
+    given: Sequence[Any],
+    options: dict[str, Any],
+) -> tuple[Any, Sequence[Any]]:
+    """Return the settings of a call, and what is left of its arguments without a name."""
+    fields = inspect.signature(settings).parameters
+    _require_known(name, options, fields)
+    is_settings = bool(given) and isinstance(given[0], settings)
+    places = 1 if is_settings else _count_places(given, len(by_place))
+    if len(given) > places + 1:
+        count = f"{len(by_place)} arguments" if by_place[1:] else "one argument"
+        raise TypeError(f"{name}() takes {count} without a name")
+    if is_settings:
+        return dataclasses.replace(given[0], **options), given[1:]
+    options |= _by_name(name, by_place, given[:places], options)
+    for each in by_place:
+        if each not in options and fields[each].default is inspect.Parameter.empty:
+            raise TypeError(f"{name}() needs {each!r}")
+    return settings(**options), given[places:]
+
+
+def _signature(
+    function: Callable[..., Any], fields: Mapping[str, inspect.Parameter], by_place: Sequence[str]
+) -> inspect.Signature:
+    """Return the signature that shows the fields: those given by place, the progress, the rest."""
+    shown = [
+        each.replace(kind=each.KEYWORD_ONLY, annotation=_plain(each.annotation))
+        for each in fields.values()
+    ]
+    placed = [
+        each.replace(kind=each.POSITIONAL_OR_KEYWORD) for each in shown if each.name in by_place
+    ]
+    follows = inspect.signature(function).parameters["progress"].replace(default=silent)
+    rest = (each for each in shown if each.name not in by_place)
+    return inspect.Signature([*placed, follows, *rest])
+
+
+def _plain(annotation: Any) -> Any:
+    """Return a type without what a command line adds to it."""
+    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+
+
+def _count_places(given: Sequence[Any], most: int) -> int:
+    """Return how many arguments without a name are fields; what can be called is the progress."""
+    fields = itertools.takewhile(lambda each: not callable(each), given[1:most])
+    return min(len(given), 1) + sum(1 for _ in fields)
+
+
+def _by_name(
+    function: str, names: Sequence[str], given: Sequence[Any], options: Collection[str]
+) -> dict[str, Any]:
+    """Return arguments without a name by their fields."""
+    found = dict(zip(names, given, strict=False))
+    for name in found:
+        if name in options:
+            raise TypeError(f"{function}() got multiple values for {name!r}")
+    return found
 
 
 def _require_known(function: str, options: Collection[str], fields: Collection[str]) -> None:

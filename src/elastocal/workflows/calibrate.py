@@ -1,22 +1,23 @@
 """``calibrate``: from a measured dataset to a calibrated model (paper Eq. 15-19)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
 from elastocal import identification
 from elastocal.cell import ProcessFile, ProductionPath, read_production
-from elastocal.dataset import Dataset, content_sha256, merge, read, without
-from elastocal.elastic import known_springs
+from elastocal.dataset import Dataset, Readings, content_sha256, merge, read, without
+from elastocal.elastic import ElasticModel, KnownSpring, Spring, known_springs
 from elastocal.errors import DatasetError, ElastocalError, IdentificationError, present
 from elastocal.findings import Finding, Kind
 from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
+    Climbed,
     FitSettings,
     PredictionDoubt,
     ProductionCoverage,
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
     from elastocal.cell import Cell
 
 __all__ = ["CalibrateResult", "CalibrateSettings", "calibrate"]
+_GIVEN = "given"
+"""What a model file says of springs that were given themselves."""
 _SAME_MARKER = 0.03
 """Distance of a marker from where readings say, in m, within which it is that one."""
 
@@ -50,8 +53,18 @@ _SAME_MARKER = 0.03
 class CalibrateSettings(FitSettings):
     """Settings of a calibration: readings, springs and fit."""
 
-    data: Annotated[str | PathLike[str] | Sequence[str | PathLike[str]], Option(argument=True)]
-    """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are renumbered."""
+    data: Annotated[
+        str | PathLike[str] | Dataset | Sequence[str | PathLike[str] | Dataset],
+        Option(argument=True),
+    ]
+    """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are renumbered. In
+    Python also a `Dataset`."""
+    # Wider than what a model file keeps of it; see `fit`.
+    springs: Annotated[str | Iterable[Spring], Option(choices="springs", file=True)] = field(
+        default="auto", kw_only=True
+    )  # type: ignore[assignment]
+    """Spring layout: a name, or a YAML file; ``auto``: the model that the readings carry. In Python
+    also springs."""
     out: Annotated[Path | None, Option(required=True, help="Model file to write.")] = None
     """Model file to write; none: the result is only returned."""
     robot: Annotated[str | None, Option(choices="robot")] = None
@@ -77,15 +90,40 @@ class CalibrateSettings(FitSettings):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The datasets."""
-        if isinstance(self.data, str | PathLike):
-            return (Path(self.data),)
-        return tuple(map(Path, self.data))
+        """The datasets that are files."""
+        return tuple(Path(each) for each in self._sources if not isinstance(each, Dataset))
+
+    def __post_init__(self) -> None:
+        """Keep the springs that an iterator gives."""
+        super().__post_init__()
+        if not isinstance(self.springs, str):
+            object.__setattr__(self, "springs", tuple(self.springs))
+
+    def read(self) -> list[tuple[Path, Dataset]]:
+        """Return the datasets with their files; one that is given has the name of its place."""
+        return [
+            (Path(f"dataset {number}"), each)
+            if isinstance(each, Dataset)
+            else (Path(each), read(Path(each)))
+            for number, each in enumerate(self._sources, start=1)
+        ]
+
+    @property
+    def _sources(self) -> tuple[str | PathLike[str] | Dataset, ...]:
+        if isinstance(self.data, str | PathLike | Dataset):
+            return (self.data,)
+        return tuple(self.data)
 
     @property
     def fit(self) -> FitSettings:
         """The part of the settings that the model file keeps."""
-        return FitSettings(**{each.name: getattr(self, each.name) for each in fields(FitSettings)})
+        kept = {each.name: getattr(self, each.name) for each in fields(FitSettings)}
+        return FitSettings(**kept | {"springs": self.springs if self.given is None else _GIVEN})
+
+    @property
+    def given(self) -> tuple[Spring, ...] | None:
+        """The springs that are given themselves; None: those of a layout or a file."""
+        return None if isinstance(self.springs, str) else tuple(self.springs)
 
 
 @workflow(CalibrateSettings, marks=("elastocal.model/",))
@@ -105,11 +143,19 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         If the readings, the robot or the settings do not fit; see `identification.calibrate`.
     FileAccessError
         If a file cannot be read or written, or ``out`` is an input, or another's file.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> readings = ec.datasets.fanuc_r2000ic()
+    >>> result = ec.calibrate(readings, springs="actuated")
+    >>> [f"{each:.2e}" for each in result.compliance[:3].tolist()]  # rad/(N m)
+    ['1.16e-06', '3.68e-07', '5.10e-07']
     """
     if settings.update is not None:
         return _updated(settings, settings.update)
     options = settings.options()
-    found = [(path, read(path)) for path in settings.files]
+    found = settings.read()
     made_from = {str(path): content_sha256(each) for path, each in found}
     measured, source = _measured(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
@@ -122,24 +168,23 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     marker = measured.marker if settings.marker is None else settings.marker
     path, unknown = _production(settings, arm)
     rows = None if path is None else _rows(path)
-    choice = choose_model(arm, readings, settings.springs, options, marker, production=rows)
-    known = known_springs(arm, settings.springs) or choice.known
-    options = with_knowledge(options, known, choice.model, readings, marker)
+    chosen = _chosen(settings, arm, readings, marker, rows)
+    options = with_knowledge(options, chosen.known, chosen.model, readings, marker)
     calibration = identification.calibrate(
-        choice.model,
+        chosen.model,
         readings,
         np.random.default_rng(settings.seed),
         options,
         marker_offset=marker,
-        ladder=choice.ladder,
+        ladder=chosen.ladder,
         provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
-    figures = summary(calibration, settings.fit, known)
+    figures = summary(calibration, settings.fit, chosen.known)
     if measured.check_cases:
         kept_out = measured.readings(arm.joint_names, check=True)
         figures = replace(figures, check=check_loads(calibration, kept_out, marker))
     if settings.budget:
-        figures = replace(figures, budget=error_budget(choice.model, readings, options, marker))
+        figures = replace(figures, budget=error_budget(chosen.model, readings, options, marker))
     if path is not None:
         coverage, doubt = _on_production(path, calibration.calibrated)
         warnings = (*figures.warnings, *(doubt.warnings if doubt else ()))
@@ -168,7 +213,7 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
             flag = "tool" if name == "tool_frame" else name
             raise IdentificationError(f"--{flag} goes with a calibration, not with --update")
     before = read_json(file, CalibrateResult)
-    found = [(path, read(path)) for path in settings.files]
+    found = settings.read()
     measured, source = _measured(found)
     calibrated = before.calibrated
     readings = measured.readings(calibrated.model.robot.joint_names)
@@ -187,6 +232,28 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+class _Chosen(NamedTuple):
+    """The springs that are fitted, the rungs that they were chosen from, and prior knowledge."""
+
+    model: ElasticModel
+    ladder: tuple[Climbed, ...] = ()
+    known: tuple[KnownSpring, ...] = ()
+
+
+def _chosen(
+    settings: CalibrateSettings,
+    arm: Robot,
+    readings: Readings,
+    marker: tuple[float, float, float] | None,
+    rows: ProductionRows | None,
+) -> _Chosen:
+    if settings.given is not None:
+        return _Chosen(ElasticModel(arm, settings.given))
+    name, options = str(settings.springs), settings.options()
+    choice = choose_model(arm, readings, name, options, marker, production=rows)
+    return _Chosen(choice.model, choice.ladder, known_springs(arm, name) or choice.known)
 
 
 def _as_built(

@@ -8,7 +8,7 @@ from typing import Annotated
 from elastocal import dataset
 from elastocal.dataset import PathTable, find_columns, in_file
 from elastocal.errors import DatasetError
-from elastocal.identification import read_model
+from elastocal.identification import CalibratedModel, CalibrateResult, ModelSource, read_model
 from elastocal.identification.recertification import (
     ComparedRows,
     CompareResult,
@@ -29,10 +29,10 @@ __all__ = ["CompareResult", "CompareSettings", "compare", "measured_rows"]
 class CompareSettings:
     """The calibrations that are compared, over which rows, against which limit."""
 
-    old: Annotated[str | PathLike[str], Option(argument=True)]
-    """Model file of the earlier calibration."""
-    new: Annotated[str | PathLike[str], Option(argument=True)]
-    """Model file of the later one."""
+    old: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    """Model file of the earlier calibration; in Python also what `calibrate` returned."""
+    new: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    """Model file of the later one, or the calibration."""
     rows: Path | None = None
     """Poses and forces that matter: CSV as for `predict`, or a dataset; none: springs only."""
     limit: Annotated[
@@ -71,10 +71,18 @@ def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # 
         If the rows cannot be used.
     FileAccessError
         If a file cannot be read or written, or an output is an input.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> readings = ec.datasets.fanuc_r2000ic()
+    >>> old = ec.calibrate(readings, springs="actuated", exclude=("0", "1", "2"))
+    >>> new = ec.calibrate(readings, springs="actuated", exclude=("3", "4", "5"))
+    >>> ec.compare(old, new).summary.robot
+    'fanuc_r2000ic'
     """
-    old, new = Path(settings.old), Path(settings.new)
-    rows = None if settings.rows is None else _read_rows(settings.rows, new)
-    found = recertify_files(old, new, rows=rows, limit=settings.limit)
+    rows = None if settings.rows is None else _read_rows(settings.rows, settings.new)
+    found = recertify_files(settings.old, settings.new, rows=rows, limit=settings.limit)
     if settings.figure is not None:
         from elastocal.report import write_recertification_figure
 
@@ -90,7 +98,7 @@ def measured_rows(provenance: str) -> Path | None:
     return path if path.suffix.lower() in (".nc", ".csv") and path.is_file() else None
 
 
-def _read_rows(path: Path, model: Path) -> ComparedRows:
+def _read_rows(path: Path, model: ModelSource) -> ComparedRows:
     """Return the rows of a CSV file or the readings of a dataset, for the robot of a model."""
     robot = read_model(model).model.robot
     suffix = path.suffix.lower()
@@ -105,7 +113,7 @@ def _read_rows(path: Path, model: Path) -> ComparedRows:
         return ComparedRows(rows.joints, *wrench, rows.names("visit"))
 
 
-def _readings(path: Path, robot: Robot, model: Path) -> ComparedRows:
+def _readings(path: Path, robot: Robot, model: ModelSource) -> ComparedRows:
     """Return the readings of a dataset, and the arm that they were taken on."""
     data = dataset.read(path)
     arm = robot

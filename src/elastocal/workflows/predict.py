@@ -9,7 +9,14 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import PathTable, find_columns, in_file, new_rows
-from elastocal.identification import CoveredRows, DeflectionSummary, Prediction, ProductionCoverage
+from elastocal.identification import (
+    CalibratedModel,
+    CalibrateResult,
+    CoveredRows,
+    DeflectionSummary,
+    Prediction,
+    ProductionCoverage,
+)
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -28,8 +35,8 @@ _NO_MISFIT = (
 class PredictSettings(NewTool, ArmAsBuilt):
     """Settings of a prediction: the model and the rows."""
 
-    model: Annotated[str | PathLike[str], Option(argument=True)]
-    """Model file of `calibrate`."""
+    model: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    """Model file of `calibrate`; in Python also what it returned."""
     rows: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``."""
     out: Annotated[Path | None, Option(required=True, help="CSV to write.")] = None
@@ -93,7 +100,7 @@ class PredictResult(Result):
 
 @workflow(PredictSettings, marks=("deflection_x_low[m]",))
 def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # noqa: ARG001 - done in an instant
-    """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
+    r"""Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
 
     Parameters
     ----------
@@ -108,9 +115,21 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
         If the model or the rows are not valid: a joint far outside its limits among them.
     FileAccessError
         If a file cannot be read or written, or ``out`` is an input.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import elastocal as ec
+    >>> model = ec.calibrate(ec.datasets.fanuc_r2000ic(), springs="actuated")
+    >>> joints = ",".join(f"joint_{n}[deg]" for n in range(1, 7))
+    >>> rows = Path("rows.csv")
+    >>> heads = f"{joints},force_x[N],force_y[N],force_z[N]"
+    >>> _ = rows.write_text(f"{heads}\n0,0,0,0,-60,0,0,0,500\n")
+    >>> ec.predict(model, rows).prediction.deflection.shape
+    (1, 3)
     """
-    model, rows = Path(settings.model), Path(settings.rows)
-    calibrated = settings.read_model(model)
+    rows = Path(settings.rows)
+    calibrated = settings.read_model(settings.model)
     robot = calibrated.model.robot
     controller, unloaded = settings.unloaded(robot)
     with in_file(rows):

@@ -34,6 +34,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ from elastocal.identification.calibrated import CalibratedModel, check_rows
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
-from elastocal.identification.model_file import CalibrateResult
+from elastocal.identification.model_file import CalibrateResult, ModelSource
 from elastocal.identification.production import CoveredRows, covered_rows
 from elastocal.identification.recertification._sums import (
     common_springs,
@@ -561,8 +562,8 @@ def _same_plan(old: CalibratedModel, new: CalibratedModel) -> bool:
 
 
 def recertify_files(
-    old: Path,
-    new: Path,
+    old: ModelSource,
+    new: ModelSource,
     q: ArrayLike | None = None,
     force: ArrayLike | None = None,
     moment: ArrayLike | None = None,
@@ -574,8 +575,8 @@ def recertify_files(
 
     Parameters
     ----------
-    old, new : Path
-        Model files of `elastocal calibrate`.
+    old, new : path, CalibrateResult or CalibratedModel
+        What `elastocal calibrate` returned, or its files.
     q, force, moment, rows, limit
         As for `recertify`.
 
@@ -586,10 +587,14 @@ def recertify_files(
     IdentificationError, SpringError, RobotError
         See `recertify`.
     """
-    if Path(old).resolve() == Path(new).resolve():
-        raise IdentificationError(f"{old} and {new} are one and the same file: nothing to compare")
+    names = _named(old, "the old model"), _named(new, "the new model")
+    files = isinstance(old, str | PathLike) and isinstance(new, str | PathLike)
+    if old is new or (files and Path(names[0]).resolve() == Path(names[1]).resolve()):
+        kind = "file" if files else "model"
+        raise IdentificationError(
+            f"{names[0]} and {names[1]} are one and the same {kind}: nothing to compare"
+        )
     (old_model, old_figures), (new_model, new_figures) = _read(old), _read(new)
-    names = (str(old), str(new))
     found = recertify(old_model, new_model, q, force, moment, rows=rows, limit=limit, names=names)
     notes = [_frame_note(old_figures, new_figures)]
     if not (old_model.model.bears_weight and new_model.model.bears_weight):
@@ -735,9 +740,18 @@ def _given_rows(
     return rows or ComparedRows(joints, forces, moments)
 
 
-def _read(path: Path) -> tuple[CalibratedModel, CalibrationSummary | None]:
-    """Return the model of a file, and the figures of its calibration."""
-    found = read_json(path, CalibrateResult)
+def _named(source: ModelSource, otherwise: str) -> str:
+    return str(source) if isinstance(source, str | PathLike) else otherwise
+
+
+def _read(source: ModelSource) -> tuple[CalibratedModel, CalibrationSummary | None]:
+    """Return a model, and the figures of its calibration."""
+    if isinstance(source, CalibratedModel):
+        return source, None
+    path = _named(source, "the model")
+    found = (
+        source if isinstance(source, CalibrateResult) else read_json(Path(path), CalibrateResult)
+    )
     try:
         return found.calibrated, found.calibration
     except (SpringError, RobotError) as error:
