@@ -81,6 +81,17 @@ def test_campaigns_are_held_against_one_another_on_the_same_seeds(tables, kind):
     assert len({row.strip("| ").split(" | ")[-1] for row in rows}) == 1
 
 
+@pytest.mark.parametrize("kind", ["afp", "machining"])
+def test_touches_before_production_are_held_against_springs_alone_on_the_same_seeds(tables, kind):
+    rows = [row.strip("| ").split(" | ") for row in tables.touched(kind).splitlines()[2:]]
+    typical = [row for row in rows if row[0] == "typical"]
+    assert [row[1] for row in typical] == ["springs alone", "touched"]
+    assert [row[-1] for row in typical] == ["5", "5"]
+    alone, touched = (float(row[3].partition("%")[0]) for row in typical)
+    assert touched > alone
+    assert float(typical[1][2]) < 5.0
+
+
 @pytest.mark.slow
 def test_a_case_measured_anew_gives_the_figures_that_are_quoted(tables, tmp_path):
     from gallery.process_figures import SHORTER, Case, Measurement

@@ -116,6 +116,8 @@ def touched(kind: str) -> str:
             for which in ({"campaign": "template", "springs": "auto"}, {"campaign": TOUCHED})
         ]
         seeds = sorted(pairs[0].keys() & pairs[1].keys())
+        if not seeds:
+            continue
         for name, found in zip(("springs alone", "touched"), pairs, strict=True):
             some = [found[seed] for seed in seeds]
             minutes = {each.get("touch_minutes") or 0.0 for each in some}
@@ -123,8 +125,7 @@ def touched(kind: str) -> str:
                 _mean([_reduction(_measure(each, which, load)["mean"]) for each in some], ".1%")
                 for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
             ]
-            if some:
-                rows.append((truth, name, _span(minutes, ".1f"), *cells, str(len(some))))
+            rows.append((truth, name, _span(minutes, ".1f"), *cells, str(len(some))))
     return _markdown(_TOUCHED, rows)
 
 
