@@ -187,7 +187,7 @@ def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
     )
     figures = json.loads(result.out)
     contract = {"held_out", "ladder", "parameters", "fixed", "blunders"}
-    assert set(figures) == contract | {"axes", "iso_9283", "urdf"}
+    assert set(figures) == contract | {"axes", "iso_9283", "urdf", "with_blunders"}
     assert figures["held_out"]["chosen"]["mean"] < 1.2 * FLOOR
     assert figures["held_out"]["registration"]["mean"] > 5e-4
     assert set(figures["blunders"]) == measured.blunders

@@ -449,7 +449,7 @@ def _tool(given: Given) -> None:
 @command("Identify")
 def _geometry(given: Given) -> None:
     result = _worked(workflows.geometry, given)
-    kept = ("held_out", "ladder", "parameters", "fixed", "blunders")
+    kept = ("held_out", "with_blunders", "ladder", "parameters", "fixed", "blunders")
     figures = {key: getattr(result.model, key) for key in kept}
     more = {"axes": result.accuracy.axes, "iso_9283": result.accuracy.poses}
     more["urdf"] = result.expressed

@@ -117,7 +117,7 @@ def accuracy_figures(problem: GeometryProblem, found: GeometryLadder) -> Geometr
     """
     by_rung = {each.rung: each.residual for each in found.rungs}
     before, after = by_rung["registration"], by_rung[found.chosen]
-    used = np.flatnonzero(found.whole.fit.used)
+    used = np.flatnonzero(found.errors(found.chosen).counted)
     T = found.whole.fit.state.T_station_base[problem.station[used]]
     place = np.einsum("nji,nj->ni", T[:, :3, :3], problem.measured[used] - T[:, :3, 3])
     parts = [(name, before[:, i], after[:, i]) for i, name in enumerate("xyz")]
@@ -169,7 +169,7 @@ def _pose_accuracy(
 
 
 def _blunders(problem: GeometryProblem, found: GeometryLadder) -> Iterator[Blunder]:
-    for point in np.flatnonzero(~found.whole.fit.used).tolist():
+    for point in np.flatnonzero(~found.errors(found.chosen).counted).tolist():
         row = int(problem.row[point])
         distance = float(np.linalg.norm(found.whole.fit.residual[point]))
         station = str(problem.data.station[row])

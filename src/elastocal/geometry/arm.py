@@ -127,6 +127,13 @@ def _increments(turn: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) - first * K + second * K @ K)
 
 
+def arm_length(robot: Robot) -> float:
+    """Return the length of an arm's links behind its first joint, in m."""
+    joints = robot.chain.joints[robot.external_axes + 1 :]
+    steps = [*(each.placement for each in joints), robot.chain.T_last_tip]
+    return sum(float(np.linalg.norm(T[:3, 3])) for T in steps)
+
+
 def motion_terms(q: FloatArray, torque: FloatArray) -> FloatArray:
     """Return the factors of each error of a joint's motion, shape (pose, joint, 7)."""
     one = np.ones_like(q)

@@ -82,12 +82,18 @@ def geometry_model(
         ladder=rungs,
         parameters=parameters,
         fixed=tuple(FixedParameter(each.name, each.why) for each in found.whole.fit.fixed),
-        blunders=tuple(sorted(set(problem.row[~found.whole.fit.used].tolist()))),
+        blunders=tuple(sorted(set(problem.row[~found.errors(found.chosen).counted].tolist()))),
         positions=len(problem),
         provenance=provenance,
         findings=findings(problem, found.whole.fit),
         T_tcp_built=_tcp_as_built(state.markers, markers),
         chain=_chain(found, markers),
+        with_blunders=HeldOutFigures(
+            *(
+                DistanceFigures.of(found.errors(rung).every_distance)
+                for rung in ("registration", found.chosen)
+            )
+        ),
     )
 
 

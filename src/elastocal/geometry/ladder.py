@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import GeometryError
 from elastocal.geometry.determined import Fixed, told_apart
+from elastocal.geometry.left_out import of_the_arm
 from elastocal.geometry.problem import (
     CHAIN_RUNGS,
     RUNGS,
@@ -41,15 +42,27 @@ class RungErrors:
     """Errors of a rung at poses that it was not fitted to."""
 
     rung: str
-    residual: FloatArray
-    """Measured minus expected of each position that is no blunder, in base, shape (point, 3), m."""
+    every: FloatArray
+    """Measured minus expected of each position, blunders included, in base, shape (point, 3), m."""
+    counted: BoolArray
+    """Positions that are no blunders, shape (point,)."""
     free: int
     """Unknowns that the positions determine."""
 
     @property
+    def residual(self) -> FloatArray:
+        """That of the positions that are no blunders, shape (position, 3), in m."""
+        return self.every[self.counted]
+
+    @property
     def distance(self) -> FloatArray:
-        """Its length, shape (point,), in m."""
+        """Its length, shape (position,), in m."""
         return np.asarray(np.linalg.norm(self.residual, axis=1))
+
+    @property
+    def every_distance(self) -> FloatArray:
+        """The length of every residual, blunders included, shape (point,), in m."""
+        return np.asarray(np.linalg.norm(self.every, axis=1))
 
 
 @brief_repr
@@ -121,14 +134,15 @@ def climb(
     block = blocks(problem)
     sums = _Sums(problem, reference, block)
     rungs = [sums.held_out(rung, free[rung][0]) for rung in RUNGS]
-    used = np.flatnonzero(reference.used)
+    used = reference.used
     fold = block[used] % FOLDS
     if len(np.unique(fold)) < FOLDS:
         raise GeometryError(
             f"the positions are of {len(np.unique(problem.data.pose))} poses: at least"
             f" {FOLDS} are needed, so that some can be left out; measure more poses"
         )
-    errors = np.array([[each.distance[fold == k].mean() for each in rungs] for k in range(FOLDS)])
+    distances = [each.every_distance[used] for each in rungs]
+    errors = np.array([[each[fold == k].mean() for each in distances] for k in range(FOLDS)])
     overlap = Overlap(FOLDS, 0.0, 1.0 / FOLDS)
     judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)
     chosen = RUNGS[judged.near[0]]
@@ -186,16 +200,16 @@ class _Sums:
         self.size = np.array([u.size for u in problem.unknowns])
         self.values = problem.values(about.state) / self.size
         self.width = prior_width(problem)
-        used = np.flatnonzero(about.used)
-        self.block = block[used]
+        self.block, self.fitted = block, np.repeat(about.used, 3)
         self.count = int(block.max()) + 1
-        self.A = (about.J[used] * self.size).reshape(3 * len(used), -1)
-        self.b = about.residual[used].ravel()
+        self.A = (about.J * self.size).reshape(3 * len(block), -1)
+        self.b = about.residual.ravel()
+        self.counted = about.used | of_the_arm(problem, about)
         p = self.A.shape[1]
         self.G, self.h = np.zeros((self.count, p, p)), np.zeros((self.count, p))
         rows = np.repeat(self.block, 3)
         for k in np.unique(self.block):
-            own = rows == k
+            own = (rows == k) & self.fitted
             self.G[k] = self.A[own].T @ self.A[own]
             self.h[k] = self.A[own].T @ self.b[own]
 
@@ -210,7 +224,7 @@ class _Sums:
             # The noise relative to which a rung's prior is weighted is the residual of that rung.
             x = _solved(self.G.sum(axis=0), h.sum(axis=0), free, ridge)
             residual = (b - self.A[:, free] @ x).reshape(-1, 3)
-            ridge = prior_weight(self.problem, noise(residual))
+            ridge = prior_weight(self.problem, noise(residual[self.about.used]))
         for k in range(FOLDS):
             train = np.arange(self.count) % FOLDS != k
             x = _solved(self.G[train].sum(axis=0), h[train].sum(axis=0), free, ridge)
@@ -218,7 +232,7 @@ class _Sums:
             rows = np.repeat(out, 3)
             left = b[rows] - self.A[np.ix_(rows, free)] @ x
             residual[out] = left.reshape(-1, 3)
-        return RungErrors(rung, residual, len(free))
+        return RungErrors(rung, residual, self.counted, len(free))
 
     def draws(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Return how far noise and prior take the unknowns from the fit, shape (draw, unknown).
@@ -233,8 +247,8 @@ class _Sums:
         free, ridge = self.about.free, prior_weight(self.problem, self.about.sigma)[self.about.free]
         G = self.G.sum(axis=0)[np.ix_(free, free)]
         H_inverse = np.linalg.inv(G + np.diag(ridge))
-        freedom = len(self.b) - float(np.trace(H_inverse @ G))
-        sigma = float(np.linalg.norm(self.b)) / np.sqrt(max(freedom, 1.0))
+        freedom = int(self.fitted.sum()) - float(np.trace(H_inverse @ G))
+        sigma = float(np.linalg.norm(self.b[self.fitted])) / np.sqrt(max(freedom, 1.0))
         values, vectors = np.linalg.eigh(G)
         root = H_inverse @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         stretch = self._block_scatter(free, H_inverse) / (sigma * np.linalg.norm(root, axis=1))
@@ -250,7 +264,7 @@ class _Sums:
 
         0 where there are too few to tell.
         """
-        there = np.unique(self.block)
+        there = np.unique(self.block[self.about.used])
         if len(there) < _BLOCKS_THAT_TELL:
             return np.zeros(len(free))
         one = np.eye(len(free))

@@ -6,6 +6,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.findings import Finding, Kind, as_count, as_number
+from elastocal.geometry.left_out import left_out_findings
 from elastocal.geometry.problem import GeometryProblem
 from elastocal.geometry.solve import GeometryFit
 
@@ -46,7 +47,9 @@ MOVED = Kind(
 def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[Finding, ...]:
     """Return the findings about the positions of a fit."""
     notes = [] if problem.robot.has_masses else [NO_MASSES(name=problem.robot.name)]
-    return (*notes, *_swapped_markers(problem, fit), *_moved_stations(problem, fit))
+    notes += [*_swapped_markers(problem, fit), *(moved := _moved_stations(problem, fit))]
+    # A station that moved leaves out rows whose markers agree, too.
+    return (*notes, *(() if moved else left_out_findings(problem, fit)))
 
 
 def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:

@@ -149,6 +149,8 @@ class GeometryModel:
     chain: ChainErrors | None = None
     """Part that a URDF expresses, fitted separately; None in older files, which leave the rest
     out."""
+    with_blunders: HeldOutFigures | None = None
+    """As `held_out`, of every position; none in files of before."""
 
     @property
     def robot(self) -> Robot:

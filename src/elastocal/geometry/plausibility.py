@@ -23,6 +23,7 @@ from scipy.optimize import minimize_scalar
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, RobotError
+from elastocal.geometry.arm import arm_length
 from elastocal.geometry.ladder import GeometryLadder, climb
 from elastocal.geometry.position_file import AXES
 from elastocal.geometry.positions import LEAST_READINGS, Positions
@@ -403,13 +404,6 @@ def position_mistake(robot: Robot, data: Positions) -> str | None:
     if best <= max(_FAR_BETTER * stated, min(_NOT_DRAWN * arm_length(robot), 0.5 * stated)):
         return f"{', or '.join(named)}; {why}, with that undone {1e3 * best:.2g} mm"
     return unnamed
-
-
-def arm_length(robot: Robot) -> float:
-    """Return the length of an arm's links behind its first joint, in m."""
-    joints = robot.chain.joints[robot.external_axes + 1 :]
-    steps = [*(each.placement for each in joints), robot.chain.T_last_tip]
-    return sum(float(np.linalg.norm(T[:3, 3])) for T in steps)
 
 
 def implausible(problem: GeometryProblem, found: GeometryLadder) -> str | None:

@@ -57,6 +57,8 @@ def show_geometry(
         facts.append(
             (phrase("left out as blunders"), phrase("rows {rows}, counted from 0", rows=rows))
         )
+        if model.with_blunders is not None:
+            facts.append((phrase("mean error with them"), mm(model.with_blunders.chosen.mean)))
     if model.T_tcp_built is not None:
         off = point(model.T_tcp_built[:3, 3].tolist(), digits=3)
         facts.append((phrase("tcp"), phrase("{off} mm from where it is described", off=off)))

@@ -129,9 +129,10 @@ def fit(
             f"{len(problem)} positions of markers cannot tell {len(free)} unknowns: measure more"
             " poses"
         )
-    keep = np.ones(len(problem), dtype=bool) if used is None else used
     first_plain = 0 if used is not None else _ROBUST_STEPS
     (r, J), damping = problem.linearise(at), 0.0
+    # What is far off before any error of the arm is fitted cannot bend these errors to itself.
+    keep = np.linalg.norm(r, axis=1) < _BLUNDER * noise(r) if used is None else used
     for step in range(_STEPS):
         robust, returns = step < first_plain, step <= _RETURNS
         weight, now, sigma = _weights(r, len(free), keep, used, robust=robust, returns=returns)
@@ -169,7 +170,7 @@ def _weights(
     distance, count = np.linalg.norm(r, axis=1), 3 * int(keep.sum())
     sigma = noise(r[keep]) * np.sqrt(count / max(count - unknowns, 0.1 * count))
     if robust:
-        return np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)), keep, sigma
+        return keep * np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)), keep, sigma
     if used is not None:
         return used.astype(float), used, sigma
     now = distance < _BLUNDER * sigma
