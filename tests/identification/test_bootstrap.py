@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elastocal.identification import interval, solve
+from elastocal.identification import Prior, interval, solve
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.uncertainty import bootstrap
 from support.problems import made_up, planted
@@ -31,6 +31,22 @@ def test_a_draw_is_a_fit_of_whole_poses_drawn_with_replacement(problem, grams):
     chosen = np.random.default_rng(5).integers(31, size=31)
     rows = np.concatenate([np.flatnonzero(problem.block == block) for block in chosen])
     np.testing.assert_allclose(draw, solve(problem.take(rows)).compliance, rtol=1e-6)
+
+
+def test_a_spring_that_no_pose_turns_spreads_as_far_as_its_prior_leaves_it_to():
+    """Draws that all expect what the prior expects most would be sure of what nobody measured."""
+    rng = np.random.default_rng(0)
+    problem, _ = made_up(rng, blocks=40)
+    problem.O[:] *= np.array([1e-3, 1.0, 1.0, 1.0, 1.0]) / np.logspace(0, 4, 5)
+    d = np.einsum("rin,n->ri", problem.O, np.ones(5)) + rng.normal(0.0, 0.1, problem.d.shape)
+    prior = Prior(np.full(5, 2.0), np.full(5, 0.5), 0.1)
+    rows = (0.1 / 0.5) * np.column_stack([np.eye(5), np.full(5, 2.0)])
+    grams = PoseGrams.of(replace(problem, d=d, prior_rows=rows))
+    told, untold = (bootstrap(grams, 400, rng, each).std(axis=0) for each in (prior, None))
+    assert told[0] == pytest.approx(0.5, rel=0.15)
+    assert untold[0] < 0.1
+    # What the poses determine hardly spreads further.
+    np.testing.assert_allclose(told[1:] / untold[1:], 1.0, atol=0.2)
 
 
 def test_the_spread_is_that_of_repeated_campaigns():

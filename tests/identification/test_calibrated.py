@@ -51,11 +51,23 @@ def test_its_interval_is_that_of_the_predictions_of_the_draws(calibrated):
 def test_what_would_be_measured_lies_within_the_misfit_and_the_fits_interval_together(calibrated):
     q, force, _ = rows(7)
     found = replace(calibrated, misfit=Misfit(20e-6, 0.05)).predict(q, force)
-    error = np.hypot(20e-6, 0.05 * np.linalg.norm(found.deflection, axis=1)[:, None])
-    below = np.sqrt((found.deflection - found.low) ** 2 + error**2)
+    below = np.hypot(found.deflection - found.low, 20e-6)
     np.testing.assert_allclose(found.measured_low, found.deflection - below, rtol=1e-9, atol=1e-15)
     assert np.all(found.measured_low <= found.low)
     assert np.all(found.measured_high >= found.high)
+
+
+def test_the_true_deflection_may_be_off_by_what_grows_with_it_and_not_by_noise(calibrated):
+    q, force, _ = rows(7)
+    draws, found, unsplit = (
+        replace(calibrated, misfit=Misfit(*each)).predict(q, force)
+        for each in ((20e-6, 0.0), (20e-6, 0.05), (0.0, 0.05))
+    )
+    grown = 0.05 * np.linalg.norm(found.deflection, axis=1)[:, None]
+    above = np.hypot(draws.high - draws.deflection, grown)
+    np.testing.assert_allclose(found.high, found.deflection + above, rtol=1e-9, atol=1e-15)
+    # Where the parts were not told apart, the share may be noise.
+    np.testing.assert_array_equal(unsplit.high, draws.high)
 
 
 def test_without_a_known_misfit_there_is_no_interval_of_a_measurement(calibrated):

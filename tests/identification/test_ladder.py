@@ -14,16 +14,20 @@ from elastocal.identification import (
     Climbed,
     FitOptions,
     build,
+    calibrate,
     choose_model,
     leave_poses_out,
     low_loads,
     solve,
     take_best,
+    with_knowledge,
 )
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.ladder import climb
 from elastocal.identification.rungs import gears, has_levels
-from support.cells import Cell, linear_truth, rich_truth, robot
+from elastocal.robot import T_from_xyzabc, with_tool
+from elastocal.sim.arm import Linkage, press_poses
+from support.cells import TRACKED, Cell, linear_truth, rich_truth, robot
 from support.problems import campaign
 
 OPTIONS = FitOptions()
@@ -124,8 +128,20 @@ def test_the_score_of_a_pose_is_its_mean_error_where_no_load_is_low():
     ladder = chosen("rich", 8)
     readings = Cell(rich_truth(), seed=3, poses=8).readings()
     for rung in ladder.values():
-        error = [rung.held_out.error[readings.pose == k].mean() for k in np.unique(readings.pose)]
-        np.testing.assert_allclose(rung.score, error)
+        # Rungs are judged without a prior; the errors of the chosen one are with it.
+        held_out = leave_poses_out(build(rung.model, readings))
+        error = [held_out.error[readings.pose == k].mean() for k in np.unique(readings.pose)]
+        np.testing.assert_allclose(rung.score, error, rtol=1e-6)
+        assert rung.chosen or np.allclose(rung.held_out.error, held_out.error, rtol=1e-6)
+
+
+def test_the_errors_of_the_chosen_rung_are_those_of_its_calibration():
+    readings = Cell(rich_truth(), seed=3, poses=8).readings()
+    choice = choose_model(robot(), readings, "auto", OPTIONS)
+    told = with_knowledge(OPTIONS, choice.known, choice.model, readings)
+    found = calibrate(choice.model, readings, np.random.default_rng(0), told)
+    (rung,) = [each for each in choice.ladder if each.chosen]
+    np.testing.assert_allclose(rung.held_out.error, found.held_out.error, rtol=1e-9)
 
 
 def test_a_low_load_counts_half_at_its_pose_left_out_and_half_with_all_low_loads_left_out():
@@ -232,3 +248,32 @@ def test_a_blunder_does_not_decide():
     spoiled = replace(readings, marker_displacement=marker)
     ladder = choose_model(robot(), spoiled, "auto", OPTIONS).ladder
     assert taken({rung.name: rung for rung in ladder}) == "gears"
+
+
+@pytest.mark.parametrize(("springs", "told"), [("auto", True), ("gears", True), ("bearing", False)])
+def test_springs_that_a_ladder_chooses_are_told_what_the_drives_say(springs, told):
+    readings = Cell(rich_truth(), seed=3, poses=8).readings()
+    choice = choose_model(robot(), readings, springs, OPTIONS)
+    assert bool(choice.known) is told
+    if told:
+        assert [each.name for each in choice.known] == list(choice.model.parameter_names)
+
+
+def test_a_longer_tool_does_not_turn_springs_that_the_calibrated_tool_hardly_did_to_great_errors():
+    """Springs at the wrist, which presses beside its axis hardly turn, took all of the noise."""
+    arm, longer = rich_truth(), T_from_xyzabc(0.0, 0.0, 0.15, 0.0, np.radians(30.0), 0.0)
+    readings = Cell(arm, seed=3, poses=8, noise=TRACKED).readings()
+    choice = choose_model(robot(), readings, "gears", OPTIONS)
+    told = with_knowledge(OPTIONS, choice.known, choice.model, readings)
+    urdf_longer = with_tool(robot().urdf, "tcp", "far", longer)
+    truth = replace(arm, linkage=Linkage.from_urdf(urdf_longer, "far"))
+    q = press_poses(arm.linkage, 20, np.random.default_rng(1)).joints
+    force = np.tile([0.0, 0.0, 800.0], (len(q), 1))
+    true = truth.equilibrium(q, force).deflection
+    errors = []
+    for options in (OPTIONS, told):
+        fitted = calibrate(choice.model, readings, np.random.default_rng(0), options).calibrated
+        found = fitted.with_tool(longer).predict(q, force).deflection
+        errors.append(np.linalg.norm(found - true, axis=1).mean())
+    print(errors, np.linalg.norm(true, axis=1).mean())
+    assert errors[1] < 0.8 * errors[0]

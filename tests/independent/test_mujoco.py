@@ -5,6 +5,7 @@ predictions are judged at poses that it has not seen, against one press from res
 ``[nightly]``.
 """
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -12,9 +13,16 @@ import pytest
 
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
-from elastocal.identification import FitOptions, build, calibrate, choose_model, solve
+from elastocal.identification import (
+    CalibratedModel,
+    FitOptions,
+    Prediction,
+    calibrate,
+    choose_model,
+    with_knowledge,
+)
 from elastocal.robot import Robot
-from independent.arms import ARMS, drawing, poses
+from independent.arms import ANOTHER_TOOL, ARMS, drawing, poses
 from independent.mujoco_truth import Campaign, Laws, MujocoArm, Procedure, campaign, true_deflection
 
 pytestmark = pytest.mark.slow
@@ -51,96 +59,113 @@ def readings(measured: Campaign, conditioned: bool) -> Readings:
     )
 
 
+@dataclass(frozen=True)
+class Course:
+    """Presses at unseen poses, one after another, of which the last one is judged."""
+
+    name: str
+    another_tool: bool
+    q: np.ndarray
+    """Shape (pose, joint), in rad."""
+    presses: list[np.ndarray]
+    """Forces on the robot at the tcp in base, each of shape (pose, 3), in N."""
+    true: np.ndarray
+    """True deflection of the last, shape (pose, 3), in m."""
+
+    def friction(self, model: ElasticModel) -> np.ndarray | None:
+        """Return what friction bears at the last; None without friction."""
+        if not len(model.friction):
+            return None
+        borne = torque = np.zeros((len(self.q), len(model.friction)))
+        for force in self.presses:
+            now = model.load_torques(self.q, force)[:, model.friction.axis]
+            limit = model.friction.limit
+            borne, torque = np.clip(borne + now - torque, -limit, limit), now
+        return borne
+
+    def predicted(self, fitted: CalibratedModel) -> Prediction:
+        """Return what a calibrated model predicts of it."""
+        model = fitted.with_tool(ANOTHER_TOOL) if self.another_tool else fitted
+        return model.predict(self.q, self.presses[-1], friction=self.friction(model.model))
+
+
 @cache
-def truth(arm: str, laws: Laws) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Return unseen joints, the forces there, and the true deflection after each of `COURSES`."""
-    real, q, rng = (
-        MujocoArm(drawing(arm), laws),
-        poses(arm, UNSEEN, 777),
-        np.random.default_rng(777),
-    )
-    five = drawing(arm).loads_tcp
-    loads = five[rng.integers(len(five), size=UNSEEN)]
-    force = np.array([real.rigid(each)[:3, :3] @ load for each, load in zip(q, loads, strict=True)])
-    presses = {name: [level * force for level in course] for name, course in COURSES.items()}
-    return q, force, {name: true_deflection(real, q, *each) for name, each in presses.items()}
-
-
-def borne_by_friction(
-    model: ElasticModel, q: np.ndarray, presses: list[np.ndarray]
-) -> np.ndarray | None:
-    """Return what friction bears after some presses from rest; None without friction."""
-    if not len(model.friction):
-        return None
-    borne = torque = np.zeros((len(q), len(model.friction)))
-    for force in presses:
-        now, limit = model.load_torques(q, force)[:, model.friction.axis], model.friction.limit
-        borne, torque = np.clip(borne + now - torque, -limit, limit), now
-    return borne
+def courses(arm: str, laws: Laws) -> tuple[Course, ...]:
+    """Return each of `COURSES` at unseen poses, and the first two with another tool."""
+    found = []
+    for another_tool in (False, True):
+        real, rng = MujocoArm(drawing(arm, another_tool), laws), np.random.default_rng(777)
+        q, five = poses(arm, UNSEEN, 777), drawing(arm).loads_tcp
+        loads = five[rng.integers(len(five), size=UNSEEN)]
+        turned = [real.rigid(each)[:3, :3] @ load for each, load in zip(q, loads, strict=True)]
+        force = np.array(turned)
+        for name, levels in list(COURSES.items())[: 2 if another_tool else None]:
+            presses = [level * force for level in levels]
+            name = f"{name}, another tool" if another_tool else name
+            true = true_deflection(real, q, *presses)
+            found.append(Course(name, another_tool, q, presses, true))
+    return tuple(found)
 
 
 @cache
-def relative_errors(
+def calibrated(
     laws: Laws,
     how: Procedure,
     springs: str = "auto",
     arm: str = "kuka",
     count: int = POSES,
     seed: int = 1,
-) -> dict[str, float]:
-    """Return the mean error at unseen poses over the mean deflection, for each of `COURSES`."""
-    real = MujocoArm(drawing(arm), laws)
-    measured = campaign(real, poses(arm, count, seed), how, np.random.default_rng(seed))
-    seen = readings(measured, how.conditioned)
+) -> CalibratedModel:
+    """Return what elastocal makes of a campaign."""
+    rng, measured_by = np.random.default_rng(seed), MujocoArm(drawing(arm), laws)
+    seen = readings(campaign(measured_by, poses(arm, count, seed), how, rng), how.conditioned)
     choice = choose_model(robot(arm), seen, springs, FitOptions())
-    compliance = solve(build(choice.model, seen)).compliance
-    q, force, true = truth(arm, laws)
-    errors = {}
-    for name, course in COURSES.items():
-        presses = [level * force for level in course]
-        friction = borne_by_friction(choice.model, q, presses)
-        found = choice.model.deflection(compliance, q, presses[-1], friction=friction)
-        error = np.linalg.norm(found - true[name], axis=1)
-        errors[name] = float(error.mean() / np.linalg.norm(true[name], axis=1).mean())
-    shown = ", ".join(f"{name} {error:.2%}" for name, error in errors.items())
-    print(f"{arm} {choice.taken}: {shown}")
+    options = with_knowledge(FitOptions(), choice.known, choice.model, seen)
+    print(arm, choice.taken)
+    return calibrate(choice.model, seen, rng, options, ladder=choice.ladder).calibrated
+
+
+def relative_errors(
+    laws: Laws,
+    how: Procedure,
+    springs: str = "auto",
+    arm: str = "kuka",
+    count: int = POSES,
+) -> dict[str, float]:
+    """Return the mean error at unseen poses over the mean deflection, for each of `courses`."""
+    fitted, errors = calibrated(laws, how, springs, arm, count), {}
+    for course in courses(arm, laws):
+        error = np.linalg.norm(course.predicted(fitted).deflection - course.true, axis=1)
+        errors[course.name] = float(error.mean() / np.linalg.norm(course.true, axis=1).mean())
+    print(", ".join(f"{name} {error:.2%}" for name, error in errors.items()))
     return errors
 
 
+@cache
 def coverage(laws: Laws, how: Procedure) -> dict[str, tuple[float, float]]:
     """Return the mean share of components at unseen poses inside the two intervals, four arms.
 
     Of the fit the true deflections, of a measurement the same with the noise of a tracker; for
-    each of `COURSES`.
+    each of `courses`.
     """
-    inside: dict[str, list[tuple[float, float]]] = {name: [] for name in COURSES}
+    inside: dict[str, list[tuple[float, float]]] = {}
     for arm in ARMS:
-        rng = np.random.default_rng(1)
-        measured = campaign(MujocoArm(drawing(arm), laws), poses(arm, POSES, 1), how, rng)
-        seen = readings(measured, how.conditioned)
-        choice = choose_model(robot(arm), seen, "auto", FitOptions())
-        fitted = calibrate(choice.model, seen, rng, FitOptions(), ladder=choice.ladder).calibrated
-        q, force, true = truth(arm, laws)
-        for name, course in COURSES.items():
-            presses = [level * force for level in course]
-            friction = borne_by_friction(choice.model, q, presses)
-            found = fitted.predict(q, presses[-1], friction=friction)
-            noise = np.sqrt(2.0) * how.marker_noise * rng.standard_normal(true[name].shape)
-            ends = (
-                (found.low, true[name], found.high),
-                (found.measured_low, true[name] + noise, found.measured_high),
-            )
-            fit, reading = (float(np.mean((a <= x) & (x <= b))) for a, x, b in ends)
-            inside[name].append((fit, reading))
+        fitted, rng = calibrated(laws, how, arm=arm), np.random.default_rng(2)
+        for course in courses(arm, laws):
+            found, true = course.predicted(fitted), course.true
+            seen = true + np.sqrt(2.0) * how.marker_noise * rng.standard_normal(true.shape)
+            fit = np.mean((found.low <= true) & (true <= found.high))
+            reading = np.mean((found.measured_low <= seen) & (seen <= found.measured_high))
+            inside.setdefault(course.name, []).append((float(fit), float(reading)))
     found = {name: tuple(np.mean(each, axis=0).round(3)) for name, each in inside.items()}
     print(found)
     return found
 
 
 def of_four_arms(laws: Laws, how: Procedure, count: int = POSES) -> dict[str, tuple[float, float]]:
-    """Return mean and largest of the errors of the four arms, for each of `COURSES`."""
+    """Return mean and largest of the errors of the four arms, for each of `courses`."""
     each = [relative_errors(laws, how, arm=arm, count=count) for arm in ARMS]
-    found = {name: [errors[name] for errors in each] for name in COURSES}
+    found = {name: [errors[name] for errors in each] for name in each[0]}
     return {name: (float(np.mean(errors)), max(errors)) for name, errors in found.items()}
 
 
@@ -217,25 +242,29 @@ def test_six_poses_leave_a_few_percent_and_no_more_than_ten():
     ],
     ids=["hard", "friction", "conditioned"],
 )
-def test_both_intervals_hold_at_full_and_at_half_load(laws, how):
-    found = coverage(laws, how)
-    for name in ("full", "half"):
-        fit, reading = found[name]
-        assert fit > 0.80
-        assert reading > 0.93
-    assert found["reversed"][1] > 0.85
+def test_both_intervals_hold_at_every_load_and_with_another_tool(laws, how):
+    for fit, reading in coverage(laws, how).values():
+        assert 0.85 <= fit <= 0.99
+        assert reading >= 0.93
 
 
-@pytest.mark.xfail(strict=True, reason="64 to 68 %: what friction does to a reversal, draws do not")
-def test_the_interval_of_the_fit_holds_at_a_reversal():
-    assert coverage(STICKING, FIVE_LOADS_AND_A_LOW_ONE)["reversed"][0] > 0.85
+def test_another_tool_leaves_some_two_percent():
+    """Wrist springs that presses hardly turn took all of the noise: 3.8 to 5.5 %, once 19 %."""
+    for laws, how in ((HARD, FIVE_LOADS_AND_A_LOW_ONE), (STICKING, CONDITIONED)):
+        found = of_four_arms(laws, how)["full, another tool"]
+        assert found[0] < 0.03
+        assert found[1] < 0.05
 
 
-@pytest.mark.xfail(strict=True, reason="0.6 %; 0.15 % without noise of 15 µm")
+@pytest.mark.xfail(
+    strict=True, reason="0.6 %; no estimator below 0.41 % on the KUKA, whose law it knows"
+)
 def test_hard_truth_leaves_the_0_42_percent_of_issue_30():
     assert of_four_arms(HARD, FIVE_LOADS_AND_A_LOW_ONE)["full"][0] < 0.0042
 
 
-@pytest.mark.xfail(strict=True, reason="3 %: Dahl's law bends, ours has corners")
+@pytest.mark.xfail(
+    strict=True, reason="3 %: 2 % without friction, since pulls load gears beyond all presses"
+)
 def test_reversals_leave_the_2_6_percent_of_issue_30():
     assert of_four_arms(STICKING, FIVE_LOADS_AND_A_LOW_ONE)["reversed"][0] < 0.026

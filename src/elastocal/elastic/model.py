@@ -493,6 +493,31 @@ class ElasticModel:
                 coupling += weighted[0] @ W_b
         return CartesianCompliance(translation, rotation, coupling)
 
+    def compliance_at_torque(self, compliance: ArrayLike, torque: FloatArray) -> FloatArray:
+        """Return the compliance about each axis at a total torque, friction sliding.
+
+        Parameters
+        ----------
+        compliance : array_like, shape (parameter,)
+            In the units of the parameters.
+        torque : ndarray, shape (..., axis)
+            Of weight and load together, in N·m or N.
+
+        Returns
+        -------
+        ndarray, shape (..., axis)
+            In rad/(N·m) or m/N; zero where the law of a spring does not depend on total torques.
+        """
+        c, found = self.check_compliance(compliance), np.zeros(torque.shape)
+        for group in self._groups:
+            if not group.law.bears_weight:
+                continue
+            tangents = group.law.tangents(group.load(torque, np.zeros_like(torque)))
+            for a, axis in enumerate(group.axes):
+                terms = zip(group.parameters, tangents[a][a], strict=True)
+                found[..., axis] = sum(c[place] * slope for place, slope in terms)
+        return found
+
     def directional_rows(self, q: ArrayLike, direction: ArrayLike) -> FloatArray:
         """Return the rows that times ``c`` are the compliance ``u^T C u`` along a direction.
 

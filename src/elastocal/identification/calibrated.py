@@ -7,14 +7,16 @@ deflection.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.elastic import ElasticModel, check_vectors
+from elastocal.elastic import ElasticModel, ModelPosture, check_vectors
 from elastocal.errors import RobotError, SpringError
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
+from elastocal.identification.extrapolation import CalibratedTorques
 from elastocal.identification.observability import Observability
 from elastocal.identification.prediction_doubt import PredictionDoubt, ProductionRows
 from elastocal.identification.production import CoveredRows, ProductionCoverage, covered_rows
@@ -151,12 +153,14 @@ class Prediction(Result):
     deflection: FloatArray
     """Real minus commanded tcp position in base, shape (row, 3), in m."""
     low: FloatArray
-    """Lower ends of what another campaign would predict (bootstrap draws), shape (row, 3), in m."""
+    """Lower ends of the true deflection, shape (row, 3), in m: what another campaign would predict
+    (bootstrap draws), with what the springs cannot express, and with how little is known of gears
+    beyond the torques that calibration met. Without the second where the model does not know it."""
     high: FloatArray
     """Upper ends of that, shape (row, 3), in m."""
     measured_low: FloatArray
-    """Lower ends of what would be measured, shape (row, 3), in m: with what the springs cannot
-    express, and the noise of a measurement. NaN where the model does not know its misfit."""
+    """Lower ends of what would be measured, shape (row, 3), in m: with the noise of a measurement
+    besides. NaN where the model does not know its misfit."""
     measured_high: FloatArray
     """Upper ends of that, shape (row, 3), in m."""
 
@@ -356,22 +360,55 @@ class CalibratedModel:
             rows = slice(start, start + _CHUNK)
             m = None if moment is None else moment[rows]
             friction_torque = None if friction is None else friction[rows]
+            posture = self.model.at(q[rows])
             blocks = self.model.observation_blocks(
-                q[rows], force[rows], m, friction=friction_torque
+                posture, force[rows], m, friction=friction_torque
             )
             result[0, rows] = blocks @ self.compliance
-            result[1:, rows] = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
+            ends = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
+            beyond = self._beyond_calibrated(posture, force[rows], m)
+            result[1:, rows] = widened(result[0, rows], *ends, beyond)
         deflection, low, high = result
-        return Prediction(deflection, low, high, *self._measured(deflection, low, high))
+        size = np.linalg.norm(deflection, axis=1, keepdims=True)
+        return Prediction(
+            deflection,
+            *widened(deflection, low, high, self.misfit.of_the_springs(size)),
+            *widened(deflection, low, high, self.misfit.error(size)),
+        )
 
-    def _measured(
-        self, deflection: FloatArray, low: FloatArray, high: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Widen the intervals of the fit by the misfit, as independent errors add up."""
-        error = self.misfit.error(np.linalg.norm(deflection, axis=1, keepdims=True))
-        # The point estimate may lie outside the draws when a spring is at its bound.
-        below, above = np.maximum(deflection - low, 0.0), np.maximum(high - deflection, 0.0)
-        return deflection - np.hypot(below, error), deflection + np.hypot(above, error)
+    @cached_property
+    def _calibrated_torques(self) -> CalibratedTorques | None:
+        """Total torques of the calibration; none where it does not matter or is not known."""
+        if self.domain is None or not self.model.bears_weight:
+            return None
+        return CalibratedTorques.of(self.calibrated_model, self.domain)
+
+    def _beyond_calibrated(
+        self, posture: ModelPosture, force: FloatArray, moment: FloatArray | None
+    ) -> FloatArray | float:
+        """Return the error of gears beyond the torques of the calibration, shape (row, 3), in m."""
+        torques = self._calibrated_torques
+        if torques is None:
+            return 0.0
+        load = self.model.load_torques(posture, force, moment)
+        return torques.error(self.model, self.compliance, posture, load)
+
+
+def widened(
+    deflection: FloatArray, low: FloatArray, high: FloatArray, error: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of intervals widened by a further error, as independent errors add up.
+
+    Parameters
+    ----------
+    deflection, low, high : ndarray, shape (row, 3)
+        Predictions and ends of their intervals, in m.
+    error : ndarray, shape (row, 3) or (row, 1), or float
+        Half of the interval of the further error, in m.
+    """
+    # The point estimate may lie outside the draws when a spring is at its bound.
+    below, above = np.maximum(deflection - low, 0.0), np.maximum(high - deflection, 0.0)
+    return deflection - np.hypot(below, error), deflection + np.hypot(above, error)
 
 
 def check_rows(

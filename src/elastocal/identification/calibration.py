@@ -184,7 +184,7 @@ def calibrate(
     weighted = kept.reweighted(solution.reading_weight)
     held_out = leave_poses_out(weighted)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
-    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng)
+    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng, options.prior)
     by = _widening(weighted, solution.compliance, draws, held_out, ladder, unexplained)
     widened = widen_draws(weighted, solution.compliance, draws, by)
     springs, frames = weighted.springs, slice(weighted.springs.stop, None)

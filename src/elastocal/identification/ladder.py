@@ -55,7 +55,7 @@ class Climbed:
     name: str
     model: ElasticModel
     held_out: HeldOut
-    """Errors at left-out poses."""
+    """Errors at left-out poses; of the chosen rung those of the fit with its prior."""
     score: FloatArray
     """Mean error of each pose block, its low load left out too, shape (block,), in m."""
     predicted: FloatArray
@@ -146,8 +146,10 @@ def choose_model(
     beside : sequence of str
         Other layouts or spring files to judge with the ladder; none of them is taken.
     production : ProductionRows, optional
-        Where the model is to predict. Rungs to choose from are then fitted with what the drives say
-        of other springs (`DriveCompliances`), and chosen by production: see `take_best`.
+        Where the model is to predict. Every rung is then fitted with what the drives say of other
+        springs (`DriveCompliances`), and chosen by production: see `take_best`. Without it the
+        rungs are judged by the readings alone, and the prior is that of the chosen one
+        (`Choice.known`). Springs that are asked for by name have none.
 
     Raises
     ------
@@ -162,8 +164,30 @@ def choose_model(
     options = replace(options, prior=None)
     readings = usable_for_choice(robot, readings, options, marker_offset)
     if len(allowed) == 1:
-        production = None
-    return climb(robot, readings, rungs, allowed, options, marker_offset, production)
+        return climb(robot, readings, rungs, allowed, options, marker_offset)
+    choice = climb(robot, readings, rungs, allowed, options, marker_offset, production)
+    return choice if choice.known else _told(choice, robot, readings, options, marker_offset)
+
+
+def _told(
+    choice: Choice,
+    robot: Robot,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None,
+) -> Choice:
+    """Return a choice with what the drives say of its springs as their prior."""
+    drives = DriveCompliances.of(robot, readings, options, marker_offset)
+    if drives is None:
+        return choice
+    known = drives.known_springs(choice.model)
+    told = with_knowledge(options, known, choice.model, readings, marker_offset)
+    held_out = leave_poses_out(build(choice.model, readings, told, marker_offset))
+    ladder = tuple(
+        replace(each, known=known, held_out=held_out) if each.chosen else each
+        for each in choice.ladder
+    )
+    return replace(choice, ladder=ladder)
 
 
 def usable_for_choice(

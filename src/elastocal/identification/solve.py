@@ -146,7 +146,7 @@ class PoseGrams:
     start: IndexArray
     """First reading of each block, shape (block,)."""
     prior: FloatArray
-    """The same of the prior's rows, shape (spring + 1, spring + 1)."""
+    """``[O d]`` of the prior, shape (row, spring + 1)."""
     scale: FloatArray
     lower: FloatArray
     upper: FloatArray
@@ -160,7 +160,7 @@ class PoseGrams:
         _, start = np.unique(problem.block[order], return_index=True)
         rows = np.concatenate([scaled.rows, deflection], axis=2)[order]
         prior = problem.prior_rows / np.append(scaled.scale, 1.0)
-        return cls(rows, start, prior.T @ prior, scaled.scale, problem.lower, problem.upper)
+        return cls(rows, start, prior, scaled.scale, problem.lower, problem.upper)
 
     def __len__(self) -> int:
         """Return the number of pose blocks."""
@@ -184,20 +184,24 @@ class PoseGrams:
             total += np.tensordot(multiplicity[:, part], gram, axes=1)
         return total
 
-    def refit(self, multiplicity: FloatArray) -> FloatArray:
+    def refit(self, multiplicity: FloatArray, prior_error: FloatArray | None = None) -> FloatArray:
         """Return the compliances of each choice of poses.
 
         Parameters
         ----------
         multiplicity : ndarray, shape (choice, block)
             How often each pose block is taken.
+        prior_error : ndarray, shape (choice, row), optional
+            What is added to the right-hand sides of the first rows of the prior, in m.
 
         Returns
         -------
         ndarray, shape (choice, spring)
         """
-        total = self._sums(multiplicity) + self.prior
+        total = self._sums(multiplicity) + self.prior.T @ self.prior
         n = len(self.scale)
+        if prior_error is not None:
+            total[:, :n, n] += prior_error @ self.prior[: prior_error.shape[1], :n]
         # G = V diag(s^2) V^T gives what `minimise` takes of A = U diag(s) V^T: eigenvalues rise,
         # singular values fall, and U^T b = diag(1/s) V^T (A^T b). Round-off may leave an eigenvalue
         # just below zero.

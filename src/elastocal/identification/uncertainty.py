@@ -24,6 +24,7 @@ from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.identification._least_squares import minimise
+from elastocal.identification.options import Prior
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import PoseGrams, factor
 from elastocal.records import record
@@ -96,6 +97,13 @@ class Misfit:
     def error(self, size: FloatArray) -> FloatArray:
         """Return the error along an axis where deflections are predicted, of their shape, in m."""
         return np.asarray(np.hypot(self.floor, self.share * size))
+
+    def of_the_springs(self, size: FloatArray) -> FloatArray:
+        """Return the part of it that is no noise: what grows with the deflection, in m.
+
+        Zero where the parts were not told apart, and noise may be in the share.
+        """
+        return np.asarray((self.share if self.floor > 0.0 else 0.0) * size)
 
 
 UNKNOWN_MISFIT = Misfit(float("nan"), float("nan"))
@@ -246,8 +254,15 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, np.abs(error), size)
 
 
-def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:
+def bootstrap(
+    grams: PoseGrams, draws: int, rng: Generator, prior: Prior | None = None
+) -> FloatArray:
     """Return the compliances refitted to resampled poses.
+
+    A prior is no more certain than it says: in each draw it expects what a normal draw from it
+    says (J. M. Bardsley, A. Solonen, H. Haario, M. Laine, "Randomize-then-optimize", SIAM J.
+    Scientific Computing 36, 2014). Springs that the poses hardly turn then spread as far as the
+    prior leaves them to, and not about what it expects most.
 
     Parameters
     ----------
@@ -257,6 +272,8 @@ def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:
         Number of resamples.
     rng : Generator
         Source of randomness.
+    prior : Prior, optional
+        That of the problem.
 
     Returns
     -------
@@ -265,7 +282,10 @@ def bootstrap(grams: PoseGrams, draws: int, rng: Generator) -> FloatArray:
     blocks = len(grams)
     chosen = rng.integers(blocks, size=(draws, blocks))
     multiplicity = np.stack([np.bincount(draw, minlength=blocks) for draw in chosen])
-    return grams.refit(multiplicity.astype(float))
+    if prior is None:
+        return grams.refit(multiplicity.astype(float))
+    error = prior.noise * rng.standard_normal((draws, np.size(prior.mean)))
+    return grams.refit(multiplicity.astype(float), error)
 
 
 def interval(draws: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -33,7 +33,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import LAYOUTS, ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
 from elastocal.files import sha256
-from elastocal.identification import AUTO, RUNGS, FitOptions, choose_model
+from elastocal.identification import AUTO, RUNGS, FitOptions, choose_model, with_knowledge
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import to_data
@@ -278,8 +278,10 @@ class _StudySimulation:
         if model is not None:
             return studies.calibrated(model, readings, self.marker, verification)
         options = FitOptions(set_blunders_aside=False)
-        model = choose_model(self.robot, readings, springs, options, self.marker).model
-        found = studies.calibrated(model, readings, self.marker, verification)
+        choice = choose_model(self.robot, readings, springs, options, self.marker)
+        model = choice.model
+        told = with_knowledge(options, choice.known, model, readings, self.marker)
+        found = studies.calibrated(model, readings, self.marker, verification, told)
         # Each sample may have other springs, so there is no table of their compliances.
         return replace(found, compliance=np.zeros(0))
 

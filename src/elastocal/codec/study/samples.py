@@ -27,7 +27,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import CodecError, FileAccessError, SchemaError
 from elastocal.files import sha256, write_text
-from elastocal.identification import build, solve
+from elastocal.identification import FitOptions, build, solve
 from elastocal.records import read_json, record, to_data
 from elastocal.results import brief_repr
 
@@ -127,9 +127,13 @@ class Verification:
 
 
 def calibrated(
-    model: ElasticModel, readings: Readings, marker_offset: ArrayLike, verification: Verification
+    model: ElasticModel,
+    readings: Readings,
+    marker_offset: ArrayLike,
+    verification: Verification,
+    options: FitOptions | None = None,
 ) -> ConditionResult:
-    """Return compliances and accuracy of a calibration with the default options (Eq. 15-19).
+    """Return compliances and accuracy of a calibration (Eq. 15-19).
 
     Simulated instruments make no blunders, so none are looked for; otherwise the compliances are
     those of `elastocal.identification.calibrate`. Nothing is resampled: the samples of a study
@@ -145,13 +149,15 @@ def calibrated(
         Metrology marker in the tcp frame, in m.
     verification : Verification
         Where the result is judged.
+    options : FitOptions, optional
+        Bounds, weights, prior; the defaults without.
 
     Raises
     ------
     IdentificationError
         If nothing can be identified.
     """
-    compliance = solve(build(model, readings, None, marker_offset)).compliance
+    compliance = solve(build(model, readings, options, marker_offset)).compliance
     return verification.judge(model, compliance)
 
 
