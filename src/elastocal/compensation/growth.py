@@ -81,7 +81,7 @@ class TouchedPoint:
     tcp_position: Vector
     """In base, in m."""
     shift: Vector
-    """How far the tool has moved against its controller, in base, in m."""
+    """Displacement of the tool relative to its controller, in base, in m."""
     left: float
     """Distance in m from what the other touches predict."""
 
@@ -97,7 +97,7 @@ class ArmGrowth(Result):
     warm: str
     """When the warm run began: the state is of that time."""
     seconds: float
-    """How long the warm touches took."""
+    """Duration of the warm touches, in s."""
     share: float
     """Thermal share, m of growth for each m between foot and tool; 0 where it is not used."""
     offset: Vector

@@ -98,7 +98,7 @@ class GeometryAccuracy:
     registration: FloatArray
     """Measured minus expected of the nominal arm, in base, shape (position, 3), in m."""
     chosen: FloatArray
-    """Errors of the calibrated arm, likewise."""
+    """Errors of the calibrated arm, of the same shape."""
     axes: tuple[AxisErrors, ...]
     poses: tuple[PoseAccuracy, ...]
     """Poses that were visited at least twice; empty where there are none."""

@@ -87,7 +87,7 @@ class CalibrateResult(Result):
     """SHA-256 of what each dataset says (`elastocal.dataset.content_sha256`), by its file; empty
     in files before it was written."""
     update: SpringUpdate | None = None
-    """What tracked production has made of the springs; none: they are those of the calibration."""
+    """Update of the springs by tracked production; None: they are those of the calibration."""
     needs: dict[str, str] = field(default_factory=dict)
     """Distributions besides elastocal that define its springs, with the versions that made it;
     readers require them first (`elastocal.plugins.require_distributions`)."""

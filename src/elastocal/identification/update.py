@@ -32,7 +32,7 @@ from elastocal.results import brief_repr
 from elastocal.wording import mm
 
 LEAST_COURSES = 2
-"""One to learn from, and one to see what that is worth."""
+"""One course to learn from, and one to test the result."""
 _FARTHEST = 3.0
 """Largest move of a direction of the draws, in standard deviations."""
 _MOST_CORRELATED = 0.99
@@ -43,7 +43,7 @@ _NEGLIGIBLE = 1e-9
 @brief_repr
 @record()
 class SpringUpdate:
-    """What tracked production has made of a model; lengths in m."""
+    """Update of a model by tracked production; lengths in m."""
 
     readings: int
     courses: tuple[str, ...]

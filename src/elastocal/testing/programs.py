@@ -1,4 +1,4 @@
-"""What every writer of robot programs keeps that needs no reader of its language."""
+"""Contract of every writer of robot programs that needs no reader of its language."""
 
 from dataclasses import replace
 from pathlib import Path

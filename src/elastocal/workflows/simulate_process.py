@@ -62,7 +62,7 @@ class ProcessTrial:
     settings: CompensatorSettings
     seed: int
     state: ArmGrowth | None = None
-    """How far the arm has grown; None: nobody has touched."""
+    """Growth of the arm; None: it was not measured by touches."""
     controller: process.Controller = field(default_factory=process.Controller)
     jobs: int | None = None
     """Processes; by default all cores."""

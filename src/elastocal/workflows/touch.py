@@ -23,7 +23,7 @@ __all__ = ["ArmGrowth", "TouchSettings", "touch"]
 @brief_repr
 @dataclass(frozen=True)
 class TouchSettings:
-    """Which cell is touched warm, and where it was touched cold."""
+    """Settings of ``touch``: the warm cell, and the run of its cold touches."""
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``."""

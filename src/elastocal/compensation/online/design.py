@@ -63,9 +63,9 @@ class Design:
     frame: FloatArray
     """R_base_frame of the correction, shape (3, 3); the identity where it is the tcp's."""
     state: ArmGrowth | None = None
-    """How far the arm has grown; None: nothing is known of it, or there is nothing to correct."""
+    """Growth of the arm; None: unknown, or there is nothing to correct."""
     growth: Routine | None = None
-    """The program of it; None likewise."""
+    """Program of the growth; None if it is unknown."""
 
     @property
     def joints(self) -> int:

@@ -37,7 +37,7 @@ from elastocal.results import brief_repr
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class TouchedShifts:
-    """How far the tool has moved against its controller, cold to warm, at points of the tooling."""
+    """Displacements of the tool against its controller, cold to warm, at points of the tooling."""
 
     cell: Cell
     plan: PlanResult
@@ -54,7 +54,7 @@ class TouchedShifts:
     cold: RunRecord
     warm: RunRecord
     seconds: float
-    """How long the warm touches took, from the first entry of the journal to the last."""
+    """Duration of the warm touches, from the first entry of the journal to the last."""
     lost: tuple[int, ...]
     """Poses of the plan that were not touched in both runs."""
 
@@ -155,6 +155,6 @@ def _usable(reading: Reading | None) -> tuple[ToolState, Mean] | None:
 
 
 def _at(T_base_tcp: FloatArray, lever: FloatArray) -> FloatArray:
-    """Return where the controller has the marker, in base, shape (3,), in m."""
+    """Return the marker's position by the controller, in base, shape (3,), in m."""
     place: FloatArray = T_base_tcp[:3, 3] + T_base_tcp[:3, :3] @ lever
     return place

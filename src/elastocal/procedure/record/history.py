@@ -18,7 +18,7 @@ from elastocal.records import StrictModel, from_data, json_sha256, parse_json
 
 JOURNAL_SCHEMA = "elastocal.journal/1"
 Warmth = Literal["cold", "warm"]
-"""How warm an arm is when it touches the tooling, as a person says."""
+"""Stated warmth of an arm when it touches the tooling."""
 HISTORY = "runs.jsonl"
 """Name of the history, in the folder in which the folders of runs are."""
 
@@ -70,7 +70,7 @@ class RunRecord(StrictModel):
     earlier_runs: tuple[EarlierRun, ...] = ()
     """The runs of its cell before it, the last at the end."""
     touch: Warmth | None = None
-    """How warm the arm was said to be in a run of touches; None: a run of load cases."""
+    """Stated warmth of the arm in a run of touches; None: a run of load cases."""
 
     @property
     def identity(self) -> str:

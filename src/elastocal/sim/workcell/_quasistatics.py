@@ -42,7 +42,7 @@ class Quasistatics:
     strain: FloatArray | None = None
     """Strains that friction keeps while the robot is free, shape (..., gear, stop), in rad."""
     stated_warmth: float | None = None
-    """How warm every visit finds the arm; None: as its random numbers say."""
+    """Warmth of the arm in every visit; None: by its random numbers."""
 
     @classmethod
     def of(cls, cell: Cell, robot: TrueRobot) -> "Quasistatics":
