@@ -282,7 +282,11 @@ def test_check_says_what_a_good_file_is(folder, name):
             "'elastocal.plan/2'",
         ),
         ("a.json", '{"schema": "elastocal.modle/1"}', "did you mean 'elastocal.model'? (known: "),
-        ("a.json", "{}", "states no schema (known: elastocal.codec_verdicts, "),
+        (
+            "a.json",
+            "{}",
+            "states no schema (known: elastocal.arm-state, elastocal.codec_verdicts, ",
+        ),
         ("a.json", "[" * 100_000, "not valid JSON: its brackets are nested too deeply"),
         ("a.json", '{"a": ' + 5000 * "9" + "}", "JSON: it holds a number of thousands of digits"),
         (

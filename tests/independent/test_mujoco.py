@@ -257,7 +257,8 @@ def test_another_tool_leaves_some_two_percent():
 
 
 @pytest.mark.xfail(
-    strict=True, reason="0.6 %; no estimator below 0.41 % on the KUKA, whose law it knows"
+    strict=True,
+    reason="0.6 %; the bound of an estimator that is told the law is 0.32 %, 0.41 on the KUKA",
 )
 def test_hard_truth_leaves_the_0_42_percent_of_issue_30():
     assert of_four_arms(HARD, FIVE_LOADS_AND_A_LOW_ONE)["full"][0] < 0.0042
