@@ -87,6 +87,13 @@ def test_of_equal_models_the_simplest_is_the_best():
     assert judge_models(np.ones((31, 3)), ANY, Overlap.leaving_one_out(31)).best == 0
 
 
+@pytest.mark.parametrize(("lower", "best"), [(0.9995, 0), (0.998, 1)])
+def test_a_richer_model_must_err_by_a_thousandth_less_to_be_the_best(lower, best):
+    errors = rng().uniform(1e-5, 2e-5, (20, 1)) * [1.0, lower]
+    judged = judge_models(errors, np.ones(2, dtype=bool), Overlap.leaving_one_out(20))
+    assert judged.best == best
+
+
 def test_a_model_that_is_not_allowed_is_judged_and_not_the_best():
     judged = judge_models(errors(60.0, 50.0, 55.0), ~ANY | [True, False, False], Overlap(31, 0.4))
     assert judged.best == 0

@@ -27,6 +27,8 @@ from elastocal.results import brief_repr
 
 _TAIL = 0.5 * (1.0 + CONFIDENCE)
 _ALL = 1.0 - 1e-9
+_EQUAL = 1e-3
+"""Share of an error by which it must be lower to count as lower."""
 _ROUND_OFF = 1e-9
 """Part of an error below which a difference is round-off: models that say the same."""
 
@@ -141,7 +143,8 @@ class Judgement:
     difference: MeanOverSets
     """Error of each model minus that of the best allowed one, arrays of shape (model,), in m."""
     best: int
-    """Number of the allowed model with the lowest mean error; of equal ones the simplest."""
+    """Number of the allowed model with the lowest mean error; of equal ones, which differ by less
+    than a thousandth, the simplest."""
     near: IndexArray
     """Numbers of the allowed models that are not worse by more than one standard error."""
 
@@ -159,7 +162,9 @@ def judge_models(errors: FloatArray, allowed: BoolArray, overlap: Overlap) -> Ju
         Overlap of the sets.
     """
     mean = np.where(allowed, errors.mean(axis=0), np.inf)
-    best = int(np.argmin(mean))
+    # Where nothing is gained, a richer model only shares what the readings say among more springs,
+    # so that the numbers of each are those of its prior.
+    best = int(np.argmax(mean <= (1.0 + _EQUAL) * mean.min()))
     difference = paired_difference(errors, errors[:, [best]], overlap)
     within = difference.mean <= np.nan_to_num(difference.standard_error)
     near = np.flatnonzero(allowed & within)
