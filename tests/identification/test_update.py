@@ -1,11 +1,12 @@
 """Springs brought up to date by tracked production, on a simulated arm of other equations."""
 
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from elastocal.dataset import write
+from elastocal.dataset import read, write
 from elastocal.errors import IdentificationError
 from elastocal.identification import calibrate, update_springs
 from elastocal.workflows import calibrate as calibrate_files
@@ -153,7 +154,13 @@ class TestTheCommand:
         assert "at left-out courses" in done.err
         assert elastocal("check", files / "new.json").code == 0
 
-    @pytest.mark.parametrize("option", [("--budget",), ("--robot", "UR20"), ("--tcp", "tcp")])
+    @pytest.mark.parametrize(
+        "option",
+        [
+            *(("--budget",), ("--robot", "UR20"), ("--tcp", "tcp"), ("--tool", "0 mm")),
+            *(("--springs", "axial"), ("--loss", "huber"), ("--free-frame", "campaign")),
+        ],
+    )
     def test_options_of_a_calibration_are_refused(self, files, option):
         done = elastocal(
             *("calibrate", files / "monday.nc", "--update", files / "model.json"),
@@ -162,3 +169,30 @@ class TestTheCommand:
         assert done.code == 1
         assert f"{option[0]} goes with a calibration, not with --update" in done.err
         assert not (files / "no.json").exists()
+
+    def test_readings_that_have_made_the_model_do_not_count_twice(self, files):
+        with pytest.raises(IdentificationError, match="was made from these readings already"):
+            calibrate_files([files / "monday.nc", files / "old.nc"], update=files / "model.json")
+        days = [files / "monday.nc", files / "tuesday.nc"]
+        calibrate_files(days, update=files / "model.json", out=files / "once.json")
+        with pytest.raises(IdentificationError, match=r"once\.json was made from these readings"):
+            calibrate_files(days, update=files / "once.json")
+
+    @pytest.mark.parametrize(
+        ("link", "message"),
+        [("link_3", "are of different robots"), ("link_6", "have other tools")],
+    )
+    def test_production_of_another_arm_or_tool_is_refused(self, files, tmp_path, link, message):
+        days = []
+        for name in ("monday", "tuesday"):
+            dataset = read(files / f"{name}.nc")
+            urdf = ET.fromstring(dataset.robot_urdf)
+            (joint,) = (j for j in urdf.iter("joint") if j.find("parent").get("link") == link)
+            origin = joint.find("origin")
+            x, y, z = map(float, origin.get("xyz").split())
+            origin.set("xyz", f"{x} {y} {z + 0.02}")
+            changed = dataset.attributes | {"robot_urdf": ET.tostring(urdf, encoding="unicode")}
+            write(replace(dataset, attributes=changed), tmp_path / f"{name}.nc")
+            days.append(tmp_path / f"{name}.nc")
+        with pytest.raises(IdentificationError, match=message):
+            calibrate_files(days, update=files / "model.json")

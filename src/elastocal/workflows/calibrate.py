@@ -33,7 +33,7 @@ from elastocal.options import Option, ToolFrame
 from elastocal.progress import Progress
 from elastocal.records import read_json, write_json
 from elastocal.results import brief_repr
-from elastocal.robot import Robot, same_joints
+from elastocal.robot import Robot, of_one_arm, same_joints, tool_gap
 from elastocal.robot.inverse import nearest_zero_posture
 from elastocal.workflows._inputs import find_robot
 from elastocal.workflows._workflow import workflow
@@ -197,7 +197,8 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     return result
 
 
-_NOT_WITH_UPDATE = ("robot", "tcp", "tool_frame", "geometry", "process", "budget")
+_WITH_UPDATE = {"data", "out", "update", "force", "marker", "exclude", "seed"}
+"""Settings that count when a model is brought up to date; all others are of a calibration."""
 
 
 def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
@@ -206,16 +207,21 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
     Raises
     ------
     IdentificationError
-        If production has too few courses, or an option asks for a calibration.
+        If production has too few courses, is of another robot or tool or has made the model, or an
+        option asks for a calibration.
     """
-    for name in _NOT_WITH_UPDATE:
-        if getattr(settings, name):
-            flag = "tool" if name == "tool_frame" else name
+    for each in fields(settings):
+        if each.name not in _WITH_UPDATE and getattr(settings, each.name) != each.default:
+            flag = "tool" if each.name == "tool_frame" else each.name.replace("_", "-")
             raise IdentificationError(f"--{flag} goes with a calibration, not with --update")
     before = read_json(file, CalibrateResult)
     found = settings.read()
+    made_from = {str(path): content_sha256(each) for path, each in found}
+    _require_new(made_from, before, file)
     measured, source = _measured(found)
     calibrated = before.calibrated
+    if measured.robot_urdf:
+        _require_arm_of(calibrated.model.robot, measured, (str(file), source))
     readings = measured.readings(calibrated.model.robot.joint_names)
     readings = without(readings, settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
@@ -227,11 +233,36 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
         draws=moved.draws,
         update=worth,
         provenance=f"{before.provenance}; updated by {source}",
-        made_from=before.made_from | {str(path): content_sha256(each) for path, each in found},
+        made_from=before.made_from | made_from,
     )
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+def _require_new(made_from: dict[str, str], before: CalibrateResult, file: Path) -> None:
+    """Refuse readings that have made a model already: counted twice, they look twice as sure."""
+    for path, said in made_from.items():
+        if said in before.made_from.values():
+            raise IdentificationError(
+                f"{path}: {file} was made from these readings already: production is wanted that"
+                " it has not seen"
+            )
+
+
+def _require_arm_of(robot: Robot, measured: Dataset, names: tuple[str, str]) -> None:
+    """Refuse production of another robot, or at another tool, than a model's."""
+    from elastocal.identification.recertification import check_same_robot
+
+    arm = find_robot(None, None, None, measured)
+    check_same_robot(robot, arm, names)
+    gap = tool_gap(robot, arm)
+    if not of_one_arm(gap, robot, arm):
+        file, source = names
+        raise IdentificationError(
+            f"{file} and {source} have other tools: their tool centre points ({robot.tip},"
+            f" {arm.tip}) are {gap} apart; calibrate at the tool of production"
+        )
 
 
 class _Chosen(NamedTuple):
