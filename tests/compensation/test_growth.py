@@ -15,7 +15,7 @@ from elastocal.compensation import (
     write_arm_growth,
 )
 from elastocal.compensation.online import Compensator, Reading, design
-from elastocal.errors import CompensationError, SchemaError
+from elastocal.errors import CompensationError, RobotError, SchemaError
 from elastocal.robot import Robot, catalogue
 from support import compensated
 from support.virtual_chain import ARMS
@@ -136,12 +136,53 @@ def test_a_changed_file_is_refused(tmp_path):
         read_arm_growth(path, arm())
 
 
+@pytest.mark.parametrize("date", ["yesterday", "2026-11-02T06:00:00", ""])
+def test_a_date_that_is_none_is_refused_in_a_line(tmp_path, date):
+    path = tmp_path / "state.json"
+    write_arm_growth(path, state_of(touched(grown(arm(), np.full(6, 20e-6)))))
+    data = json.loads(path.read_text())
+    del data["content_sha256"]
+    path.write_text(json.dumps(data | {"warm": date}))
+    with pytest.raises(
+        SchemaError, match=r"state\.json: warm .* is no date and time with its zone"
+    ):
+        read_arm_growth(path, arm())
+
+
+def test_a_robot_that_cannot_be_read_is_refused_by_its_file(tmp_path):
+    path = tmp_path / "state.json"
+    write_arm_growth(path, state_of(touched(grown(arm(), np.full(6, 20e-6)))))
+    data = json.loads(path.read_text())
+    del data["content_sha256"]
+    path.write_text(json.dumps(data | {"robot": data["robot"] | {"tcp": "nowhere"}}))
+    with pytest.raises(RobotError, match=r"state\.json: .*nowhere"):
+        read_arm_growth(path, arm())
+
+
+def test_what_was_found_is_said_wherever_the_state_corrects():
+    sound = touched(grown(arm(), np.full(6, 20e-6)))
+    moved = state_of(replace(sound, shift=sound.shift + np.array([0.4e-3, 0.0, 0.0])))
+    growth, finding = moved.notes(datetime(2026, 11, 2, 7, tzinfo=UTC))
+    assert "corrections hold the growth" in growth
+    assert "one of them has moved" in finding
+
+
+def test_a_state_that_corrects_nothing_says_so_and_not_that_corrections_hold_it():
+    found = [state_of(touched(arm(), seed=seed)) for seed in range(10)]
+    idle = next(each for each in found if not each.corrects)
+    (note,) = idle.notes(datetime(2026, 11, 2, 7, tzinfo=UTC))
+    assert "the state corrects nothing" in note
+
+
 def test_an_old_state_says_so():
     state = state_of(touched(grown(arm(), np.full(6, 20e-6))))
     (fresh,) = state.notes(datetime(2026, 11, 2, 7, tzinfo=UTC))
     _, old = state.notes(datetime(2026, 11, 4, 6, tzinfo=UTC))
     assert "as touched at 2026-11-02T06:00:00" in fresh
     assert old == "the state of the arm is 48 h old: touch again"
+    # A clock that is set wrong on either machine says nothing of how old it is.
+    _, early = state.notes(datetime(2026, 11, 1, 6, tzinfo=UTC))
+    assert early == "the state of the arm is -24 h old: touch again"
 
 
 class TestFoot:

@@ -31,7 +31,7 @@ from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification import RobotRecord
 from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
-from elastocal.robot import Robot, link_gap, of_one_arm, same_joints
+from elastocal.robot import Robot, link_gap, of_one_arm, refusals_naming, same_joints
 from elastocal.units import quantity
 from elastocal.wording import mm, phrase, phrases
 
@@ -123,9 +123,15 @@ class ArmGrowth(Result):
         Raises
         ------
         CompensationError
-            If it grows by more than any arm does.
+            If it grows by more than any arm does, or a date is none.
         """
-        _require_possible(self.share, np.array(self.offset), "the state")
+        _require_possible(self.share, np.array(self.offset), "the state says")
+        for name, date in (("cold", self.cold), ("warm", self.warm)):
+            if _date(date) is None:
+                raise CompensationError(
+                    f"{name} {date!r} is no date and time with its zone, such as"
+                    " 2026-11-02T06:00:00+00:00"
+                )
 
     @property
     def corrects(self) -> bool:
@@ -152,9 +158,12 @@ class ArmGrowth(Result):
         Raises
         ------
         CompensationError
-            With how far apart the two are.
+            By the names of both.
+        RobotError
+            If the state's own robot cannot be read.
         """
-        touched = self.robot.read()
+        with refusals_naming(file):
+            touched = self.robot.read()
         gap = link_gap(touched, robot) if same_joints(touched, robot) else None
         if gap is None or not of_one_arm(gap, touched, robot):
             raise CompensationError(
@@ -172,9 +181,12 @@ class ArmGrowth(Result):
             offset=mm(float(np.linalg.norm(self.offset))),
         )
         age = (now - datetime.fromisoformat(self.warm)).total_seconds() / 3600.0
-        if age <= _OLD:
-            return (growth,)
-        return growth, phrase("the state of the arm is {age} h old: touch again", age=f"{age:.0f}")
+        old = phrase("the state of the arm is {age} h old: touch again", age=f"{age:.0f}")
+        return (
+            *([growth] if self.corrects else []),
+            *self.findings,
+            *([] if abs(age) <= _OLD else [old]),
+        )
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
@@ -307,7 +319,7 @@ def arm_growth(
             f"{count} points were touched in both runs: at least {LEAST_TOUCHES} are needed"
         )
     # By the shifts as they are: the priors of the fit would hide what is no growth in its noise.
-    _require_possible(0.0, np.median(touches.shift, axis=0), "the touches")
+    _require_possible(0.0, np.median(touches.shift, axis=0), "the touches say")
     tool = robot.forward(touches.q)[:, :3, 3]
     lever = tool - robot.foot(touches.q)
     fit = _fitted(lever, touches.shift)
@@ -370,11 +382,20 @@ def _require_possible(share: float, offset: FloatArray, what: str) -> None:
     away = float(np.linalg.norm(offset))
     if not (abs(share) <= _LARGEST_SHARE and away <= _LARGEST_OFFSET):
         raise CompensationError(
-            f"{what} say that the arm has grown by {_micro(share)} and moved by"
+            f"{what} that the arm has grown by {_micro(share)} and moved by"
             f" {quantity(away, 'mm', '.3g')}, at most {_micro(_LARGEST_SHARE)} and"
             f" {quantity(_LARGEST_OFFSET, 'mm', '.3g')} are an arm's: did the tracker, the tooling"
             " or the tool move?"
         )
+
+
+def _date(text: str) -> datetime | None:
+    """Return a date and time with its zone; None: the text is none."""
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return None if found.tzinfo is None else found
 
 
 def _vector(values: FloatArray) -> Vector:
