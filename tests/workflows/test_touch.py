@@ -1,6 +1,8 @@
 """``touch`` on the simulated cell: cold and warm runs, the state, and what corrects by it."""
 
 import json
+import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,12 +10,14 @@ import pytest
 from elastocal.cell import load_cell
 from elastocal.errors import ProcedureError
 from elastocal.procedure import read_journal, read_touches
+from elastocal.procedure.derive import touches as touches_module
 from elastocal.sim import truth_of
 from elastocal.workflows import check, derive, run, touch
 from support.cli import elastocal
 from support.run_cells import planned_cell
 
 POSES = 8
+JUMP = np.array([0.0, 5e-3, 0.0])
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +101,13 @@ def test_touches_have_no_dataset(touched):
         derive(folder / "cold")
 
 
+def test_whoever_verifies_touches_is_not_sent_to_derive_them(touched):
+    folder, _, _ = touched
+    done = elastocal("verify", folder / "cold")
+    assert done.code == 1
+    assert "touches have none, they press no load case: `elastocal touch` reads them" in done.err
+
+
 def test_a_run_that_is_resumed_stays_what_it_is(touched):
     folder, made, _ = touched
     with pytest.raises(ProcedureError, match=r"its touch is cold, not None.*give --touch cold"):
@@ -107,3 +118,63 @@ def test_a_word_for_how_warm_it_is_must_be_one_of_two(touched):
     folder, made, _ = touched
     with pytest.raises(ProcedureError, match="--touch 'hot' is not one of cold, warm"):
         run(made.cell, plan=made.plan, out=folder / "hot", touch="hot", confirmed=True)
+
+
+def copied(run, folder, commits):
+    """Copy a run whose journal ends after some poses."""
+    shutil.copytree(run, folder)
+    journal, kept = folder / "journal.jsonl", []
+    for line in journal.read_text(encoding="utf-8").splitlines(keepends=True):
+        kept.append(line)
+        commits -= json.loads(line)["event"] == "commit"
+        if not commits:
+            break
+    journal.write_text("".join(kept), encoding="utf-8")
+    return folder
+
+
+def test_nothing_moves_where_the_cold_run_is_of_no_use(touched, tmp_path):
+    folder, made, _ = touched
+    for cold, message in (
+        (folder / "state-run", "is warm: the cold touches are wanted"),
+        (
+            copied(folder / "cold", tmp_path / "two", 2),
+            "no tracker can be registered: station_1 it",
+        ),
+    ):
+        with pytest.raises(ProcedureError, match=message):
+            touch(made.cell, cold=cold, out=tmp_path / "v.json", confirmed=True)
+        assert not (tmp_path / "v-run").exists()
+
+
+def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(touched, tmp_path):
+    folder, made, _ = touched
+    half, files = copied(folder / "state-run", tmp_path / "half", 4), {"cold": folder / "cold"}
+    files |= {"warm": half, "out": tmp_path / "w.json"}
+    with pytest.raises(ProcedureError, match="half: the warm touches are not done: `--resume`"):
+        touch(made.cell, **files)
+    assert not (tmp_path / "w.json").exists()
+    assert len(touch(made.cell, **files, resume=True, confirmed=True).points) == POSES
+
+
+@pytest.mark.parametrize("moved", ["cold", "state-run"])
+def test_a_tracker_that_moved_during_the_touches_is_refused(touched, monkeypatch, moved):
+    folder, _, _ = touched
+
+    def read(path):
+        run = read_run(path)
+        return replace(run, poses=tuple(map(pushed, run.poses))) if path.name == moved else run
+
+    def pushed(pose):
+        if pose.pose < POSES // 2:
+            return pose
+        return replace(pose, **{name: away(getattr(pose, name)) for name in ("reference", "light")})
+
+    def away(reading):
+        marker = reading.marker
+        return replace(reading, marker=replace(marker, value=marker.value + JUMP))
+
+    read_run = touches_module.read_run
+    monkeypatch.setattr(touches_module, "read_run", read)
+    with pytest.raises(ProcedureError, match=rf"{moved}: station station_1 moved by"):
+        read_touches(folder / "cold", folder / "state-run")

@@ -7,6 +7,7 @@ from .derive import (
     read_summary as read_summary,
     read_touches as read_touches,
     rehearse_derivation as rehearse_derivation,
+    require_cold_touches as require_cold_touches,
     write_derived as write_derived,
 )
 from .record import (

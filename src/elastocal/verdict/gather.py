@@ -205,8 +205,10 @@ def _with_run(evidence: Evidence, reader: PartReader, run: RunFolder) -> Evidenc
     record = evidence.run_record
     path = run.cell / (record.cell_file if record else "cell.yaml")
     evidence = _with_plan(_with_cell(evidence, reader, path), reader, run)
-    summary = _derived(reader, "summary of the run", run.summary, read_summary)
-    evidence = replace(evidence, dataset=_derived(reader, "dataset", run.dataset, datasets.read))
+    touches = record is not None and record.touch is not None
+    summary = _derived(reader, "summary of the run", run.summary, read_summary, touches)
+    dataset = _derived(reader, "dataset", run.dataset, datasets.read, touches)
+    evidence = replace(evidence, dataset=dataset)
     for file in run_files(run):
         reader.use(file)
     return replace(evidence, summary=summary)
@@ -240,10 +242,12 @@ def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Eviden
 
 
 def _derived(
-    reader: PartReader, name: str, path: Path, read: Callable[[Path], Part]
+    reader: PartReader, name: str, path: Path, read: Callable[[Path], Part], touches: bool
 ) -> Part | None:
     if not path.is_file():
         reason = f"there is no {reader.folders.shown(path)}; `elastocal derive` makes it"
+        if touches:
+            reason = "touches have none, they press no load case: `elastocal touch` reads them"
         reader.note_missing(name, reason)
         return None
     return reader.read(name, path, lambda: read(path))

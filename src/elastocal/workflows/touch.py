@@ -9,7 +9,14 @@ from elastocal.cell import Arming
 from elastocal.compensation import ArmGrowth, Touches, arm_growth, write_arm_growth
 from elastocal.errors import ProcedureError
 from elastocal.options import Option, Statements
-from elastocal.procedure import RunEnd, RunFolder, read_touches
+from elastocal.procedure import (
+    Event,
+    RunEnd,
+    RunFolder,
+    read_journal,
+    read_touches,
+    require_cold_touches,
+)
 from elastocal.progress import Progress
 from elastocal.records import schema_of
 from elastocal.results import brief_repr
@@ -95,9 +102,11 @@ def touch(settings: TouchSettings, progress: Progress) -> ArmGrowth:
 
 
 def _touch_warm(settings: TouchSettings, progress: Progress) -> None:
-    """Make the warm run, unless it has been made."""
+    """Make the warm run, unless it has been made; refuse before anything moves for nothing."""
+    require_cold_touches(settings.cold)
     folder, given = RunFolder(settings.folder), settings.warm is not None
     if given and folder.journal.is_file() and not settings.resume:
+        _require_done(folder)
         return
     finished = run(
         RunSettings(
@@ -118,4 +127,13 @@ def _touch_warm(settings: TouchSettings, progress: Progress) -> None:
         raise ProcedureError(
             f"{settings.folder}: {finished.figures.message or finished.figures.state}: `--resume`"
             " goes on"
+        )
+
+
+def _require_done(folder: RunFolder) -> None:
+    """Refuse a run whose session did not come to its end: half of the points would be lost."""
+    entries = read_journal(folder.journal)
+    if entries and entries[-1].event is not Event.FINISH:
+        raise ProcedureError(
+            f"{folder.path}: the warm touches are not done: `--resume` goes on with them"
         )

@@ -30,4 +30,7 @@ from .summary import (
 from .tool import (
     sensor_load as sensor_load,
 )
-from .touches import read_touches as read_touches
+from .touches import (
+    read_touches as read_touches,
+    require_cold_touches as require_cold_touches,
+)

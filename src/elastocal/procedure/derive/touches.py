@@ -30,7 +30,7 @@ from elastocal.procedure.derive.readings import (
     marker_readings,
 )
 from elastocal.procedure.record import ReadingStatus, RunRecord
-from elastocal.procedure.registration import register
+from elastocal.procedure.registration import Registration, register
 from elastocal.results import brief_repr
 
 
@@ -71,16 +71,15 @@ def read_touches(cold: Path, warm: Path) -> TouchedShifts:
     ------
     ProcedureError
         If a run is none of touches, the two are not of one plan and robot, no pose was touched in
-        both, or the tracker of the cold run cannot be registered.
+        both, the tracker of the cold run cannot be registered, or one moved during a run.
     SchemaError, FileAccessError
         If a file of a run is damaged or cannot be read.
     """
     before, after = _touched(cold, "cold"), _touched(warm, "warm")
     if before.record.plan != after.record.plan:
         raise ProcedureError(f"{warm} and {cold} are of two plans: touch the same points warm")
-    lever = marker_in_tcp(before.cell)
-    seen = marker_readings(before.poses, before.cell.robot, before.cell.gravity_base, lever)
-    registration = register(seen, lever)
+    registration = _registered_cold(before)
+    _registered(after)
     rows = []
     first = {pose.pose: pose for pose in before.poses}
     for pose in after.poses:
@@ -90,8 +89,7 @@ def read_touches(cold: Path, warm: Path) -> TouchedShifts:
             pair = _pair(old, pose, fit.T_base_tracker[:3, :3], registration.lever_arm)
             rows += [] if pair is None else [(pose.pose, *pair)]
     if not rows:
-        why = "; ".join(f"{name}: {text}" for name, text in registration.unregistered.items())
-        raise ProcedureError(f"{warm}: no pose was touched in both runs{why and f' ({why})'}")
+        raise ProcedureError(f"{warm}: no pose was touched in both runs")
     touched, q, shift, moved = (np.array(column) for column in zip(*rows, strict=True))
     normal = np.array([before.plan.poses[number].normal for number in touched.tolist()])
     return TouchedShifts(
@@ -107,6 +105,44 @@ def read_touches(cold: Path, warm: Path) -> TouchedShifts:
         after.entries[-1].time - after.entries[0].time,
         tuple(each.id for each in before.plan.poses if each.id not in touched),
     )
+
+
+def require_cold_touches(cold: Path) -> None:
+    """Refuse a run with which no warm touches can be compared, before an arm moves for them.
+
+    Raises
+    ------
+    ProcedureError, SchemaError, FileAccessError
+        As `read_touches`.
+    """
+    _registered_cold(_touched(cold, "cold"))
+
+
+def _registered_cold(run: CommittedRun) -> Registration:
+    """Return the registration of the cold run, by which both runs are turned into base."""
+    found = _registered(run)
+    if not found.stations:
+        why = "; ".join(f"{name} {text}" for name, text in found.unregistered.items())
+        raise ProcedureError(f"{run.folder.path}: no tracker can be registered: {why}")
+    return found
+
+
+def _registered(run: CommittedRun) -> Registration:
+    """Return the registration of a run's trackers, none of which moved during it.
+
+    A pose that was touched before the move would be compared with one after it: the way of the
+    stand would be taken for the arm's.
+    """
+    lever = marker_in_tcp(run.cell)
+    seen = marker_readings(run.poses, run.cell.robot, run.cell.gravity_base, lever)
+    found = register(seen, lever)
+    for move in found.moves:
+        raise ProcedureError(
+            f"{run.folder.path}: station {move.station} moved by {1e3 * move.distance:.2f} mm"
+            f" between poses {move.before} and {move.pose}: fix its stand, touch cold and"
+            " warm again"
+        )
+    return found
 
 
 def _touched(folder: Path, warmth: str) -> CommittedRun:
