@@ -157,8 +157,8 @@ class TestTheCommand:
     @pytest.mark.parametrize(
         "option",
         [
-            *(("--budget",), ("--robot", "UR20"), ("--tcp", "tcp"), ("--tool", "0 mm")),
-            *(("--springs", "axial"), ("--loss", "huber"), ("--free-frame", "campaign")),
+            *(("--budget",), ("--springs", "axial"), ("--loss", "huber")),
+            *(("--free-frame", "campaign"), ("--keep-blunders",)),
         ],
     )
     def test_options_of_a_calibration_are_refused(self, files, option):
@@ -196,3 +196,16 @@ class TestTheCommand:
             days.append(tmp_path / f"{name}.nc")
         with pytest.raises(IdentificationError, match=message):
             calibrate_files(days, update=files / "model.json")
+
+    def test_the_tool_is_given_as_in_the_calibration(self, files, tmp_path):
+        # Readings that state the place of their tcp leave no choice.
+        for name in ("old", "monday", "tuesday"):
+            dataset = read(files / f"{name}.nc")
+            write(replace(dataset, tcp_position=None), tmp_path / f"{name}.nc")
+        days, model = [tmp_path / "monday.nc", tmp_path / "tuesday.nc"], tmp_path / "model.json"
+        calibrate_files(tmp_path / "old.nc", springs="bearing", draws=40, tcp="link_6", out=model)
+        with pytest.raises(
+            IdentificationError, match="give --tcp and --tool as in the calibration"
+        ):
+            calibrate_files(days, update=model)
+        assert calibrate_files(days, update=model, tcp="link_6").update is not None

@@ -197,7 +197,9 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     return result
 
 
-_WITH_UPDATE = {"data", "out", "update", "force", "marker", "exclude", "seed"}
+_WITH_UPDATE = frozenset(
+    {"data", "out", "update", "force", "marker", "exclude", "seed", "robot", "tcp", "tool_frame"}
+)
 """Settings that count when a model is brought up to date; all others are of a calibration."""
 
 
@@ -212,7 +214,7 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
     """
     for each in fields(settings):
         if each.name not in _WITH_UPDATE and getattr(settings, each.name) != each.default:
-            flag = "tool" if each.name == "tool_frame" else each.name.replace("_", "-")
+            flag = each.name.replace("_", "-")
             raise IdentificationError(f"--{flag} goes with a calibration, not with --update")
     before = read_json(file, CalibrateResult)
     found = settings.read()
@@ -220,8 +222,9 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
     _require_new(made_from, before, file)
     measured, source = _measured(found)
     calibrated = before.calibrated
-    if measured.robot_urdf:
-        _require_arm_of(calibrated.model.robot, measured, (str(file), source))
+    if settings.robot is not None or measured.robot_urdf:
+        arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
+        _require_arm_of(calibrated.model.robot, arm, (str(file), source))
     readings = measured.readings(calibrated.model.robot.joint_names)
     readings = without(readings, settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
@@ -250,18 +253,18 @@ def _require_new(made_from: dict[str, str], before: CalibrateResult, file: Path)
             )
 
 
-def _require_arm_of(robot: Robot, measured: Dataset, names: tuple[str, str]) -> None:
+def _require_arm_of(robot: Robot, arm: Robot, names: tuple[str, str]) -> None:
     """Refuse production of another robot, or at another tool, than a model's."""
     from elastocal.identification.recertification import check_same_robot
 
-    arm = find_robot(None, None, None, measured)
     check_same_robot(robot, arm, names)
     gap = tool_gap(robot, arm)
     if not of_one_arm(gap, robot, arm):
         file, source = names
         raise IdentificationError(
             f"{file} and {source} have other tools: their tool centre points ({robot.tip},"
-            f" {arm.tip}) are {gap} apart; calibrate at the tool of production"
+            f" {arm.tip}) are {gap} apart; give --tcp and --tool as in the calibration, if"
+            " production had that tool"
         )
 
 
