@@ -20,6 +20,7 @@ from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
 from elastocal.units import quantity
+from elastocal.verdict import Verdict
 from elastocal.workflows._operator_and_devices import Operator, Unattended
 from elastocal.workflows._workflow import Workflow, workflow
 from elastocal.workflows.calibrate import calibrate
@@ -28,7 +29,7 @@ from elastocal.workflows.compensate import compensate
 from elastocal.workflows.export import export
 from elastocal.workflows.init import init
 from elastocal.workflows.plan import plan
-from elastocal.workflows.report import report
+from elastocal.workflows.report import ReportResult, report
 from elastocal.workflows.run import RunResult, run
 from elastocal.workflows.simulate_process import STIFFEST, simulate_process
 from elastocal.workflows.tool import tool
@@ -142,6 +143,8 @@ class DemoResult(Result):
     folder: Path
     process: SimulateProcessResult
     """Deviations before and after correction: the paper's Table 1."""
+    verdict: Verdict | None = None
+    """Verdict of the report."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the summary after the demo."""
@@ -166,12 +169,21 @@ class DemoResult(Result):
         return self.process
 
     def closing(self) -> tuple[str, ...]:
-        """Return the facts in two sentences."""
+        """Return the facts in some sentences: before and after, the verdict, what to do next."""
         (_, mean), (_, largest), (_, page) = self.facts()
         return (
             f"mean deviation on the process path: {mean}; largest {largest}",
+            *self._judged(),
             f"open {page} in a browser; {self.folder / README} says what each file is",
         )
+
+    def _judged(self) -> Iterator[str]:
+        """Yield what is proved, the first reason why not, and what to do next."""
+        if self.verdict is None:
+            return
+        yield f"{self.verdict.word}: {self.verdict.meaning}"
+        yield from (f"because {reason}" for reason in self.verdict.reasons[:1])
+        yield from (f"next: {advice}" for advice in self.verdict.advice[:1])
 
 
 @workflow(DemoSettings)
@@ -210,7 +222,8 @@ def demo(settings: DemoSettings, progress: Progress) -> DemoResult:
             results[chapter.words[0]] = result
     finish(out, settings.kind, settings.seed, [chapter.line for chapter in story])
     process = of_kind(results.get("simulate-process"), SimulateProcessResult, "last result")
-    return DemoResult(out, process)
+    made = of_kind(results.get("report"), ReportResult, "report")
+    return DemoResult(out, process, made.verdict)
 
 
 def chapters(kind: str, out: Path, seed: int) -> tuple[Chapter, ...]:

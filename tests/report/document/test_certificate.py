@@ -1,6 +1,7 @@
 """The certificate's figures, the uncertainty, and the tables for Excel."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from elastocal.report.document import section_blocks, write_workbook
 from elastocal.report.document.certificate import _scale, certificate_of_evidence
 from elastocal.report.document.page import ordered_sections
 from elastocal.verdict import Evidence, judge_evidence, state_uncertainty
+from elastocal.workflows import DemoResult
 from support.reported import MADE
 
 
@@ -56,6 +58,16 @@ def test_without_anything_there_is_a_certificate_that_says_so():
     assert found.picture is None
     assert "Not known" in found.coverage
     assert "Not stated" in found.uncertainty
+
+
+def test_a_demo_ends_with_the_verdict_and_what_to_do_next(parts, tmp_path):
+    verdict = judge_evidence(replace(parts, limits=replace(parts.limits, tolerance=1e-6)))
+    process = SimpleNamespace(lines=parts.process.table.lines)
+    first, *judged, page = DemoResult(tmp_path, process, verdict).closing()
+    assert first.startswith("mean deviation on the process path: ")
+    assert judged[0] == f"{verdict.word}: {verdict.meaning}"
+    assert judged[1:] == [f"because {verdict.reasons[0]}", f"next: {verdict.advice[0]}"]
+    assert DemoResult(tmp_path, process).closing() == (first, page)
 
 
 @pytest.mark.parametrize("longest", [0.03, 0.31, 0.9999, 1.0, 2.4, 17.0, 250.0])
