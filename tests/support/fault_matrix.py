@@ -476,8 +476,8 @@ STAYS = {
     "arm: garbage": "No message of the controller can be answered, so it stops by its `Timeout`."
     " Mend the line, start the program, then `elastocal release` or `--resume`.",
     "arm: NaN": "A position that is no number is not answered, and the controller stops by its"
-    " `Timeout`. Start the program anew, then `elastocal release` or `--resume`.",
-    "arm: program restarted": "A program that begins anew forgets its correction, and the arm takes"
+    " `Timeout`. Restart the program, then `elastocal release` or `--resume`.",
+    "arm: program restarted": "A program that restarts forgets its correction, and the arm takes"
     " no order of the old one. Free the tool with `elastocal release`, or go on with `--resume`.",
     "arm: metres for millimetres": "The place of the tool is not known, so no retract is begun."
     " Free the tool with the pendant.",

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from elastocal.arrays import FloatArray
 from elastocal.blocks import Block, Facts, Row, Table
@@ -246,7 +246,7 @@ class _Fit:
     @property
     def factor(self) -> float:
         """Half of a 95 % interval in standard deviations (Student's t)."""
-        return float(student.ppf(_LEVEL, self.free))
+        return float(stdtrit(self.free, _LEVEL))
 
 
 def _fitted(lever: FloatArray, shift: FloatArray) -> _Fit:

@@ -5,7 +5,6 @@ import dataclasses
 import importlib
 import inspect
 import io
-import json
 import re
 import signal
 import sys
@@ -20,6 +19,7 @@ import pytest
 from elastocal import plugins
 from elastocal.cli import COMMANDS, Command, Given, plugged, run
 from elastocal.options import OWN, REQUIRED, settings_fields
+from elastocal.records import parse_json
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class CommandSuite:
     ) -> None:
         result = run_command(command, *arguments, "--json")
         assert result.code == 0, result.err
-        assert isinstance(json.loads(result.out), dict)
+        assert isinstance(parse_json(result.out, "standard output"), dict)
         assert result.out.count("\n") == 1
 
     def test_its_page_is_said_in_the_languages_of_its_package(

@@ -8,13 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation import ArmGrowth, read_arm_growth
 from elastocal.dataset import Dataset, require_joint_names
 from elastocal.errors import (
     CompensationError,
@@ -49,6 +48,9 @@ from elastocal.robot import (
 )
 from elastocal.units import parse_number, parse_point, parse_quantity, quantity
 from elastocal.wording import listed
+
+if TYPE_CHECKING:
+    from elastocal.compensation import ArmGrowth
 
 _LONGEST_TOOL = 10.0
 """In m: no tool of a robot is longer; a longer one was meant in mm."""
@@ -214,7 +216,7 @@ class TouchedArm:
     arm_state: Annotated[Path | None, Option(metavar="STATE.json")] = None
     """State of the arm by `touch`: its growth is corrected too."""
 
-    def growth(self, robot: Robot) -> ArmGrowth | None:
+    def growth(self, robot: Robot) -> "ArmGrowth | None":
         """Return how far the arm has grown; None where nobody has touched.
 
         Raises
@@ -224,7 +226,12 @@ class TouchedArm:
         SchemaError, FileAccessError
             If the file is no state, was changed by hand, or cannot be read.
         """
-        return None if self.arm_state is None else read_arm_growth(self.arm_state, robot)
+        if self.arm_state is None:
+            return None
+        # Most commands with inputs correct nothing.
+        from elastocal.compensation import read_arm_growth
+
+        return read_arm_growth(self.arm_state, robot)
 
     def growth_notes(self, robot: Robot) -> tuple[str, ...]:
         """Return what a person should know of a correction that counts the state in."""
