@@ -182,6 +182,17 @@ class TestFilling:
             pytest.fail("the block must not run")
 
 
+def test_the_folder_that_one_is_in_can_be_filled(tmp_path, monkeypatch):
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    with filling(Path(), "last.txt", force=True) as folder:
+        assert folder.parent == tmp_path
+        (folder / "last.txt").write_text("x")
+    assert [each.name for each in here.iterdir()] == ["last.txt"]
+    assert [each.name for each in tmp_path.iterdir()] == ["here"]
+
+
 def test_what_is_wrong_with_another_file_is_told_of_that_file(tmp_path):
     def copied():
         with replacing(tmp_path / "out.txt") as temporary:

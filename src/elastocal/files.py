@@ -229,6 +229,10 @@ def _under_way(path: Path, make: Callable[[Path], None], suffix: str = "") -> It
 
     Its name is known before it is made, so that it is removed even where a signal arrives then.
     """
+    # The folder that one is in has a name, too, but for the root of all.
+    path = path if path.name else path.absolute()
+    if not path.name:
+        raise FileAccessError(f"cannot write {path}: it is the root of all folders")
     made = False
     while not made:
         place = path.with_name(f"{_prefix(path)}{secrets.token_urlsafe(6)}{suffix}")
