@@ -23,7 +23,8 @@ class _ArrayField:
 
     def _read(self, value: Any) -> NDArray[Any]:
         try:
-            array = np.array(value)
+            # A text among numbers would give every item of the array the room of the longest.
+            array = np.array(None if _holds_text(value) else value)
         except ValueError:
             array = np.array(None)
         if array.size and array.dtype.kind not in _ACCEPTED[self.kind]:
@@ -42,6 +43,11 @@ class _ArrayField:
         reason = "rows must have one length" if at is None else f"must be {_WORDS[self.kind]}"
         where = {"at": at or [], "given": given}
         return PydanticCustomError("array", reason, where)
+
+
+def _holds_text(value: Any) -> bool:
+    """Return whether a text is among items, however deep."""
+    return isinstance(value, str) or (isinstance(value, list) and any(map(_holds_text, value)))
 
 
 def _first_wrong(

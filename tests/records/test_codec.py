@@ -1,5 +1,6 @@
 import enum
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -84,6 +85,17 @@ def test_what_does_not_fit_is_refused_in_one_line(change, words):
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
     assert str(refused.value).startswith("f.json")
+
+
+def test_a_long_text_among_numbers_takes_no_more_room_than_it_has():
+    draws = [[1.0] * 50 for _ in range(50)]
+    draws[20][30] = "x" * 10_000
+    tracemalloc.start()
+    with pytest.raises(SchemaError, match=r"draws\.20\.30: must be a finite number"):
+        from_data(Whole, to_data(whole()) | {"draws": draws}, "f.json")
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 10e6
 
 
 def test_a_missing_key_is_named():
