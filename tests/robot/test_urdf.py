@@ -205,6 +205,11 @@ class TestRefusals:
         [
             (
                 '<link name="a"/>',
+                '<link name="a"><inertial><mass value="60. "/></inertial></link>',
+                "link 'a': <mass value='60. '> must be a finite number",
+            ),
+            (
+                '<link name="a"/>',
                 '<link name="a"><inertial><mass value="-2"/></inertial></link>',
                 "link 'a': <mass value='-2'> is -2 kg: it must not be negative",
             ),

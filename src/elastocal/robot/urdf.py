@@ -104,7 +104,9 @@ def _check_numbers(owner: str, element: ElementTree.Element) -> None:
         values = _floats(text)
         # A limit may be infinite, as several exporters write "none".
         finite = all(map(math.isfinite, values)) or element.tag == "limit"
-        if len(values) != count or not finite or any(map(math.isnan, values)):
+        # A single number with a space beside it is none to urdfdom, which then drops the inertia.
+        spaced = count == 1 and text != text.strip()
+        if len(values) != count or spaced or not finite or any(map(math.isnan, values)):
             what = "a finite number" if count == 1 else f"{count} finite numbers"
             raise RobotError(f"URDF {owner}: <{element.tag} {name}={text!r}> must be {what}")
         if element.tag == "axis" and not any(values):
