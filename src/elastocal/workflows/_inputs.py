@@ -233,10 +233,10 @@ class TouchedArm:
 
         return read_arm_growth(self.arm_state, robot)
 
-    def growth_notes(self, robot: Robot) -> tuple[str, ...]:
-        """Return what a person should know of a correction that counts the state in."""
-        found = self.growth(robot)
-        return () if found is None else found.notes(datetime.now(UTC))
+
+def growth_notes(state: "ArmGrowth | None") -> tuple[str, ...]:
+    """Return what a person should know of a correction that counts a state in."""
+    return () if state is None else state.notes(datetime.now(UTC))
 
 
 def _require_near(what: str, point: ArrayLike, origin: str) -> None:

@@ -39,6 +39,7 @@ from elastocal.workflows._inputs import (
     NewTool,
     TouchedArm,
     coverage_notes,
+    growth_notes,
     parse_frame,
     parse_posture,
     write_posture,
@@ -167,7 +168,8 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     usual = None if is_program or start is not None else _usual_posture(calibrated)
     start = start if usual is None else usual
     controller, built = settings.unloaded(robot)
-    unloaded = _grown(settings.growth(robot), controller, built)
+    state = settings.growth(robot)
+    unloaded = _grown(state, controller, built)
     how = CorrectionSettings(start, settings.largest, unloaded, controller)
     if is_program:
         if forces is None:
@@ -188,7 +190,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         tool=calibrated.tool_name,
         notes=(
             *_built(settings),
-            *settings.growth_notes(robot),
+            *growth_notes(state),
             *coverage_notes(calibrated),
             *notes,
             *further,

@@ -26,6 +26,7 @@ from elastocal.workflows._inputs import (
     NewTool,
     TouchedArm,
     coverage_notes,
+    growth_notes,
     require_model_of_arm,
     require_same_robot,
 )
@@ -137,8 +138,9 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     else:
         chosen = settings_within(settings.compensator, *around[1:])
     load = read_sensor_load(settings.tool, calibrated.model.robot)
+    state = settings.growth(calibrated.model.robot)
     try:
-        numbers = design(calibrated, chosen, load, settings.growth(calibrated.model.robot))
+        numbers = design(calibrated, chosen, load, state)
     except CompensationError as error:
         raise CompensationError(f"{model}: {error}") from error
     on_production = calibrated.on_production
@@ -158,7 +160,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
             *(coverage_notes(calibrated) if calibrated.tool is not None else ()),
             *(on_production.warnings if on_production else ()),
             *((_NO_TOOL,) if settings.tool is None else ()),
-            *settings.growth_notes(calibrated.model.robot),
+            *growth_notes(state),
         ),
         on_production=on_production,
     )

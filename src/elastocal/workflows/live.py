@@ -26,6 +26,7 @@ from elastocal.workflows._inputs import (
     NewTool,
     TouchedArm,
     coverage_notes,
+    growth_notes,
     require_model_of_arm,
     require_same_robot,
     seconds_of,
@@ -208,8 +209,9 @@ def _prepare(settings: LiveSettings) -> Prepared:
     require_model_of_arm(calibrated, settings.model)
     chosen = settings_within(settings.compensator, limits, cell)
     load = read_sensor_load(settings.tool, calibrated.model.robot) or sensor_load(cell)
+    state = settings.growth(calibrated.model.robot)
     try:
-        numbers = design(calibrated, chosen, load, settings.growth(calibrated.model.robot))
+        numbers = design(calibrated, chosen, load, state)
     except CompensationError as error:
         raise CompensationError(f"{settings.model}: {error}") from error
     return Prepared(
@@ -223,7 +225,7 @@ def _prepare(settings: LiveSettings) -> Prepared:
         tares=settings.tool is None,
         notes=(
             *_notes(settings, cell, calibrated),
-            *settings.growth_notes(calibrated.model.robot),
+            *growth_notes(state),
         ),
     )
 
