@@ -153,8 +153,11 @@ house:
 clean:
 	rm -rf $(VENV) $(LOWEST) $(PACKAGE) dist demo site mutants
 
+say = @printf '%s\n' $(1)
+
 $(VENV)/bin/python:
-	$(PYTHON) -m venv $(VENV)
+	$(call say,"Making $(VENV) with $$($(PYTHON) --version): nothing is installed outside of it.")
+	@$(PYTHON) -m venv $(VENV)
 
 comma := ,
 # uv takes a third of pip's time; where it cannot be had, pip does it.
@@ -162,13 +165,18 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 install = { $(PIP) uv && $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python \
 	-e $(1); } 2>/dev/null || $(PIP) -e $(1)
 
+NEEDED = sed -n '/^dependencies = \[/,/^\]/s/^ *"\([A-Za-z0-9_-]*\).*/\1/p' pyproject.toml
+
 $(VENV)/installed: pyproject.toml | $(VENV)/bin/python
-	$(call install,.)
-	touch $@
+	$(call say,"Installing elastocal and the packages that it needs: about a minute$(comma) 1 GB." \
+		"They are $$($(NEEDED) | paste -sd ' ').")
+	@$(call install,.)
+	@touch $@
 
 $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
-	$(call install,'.[dev$(comma)docs]')
-	touch $@ $(VENV)/installed
+	$(call say,"Installing elastocal$(comma) what it needs$(comma) and the tools of developers.")
+	@$(call install,'.[dev$(comma)docs]')
+	@touch $@ $(VENV)/installed
 
 # Where it cannot be had nothing is fuzzed, and that is said.
 $(VENV)/installed-fuzz: $(VENV)/installed-dev

@@ -15,6 +15,7 @@ from elastocal.errors import ReportError
 from elastocal.procedure import RunEnd
 from elastocal.results import MOST_CHARACTERS, MOST_LINES, Result
 from elastocal.robot import catalogue
+from elastocal.verdict import Evidence, judge_evidence
 from support import (
     foreign_logs,
     kuka_bench,
@@ -79,7 +80,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.compensate(model, path=path, out=out / "corrected.csv"),
         derived,
         workflows.dry_run(settings),
-        workflows.DemoResult(out, process),
+        workflows.DemoResult(out, process, judge_evidence(Evidence(made=reported.MADE))),
         workflows.export(model, out=out / "c"),
         workflows.geometry(positions, robot="KR 210 R2700-2", tcp="flange", draws=40),
         workflows.guess_map(logs),

@@ -114,7 +114,7 @@ def test_the_largest_errors_at_one_pose_are_told_together():
     many = errors(0.4, 0.1, 0.2)
     assert many.at_one_pose() is None
     several = replace(many, pose=np.repeat(np.arange(5), 4), error=np.linspace(1e-4, 2.9e-4, 20))
-    assert several.at_one_pose() == (
+    assert several.at_one_pose().sentence == (
         "The 4 largest errors are all at pose 4; at the other poses none exceeds 0.250 mm."
     )
 

@@ -31,6 +31,28 @@ _SAME = 1e-4
 
 
 @brief_repr
+@dataclass(frozen=True)
+class ErrorsAtOnePose:
+    """The largest errors, which are all at one pose."""
+
+    pose: int
+    count: int
+    rest: float
+    """Largest error at the other poses, in m."""
+
+    @property
+    def sentence(self) -> Phrase:
+        """The same in words."""
+        return phrase(
+            "The {count} largest errors are all at pose {pose}; at the other poses none exceeds"
+            " {rest}.",
+            count=self.count,
+            pose=self.pose,
+            rest=mm(self.rest),
+        )
+
+
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class UnseenErrors:
     """Errors of predicted deflections at poses that were left out of the fit."""
@@ -59,20 +81,14 @@ class UnseenErrors:
         """Return how many readings have a larger error."""
         return int(np.count_nonzero(~(self.error <= tolerance)))
 
-    def at_one_pose(self) -> Phrase | None:
-        """Return whether the largest errors are all at one pose; None below three of them."""
+    def at_one_pose(self) -> "ErrorsAtOnePose | None":
+        """Return the largest errors if they are all at one pose; None below three of them."""
         order = np.argsort(-self.error, kind="stable")
         pose = int(self.pose[order[0]])
         others = np.flatnonzero(self.pose[order] != pose)
         if not others.size or others[0] < _MOST_ALONE:
             return None
-        return phrase(
-            "The {count} largest errors are all at pose {pose}; at the other poses none exceeds"
-            " {rest}.",
-            count=int(others[0]),
-            pose=pose,
-            rest=mm(float(self.error[order[others[0]]])),
-        )
+        return ErrorsAtOnePose(pose, int(others[0]), float(self.error[order[others[0]]]))
 
 
 @dataclass(frozen=True, eq=False)

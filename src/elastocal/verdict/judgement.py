@@ -15,6 +15,7 @@ from elastocal.identification import MOST_UNEXPLAINED, UnseenErrors
 from elastocal.results import brief_repr
 from elastocal.verdict.evidence import AcceptanceLimits, Evidence
 from elastocal.verdict.findings import find_everything, place_of_reading
+from elastocal.verdict.headline import ProductionEffect, next_step, production_effect
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
 _LOUD = 0.3
@@ -48,6 +49,10 @@ class Verdict:
     """Further things to know."""
     advice: tuple[str, ...]
     """Ways to improve the result."""
+    next_step: str
+    """The one of them that brings most, with a figure; or the use of the result."""
+    effect: ProductionEffect | None = None
+    """Deviation on production before and after correction; None where it is not known."""
 
 
 def judge_evidence(evidence: Evidence) -> Verdict:
@@ -100,6 +105,8 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
         tuple(dict.fromkeys((*broken[:1], *own[: light is Light.RED], *broken, *own, *held))),
         tuple(notes),
         tuple(all_advice),
+        next_step(evidence, held),
+        production_effect(evidence),
     )
 
 
@@ -309,7 +316,7 @@ def _sentence(evidence: Evidence, unseen: UnseenErrors | None) -> Phrase:
         max=mm(unseen.max),
     )
     alone = unseen.at_one_pose()
-    return sentences([left_out, accuracy, *([alone] if alone else []), against])
+    return sentences([left_out, accuracy, *([alone.sentence] if alone else []), against])
 
 
 def _stated(evidence: Evidence) -> Phrase:

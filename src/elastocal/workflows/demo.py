@@ -19,7 +19,6 @@ from elastocal.parallel import process_count, process_pool
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
-from elastocal.units import quantity
 from elastocal.verdict import Verdict
 from elastocal.workflows._operator_and_devices import Operator, Unattended
 from elastocal.workflows._workflow import Workflow, workflow
@@ -143,24 +142,18 @@ class DemoResult(Result):
     folder: Path
     process: SimulateProcessResult
     """Deviations before and after correction: the paper's Table 1."""
-    verdict: Verdict | None = None
+    verdict: Verdict
     """Verdict of the report."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return the summary after the demo."""
-        line = self.process.lines[-1]
-        before, after, share = line.before, line.after, line.reduction
+        """Return the summary after the demo: before and after, the verdict, what to do next."""
+        verdict = self.verdict
+        effects = () if verdict.effect is None else (verdict.effect,)
         return (
-            (
-                "mean deviation on the process path",
-                f"{quantity(before.mean, 'mm', '.3f')} before,"
-                f" {quantity(after.mean, 'mm', '.3f')} after correction"
-                f" (-{100 * share.mean:.1f} %)",
-            ),
-            (
-                "largest",
-                f"{quantity(before.max, 'mm', '.3f')}, then {quantity(after.max, 'mm', '.3f')}",
-            ),
+            *((each.where, f"{each.figures}, {each.rest}") for each in effects),
+            (verdict.word, verdict.meaning),
+            *(("because", reason) for reason in verdict.reasons[:1]),
+            ("next", verdict.next_step),
             ("report", str(self.folder / "report.html")),
         )
 
@@ -169,21 +162,12 @@ class DemoResult(Result):
         return self.process
 
     def closing(self) -> tuple[str, ...]:
-        """Return the facts in some sentences: before and after, the verdict, what to do next."""
-        (_, mean), (_, largest), (_, page) = self.facts()
+        """Return the facts in some sentences."""
+        *facts, (_, page) = self.facts()
         return (
-            f"mean deviation on the process path: {mean}; largest {largest}",
-            *self._judged(),
+            *(f"{name}: {text}" for name, text in facts),
             f"open {page} in a browser; {self.folder / README} says what each file is",
         )
-
-    def _judged(self) -> Iterator[str]:
-        """Yield what is proved, the first reason why not, and what to do next."""
-        if self.verdict is None:
-            return
-        yield f"{self.verdict.word}: {self.verdict.meaning}"
-        yield from (f"because {reason}" for reason in self.verdict.reasons[:1])
-        yield from (f"next: {advice}" for advice in self.verdict.advice[:1])
 
 
 @workflow(DemoSettings)

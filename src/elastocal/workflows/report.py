@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
-from elastocal.blocks import Block, Bullets, Facts
+from elastocal.blocks import Block, Bullets, Facts, Paragraph
 from elastocal.errors import FileAccessError
 from elastocal.identification.recertification import Estimate
 from elastocal.options import Option, Statements
@@ -115,6 +115,10 @@ class ReportFigures:
     verdict: str
     reasons: tuple[str, ...]
     advice: tuple[str, ...]
+    next_step: str
+    """The one of them that brings most, with a figure."""
+    effect: str | None
+    """Deviation on production before and after correction; None where it is not known."""
     tolerance: float | None
     unseen: UnseenFigures | None
     """None if the calibration could not be repeated."""
@@ -134,14 +138,18 @@ class ReportResult(Result):
         return (
             (f"{self.verdict.word}{self.light}", f"{self.verdict.meaning} {self.verdict.sentence}"),
             *(("because", reason) for reason in self.verdict.reasons),
+            ("next", self.verdict.next_step),
             ("written to", self.files),
         )
 
     def show(self) -> Iterator[Block]:
-        """Yield the verdict and its reasons."""
-        verdict, *reasons, _ = self.facts()
-        yield Facts((verdict,))
-        yield Bullets(tuple(reason for _, reason in reasons))
+        """Yield the verdict, its reasons, the effect on production and the next step."""
+        word, *_ = self.facts()
+        yield Facts((word,))
+        yield Bullets(self.verdict.reasons)
+        if self.verdict.effect is not None:
+            yield Paragraph(self.verdict.effect.sentence)
+        yield Facts((("next", self.verdict.next_step),))
 
     @property
     def light(self) -> str:
@@ -229,6 +237,8 @@ def _figures(
         verdict=f"{verdict.meaning} {verdict.sentence}",
         reasons=tuple(verdict.reasons),
         advice=tuple(verdict.advice),
+        next_step=verdict.next_step,
+        effect=verdict.effect.sentence if verdict.effect else None,
         tolerance=evidence.limits.tolerance,
         unseen=unseen,
         missing=tuple(each.name for each in evidence.missing),

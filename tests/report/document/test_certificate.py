@@ -1,7 +1,7 @@
 """The certificate's figures, the uncertainty, and the tables for Excel."""
 
 from dataclasses import replace
-from types import SimpleNamespace
+from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from openpyxl import load_workbook
 from elastocal.report import language_of
 from elastocal.report.document import section_blocks, write_workbook
 from elastocal.report.document.certificate import _scale, certificate_of_evidence
-from elastocal.report.document.page import ordered_sections
+from elastocal.report.document.page import ordered_sections, verdict_html
 from elastocal.verdict import Evidence, judge_evidence, state_uncertainty
 from elastocal.workflows import DemoResult
 from support.reported import MADE
@@ -60,14 +60,27 @@ def test_without_anything_there_is_a_certificate_that_says_so():
     assert "Not stated" in found.uncertainty
 
 
-def test_a_demo_ends_with_the_verdict_and_what_to_do_next(parts, tmp_path):
+def test_a_demo_ends_with_the_words_of_the_first_page(parts, tmp_path):
     verdict = judge_evidence(replace(parts, limits=replace(parts.limits, tolerance=1e-6)))
-    process = SimpleNamespace(lines=parts.process.table.lines)
-    first, *judged, page = DemoResult(tmp_path, process, verdict).closing()
-    assert first.startswith("mean deviation on the process path: ")
-    assert judged[0] == f"{verdict.word}: {verdict.meaning}"
-    assert judged[1:] == [f"because {verdict.reasons[0]}", f"next: {verdict.advice[0]}"]
-    assert DemoResult(tmp_path, process).closing() == (first, page)
+    told = DemoResult(tmp_path, parts.process.table, verdict).closing()
+    page = PageText(verdict_html(parts, verdict)).text
+    for line in (verdict.effect.figures, verdict.effect.rest, verdict.next_step, verdict.word):
+        assert any(line in each for each in told)
+        assert line.replace("`", "") in page
+    assert told[-2] == f"next: {verdict.next_step}"
+
+
+class PageText(HTMLParser):
+    """The text of a page, its white space as one blank."""
+
+    def __init__(self, page):
+        super().__init__()
+        self._parts = []
+        self.feed(page)
+        self.text = " ".join("".join(self._parts).split())
+
+    def handle_data(self, data):
+        self._parts.append(data)
 
 
 @pytest.mark.parametrize("longest", [0.03, 0.31, 0.9999, 1.0, 2.4, 17.0, 250.0])

@@ -22,7 +22,7 @@ from elastocal.verdict import (
 )
 from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
-_MOST_REASONS = 3
+_MOST_REASONS = 2
 """Reasons on the sheet, of two or three lines each on paper: the rest is in the appendix."""
 _LONG_REASON, _LONG_NAME = 110, 60
 _WIDE, _HIGH = 600.0, 190.0

@@ -199,7 +199,7 @@ def _suspicious(evidence: Evidence) -> Iterator[blocks.Block]:
         alone = None if evidence.unseen is None else evidence.unseen.at_one_pose()
         nothing = phrase("No reading was set aside, and none looks wrong by itself.")
         below = phrase("The largest errors stand below.")
-        look = [alone, phrase("Look at that pose.")] if alone else []
+        look = [alone.sentence, phrase("Look at that pose.")] if alone else []
         yield blocks.Paragraph(sentences([nothing, *look, below]))
         return
     yield suspicious_table(figures.suspicious)
