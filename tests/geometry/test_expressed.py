@@ -12,6 +12,7 @@ from elastocal.geometry import (
     link_table,
 )
 from elastocal.geometry.ladder import climb
+from elastocal.geometry.problem import RUNGS
 from elastocal.geometry.solve import register
 from elastocal.progress import silent
 from elastocal.records import read_json
@@ -90,7 +91,8 @@ def test_an_arm_whose_gears_are_bad_is_written_without_what_they_stood_in_for(ar
         ARMS[arm](), 500, markers=1, stations=1, error=3e-4, noise=5e-5, gears=1e-3, span=0.6
     )
     nominal, written, model = nominal_and_written(measured, 300)
-    assert next(each.rung for each in model.ladder if each.chosen) == "harmonics"
+    # Gears of three times what the prior of twice a turn expects are functions of the joint, too.
+    assert next(each.rung for each in model.ladder if each.chosen) in RUNGS[-2:]
     assert model.chain.rung in ("offsets", "geometry")
     assert written < nominal
     assert written == pytest.approx(model.chain.held_out.mean, rel=0.15)

@@ -95,7 +95,7 @@ def test_the_minimum_is_one_by_any_start():
     size = np.array([each.size for each in problem.unknowns])
     x[free[0]] = (2.0 * size * rng.normal(size=len(size)))[free[0]]
     second = fit(problem, free, problem.moved(start, x), used)
-    A = first.J[:, :, free[0]].reshape(-1, len(free[0]))
+    A = first.derivatives.dense[:, :, free[0]].reshape(-1, len(free[0]))
     sigma = first.sigma * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
     apart = (problem.values(second.state) - problem.values(first.state))[free[0]]
     assert np.abs(apart / sigma).max() < 0.1

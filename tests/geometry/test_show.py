@@ -14,7 +14,11 @@ FIGURES = SimpleNamespace(bias=1e-4, mean=2e-4, rms=3e-4, p95=4e-4, max=5e-4)
 HELD_OUT = SimpleNamespace(mean=2e-4, p95=4e-4, max=5e-4)
 MODEL = SimpleNamespace(
     chain=None,
-    ladder=(SimpleNamespace(rung="links", unknowns=24, held_out=HELD_OUT, chosen=True),),
+    ladder=(
+        SimpleNamespace(
+            rung="links", unknowns=24, held_out=HELD_OUT, chosen=True, regions=HELD_OUT
+        ),
+    ),
     parameters=(
         GeometryParameter("link 2 along x", 4.2e-8, "m/N", 3.1e-8, 5.3e-8, True),
         GeometryParameter("gear of joint 1", 2e-6, "1", -1e-6, 5e-6, False),
@@ -22,6 +26,9 @@ MODEL = SimpleNamespace(
     fixed=(),
     findings=(),
     blunders=(),
+    functions=(
+        SimpleNamespace(joint="joint_1", known=True, largest=2.2e-4, order=17, amplitude=9e-5),
+    ),
     T_tcp_built=None,
 )
 POSES = tuple(PoseAccuracy(n, "s", 0, 3, 3e-4 * n, 1e-4 * n, 5e-5 * n) for n in (1, 2))
@@ -54,3 +61,9 @@ def test_terminal_and_page_show_the_same_blocks():
     facts = next(block for block in shown if isinstance(block, Facts))
     assert facts in tuple(geometry_page._iso(found))
     assert dict(facts.pairs)["RP, largest"] == "0.100 mm"
+
+
+def test_functions_of_the_joints_are_shown_with_the_regions_that_decided():
+    lines = [line.split() for line in printed().splitlines()]
+    assert ["joint_1", "known", "220", "17", "90"] in lines
+    assert ["links", "24", "0.200", "0.400", "0.500", "0.200", "taken"] in lines

@@ -38,13 +38,15 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     payloads: tuple[float, ...] = (0.0,),
     compliance: float = 0.0,
     gears: float = 0.0,
+    functions: float = 0.0,
     blunders: int = 0,
     span: float = 0.0,
     joints: np.ndarray | None = None,
 ) -> Measured:
     """Return positions of markers on an arm whose joints stand and turn elsewhere than drawn.
 
-    Joints go all over their range, or as far as `span` from one posture, or are given.
+    Joints go all over their range, or as far as `span` from one posture, or are given. Gears and
+    encoders may err by functions of their joint, of so many rad at most.
     """
     rng = np.random.default_rng(seed)
     truth = Robot.from_urdf(
@@ -62,6 +64,7 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
         gears * np.random.default_rng(seed).normal(size=(2, 2, q.shape[1]))
     ):
         yielded = yielded + a * np.sin((turn + 1) * q) + b * np.cos((turn + 1) * q)
+    yielded = yielded + planted_functions(q, functions, seed)
     T = truth.forward(yielded)
     points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], MARKERS[:markers])
     station = np.arange(rows) % stations
@@ -83,6 +86,16 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
         force=np.zeros((rows, 3)),
     )
     return Measured(robot, truth, data, frozenset(wrong.tolist()), T_station_base)
+
+
+def planted_functions(q: np.ndarray, largest: float, seed: int) -> np.ndarray:
+    """Return how much farther joints turn than they say: three waves of 8 to 30 a turn each."""
+    rng, found = np.random.default_rng([seed, 8]), np.zeros_like(q)
+    for joint in range(q.shape[1]):
+        for order in rng.choice(np.arange(8, 31), 3, replace=False):
+            phase = rng.uniform(0.0, 2.0 * np.pi)
+            found[:, joint] += largest / 3.0 * np.sin(order * q[:, joint] + phase)
+    return found
 
 
 def write_positions(path: Path, measured: Measured) -> Path:

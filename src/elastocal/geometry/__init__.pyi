@@ -10,6 +10,9 @@ from .denavit_hartenberg import (
 from .fitted_model import (
     geometry_model as geometry_model,
 )
+from .joint_functions import (
+    JointFunction as JointFunction,
+)
 from .model import (
     DistanceFigures as DistanceFigures,
     GeometryModel as GeometryModel,
@@ -40,6 +43,7 @@ from .problem import (
 from .show import (
     arm_error_table as arm_error_table,
     axis_table as axis_table,
+    function_table as function_table,
     repeatability_facts as repeatability_facts,
     rung_table as rung_table,
     show_geometry as show_geometry,

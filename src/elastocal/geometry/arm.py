@@ -3,10 +3,11 @@
 Each joint's frame is placed in the link before it by ``placement · [R(r) | t]``, three shifts ``t``
 and three small turns ``r`` along and about the axes of that frame; the joint then moves by
 
-    q' = q + o + s q + a1 sin q + b1 cos q + a2 sin 2q + b2 cos 2q + c tau,
+    q' = q + o + s q + sum_k (a_k sin kq + b_k cos kq) + c tau,
 
-its offset ``o``, transmission ``s``, errors of its gear once and twice a turn, and the rotation by
-its compliance under the torque ``tau`` of weight, payload and process force. A rotation of the
+its offset ``o``, transmission ``s``, errors of its gear and encoder ``k`` times a turn, and the
+rotation by its compliance under the torque ``tau`` of weight, payload and process force. A rotation
+of the
 placement about the joint's own axis is its offset and is not counted twice. The poses of the base
 and of the markers are further unknowns (`elastocal.geometry.problem`). This is the product of
 exponentials about the nominal frames (R. He et al., IEEE Transactions on Robotics 26(3), 2010): it
@@ -25,8 +26,22 @@ from elastocal.robot import Robot
 
 KINDS = ("shift_x", "shift_y", "shift_z", "turn_x", "turn_y", "turn_z")
 """Errors of a joint's pose in the link before it."""
-MOTION = ("offset", "scale", "sin", "cos", "sin2", "cos2", "compliance")
-"""Errors of a joint's motion."""
+LOW_ORDERS, ORDERS = 2, 40
+"""Orders of an arm's eccentric gears, and of all that is fitted: how often a turn."""
+
+
+def motion_names(orders: int) -> tuple[str, ...]:
+    """Return the errors of a joint's motion, with a series up to some order.
+
+    >>> motion_names(2)
+    ('offset', 'scale', 'sin', 'cos', 'sin2', 'cos2', 'compliance')
+    """
+    counts = ("", *range(2, orders + 1))
+    return ("offset", "scale", *(f"{f}{k}" for k in counts for f in ("sin", "cos")), "compliance")
+
+
+MOTION = motion_names(LOW_ORDERS)
+"""Errors of a joint's motion of an arm without functions of its joints."""
 
 
 @brief_repr
@@ -37,12 +52,36 @@ class ArmErrors:
     place: FloatArray
     """Shape (joint, 6): shifts in m, rotations in rad."""
     motion: FloatArray
-    """Shape (joint, 7): in the order of `MOTION`; rad (m) of each unit term, rad/(N·m)."""
+    """Shape (joint, 3 + 2 orders): in the order of `motion_names`; rad (m) of each unit term,
+    rad/(N·m)."""
 
     @classmethod
     def none(cls, joints: int) -> "ArmErrors":
         """Return the nominal arm."""
         return cls(np.zeros((joints, len(KINDS))), np.zeros((joints, len(MOTION))))
+
+    @property
+    def series(self) -> FloatArray:
+        """Sines and cosines of each order, shape (joint, order, 2), in rad."""
+        return self.motion[:, 2:-1].reshape(len(self.motion), -1, 2)
+
+    def up_to(self, orders: int) -> "ArmErrors":
+        """Return the same errors with the series up to some order; what it lacks is 0."""
+        kept = min(2 * orders, self.motion.shape[1] - 3)
+        motion = np.zeros((len(self.motion), 3 + 2 * orders))
+        motion[:, : 2 + kept], motion[:, -1] = self.motion[:, : 2 + kept], self.motion[:, -1]
+        return ArmErrors(self.place.copy(), motion)
+
+    def shortest(self) -> "ArmErrors":
+        """Return the same errors without orders that no joint has, beyond the low ones."""
+        there = np.flatnonzero(self.series.any(axis=(0, 2)))
+        return self.up_to(max(LOW_ORDERS, int(there[-1]) + 1 if len(there) else 0))
+
+    def moved(self, q: FloatArray, torque: FloatArray) -> FloatArray:
+        """Return how far the joints really turn, shape (pose, joint), in rad or m."""
+        waved = series(q, self.shortest().series)
+        offset, scale, compliance = self.motion[:, [0, 1, -1]].T
+        return np.asarray(q + offset + scale * q + waved + compliance * torque)
 
 
 @brief_repr
@@ -81,7 +120,7 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
     count, joints = len(q), robot.chain.joints
     R, p = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     rotation, origin, axis, shifts, turns = [], [], [], [], []
-    moved = q + np.einsum("pjm,jm->pj", motion_terms(q, torque), errors.motion)
+    moved = errors.moved(q, torque)
     for index, joint in enumerate(joints):
         place = errors.place[index]
         T = joint.placement
@@ -135,11 +174,39 @@ def arm_length(robot: Robot) -> float:
 
 
 def motion_terms(q: FloatArray, torque: FloatArray) -> FloatArray:
-    """Return the factors of each error of a joint's motion, shape (pose, joint, 7)."""
-    one = np.ones_like(q)
-    return np.stack(
-        [one, q, np.sin(q), np.cos(q), np.sin(2.0 * q), np.cos(2.0 * q), torque], axis=2
-    )
+    """Return the factors of each error of a joint's motion in `MOTION`, shape (pose, joint, 7)."""
+    low = waves(q, 1, LOW_ORDERS)
+    return np.concatenate([np.stack([np.ones_like(q), q], 2), low, torque[..., None]], axis=2)
+
+
+def waves(q: FloatArray, first: int, last: int) -> FloatArray:
+    """Return sine and cosine of some orders in turn, shape (pose, joint, 2 orders)."""
+    # The poses come last in memory: the recurrence then runs along them.
+    turn = np.exp(1j * q.T)
+    power, found = turn**first, np.empty((q.shape[1], 2 * (last + 1 - first), len(q)))
+    for k in range(last + 1 - first):
+        power = power * turn if k else power
+        found[:, 2 * k], found[:, 2 * k + 1] = power.imag, power.real
+    return found.transpose(2, 0, 1)
+
+
+def series(q: FloatArray, terms: FloatArray, first: int = 1) -> FloatArray:
+    """Return the sum of sines and cosines of each joint, by Horner's rule, shape (pose, joint).
+
+    Parameters
+    ----------
+    q : ndarray, shape (pose, joint)
+        Angles, in rad.
+    terms : ndarray, shape (joint, order, 2)
+        Of sine and cosine.
+    first : int
+        The first order.
+    """
+    turn = np.exp(1j * q)
+    total = np.zeros_like(turn)
+    for sine, cosine in terms.transpose(1, 2, 0)[::-1]:
+        total = total * turn + (cosine - 1j * sine)
+    return np.asarray((total * turn**first).real)
 
 
 def screws(robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
+from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.problem import RUNGS, GeometryProblem
 from elastocal.wording import phrase
 
@@ -27,9 +28,12 @@ class Fixed:
 
 
 def told_apart(
-    J: FloatArray, problem: GeometryProblem, rung: str
+    derivatives: Derivatives, problem: GeometryProblem, rung: str
 ) -> tuple[IndexArray, list[Fixed]]:
     """Return the unknowns of a rung that are determined, and why the others are not.
+
+    Higher orders of functions of the joints are no question here: their prior decides what they
+    are where positions do not.
 
     Unknowns are taken in the order of the ladder; one whose effect at its likely size equals,
     within the resolution, that of a combination of those before is fixed at zero, and named with
@@ -37,7 +41,8 @@ def told_apart(
     inexact.
     """
     rungs = RUNGS[: RUNGS.index(rung) + 1]
-    order = [i for r in rungs for i, u in enumerate(problem.unknowns) if u.rung == r]
+    dense, J = problem.unknowns[: problem.dense], derivatives.dense
+    order = [i for r in rungs for i, u in enumerate(dense) if u.rung == r]
     size = np.array([u.size for u in problem.unknowns])
     # An even selection of the positions of every station and marker; all of them show no more.
     some = np.unique(np.linspace(0, len(J) - 1, _MOST_ROWS).astype(np.intp))

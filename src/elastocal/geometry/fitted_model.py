@@ -1,10 +1,13 @@
 """From a fitted ladder to the model of an arm, which is its file."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.geometry.arm import MOTION
+from elastocal.geometry.joint_functions import joint_functions
 from elastocal.geometry.ladder import GeometryLadder
 from elastocal.geometry.mistakes import findings
 from elastocal.geometry.model import (
@@ -17,7 +20,7 @@ from elastocal.geometry.model import (
     HeldOutFigures,
 )
 from elastocal.geometry.plausibility import require_known_markers
-from elastocal.geometry.problem import GeometryProblem
+from elastocal.geometry.problem import RUNGS, GeometryProblem
 from elastocal.identification import interval
 
 _LINE = 1e-2
@@ -50,6 +53,7 @@ def geometry_model(
         If markers are known of another number than were measured.
     """
     robot, data, state = problem.robot, problem.data, found.whole.fit.state
+    errors = state.errors.shortest()
     low, high = interval(found.whole.draws)
     free = set(found.whole.fit.free.tolist())
     parameters = tuple(
@@ -62,20 +66,15 @@ def geometry_model(
             bool(high[index] - low[index] <= 2.0 * each.size),
         )
         for index, each in enumerate(problem.unknowns)
-        if index in free and each.rung != "registration"
+        if index in free and each.rung not in ("registration", RUNGS[-1])
     )
-    rungs = tuple(
-        GeometryRung(
-            each.rung, each.free, DistanceFigures.of(each.distance), each.rung == found.chosen
-        )
-        for each in found.rungs
-    )
+    rungs = tuple(_rungs(found))
     chosen = next(each for each in rungs if each.chosen)
     return GeometryModel(
         robot_urdf=robot.urdf,
         tcp=robot.tip,
-        place=state.errors.place,
-        motion=state.errors.motion,
+        place=errors.place,
+        motion=errors.motion,
         stations=dict(zip(data.stations, state.T_station_base, strict=True)),
         markers=state.markers,
         held_out=HeldOutFigures(rungs[0].held_out, chosen.held_out),
@@ -94,7 +93,20 @@ def geometry_model(
                 for rung in ("registration", found.chosen)
             )
         ),
+        functions=joint_functions(problem, found),
     )
+
+
+def _rungs(found: GeometryLadder) -> Iterator[GeometryRung]:
+    for each in found.rungs:
+        regions = each.region_distance
+        yield GeometryRung(
+            each.rung,
+            each.free,
+            DistanceFigures.of(each.distance),
+            each.rung == found.chosen,
+            None if regions is None else DistanceFigures.of(regions),
+        )
 
 
 def _chain(found: GeometryLadder, known: FloatArray | None) -> ChainErrors:

@@ -1,17 +1,21 @@
-"""Ladder of geometric models, judged at left-out poses.
+"""Ladder of geometric models, judged at left-out poses and in left-out regions of joint space.
 
 All rungs and folds share one linearisation: errors of a millimetre and a milliradian make the
 problem linear to a micrometre. The normal equations are sums over blocks of consecutive poses, so
 that a fold is a sum of some of them.
+
+The last rung, functions of the joints, is rich enough to learn from the neighbours of a pose
+whatever is wrong there. It is tried where the residuals show such functions, and taken where it
+also predicts regions of joint space that it has not seen: only functions of single joints do.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.errors import GeometryError
+from elastocal.errors import GeometryError, present
 from elastocal.geometry.determined import Fixed, told_apart
 from elastocal.geometry.left_out import of_the_arm
 from elastocal.geometry.problem import (
@@ -22,8 +26,8 @@ from elastocal.geometry.problem import (
     prior_weight,
     prior_width,
 )
-from elastocal.geometry.solve import GeometryFit, fit, noise, register
-from elastocal.identification import Overlap, judge_models
+from elastocal.geometry.solve import GeometryFit, fit, freedom_of, noise, register
+from elastocal.identification import Overlap, judge_models, paired_difference
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
 
@@ -34,6 +38,15 @@ _BLOCKS_THAT_TELL = 20
 """Fewer blocks scatter by chance."""
 _NOISE_STEPS = 3
 """Number of fits of a rung for the estimate of its residual noise."""
+_FUNCTIONS = RUNGS[-1]
+_REGIONS = 8
+"""Regions of joint space, each left out in turn."""
+_SURE, _GAIN = 2.0, 0.05
+"""Standard errors, and part of the error, by which functions of the joints must be better in
+left-out regions."""
+_SIGNS, _STRANGE = 30, 3.5
+"""Random signs that show what residuals without functions do, and standard deviations of it from
+which functions are tried."""
 
 
 @brief_repr
@@ -48,6 +61,9 @@ class RungErrors:
     """Positions that are no blunders, shape (point,)."""
     free: int
     """Unknowns that the positions determine."""
+    regions: FloatArray | None = None
+    """As `every`, the region of joint space of each left out; None where functions of the joints
+    were not tried."""
 
     @property
     def residual(self) -> FloatArray:
@@ -63,6 +79,12 @@ class RungErrors:
     def every_distance(self) -> FloatArray:
         """The length of every residual, blunders included, shape (point,), in m."""
         return np.asarray(np.linalg.norm(self.every, axis=1))
+
+    @property
+    def region_distance(self) -> FloatArray | None:
+        """The length in left-out regions, of no blunders, shape (position,), in m."""
+        regions = self.regions
+        return None if regions is None else np.linalg.norm(regions[self.counted], axis=1)
 
 
 @brief_repr
@@ -81,7 +103,7 @@ class FittedRung:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class GeometryLadder:
-    """All rungs, and the one that was chosen."""
+    """All rungs that were tried, and the one that was chosen."""
 
     rungs: tuple[RungErrors, ...]
     whole: FittedRung
@@ -131,30 +153,36 @@ def climb(
     free = {rung: _up_to(rung, problem, *apart) for rung in RUNGS}
     reference = fit(problem, free["weight"], start)
     progress("geometry", 2, 4)
-    block = blocks(problem)
+    block, used = blocks(problem), reference.used
     sums = _Sums(problem, reference, block)
-    rungs = [sums.held_out(rung, free[rung][0]) for rung in RUNGS]
-    used = reference.used
-    fold = block[used] % FOLDS
-    if len(np.unique(fold)) < FOLDS:
+    rungs = [sums.held_out(rung, free[rung][0]) for rung in RUNGS[:-1]]
+    fold = block % FOLDS
+    if len(np.unique(fold[used])) < FOLDS:
         raise GeometryError(
             f"the positions are of {len(np.unique(problem.data.pose))} poses: at least"
             f" {FOLDS} are needed, so that some can be left out; measure more poses"
         )
-    distances = [each.every_distance[used] for each in rungs]
-    errors = np.array([[each[fold == k].mean() for each in distances] for k in range(FOLDS)])
+    errors = _errors([each.every for each in rungs], fold, used)
     overlap = Overlap(FOLDS, 0.0, 1.0 / FOLDS)
     judged = judge_models(errors, np.ones(len(rungs), dtype=bool), overlap)
     chosen = RUNGS[judged.near[0]]
-    progress("geometry", 3, 4)
     rungs_of_chain = errors[:, : len(CHAIN_RUNGS)].mean(axis=0)
     of_chain = chosen if chosen in CHAIN_RUNGS else CHAIN_RUNGS[int(rungs_of_chain.argmin())]
+    if _shows_functions(problem, reference, sums.fitted(free["harmonics"][0])[1], rng):
+        rungs = _with_functions(problem, reference, rungs, {r: free[r][0] for r in RUNGS})
+        if _predicts_regions(problem, rungs, RUNGS.index(chosen), used):
+            chosen = _FUNCTIONS
+    progress("geometry", 3, 4)
 
     def fitted(rung: str) -> FittedRung:
         begin = _without(reference, problem, rung)
         final = fit(problem, free[rung], begin, reference.used)
         values = problem.values(final.state)
-        spread = _Sums(problem, final, block).draws(draws, rng)
+        # As many blocks as their scatter needs: normal matrices of functions are large.
+        few = block * _BLOCKS_THAT_TELL // (int(block.max()) + 1)
+        functions = rung == _FUNCTIONS
+        sums = _Sums(problem, final, few if functions else block, functions=functions)
+        spread = sums.draws(draws, rng)
         return FittedRung(rung, final, values, values + spread)
 
     whole = fitted(chosen)
@@ -170,7 +198,93 @@ def _up_to(
     kept = RUNGS[: RUNGS.index(rung) + 1]
     names = {each.name for each in problem.unknowns if each.rung in kept}
     chosen = [index for index in free.tolist() if problem.unknowns[index].name in names]
+    if rung == _FUNCTIONS:
+        chosen += range(problem.dense, len(problem.unknowns))
     return np.array(chosen), [each for each in fixed if each.name in names]
+
+
+def _errors(every: Sequence[FloatArray], part: IndexArray, used: BoolArray) -> FloatArray:
+    """Return the mean error in each part of the positions, shape (part, model), in m."""
+    distances = np.linalg.norm(np.array(every), axis=2)[:, used]
+    parts = part[used]
+    return np.array([distances[:, parts == k].mean(axis=1) for k in np.unique(parts)])
+
+
+def _shows_functions(
+    problem: GeometryProblem, fitted: GeometryFit, residual: FloatArray, rng: np.random.Generator
+) -> bool:
+    """Return whether residuals speak for functions of some joint.
+
+    The score of the variance of its series, against the same with a random sign for each row (C. R.
+    Rao, Proceedings of the Cambridge Philosophical Society 44, 1948; R. Davidson, E. Flachaire,
+    Journal of Econometrics 146, 2008): far cheaper than the fit of the rung.
+    """
+    if len(np.unique(problem.data.pose)) < _BLOCKS_THAT_TELL:
+        return False
+    size = np.array([each.size for each in problem.unknowns])[problem.dense :]
+    # A stream of its own, so that the draws are those of before.
+    signs = rng.spawn(1)[0].choice([-1.0, 1.0], (_SIGNS, len(problem.data)))
+    signs[0] = 1.0
+    left = np.where(fitted.used[:, None], residual, 0.0)
+    scores = fitted.derivatives.series_scores(left, signs)
+    energy = ((scores * size) ** 2).reshape(_SIGNS, fitted.derivatives.joints, -1).sum(axis=2)
+    chance = energy[1:]
+    return bool((energy[0] > chance.mean(axis=0) + _STRANGE * chance.std(axis=0)).any())
+
+
+def _with_functions(
+    problem: GeometryProblem,
+    reference: GeometryFit,
+    rungs: Sequence[RungErrors],
+    free: dict[str, IndexArray],
+) -> list[RungErrors]:
+    """Return the rungs with functions of the joints, and the errors of all in left-out regions."""
+    poses = _Sums(problem, reference, blocks(problem) % FOLDS, functions=True)
+    found = [*rungs, poses.held_out(_FUNCTIONS, free[_FUNCTIONS])]
+    regions = _Sums(problem, reference, joint_regions(problem), functions=True)
+    return [
+        replace(each, regions=regions.held_out(each.rung, free[each.rung], _REGIONS).every)
+        for each in found
+    ]
+
+
+def _predicts_regions(
+    problem: GeometryProblem, rungs: Sequence[RungErrors], chosen: int, used: BoolArray
+) -> bool:
+    """Return whether functions of the joints are better than all else in regions not seen.
+
+    And better than the chosen rung at left-out poses.
+    """
+    mean = [each.every_distance[used].mean() for each in (rungs[-1], rungs[chosen])]
+    regions = [present(each.regions, "regions") for each in rungs]
+    errors = _errors(regions, joint_regions(problem), used)
+    best = int(errors[:, :-1].mean(axis=0).argmin())
+    overlap = Overlap(len(errors), 0.0, 1.0 / len(errors))
+    gain = paired_difference(errors[:, [-1]], errors[:, [best]], overlap)
+    least = _GAIN * errors[:, best].mean()
+    return bool(
+        mean[0] < mean[1] and gain.mean[0] < -max(_SURE * float(gain.standard_error[0]), least)
+    )
+
+
+def joint_regions(problem: GeometryProblem) -> IndexArray:
+    """Return the region of joint space of each position: halves of halves of the widest joints.
+
+    Rows of one pose stay together.
+    """
+    _, first, pose = np.unique(problem.data.pose, return_index=True, return_inverse=True)
+    q, parts = problem.data.q[first], [np.arange(len(first))]
+    while len(parts) < _REGIONS:
+        halves = []
+        for part in parts:
+            low, high = np.percentile(q[part], [5.0, 95.0], axis=0)
+            order = part[np.argsort(q[part, int((high - low).argmax())], kind="stable")]
+            halves += np.array_split(order, 2)
+        parts = halves
+    region = np.empty(len(first), dtype=np.intp)
+    for number, part in enumerate(parts):
+        region[part] = number
+    return region[pose][problem.row]
 
 
 def blocks(problem: GeometryProblem) -> IndexArray:
@@ -195,44 +309,75 @@ def _without(reference: GeometryFit, problem: GeometryProblem, rung: str) -> Sta
 class _Sums:
     """Normal equations of each block of positions about a fit, weighed columns."""
 
-    def __init__(self, problem: GeometryProblem, about: GeometryFit, block: IndexArray) -> None:
-        self.problem, self.about = problem, about
+    def __init__(
+        self,
+        problem: GeometryProblem,
+        about: GeometryFit,
+        block: IndexArray,
+        *,
+        functions: bool = False,
+    ) -> None:
+        self.problem, self.about, self.block = problem, about, block
         self.size = np.array([u.size for u in problem.unknowns])
         self.values = problem.values(about.state) / self.size
         self.width = prior_width(problem)
-        self.block, self.fitted = block, np.repeat(about.used, 3)
         self.count = int(block.max()) + 1
-        self.A = (about.J * self.size).reshape(3 * len(block), -1)
-        self.b = about.residual.ravel()
         self.counted = about.used | of_the_arm(problem, about)
-        p = self.A.shape[1]
+        p = len(self.size) if functions else problem.dense
         self.G, self.h = np.zeros((self.count, p, p)), np.zeros((self.count, p))
-        rows = np.repeat(self.block, 3)
-        for k in np.unique(self.block):
-            own = (rows == k) & self.fitted
-            self.G[k] = self.A[own].T @ self.A[own]
-            self.h[k] = self.A[own].T @ self.b[own]
+        for k in np.unique(block):
+            own = np.flatnonzero((block == k) & about.used)
+            self.G[k], self.h[k] = self._normal(about.residual, own)
 
-    def held_out(self, rung: str, free: IndexArray) -> RungErrors:
-        """Return the errors of a rung at each fold, fitted to the others."""
+    def _normal(self, residual: FloatArray, points: IndexArray) -> tuple[FloatArray, FloatArray]:
+        one, every = np.ones(len(self.block)), np.arange(self.G.shape[1])
+        return self.about.derivatives.normal(residual, one, self.size, every, points)
+
+    @property
+    def _back(self) -> FloatArray:
+        """The step of what the fit has back to zero, where the prior of all rungs is, in sizes."""
         frames = np.array([u.rung == "registration" for u in self.problem.unknowns])
-        # What the fit has goes back to zero, where the prior of all rungs is.
-        back = np.where(frames, 0.0, -self.values)
-        b, h = self.b - self.A @ back, self.h - self.G @ back
-        residual, ridge = b.reshape(-1, 3), prior_weight(self.problem, self.about.sigma)
+        return np.where(frames, 0.0, -self.values)
+
+    def fitted(self, free: IndexArray) -> tuple[FloatArray, FloatArray]:
+        """Return the weight of the prior in a fit to all positions, and what that leaves."""
+        G, sigma = self.G.sum(axis=0), self.about.sigma
+        h = self.h.sum(axis=0) - G @ self._back[: len(G)]
+        residual = start = self._left(self._back)
         for _ in range(_NOISE_STEPS):
             # The noise relative to which a rung's prior is weighted is the residual of that rung.
-            x = _solved(self.G.sum(axis=0), h.sum(axis=0), free, ridge)
-            residual = (b - self.A[:, free] @ x).reshape(-1, 3)
-            ridge = prior_weight(self.problem, noise(residual[self.about.used]))
-        for k in range(FOLDS):
-            train = np.arange(self.count) % FOLDS != k
-            x = _solved(self.G[train].sum(axis=0), h[train].sum(axis=0), free, ridge)
-            out = self.block % FOLDS == k
-            rows = np.repeat(out, 3)
-            left = b[rows] - self.A[np.ix_(rows, free)] @ x
-            residual[out] = left.reshape(-1, 3)
+            ridge = prior_weight(self.problem, sigma)
+            residual = start - self._moved(self._solved(G, h, free, ridge))
+            H = G[np.ix_(free, free)] + np.diag(ridge[free])
+            sigma = noise(residual[self.about.used], freedom_of(H, ridge[free]))
+        return prior_weight(self.problem, sigma), residual
+
+    def held_out(self, rung: str, free: IndexArray, folds: int = FOLDS) -> RungErrors:
+        """Return the errors of a rung at each fold, fitted to the others."""
+        ridge, start = self.fitted(free)[0], self._left(self._back)
+        h = self.h - self.G @ self._back[: self.G.shape[1]]
+        residual = np.empty_like(start)
+        for k in range(folds):
+            train = np.arange(self.count) % folds != k
+            x = self._solved(self.G[train].sum(axis=0), h[train].sum(axis=0), free, ridge)
+            out = np.flatnonzero(self.block % folds == k)
+            residual[out] = start[out] - self._moved(x, out)
         return RungErrors(rung, residual, self.counted, len(free))
+
+    def _left(self, x: FloatArray) -> FloatArray:
+        """Return the residuals after a step, shape (point, 3), in m."""
+        return np.asarray(self.about.residual - self._moved(x))
+
+    def _moved(self, x: FloatArray, points: IndexArray | slice = slice(None)) -> FloatArray:
+        return self.about.derivatives.times(self.size * x, points)
+
+    def _solved(
+        self, G: FloatArray, h: FloatArray, free: IndexArray, ridge: FloatArray
+    ) -> FloatArray:
+        """Return the step that normal equations ask for, in sizes, shape (unknown,)."""
+        x = np.zeros(len(self.size))
+        x[free] = np.linalg.solve(G[np.ix_(free, free)] + np.diag(ridge[free]), h[free])
+        return x
 
     def draws(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Return how far noise and prior take the unknowns from the fit, shape (draw, unknown).
@@ -247,8 +392,9 @@ class _Sums:
         free, ridge = self.about.free, prior_weight(self.problem, self.about.sigma)[self.about.free]
         G = self.G.sum(axis=0)[np.ix_(free, free)]
         H_inverse = np.linalg.inv(G + np.diag(ridge))
-        freedom = int(self.fitted.sum()) - float(np.trace(H_inverse @ G))
-        sigma = float(np.linalg.norm(self.b[self.fitted])) / np.sqrt(max(freedom, 1.0))
+        residual = self.about.residual[self.about.used]
+        freedom = residual.size - float(np.trace(H_inverse @ G))
+        sigma = float(np.linalg.norm(residual)) / np.sqrt(max(freedom, 1.0))
         values, vectors = np.linalg.eigh(G)
         root = H_inverse @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         stretch = self._block_scatter(free, H_inverse) / (sigma * np.linalg.norm(root, axis=1))
@@ -275,8 +421,3 @@ class _Sums:
             ]
         )
         return np.asarray(np.linalg.norm(scores @ H_inverse, axis=0))
-
-
-def _solved(G: FloatArray, h: FloatArray, free: IndexArray, ridge: FloatArray) -> FloatArray:
-    own = G[np.ix_(free, free)]
-    return np.asarray(np.linalg.solve(own + np.diag(ridge[free]), h[free]))

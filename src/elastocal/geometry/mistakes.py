@@ -99,7 +99,7 @@ def _best_split(
 ) -> tuple[int, float, float]:
     """Return the best split of a station's positions, F, and the shift between the parts, in m."""
     columns = slice(6 * problem.station[points[0]], 6 * problem.station[points[0]] + 6)
-    A, r = fit.J[points, :, columns], fit.residual[points]
+    A, r = fit.derivatives.dense[points, :, columns], fit.residual[points]
     G = np.cumsum(np.einsum("nki,nkj->nij", A, A), axis=0)
     h = np.cumsum(np.einsum("nki,nk->ni", A, r), axis=0)
     total = float((r**2).sum())

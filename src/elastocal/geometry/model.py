@@ -11,6 +11,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, SchemaError
 from elastocal.findings import Finding
 from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
+from elastocal.geometry.joint_functions import JointFunction
 from elastocal.geometry.positions import Payload, Positions, joint_torques
 from elastocal.records import read_json, record
 from elastocal.results import brief_repr
@@ -28,7 +29,7 @@ from elastocal.robot import (
 )
 from elastocal.wording import mm
 
-SCHEMA = "elastocal.geometry/3"
+SCHEMA = "elastocal.geometry/4"
 _OFFSET = MOTION.index("offset")
 _DRAWN_TOOL = "tool_as_drawn"
 _SAME = 1e-6
@@ -68,6 +69,9 @@ class GeometryRung:
     """Number of unknowns that the positions determine."""
     held_out: DistanceFigures
     chosen: bool
+    regions: DistanceFigures | None = None
+    """Errors in regions of joint space that were left out; None where functions of the joints were
+    not tried."""
 
 
 @record()
@@ -117,7 +121,7 @@ class ChainErrors:
 
 
 @brief_repr
-@record(SCHEMA, reads=("elastocal.geometry/1", "elastocal.geometry/2"))
+@record(SCHEMA, reads=tuple(f"elastocal.geometry/{n}" for n in (1, 2, 3)))
 class GeometryModel:
     """A calibrated geometry, which is also its file."""
 
@@ -127,7 +131,8 @@ class GeometryModel:
     place: FloatArray
     """Errors of the joints' poses: shifts in m and rotations in rad, shape (joint, 6)."""
     motion: FloatArray
-    """Errors of their motion, shape (joint, 7): `elastocal.geometry.MOTION`."""
+    """Errors of their motion, shape (joint, 3 + 2 orders): offset, scale, sine and cosine of each
+    order from once a turn on, compliance. Two orders, or those of functions of the joints."""
     stations: dict[str, FloatArray]
     """Base in the frame of each station, shape (4, 4), in m."""
     markers: FloatArray
@@ -151,6 +156,8 @@ class GeometryModel:
     out."""
     with_blunders: HeldOutFigures | None = None
     """As `held_out`, of every position; none in files of before."""
+    functions: tuple[JointFunction, ...] = ()
+    """Functions of the joints, where that rung was chosen."""
 
     @property
     def robot(self) -> Robot:
@@ -349,7 +356,7 @@ def read_geometry(path: Path) -> GeometryModel:
     wanted = {
         **of_chain,
         "place": (found.place, (joints, len(KINDS))),
-        "motion": (found.motion, (joints, len(MOTION))),
+        "motion": (found.motion, (joints, max(len(MOTION), found.motion.shape[-1] // 2 * 2 + 1))),
         "markers": (found.markers, (*found.markers.shape[:1], 3)),
         **{f"stations.{name}": (T, (4, 4)) for name, T in found.stations.items()},
     }

@@ -258,13 +258,13 @@ class _Knowledge:
         problem = GeometryProblem(robot, replace(free, markers=marker[:, None], station=station))
         stands = np.tile(np.eye(4), (len(problem.data.stations), 1, 1))
         nominal = State(stands, at_tcp[None], ArmErrors.none(pool.q.shape[1]))
-        J = problem.linearise(nominal)[1]
-        columns, fixed = told_apart(J, problem, _RUNG)
+        derivatives = problem.linearise(nominal)[1]
+        columns, fixed = told_apart(derivatives, problem, _RUNG)
         size = np.array([unknown.size for unknown in problem.unknowns])[columns]
         rungs = [problem.unknowns[column].rung for column in columns.tolist()]
         errors = sum(rung != "registration" for rung in rungs)
         why = {each.name: each.why for each in fixed}
-        return cls(marker, J[:, :, columns] * size, errors, why)
+        return cls(marker, derivatives.dense[:, :, columns] * size, errors, why)
 
     def candidates(self, left: IndexArray) -> Candidates:
         """Return some postures for a search that is to predict well all over the pool."""

@@ -8,13 +8,24 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.files import Limit
-from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, ArmFrames, frames, screws
+from elastocal.geometry.arm import (
+    KINDS,
+    LOW_ORDERS,
+    MOTION,
+    ORDERS,
+    ArmErrors,
+    ArmFrames,
+    frames,
+    motion_names,
+    screws,
+)
+from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.positions import Positions, joint_torques
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, ChainJoint, Robot
 
-RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics")
-"""Rungs from the frames alone to errors of the gears; each includes all before."""
+RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics", "joint-functions")
+"""Rungs from the frames alone to functions of each joint; each includes all before."""
 CHAIN_RUNGS = RUNGS[:3]
 """Rungs with only poses and zeros of joints: what a URDF can express."""
 _SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3}
@@ -37,6 +48,12 @@ _OF_ANY_JOINT = ("offset", "scale", "compliance")
 """Errors of motion that linear axes have too."""
 _GEAR_SIZE = 2e-4
 """Expected size of an error of a gear once or twice a turn, in rad."""
+_WAVE_SIZE, _WAVE_ORDER = 3.5e-5, 20.0
+"""The same of a higher order, in rad, and the order at which half of it is expected: all orders
+together make functions of 0.4 mrad at three sizes, where gears and encoders of a UR10 have 0.1 to
+0.35."""
+_FIRST = 2 + 2 * LOW_ORDERS
+"""Place of the first higher order among errors of motion."""
 _MOST_NUMBERS = Limit("ELASTOCAL_MAX_FIT_MB", 150, "MB of derivatives")
 """Thirty thousand positions of two stations and three markers on six axes; a fit takes some times
 as much."""
@@ -88,18 +105,27 @@ class GeometryProblem:
         self.station = np.array([index[name] for name in data.station.tolist()])[self.row]
         self.measured = data.markers[self.row, self.marker]
         self.unknowns = unknowns(robot, data)
+        self.dense = sum(each.rung != RUNGS[-1] for each in self.unknowns)
+        """Number of unknowns without the higher orders of functions of the joints, which follow."""
         stations, markers = len(data.stations), data.markers.shape[1]
         _MOST_NUMBERS.require(
-            3e-6 * len(self) * len(self.unknowns) * np.dtype(float).itemsize,
+            3e-6 * len(self) * self.dense * np.dtype(float).itemsize,
             f"the fit of {len(self)} positions, {stations} stations and {markers} markers",
         )
         joints = robot.chain.joints
         # Joint and kind of each error of pose and of motion, in the order of their columns.
         self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)
-        self._moving = tuple(np.array(_moving(joints), dtype=np.intp).T)
+        low = np.array(_moving(joints), dtype=np.intp).T
         # The same of both, counted as `screws` does.
-        moving = self._moving[0], self._moving[1] + len(KINDS)
-        self._errors = np.concatenate([self._placed, moving], axis=1)
+        self._errors = np.concatenate([self._placed, (low[0], low[1] + len(KINDS))], axis=1)
+        self._waved = np.flatnonzero([joint.revolute for joint in joints])
+        names = motion_names(ORDERS)
+        kinds = [names.index(MOTION[kind]) for kind in low[1]]
+        waves = [(j, k) for j in self._waved.tolist() for k in range(_FIRST, len(names) - 1)]
+        joint, kind = np.array(waves, dtype=np.intp).reshape(-1, 2).T
+        self._moving = np.concatenate([low[0], joint]), np.concatenate([kinds, kind])
+        turned = self.dense - len(low[0]) + np.flatnonzero(low[1] == MOTION.index("offset"))
+        self._turned = turned[self._waved]
 
     def __len__(self) -> int:
         """Return the number of seen markers."""
@@ -112,15 +138,15 @@ class GeometryProblem:
         """
         return self._expected(at)[0]
 
-    def linearise(self, at: State) -> tuple[FloatArray, FloatArray]:
-        """Return residuals, and derivatives of what is expected, shape (point, 3, unknown).
+    def linearise(self, at: State) -> tuple[FloatArray, Derivatives]:
+        """Return residuals, and derivatives of what is expected by every unknown.
 
         ``J x = residual`` is the next step.
         """
         residual, arm, points, R = self._expected(at)
         stations, markers = len(self.data.stations), len(at.markers)
         start = 6 * stations + 3 * markers
-        J = np.zeros((len(self), 3, len(self.unknowns)))
+        J = np.zeros((len(self), 3, self.dense))
         each, tool = np.arange(len(self)), arm.T_base_tcp[self.row]
         for axis in range(3):
             unit = R[:, axis]  # an axis of the station in base
@@ -128,7 +154,7 @@ class GeometryProblem:
             J[each, :, 6 * self.station + 3 + axis] = np.cross(unit, points)
             J[each, :, 6 * stations + 3 * self.marker + axis] = tool[:, :3, axis]
         J[:, :, start:] = self._arm_columns(arm, points)
-        return residual, J
+        return residual, Derivatives(J, self._turned, self.data.q[:, self._waved], self.row)
 
     def _expected(self, at: State) -> tuple[FloatArray, ArmFrames, FloatArray, FloatArray]:
         """Return residuals, frames, and by marker: places in base, directions of its station."""
@@ -160,15 +186,16 @@ class GeometryProblem:
         start = 6 * stations
         shift = step[start : start + 3 * markers].reshape(-1, 3)
         arm = step[start + 3 * markers :]
-        place, motion = at.errors.place.copy(), at.errors.motion.copy()
+        errors = at.errors.up_to(ORDERS)
         placed = len(self._placed[0])
-        place[self._placed] += arm[:placed]
-        motion[self._moving] += arm[placed:]
-        return State(T, at.markers + shift, ArmErrors(place, motion))
+        errors.place[self._placed] += arm[:placed]
+        errors.motion[self._moving] += arm[placed:]
+        return State(T, at.markers + shift, errors)
 
     def values(self, at: State) -> FloatArray:
         """Return the value of each unknown, shape (unknown,); frames and markers count as 0."""
-        arm = np.concatenate([at.errors.place[self._placed], at.errors.motion[self._moving]])
+        errors = at.errors.up_to(ORDERS)
+        arm = np.concatenate([errors.place[self._placed], errors.motion[self._moving]])
         return np.concatenate([np.zeros(len(self.unknowns) - len(arm)), arm])
 
 
@@ -212,7 +239,18 @@ def unknowns(robot: Robot, data: Positions) -> tuple[Unknown, ...]:
     yields = compliance_sizes(robot)
     for joint, kind in _moving(joints):
         found.append(_motion_unknown(joints[joint], MOTION[kind], float(yields[joint])))
+    names, sizes = motion_names(ORDERS)[_FIRST:-1], np.repeat(wave_sizes(), 2).tolist()
+    for each in joints:
+        if each.revolute:
+            waves = zip(names, sizes, strict=True)
+            found += [Unknown(f"{each.name}.{n}", "rad", RUNGS[-1], size) for n, size in waves]
     return tuple(found)
+
+
+def wave_sizes() -> FloatArray:
+    """Return the likely size of each order of a joint's function above the low ones, in rad."""
+    orders = np.arange(LOW_ORDERS + 1, ORDERS + 1)
+    return np.asarray(_WAVE_SIZE / (1.0 + (orders / _WAVE_ORDER) ** 2))
 
 
 def compliance_sizes(robot: Robot) -> FloatArray:

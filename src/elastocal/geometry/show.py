@@ -49,6 +49,8 @@ def show_geometry(
     yield rung_table(model)
     if model.parameters:
         yield arm_error_table(model)
+    if model.functions:
+        yield function_table(model)
     if accuracy.poses:
         yield repeatability_facts(accuracy.poses)
     facts = [("warning", str(each)) for each in model.findings]
@@ -128,19 +130,38 @@ def rung_table(model: GeometryModel) -> Table:
     """Return the models that were tried, with their errors at the same left-out poses."""
     taken = {"" if model.chain is None else model.chain.rung: phrase("in URDF and table")}
     taken |= {each.rung: phrase("taken") for each in model.ladder if each.chosen}
+    tried = any(each.regions is not None for each in model.ladder)
+    heads = phrases("Model", "Unknowns", "Mean", "95 % below", "Largest")
     return Table(
         phrase("Models at the same left-out poses, mm"),
-        (*phrases("Model", "Unknowns", "Mean", "95 % below", "Largest"), ""),
+        (*heads, *(phrases("Mean, regions left out") if tried else ()), ""),
         tuple(
             (
                 each.rung,
                 each.unknowns,
                 *(f"{1e3 * value:.3f}" for value in vars(each.held_out).values()),
+                *(() if each.regions is None else (f"{1e3 * each.regions.mean:.3f}",)),
                 taken.get(each.rung, ""),
             )
             for each in model.ladder
         ),
     )
+
+
+def function_table(model: GeometryModel) -> Table:
+    """Return the functions of the joints, a row a joint."""
+    heads = (phrase("Joint"), "", *phrases("Largest, µrad", "Strongest order", "Its amplitude"))
+    rows = tuple(
+        (
+            each.joint,
+            phrase("known") if each.known else phrase("not known"),
+            f"{1e6 * each.largest:.0f}",
+            each.order,
+            f"{1e6 * each.amplitude:.0f}",
+        )
+        for each in model.functions
+    )
+    return Table(phrase("Functions of the joints beyond twice a turn"), heads, rows, texts=2)
 
 
 def arm_error_table(model: GeometryModel) -> Table:

@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import GeometryError
 from elastocal.geometry.arm import ArmErrors
+from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.determined import Fixed
 from elastocal.geometry.problem import GeometryProblem, State, prior_weight
 from elastocal.results import brief_repr
@@ -81,8 +82,8 @@ class GeometryFit:
     state: State
     residual: FloatArray
     """Shape (point, 3), in m."""
-    J: FloatArray
-    """Derivatives there, shape (point, 3, unknown)."""
+    derivatives: Derivatives
+    """Derivatives there."""
     free: IndexArray
     """Unknowns that were fitted."""
     fixed: tuple[Fixed, ...]
@@ -124,22 +125,23 @@ def fit(
         If there are fewer positions than unknowns, or the fit does not settle.
     """
     at, (free, fixed) = start, chosen
-    if 3 * len(problem) < len(free) + 3:
+    told = int((free < problem.dense).sum())
+    # Functions of the joints have priors that are stronger than few positions.
+    if 3 * len(problem) < told + 3:
         raise GeometryError(
-            f"{len(problem)} positions of markers cannot tell {len(free)} unknowns: measure more"
-            " poses"
+            f"{len(problem)} positions of markers cannot tell {told} unknowns: measure more poses"
         )
     first_plain = 0 if used is not None else _ROBUST_STEPS
-    (r, J), damping = problem.linearise(at), 0.0
+    (r, J), damping, freedom = problem.linearise(at), 0.0, float(told)
     # What is far off before any error of the arm is fitted cannot bend these errors to itself.
     keep = np.linalg.norm(r, axis=1) < _BLUNDER * noise(r) if used is None else used
     for step in range(_STEPS):
         robust, returns = step < first_plain, step <= _RETURNS
-        weight, now, sigma = _weights(r, len(free), keep, used, robust=robust, returns=returns)
+        weight, now, sigma = _weights(r, freedom, keep, used, robust=robust, returns=returns)
         same, keep = bool((now == keep).all()), now
         squares = _Squares(problem, free, weight, sigma)
         found = squares.lowered(at, r, J, damping)
-        at, r, damping = found.state, found.residual, found.damping
+        at, r, damping, freedom = found.state, found.residual, found.damping, found.freedom
         if not robust and same and found.promised <= _DONE * sigma**2:
             return GeometryFit(at, r, J, free, tuple(fixed), keep, sigma)
         # Weights of the first steps are rough anyway.
@@ -152,14 +154,40 @@ def fit(
     )
 
 
-def noise(residual: FloatArray) -> float:
-    """Return the robust standard deviation of a coordinate of residuals, shape (point, 3), in m."""
-    return max(float(np.median(np.linalg.norm(residual, axis=1))) / _CHI, _FINEST)
+def noise(residual: FloatArray, freedom: float = 0.0) -> float:
+    """Return the robust standard deviation of a coordinate that was measured, in m.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (point, 3)
+        What a fit leaves, in m.
+    freedom : float
+        Number of unknowns that the fit took from the residuals.
+    """
+    size = float(np.median(np.linalg.norm(residual, axis=1))) / _CHI
+    count = residual.size
+    widened = size * float(np.sqrt(count / max(count - freedom, 0.1 * count)))
+    return max(widened, _FINEST)
+
+
+def freedom_of(G: FloatArray, prior: FloatArray) -> float:
+    """Return how many unknowns positions determine beside a prior: the trace of the hat matrix.
+
+    (G. Wahba, "Spline Models for Observational Data", 1990, section 4.3.)
+
+    Parameters
+    ----------
+    G : ndarray, shape (unknown, unknown)
+        Normal matrix with the prior.
+    prior : ndarray, shape (unknown,)
+        Weight of it.
+    """
+    return float(len(prior) - prior @ np.diag(np.linalg.inv(G)))
 
 
 def _weights(
     r: FloatArray,
-    unknowns: int,
+    freedom: float,
     keep: BoolArray,
     used: BoolArray | None,
     *,
@@ -167,8 +195,7 @@ def _weights(
     returns: bool,
 ) -> tuple[FloatArray, BoolArray, float]:
     """Return the weight of each position, which are no blunders, and the noise of a coordinate."""
-    distance, count = np.linalg.norm(r, axis=1), 3 * int(keep.sum())
-    sigma = noise(r[keep]) * np.sqrt(count / max(count - unknowns, 0.1 * count))
+    distance, sigma = np.linalg.norm(r, axis=1), noise(r[keep], freedom)
     if robust:
         return keep * np.minimum(1.0, 2.0 * sigma / np.maximum(distance, _FINEST)), keep, sigma
     if used is not None:
@@ -190,6 +217,8 @@ class _Step:
     promised: float
     """Decrease of the sum that a step without damping promised, in m²; 0 where only rounding is
     left."""
+    freedom: float
+    """Unknowns that the positions determine beside the prior."""
     most_moved: IndexArray
     """The free unknowns that it would have moved most, in their likely sizes, the first four."""
 
@@ -204,25 +233,21 @@ class _Squares:
         self, problem: GeometryProblem, free: IndexArray, weight: FloatArray, sigma: float
     ) -> None:
         self.problem, self.free, self.weight = problem, free, weight
-        self.size = np.array([each.size for each in problem.unknowns])[free]
+        self.sizes = np.array([each.size for each in problem.unknowns])
+        self.size = self.sizes[free]
         self.prior = prior_weight(problem, sigma)[free]
 
     def _sum(self, at: State, r: FloatArray) -> float:
         pulled = self.problem.values(at)[self.free] / self.size
         return float(self.weight @ (r**2).sum(axis=1) + self.prior @ pulled**2)
 
-    def lowered(self, at: State, r: FloatArray, J: FloatArray, damping: float) -> _Step:
+    def lowered(self, at: State, r: FloatArray, J: Derivatives, damping: float) -> _Step:
         """Return a step that lowers the sum, by derivatives near the state."""
-        root = np.repeat(np.sqrt(self.weight), 3)
-        A = J[:, :, self.free].reshape(len(root), -1)
-        A *= self.size
-        A *= root[:, None]
-        h = A.T @ (r.ravel() * root)
+        G, h = J.normal(r, self.weight, self.sizes, self.free)
         h -= self.prior * self.problem.values(at)[self.free] / self.size
-        G = A.T @ A
         G[np.diag_indices_from(G)] += self.prior
         now, diagonal = self._sum(at, r), np.diag(G) + np.finfo(float).tiny
-        whole = np.linalg.solve(G, h)
+        whole, freedom = np.linalg.solve(G, h), freedom_of(G, self.prior)
         best, most = float(whole @ h), np.argsort(np.abs(whole))[::-1][:4]
         for _ in range(_TRIES):
             x = whole if not damping else np.linalg.solve(G + np.diag(damping * diagonal), h)
@@ -234,6 +259,6 @@ class _Squares:
             fall = now - self._sum(there, left)
             if fall > _FAIR * promised:
                 calm = damping / 10.0 if fall > 0.5 * promised else damping
-                return _Step(there, left, calm if calm > _DONE else 0.0, best, most)
+                return _Step(there, left, calm if calm > _DONE else 0.0, best, freedom, most)
             damping = max(10.0 * damping, 1e-4)
-        return _Step(at, r, 0.0, best if best > _ROUNDING * now else 0.0, most)
+        return _Step(at, r, 0.0, best if best > _ROUNDING * now else 0.0, freedom, most)

@@ -14,12 +14,13 @@ from elastocal.geometry import (
     PoseAccuracy,
     arm_error_table,
     axis_table,
+    function_table,
     repeatability_facts,
     rung_table,
 )
 from elastocal.report.document.sections_page import write_page
 from elastocal.report.language import ENGLISH, Language
-from elastocal.report.plots import MANY_POSITIONS, error_maps, parameter_figure
+from elastocal.report.plots import MANY_POSITIONS, error_maps, function_figure, parameter_figure
 from elastocal.results import brief_repr
 from elastocal.robot import xyzabc_from_T
 from elastocal.units import in_unit
@@ -72,6 +73,11 @@ def write_geometry_page(path: Path, found: GeometryFindings, language: Language 
             ("maps", phrase("Where in the workspace"), _maps),
             ("iso", phrase("Pose accuracy and repeatability (ISO 9283)"), _iso),
             ("errors", phrase("Which errors are known, and how well"), _errors),
+            *(
+                [("functions", phrase("Functions of the joints"), _functions)]
+                if model.functions
+                else []
+            ),
             ("links", phrase("Denavit-Hartenberg table"), _links),
             ("blunders", phrase("Positions left out"), _blunders),
             ("frames", phrase("Stations, markers, provenance"), _frames),
@@ -232,6 +238,24 @@ def _errors(found: GeometryFindings) -> Iterator[blocks.Block]:
         yield blocks.Details(
             phrase("What they go together with ({fixed})", fixed=len(fixed)), (table,)
         )
+
+
+def _functions(found: GeometryFindings) -> Iterator[blocks.Block]:
+    functions = found.model.functions
+    yield blocks.Picture(
+        partial(function_figure, functions),
+        phrase(
+            "Error of {joints} as a function of the angle, with 95 % bands",
+            joints=counted(len(functions), "joint"),
+        ),
+        phrase(
+            "How much farther a joint turns than its controller says, beyond what scale, once and"
+            " twice a turn explain; over the measured range. Grey: the band is wider than what one"
+            " would guess without measuring. Taken because it predicts regions of joint space that"
+            " were left out, as errors of gears and encoders do."
+        ),
+    )
+    yield function_table(found.model)
 
 
 def _links(found: GeometryFindings) -> Iterator[blocks.Block]:

@@ -19,6 +19,7 @@ from .codec_chart import (
 from .geometry_figures import (
     MANY_POSITIONS as MANY_POSITIONS,
     error_maps as error_maps,
+    function_figure as function_figure,
     parameter_figure as parameter_figure,
 )
 from .interactive_codec import compliance_views as compliance_views, error_views as error_views

@@ -13,7 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from elastocal.arrays import FloatArray
-from elastocal.geometry import GeometryAccuracy, GeometryParameter
+from elastocal.geometry import GeometryAccuracy, GeometryParameter, JointFunction
 from elastocal.report.plots import style
 from elastocal.units import in_unit
 from elastocal.wording import counted, mm, phrase
@@ -165,3 +165,27 @@ def _draw_parameters(axes: Axes, own: Sequence[GeometryParameter], factor: float
     axes.tick_params(axis="x", labelsize=7)
     axes.set_ylim(len(own) - 0.4, -0.6)
     style.open_frame(axes, "both")
+
+
+def function_figure(functions: Sequence[JointFunction]) -> Figure:
+    """Return the function of each joint with its 95 % band, a panel a joint, on one scale."""
+    columns, width, height = 2, 4.2, 1.35
+    rows = -(-len(functions) // columns)
+    figure = style.new_figure(_WIDTH, rows * (height + _AXIS) + 0.25)
+    top = float(figure.get_size_inches()[1]) - 0.25
+    largest = max(float(np.percentile(np.abs(each.value), _TOP)) for each in functions)
+    for number, each in enumerate(functions):
+        row, column = divmod(number, columns)
+        left = _LEFT + column * (width + 0.75)
+        axes = figure.add_panel(left, top - height - row * (height + _AXIS), width, height)
+        colour = style.BLUE if each.known else style.REFUSED
+        angle = in_unit(each.angle, "deg")
+        axes.fill_between(angle, 1e6 * each.low, 1e6 * each.high, color=colour, alpha=0.25, lw=0.0)
+        axes.plot(angle, 1e6 * each.value, color=colour, lw=1.0)
+        axes.set_ylim(-1.5e6 * largest, 1.5e6 * largest)
+        axes.set_title(style.literal(each.joint), fontsize=9)
+        axes.set_xlabel(phrase("Joint in °"), fontsize=8)
+        axes.set_ylabel("µrad", fontsize=8)
+        axes.tick_params(labelsize=7)
+        style.open_frame(axes, "both")
+    return figure

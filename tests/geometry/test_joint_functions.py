@@ -1,0 +1,154 @@
+"""Functions of each joint: found where an arm has them, and only there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elastocal.geometry import GeometryModel, GeometryProblem, errors_at, geometry_model
+from elastocal.geometry.arm import ArmErrors, motion_terms, series, waves
+from elastocal.geometry.joint_functions import beyond_low_orders
+from elastocal.geometry.ladder import climb, joint_regions
+from elastocal.geometry.solve import register
+from elastocal.progress import silent
+from support.measured_arms import (
+    Measured,
+    kuka,
+    measure,
+    planted_functions,
+    seven_axes,
+    universal,
+)
+
+FUNCTIONS, NOISE = 2.5e-4, 5e-5
+FLOOR = NOISE * np.sqrt(8.0 / np.pi)
+"""Mean distance of the noise."""
+PLANTED = {"error": 3e-4, "noise": NOISE, "markers": 1, "stations": 1, "gears": 1e-4}
+
+
+def fitted(measured: Measured, rows: np.ndarray | None = None) -> GeometryModel:
+    data = measured.data if rows is None else measured.data.rows(rows)
+    problem = GeometryProblem(measured.robot, data)
+    found = climb(problem, 40, np.random.default_rng(1), silent)
+    return geometry_model(problem, found, "test")
+
+
+def rung(model: GeometryModel) -> str:
+    return next(each.rung for each in model.ladder if each.chosen)
+
+
+@pytest.fixture(scope="module")
+def measured() -> Measured:
+    return measure(universal(), 700, functions=FUNCTIONS, seed=3, **PLANTED)
+
+
+@pytest.fixture(scope="module")
+def model(measured) -> GeometryModel:
+    return fitted(measured, np.arange(700) < 500)
+
+
+def test_the_series_is_evaluated_as_it_is_written():
+    rng = np.random.default_rng(0)
+    q, terms = rng.uniform(-6.0, 6.0, (9, 3)), rng.normal(size=(3, 38, 2))
+    orders = np.arange(3, 41)
+    sines, cosines = np.sin(q[..., None] * orders), np.cos(q[..., None] * orders)
+    expected = (sines * terms[:, :, 0] + cosines * terms[:, :, 1]).sum(axis=2)
+    assert np.allclose(series(q, terms, 3), expected, rtol=0.0, atol=1e-11)
+    by_waves = np.einsum("pjk,jk->pj", waves(q, 3, 40), terms.reshape(3, -1))
+    assert np.allclose(by_waves, expected, rtol=0.0, atol=1e-11)
+
+
+def test_two_orders_are_one_case_of_many():
+    rng = np.random.default_rng(0)
+    q, torque, motion = rng.normal(size=(5, 2)), rng.normal(size=(5, 2)), rng.normal(size=(2, 7))
+    errors = ArmErrors(np.zeros((2, 6)), motion)
+    expected = q + np.einsum("pjm,jm->pj", motion_terms(q, torque), motion)
+    assert np.allclose(errors.moved(q, torque), expected, rtol=0.0, atol=1e-13)
+    longer = errors.up_to(40)
+    assert longer.motion.shape == (2, 83)
+    assert np.array_equal(longer.moved(q, torque), errors.moved(q, torque))
+    assert np.array_equal(longer.shortest().motion, motion)
+
+
+def test_the_normal_equations_are_those_of_all_columns():
+    """Several markers a row, weights, sizes; no column of the series is written out."""
+    data = measure(kuka(), 7, markers=3).data
+    problem = GeometryProblem(kuka(), data)
+    residual, derivatives = problem.linearise(register(problem))
+    unknowns = len(problem.unknowns)
+    J = np.stack([derivatives.times(one) for one in np.eye(unknowns)], axis=2)
+    weight = np.random.default_rng(0).uniform(0.0, 1.0, len(problem))
+    size = np.array([each.size for each in problem.unknowns])
+    free = np.concatenate([[3, 20, 17], np.arange(problem.dense, unknowns)])
+    points = np.arange(2, 19)
+    A, w = (J * size)[points][:, :, free], weight[points]
+    G, h = derivatives.normal(residual, weight, size, free, points)
+    scale = np.abs(G).max()
+    assert np.allclose(G, np.einsum("nai,n,naj->ij", A, w, A), rtol=0.0, atol=1e-12 * scale)
+    expected = np.einsum("nai,n,na->i", A, w, residual[points])
+    assert np.allclose(h, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_planted_functions_are_found_to_the_noise(model, measured):
+    unseen = measured.data.rows(np.arange(700) >= 500)
+    assert rung(model) == "joint-functions"
+    by_rung = {each.rung: each for each in model.ladder}
+    best = by_rung["joint-functions"]
+    for figures in (best.held_out, best.regions):
+        assert figures.mean < 1.6 * FLOOR
+        assert figures.mean < 0.6 * by_rung["harmonics"].held_out.mean
+    off = np.linalg.norm(model.predict(unseen) - unseen.markers, axis=2)
+    assert off.mean() == pytest.approx(best.held_out.mean, rel=0.15)
+
+
+def test_bands_hold_the_planted_functions(model, measured):
+    held = []
+    for number, each in enumerate(model.functions):
+        if each.known:
+            q = np.zeros((len(each.angle), 6))
+            q[:, number] = each.angle
+            truth = planted_functions(q, FUNCTIONS, 3)[:, [number]]
+            truth = beyond_low_orders(each.angle, truth)[:, 0]
+            held.append((each.low <= truth) & (truth <= each.high))
+            assert each.largest == pytest.approx(np.abs(truth).max(), rel=0.5)
+            assert 8 <= each.order <= 30
+    assert len(held) >= 4
+    assert 0.9 < np.concatenate(held).mean() < 0.999
+
+
+def test_another_day_needs_frame_and_marker_alone(model, measured):
+    seen, unseen = (measured.data.rows(rows) for rows in (np.arange(500), np.arange(500, 700)))
+    later = replace(
+        unseen, campaign=np.full(200, "later"), station=np.full(200, "t"),
+        markers=unseen.markers + np.array([0.3, 0.0, -0.1]),
+    )  # fmt: skip
+    assert errors_at(model, seen, later).mean() < 1.7 * FLOOR
+
+
+def test_a_urdf_does_without_them(model):
+    assert model.chain.rung in ("offsets", "geometry")
+    assert model.chain.held_out.mean < model.held_out.registration.mean
+
+
+@pytest.mark.parametrize("arm", [kuka, seven_axes])
+def test_no_functions_are_found_where_there_are_none(arm):
+    chosen = [rung(fitted(measure(arm(), 150, seed=seed, **PLANTED))) for seed in range(2)]
+    assert "joint-functions" not in chosen
+
+
+def test_what_only_neighbours_show_is_no_function_of_a_joint():
+    """A bump of joint space, as heat or another cell leaves it: left-out regions do not see it."""
+    measured = measure(kuka(), 400, seed=1, **PLANTED)
+    q = measured.data.q
+    bump = 5e-4 * np.sin(3.0 * q[:, 0]) * np.sin(4.0 * q[:, 1]) * np.cos(3.0 * q[:, 2])
+    data = replace(measured.data, markers=measured.data.markers + bump[:, None, None])
+    assert rung(fitted(replace(measured, data=data))) != "joint-functions"
+
+
+def test_regions_are_whole_poses_and_far_apart():
+    data = measure(universal(), 64, markers=3).data
+    problem = GeometryProblem(universal(), replace(data, pose=np.arange(64) // 2))
+    region = joint_regions(problem)
+    assert set(region.tolist()) == set(range(8))
+    for pose in range(32):
+        assert len(set(region[problem.data.pose[problem.row] == pose].tolist())) == 1
