@@ -10,8 +10,18 @@ import pytest
 from elastocal import workflows
 from elastocal.cell import Cell, load_cell
 from elastocal.compensation.process import process_courses
+from elastocal.errors import PlanningError
+from elastocal.identification import posture_reach
 from elastocal.identification.production import ENOUGH
-from elastocal.planning import PlanResult, make_plan, read_plan, write_plan
+from elastocal.planning import (
+    AddedTo,
+    PlanResult,
+    best_additions,
+    make_plan,
+    postures_of,
+    read_plan,
+    write_plan,
+)
 from elastocal.planning.checks import registration_shortages
 from elastocal.planning.pool import NearProduction
 from elastocal.planning.production import plan_coverage, production_findings
@@ -42,9 +52,53 @@ def cell(folder) -> Cell:
 
 
 @pytest.fixture(scope="module")
-def plan(cell) -> PlanResult:
+def made(cell):
+    """Return its plan with the pool."""
+    return make_plan(cell, jobs=1)
+
+
+@pytest.fixture(scope="module")
+def plan(made) -> PlanResult:
     """Return its plan."""
-    return make_plan(cell, jobs=1).plan
+    return made.plan
+
+
+def test_the_best_next_pose_leaves_least_variance_on_production(cell, made):
+    measured, postures = measured_of(made.plan), postures_of(made.pool)
+    found = best_additions(cell, postures, measured, 3)
+    assert 1.0 > found.share[0] > found.share[1] > found.share[2] > 0.0
+    chosen = {pose.candidate for pose in made.plan.poses}
+    assert not chosen & set(found.order.tolist())
+    others = np.setdiff1d(np.arange(len(postures)), found.order[:1])
+    assert best_additions(cell, postures, measured, 1, others).share[0] >= found.share[0]
+
+
+def test_a_pose_that_needs_a_neighbour_gets_one_that_does_not_repeat_it(cell, made):
+    measured, postures = measured_of(made.plan), postures_of(made.pool)
+    found = best_additions(cell, postures, measured, 2, beside=measured[:1])
+    reach = posture_reach(cell.robot)
+    apart = np.max(np.abs(postures.q[found.order[0]] - measured[0]) / reach)
+    assert 0.25 <= apart < 2.0
+
+
+def test_no_more_poses_are_added_than_there_are(cell, made):
+    with pytest.raises(PlanningError, match="999 more poses are wanted, and the pool has 14"):
+        best_additions(cell, postures_of(made.pool), measured_of(made.plan), 999)
+
+
+def test_a_plan_that_adds_to_measured_poses_has_none_of_them(cell, made):
+    measured = measured_of(made.plan)
+    more = make_plan(changed(cell, poses=3), jobs=1, added_to=AddedTo(measured, measured[:1]))
+    assert len(more.plan.poses) == 3
+    assert more.plan.production is None
+    assert 0.0 < more.share < 1.0
+    ours = {pose.joints for pose in made.plan.poses}
+    assert not ours & {pose.joints for pose in more.plan.poses}
+
+
+def measured_of(plan: PlanResult) -> np.ndarray:
+    """Return the postures of a plan."""
+    return np.array([pose.joints for pose in plan.poses])
 
 
 def changed(cell: Cell, **search) -> Cell:

@@ -180,6 +180,8 @@ class FakeRun:
     recorder: Callable[[], Any] | None = None
     faults: list[str] = field(default_factory=list)
     """What was told at once."""
+    enough: Callable[[Any], str] = lambda _: ""
+    order: tuple[int, ...] = ()
 
     @property
     def settings(self) -> RunSettings:
@@ -238,9 +240,10 @@ class FakeRun:
                 known.uncommitted,
             ),
             resumes=resumes,
+            order=self.order,
         )
         recorder = self.recorder or (lambda: MemoryRecorder(self.kept))
-        hooks = SessionHooks(recorder, self.tell, self.interrupted, self.faults.append)
+        hooks = SessionHooks(recorder, self.tell, self.interrupted, self.faults.append, self.enough)
         return Runner(job, self.cell.devices, log, hooks).run()
 
     def readings(self) -> dict[tuple[int, str | None], np.ndarray]:

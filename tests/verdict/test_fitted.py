@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.procedure import Event
 from elastocal.report.document.certificate import certificate_of_evidence
 from elastocal.verdict import Evidence, fitted_readings, judge_evidence
 from elastocal.wording import Phrase
@@ -152,3 +153,17 @@ def test_without_readings_nothing_is_said_to_be_tested(parts):
     assert "Tested with" not in {str(name) for name, _ in _certificate(nothing).identity}
     assert "Tested with" in _certificate(nothing).not_entered
     assert isinstance(_certificate(nothing).not_entered, Phrase)
+
+
+def test_a_run_that_had_enough_poses_is_not_partial(parts):
+    more = replace(parts.plan.poses[0], id=max(pose.id for pose in parts.plan.poses) + 1)
+    last = parts.journal[-1]
+    enough = last.model_copy(update={"event": Event.ENOUGH, "text": "accurate enough"})
+    other = replace(
+        parts,
+        plan=replace(parts.plan, poses=(*parts.plan.poses, more)),
+        journal=(*parts.journal, enough, last),
+    )
+    verdict = judge_evidence(other)
+    assert not any("partial" in reason for reason in verdict.reasons)
+    assert any("which was enough: accurate enough" in note for note in verdict.notes)

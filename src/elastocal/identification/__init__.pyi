@@ -105,6 +105,12 @@ from .production import (
     poses_in_company as poses_in_company,
     posture_reach as posture_reach,
 )
+from .production_error import (
+    FEWEST as FEWEST,
+    ProductionError as ProductionError,
+    level_of_a_look as level_of_a_look,
+    production_error as production_error,
+)
 from .reproduction import (
     Reproduction as Reproduction,
     UnseenErrors as UnseenErrors,

@@ -1,3 +1,8 @@
+from .more import (
+    AddedTo as AddedTo,
+    best_additions as best_additions,
+    postures_of as postures_of,
+)
 from .plan import (
     PlanAndPool as PlanAndPool,
     make_plan as make_plan,
@@ -39,6 +44,7 @@ from .postures import (
 )
 from .production import (
     ProductionRecord as ProductionRecord,
+    plan_coverage as plan_coverage,
 )
 from .scene import (
     CollisionScene as CollisionScene,

@@ -28,6 +28,7 @@ from elastocal.planning.checks import (
     station_shortage,
     unseen_bumps,
 )
+from elastocal.planning.more import SHARE, AddedTo
 from elastocal.planning.motion import (
     Mover,
     Route,
@@ -196,6 +197,9 @@ class PlanAndPool:
     plan: PlanResult
     pool: PoolData
     surface: Surface
+    share: float = 1.0
+    """Share of the variance of the predictions on production that poses leave that add to
+    measured ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +223,11 @@ class _Choice:
 
 @one_blas_thread()
 def make_plan(
-    cell: Cell, compare: str | None = None, jobs: int | None = None, progress: Progress = silent
+    cell: Cell,
+    compare: str | None = None,
+    jobs: int | None = None,
+    progress: Progress = silent,
+    added_to: AddedTo | None = None,
 ) -> PlanAndPool:
     """Return the calibration poses of a cell, checked and in visiting order.
 
@@ -235,6 +243,8 @@ def make_plan(
     progress : callable, optional
         Hears the stage (``surface``, ``candidates``, ``search``, ``visiting order``), what is done
         of it and how much there is.
+    added_to : AddedTo, optional
+        Measured poses, to which those are chosen that add most.
 
     Raises
     ------
@@ -257,11 +267,12 @@ def make_plan(
     _require_enough(cell, sampled, findings)
     progress(_SEARCH, 0, 1)
     search_pool = SearchPool.of(cell, surface, sampled)
-    selection, route = _choose(cell, search_pool, sampled, mover, for_search, progress)
+    selection, route = _choose(cell, search_pool, sampled, mover, for_search, progress, added_to)
     chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route)
     search = _search(chosen)
     progress(_SEARCH, 1, 1)
-    production = search_pool.production(cell, selection.order)
+    # Of poses that only add to others it says nothing by itself.
+    production = None if added_to else search_pool.production(cell, selection.order)
     compared = None
     if other is not None:
         everyone = search_pool.preferred(cell, np.arange(len(search_pool.candidates)))
@@ -286,11 +297,12 @@ def make_plan(
             *_notes(cell, sampled.pool, search),
             *_shortages(poses),
             *unseen_bumps([pose.seen_by for pose in poses]),
-            *production_findings(cell, production),
+            *([] if added_to else production_findings(cell, production)),
         ),
         production=production,
     )
-    return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface)
+    share = float(selection.trace[SHARE][-1]) if added_to else 1.0
+    return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface, share)
 
 
 def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:
@@ -316,11 +328,15 @@ def _choose(
     mover: Mover,
     rng: Generator,
     progress: Progress,
+    added_to: AddedTo | None,
 ) -> tuple[Selection, Route]:
     """Return poses with free paths from HOME and on to the surface; replace others."""
     left: IndexArray = np.arange(len(search_pool.candidates))
     for _ in range(_REPLACEMENTS):
-        selection = search_pool.choose(cell, left, rng)
+        if added_to is None:
+            selection = search_pool.choose(cell, left, rng)
+        else:
+            selection = added_to.best(cell, sampled.pool.postures, left)
         postures = sampled.pool.postures.take(selection.order)
         route = plan_route(cell.home, postures, mover, progress)
         blocked = np.union1d(

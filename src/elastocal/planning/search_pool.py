@@ -85,10 +85,10 @@ class SearchPool:
         """Return the pool of a cell with its observation rows and its metric."""
         postures = sampled.pool.postures
         points = sampled.points.take(postures.point)
-        springs, model = _judging_model(cell, postures)
+        springs, model = judging_model(cell, postures)
         geodesic = cell.file.search.metric == "geodesic"
-        rows = _pose_rows(cell, model, postures)
-        production = _process_rows(cell, model)
+        rows = pose_rows(cell, model, postures)
+        production = process_rows(cell, model)
         candidates = Candidates(
             postures.contact,
             rows,
@@ -271,7 +271,7 @@ class SearchPool:
         return replace(found, order=left[found.order])
 
 
-def _judging_model(cell: Cell, postures: Postures) -> tuple[str, ElasticModel]:
+def judging_model(cell: Cell, postures: Postures) -> tuple[str, ElasticModel]:
     """Return the model that poses are judged by, with its name.
 
     Where production is known: gears, scaled by the torques of the pool, with friction memory where
@@ -291,7 +291,7 @@ def _judging_model(cell: Cell, postures: Postures) -> tuple[str, ElasticModel]:
     return name, ElasticModel(robot, springs)
 
 
-def _pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArray:
+def pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArray:
     """Return the observation rows of all load cases at each posture (paper Eq. 15, 17).
 
     Parameters
@@ -319,7 +319,7 @@ def _pose_rows(cell: Cell, model: ElasticModel, postures: Postures) -> FloatArra
     return rows
 
 
-def _process_rows(cell: Cell, model: ElasticModel) -> FloatArray | None:
+def process_rows(cell: Cell, model: ElasticModel) -> FloatArray | None:
     """Return the rows at the production's poses and forces, shape (row, spring).
 
     In m per unit of compliance; None when the cell names no process. Production of very many rows

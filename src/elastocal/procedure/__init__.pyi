@@ -1,8 +1,10 @@
 from .derive import (
     PoseReadings as PoseReadings,
     RunSummary as RunSummary,
+    derive_poses as derive_poses,
     derive_run as derive_run,
     on_arm_as_built as on_arm_as_built,
+    read_pose as read_pose,
     read_run as read_run,
     read_summary as read_summary,
     read_touches as read_touches,
@@ -32,6 +34,7 @@ from .record import (
     read_journal as read_journal,
     read_streams as read_streams,
     refuse_foreign_files as refuse_foreign_files,
+    why_enough as why_enough,
 )
 from .run import (
     LastKnown as LastKnown,
@@ -52,4 +55,5 @@ from .run import (
     registration_warnings as registration_warnings,
     run_record as run_record,
     run_settings as run_settings,
+    visits_in_rounds as visits_in_rounds,
 )

@@ -35,6 +35,7 @@ from .manifest import (
     manifest_of as manifest_of,
     read_manifest as read_manifest,
 )
+from .poses_needed import PosesNeeded as PosesNeeded
 from .signing import (
     OF_REPORT as OF_REPORT,
     OF_RUN as OF_RUN,

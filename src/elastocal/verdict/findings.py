@@ -5,10 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from elastocal.codec import Saturation
+from elastocal.errors import present
 from elastocal.findings import Finding, Grade, Kind, as_count, as_number, group_alike
 from elastocal.identification import SuspiciousReading
 from elastocal.identification.recertification import Verdict as Recertified
-from elastocal.procedure import commits
+from elastocal.procedure import commits, why_enough
 from elastocal.verdict.chain import LinkState
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.fitted import fitted_readings, place_of_force
@@ -126,6 +127,14 @@ PARTIAL_BY_ONE = replace(
 """The same of one pose."""
 
 
+STOPPED_EARLY = Kind(
+    "verdict.stopped-early",
+    "{measured} of {planned} were measured, which was enough: {reason}",
+    grade=Grade.NOTE,
+    shown={"planned": as_count("planned pose")},
+)
+
+
 def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
     if evidence.plan is None or evidence.dataset is None:
         return
@@ -134,6 +143,11 @@ def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
     if not missing:
         return
     committed = {log.pose for log in commits(evidence.journal)} if evidence.journal else None
+    if committed is not None and (why := why_enough(present(evidence.journal, "journal"))):
+        yield STOPPED_EARLY(planned=len(evidence.plan.poses), measured=len(committed), reason=why)
+        missing = sorted(committed.intersection(missing))
+        if not missing:
+            return
     yield (PARTIAL_BY_ONE if len(missing) == 1 else PARTIAL)(
         missing=len(missing),
         planned=len(evidence.plan.poses),

@@ -33,6 +33,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 from elastocal.tables import write_table
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.more import MeasuredRun, measured_run
 
 __all__ = [
     "POSITION_PLAN",
@@ -79,6 +80,9 @@ class PlanSettings:
     free_poses: Annotated[int | None, Option("--positions", least=1, most=100_000)] = None
     """Number of poses in free space for `geometry`, after the presses and in the same program;
     none: presses alone."""
+    more: Annotated[Path | None, Option(metavar="RUN")] = None
+    """Folder of a run: the poses that, with its own, bring the light of its report to green, each
+    the best next one, or why no number of poses does. `calibrate` takes both datasets."""
     page_language: Annotated[str, Option(choices="page language")] = "en"
     """Language of ``plan.html``."""
 
@@ -153,20 +157,27 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
         If a file cannot be read or written, or the folder holds files.
     """
     cell = _wanted_cell(settings)
+    added = None
+    if settings.more is not None:
+        added = measured_run(settings.more, cell, settings.poses)
+        cell = _with_search(cell, poses=added.poses, accuracy=None, d_max=None)
     writer, _ = choose_writer(cell.robot, settings.language)
     if writer is not None:
         writer.check_name(settings.program)
     compare = settings.compare
+    if added is not None:
+        # Another technique would choose poses of their own, not ones to add.
+        compare = "none"
     if compare is None:
         compare = "cover" if cell.technique != "cover" else "ioops"
     other = None if compare == "none" else compare
     _require_free_poses(settings)
     language = language_of(settings.page_language, "--page-language")
     if settings.dry_run:
-        return planning.make_plan(cell, other, settings.jobs, progress).plan
+        return _planned(cell, other, settings, progress, added).plan
     with filling(Path(settings.out), PLAN, settings.force) as folder:
-        planned = planning.make_plan(cell, other, settings.jobs, progress)
-        if settings.poses is not None:
+        planned = _planned(cell, other, settings, progress, added)
+        if settings.poses is not None or added is not None:
             # A plan belongs to the cell file, whatever number of poses an option requests.
             own = fingerprint(load_cell(Path(settings.cell)))
             record = replace(planned.plan.cell, fingerprint=own)
@@ -178,6 +189,22 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
             free = choose_positions(as_written, settings.free_poses, _FREE_SEARCH, seed, progress)
         _write_folder(folder, cell, planned, free, writer, settings.program, language)
     return planned.plan
+
+
+def _planned(
+    cell: Cell,
+    other: str | None,
+    settings: PlanSettings,
+    progress: Progress,
+    added: MeasuredRun | None,
+) -> planning.PlanAndPool:
+    """Return a plan of its own, or one of poses that add to a run, with what they bring."""
+    if added is None:
+        return planning.make_plan(cell, other, settings.jobs, progress)
+    to = planning.AddedTo(added.joint_position, added.beside)
+    made = planning.make_plan(cell, other, settings.jobs, progress, to)
+    findings = (*added.findings, *added.gain(made.share), *made.plan.findings)
+    return replace(made, plan=replace(made.plan, findings=findings))
 
 
 def _require_free_poses(settings: PlanSettings) -> None:
@@ -197,7 +224,12 @@ def _wanted_cell(settings: PlanSettings) -> Cell:
         return cell
     if not settings.poses >= 1:
         raise PlanningError(f"--poses {settings.poses}: must be at least 1")
-    search = cell.file.search.model_copy(update={"poses": settings.poses, "accuracy": None})
+    return _with_search(cell, poses=settings.poses, accuracy=None)
+
+
+def _with_search(cell: Cell, **changes: object) -> Cell:
+    """Return a cell that searches otherwise."""
+    search = cell.file.search.model_copy(update=changes)
     return replace(cell, file=cell.file.model_copy(update={"search": search}))
 
 

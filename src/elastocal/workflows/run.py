@@ -29,8 +29,9 @@ from elastocal.cell import (
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
 from elastocal.findings import group_alike
+from elastocal.identification import FEWEST
 from elastocal.options import CHOICES, Option, Statements
-from elastocal.planning import PLAN, PlanResult, read_plan
+from elastocal.planning import PLAN, POOL, PlanResult, read_plan, read_pool
 from elastocal.planning.export import pose_lines
 from elastocal.procedure import (
     Event,
@@ -49,6 +50,7 @@ from elastocal.results import Result, brief_repr
 from elastocal.sim import truth_of
 from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, arm_devices, rig_of
 from elastocal.workflows._workflow import workflow
+from elastocal.workflows.until import ROUND, AccuracyWatch, ReachedAccuracy
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -109,6 +111,12 @@ class RunSettings:
     is ``cold`` or ``warm``; a simulated arm is made so."""
     arming: Arming | None = None
     """Arming by a person who agreed before: the cell file must be unchanged since."""
+    until: Annotated[float | None, Option(metavar="LENGTH", read="length")] = None
+    """Stop as soon as the expected error on production is surely below this, e.g. '0.05 mm'. It is
+    stated after each pose, with its interval; the poses are visited in rounds, those first that
+    the search chose first."""
+    risk: Annotated[float, Option(metavar="P")] = 0.05
+    """Risk that the error is larger than that although the run stopped for it."""
 
 
 @brief_repr
@@ -137,6 +145,8 @@ class RunFigures:
     """Why nothing was derived of a run that is done."""
     lines: tuple[LineCounts, ...] = ()
     """Counts on the lines of the devices in this session; none for simulated devices."""
+    accuracy: ReachedAccuracy | None = None
+    """The error to expect on production, where it was asked for."""
 
     def counts(self) -> str:
         """Return the number of readings of each status, as a phrase."""
@@ -191,6 +201,8 @@ class RunResult(Result):
                 *self._lost(),
             )
         )
+        if found.accuracy is not None:
+            yield from found.accuracy.show()
         if found.dataset:
             yield Paragraph(
                 f"wrote {found.dataset} and summary.json:"
@@ -272,6 +284,8 @@ class _Job:
     folder: RunFolder
     warnings: tuple[str, ...]
     key: "Ed25519PrivateKey | None"
+    order: tuple[int, ...]
+    """Ids of the poses in the order of their visits; empty: the plan's."""
 
 
 @workflow(RunSettings, record="out")
@@ -316,13 +330,14 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
                     journal.write(devices.clock.now(), Event.START, run=record)
                 else:
                     journal.write(devices.clock.now(), Event.RESUME)
-                result = _carry_out(session, devices, journal, settings.operator, progress)
+                watch = _accuracy_watch(job, entries, settings)
+                result = _carry_out(session, devices, journal, settings.operator, progress, watch)
     if job.key is not None:
         vouched = verdict.sign(job.key, verdict.OF_RUN, procedure.file_sha256(journal_file), _now())
         verdict.write_signature(job.folder.signature, vouched)
     if result.end is RunEnd.STOPPED:
         raise ProcedureError(f"{result.message}. The arm is {result.location.value}")
-    return _derived(job, result)
+    return _derived(job, result, watch)
 
 
 @workflow(RunSettings, record="out")
@@ -336,7 +351,7 @@ def dry_run(settings: RunSettings, progress: Progress) -> DryRunResult:  # noqa:
     """
     job = _prepare(settings)
     return DryRunResult(
-        steps=procedure.itinerary(job.plan, job.settings),
+        steps=procedure.itinerary(job.plan, job.settings, job.order),
         plan=job.plan,
         poses=len(job.plan.poses),
         load_cases=tuple(name for name, _ in job.settings.loads),
@@ -369,6 +384,10 @@ def _prepare(settings: RunSettings) -> _Job:
     touches, place = settings.touch is not None, RunFolder(Path(settings.out))
     carried_out = procedure.run_settings(loaded, read, touches=touches)
     procedure.rehearse_derivation(loaded, read, place, stated)
+    if settings.until is not None:
+        if touches:
+            raise ProcedureError("--until is for load cases, not for --touch")
+        AccuracyWatch(loaded, read, place, settings.until, settings.risk, settings.operator.warn)
     return _Job(
         loaded,
         read,
@@ -379,6 +398,7 @@ def _prepare(settings: RunSettings) -> _Job:
         place,
         procedure.registration_warnings(read),
         key,
+        () if settings.until is None else procedure.visits_in_rounds(read, FEWEST, ROUND),
     )
 
 
@@ -407,7 +427,12 @@ def _now() -> str:
 
 
 def _carry_out(
-    session: Session, devices: Devices, journal: Journal, operator: Operator, progress: Progress
+    session: Session,
+    devices: Devices,
+    journal: Journal,
+    operator: Operator,
+    progress: Progress,
+    watch: AccuracyWatch | None,
 ) -> procedure.SessionResult:
     count = len(session.plan.poses)
     with operator.supervise(count) as supervision:
@@ -421,11 +446,36 @@ def _carry_out(
             show,
             supervision.interrupted,
             lambda fault: tell_at_once(operator, fault),
+            watch or (lambda _: ""),
         )
         return procedure.Runner(session, devices, journal, hooks).run()
 
 
-def _derived(job: _Job, result: procedure.SessionResult) -> RunResult:
+def _accuracy_watch(
+    job: _Job, entries: tuple[procedure.Entry, ...], settings: RunSettings
+) -> AccuracyWatch | None:
+    """Return what judges the run after each pose, with the poses of earlier sessions."""
+    if settings.until is None:
+        return None
+    tell = settings.operator.warn
+    watch = AccuracyWatch(job.cell, job.plan, job.folder, settings.until, settings.risk, tell)
+    for log in {each.pose: each for each in procedure.commits(entries)}.values():
+        watch.add(log)
+    return watch
+
+
+def _reached(
+    job: _Job, watch: AccuracyWatch | None, result: procedure.SessionResult
+) -> ReachedAccuracy | None:
+    """Return the error to expect on production, and what further poses would bring."""
+    if watch is None:
+        return None
+    pool = job.folder.plan / POOL
+    found = read_pool(pool) if pool.is_file() else None
+    return watch.result(result.enough, found)
+
+
+def _derived(job: _Job, result: procedure.SessionResult, watch: AccuracyWatch | None) -> RunResult:
     """Derive the dataset of a run that is done; what keeps it from that is no end of the run."""
     summary: RunSummary | None = None
     problem: ElastocalError | None = None
@@ -436,6 +486,7 @@ def _derived(job: _Job, result: procedure.SessionResult) -> RunResult:
         except ElastocalError as error:
             problem = error
     figures = _figures(job, result, summary, problem)
+    figures = replace(figures, accuracy=_reached(job, watch, result))
     return RunResult(figures, result.end, summary, problem, job.record.touch is not None)
 
 
@@ -480,6 +531,7 @@ def _session(job: _Job, known: LastKnown | None, devices: Devices) -> Session:
         attempts=known.attempts if known else {},
         home=procedure.home_route(job.plan, state.q, state.T_base_tcp, limit, likely),
         resumes=known is not None,
+        order=job.order,
     )
 
 

@@ -12,6 +12,7 @@ from .criteria import (
 )
 from .exchange import (
     ExchangeSearch as ExchangeSearch,
+    best_addition as best_addition,
 )
 from .information import (
     Information as Information,

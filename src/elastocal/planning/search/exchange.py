@@ -203,7 +203,7 @@ def _exchange_poses(
     seen = {chosen.tobytes()}
     ended = "whole pool" if len(chosen) == len(information) else "cap"
     while ended == "cap" and len(added) < cap:
-        best = _best_addition(information, criterion, chosen)
+        best = best_addition(information, criterion, chosen)
         worst = _worst(information, criterion, chosen, best, kept)
         added.append(best)
         dropped.append(worst)
@@ -218,7 +218,7 @@ def _exchange_poses(
     return Exchange(start, chosen, _indices(added), _indices(dropped), value, ended)
 
 
-def _best_addition(information: Information, criterion: Criterion, chosen: IndexArray) -> int:
+def best_addition(information: Information, criterion: Criterion, chosen: IndexArray) -> int:
     """Return the pose outside a choice that raises the criterion most; ties: lowest number.
 
     Raises
@@ -253,7 +253,7 @@ def _greedy_order(
     order: list[int] = []
     values = []
     for _ in range(len(chosen)):
-        order.append(_best_addition(inner, criterion, _indices(order)))
+        order.append(best_addition(inner, criterion, _indices(order)))
         values.append(float(criterion.value(inner.matrix(order))))
     return chosen[_indices(order)], np.array(values)
 

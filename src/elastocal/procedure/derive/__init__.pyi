@@ -8,7 +8,9 @@ from .as_built import (
 from .derivation import (
     MeasuredArm as MeasuredArm,
     dataset_of as dataset_of,
+    derive_poses as derive_poses,
     derive_run as derive_run,
+    read_pose as read_pose,
     read_run as read_run,
     write_derived as write_derived,
 )

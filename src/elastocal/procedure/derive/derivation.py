@@ -555,7 +555,7 @@ def read_run(run: Path) -> CommittedRun:
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
     for log in logs:
         check_stream(folder.streams / log.streams, known[log.streams])
-    poses = tuple(reduce_pose(log, _streams(folder, log, cell)) for log in logs)
+    poses = tuple(read_pose(folder, log, cell) for log in logs)
     return CommittedRun(folder, entries, record, cell, plan, poses, signs)
 
 
@@ -678,6 +678,19 @@ def _latest(logs: Sequence[PoseLog]) -> list[PoseLog]:
     """Return one log for each pose, the last one."""
     latest = {log.pose: log for log in logs}
     return [log for log in logs if latest[log.pose] is log]
+
+
+def read_pose(folder: RunFolder, log: PoseLog, cell: Cell) -> PoseReadings:
+    """Return what a committed pose was averaged to, from its streams.
+
+    Raises
+    ------
+    SchemaError
+        If the file is damaged, or of other joints.
+    FileAccessError
+        If it cannot be read.
+    """
+    return reduce_pose(log, _streams(folder, log, cell))
 
 
 def _streams(folder: RunFolder, log: PoseLog, cell: Cell) -> Streams:

@@ -32,6 +32,7 @@ from .journal import (
     commits as commits,
     read_commits as read_commits,
     read_journal as read_journal,
+    why_enough as why_enough,
 )
 from .streams import (
     SAME_TIME as SAME_TIME,

@@ -83,6 +83,8 @@ class Event(Enum):
     """A pose is finished and its streams are on the disk; holds its `PoseLog`."""
     GIVEN_UP = "given up"
     """All attempts at a pose failed; the run goes on without it."""
+    ENOUGH = "enough"
+    """The run has what was wanted of it; the poses left are not measured."""
     FINISH = "finish"
     """Last entry of a session; holds what was counted on the lines of its devices."""
 
@@ -244,6 +246,13 @@ def read_commits(path: Path) -> tuple[PoseLog, ...]:
 def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
     """Return the finished poses among the entries of a journal."""
     return tuple(entry.log for entry in entries if entry.log is not None)
+
+
+def why_enough(entries: tuple[Entry, ...]) -> str:
+    """Return why a run has enough poses; empty: it has not, or has gone on since."""
+    last = (e for e in reversed(entries) if e.event in (Event.ENOUGH, Event.RESUME, Event.COMMIT))
+    found = next(last, None)
+    return found.text if found is not None and found.event is Event.ENOUGH else ""
 
 
 def _read(path: Path) -> tuple[tuple[Entry, ...], int, bytes]:

@@ -8,6 +8,7 @@ from .routes import (
     PlannedStep as PlannedStep,
     home_route as home_route,
     itinerary as itinerary,
+    visits_in_rounds as visits_in_rounds,
 )
 from .runner import Runner as Runner
 from .session import (

@@ -5,8 +5,9 @@ Stops are numbered by the poses' ids: before the first pose and after the last o
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -95,6 +96,30 @@ def route(plan: PlanResult, start: int, end: int) -> tuple[Joints, ...]:
         for stop in range(start, end, -1):
             legs += [*reversed(plan.moves[stop].via), stop_joints(plan, stop - 1)]
     return tuple(legs)
+
+
+def home_stop(plan: PlanResult, start: int) -> int:
+    """Return the stop at HOME, of the first and the last, with the shorter route from a stop."""
+    end = len(plan.poses)
+    return HOME_AT_START if start + 1 < end - start else end
+
+
+def visits_in_rounds(plan: PlanResult, first: int, more: int) -> tuple[int, ...]:
+    """Return the ids of the poses in an order of which any beginning tells much.
+
+    The first poses of the search come first, then some more in each round. Each round follows the
+    path of the plan, to and fro, because only its legs were checked for collisions.
+
+    Parameters
+    ----------
+    first, more : int
+        Number of poses in the first round, and in each further one.
+    """
+    order, rounds = plan.search.order, []
+    begins = [0, *range(first, len(order), more), len(order)]
+    for number, (begin, end) in enumerate(pairwise(begins)):
+        rounds += sorted(order[begin:end], reverse=number % 2 == 1)
+    return tuple(rounds)
 
 
 def stop_joints(plan: PlanResult, stop: int) -> Joints:
@@ -208,17 +233,23 @@ class PlannedStep:
     """Estimated; what waits for something is taken at its shortest."""
 
 
-def itinerary(plan: PlanResult, settings: RunSettings) -> tuple[PlannedStep, ...]:
+def itinerary(
+    plan: PlanResult, settings: RunSettings, order: Sequence[int] = ()
+) -> tuple[PlannedStep, ...]:
     """Return all steps of an undisturbed run, in order.
 
     Parameters
     ----------
     settings : RunSettings
         Figures of the run.
+    order : sequence of int
+        Ids of the poses in the order of their visits; by default the plan's.
     """
     steps: list[PlannedStep] = []
-    for pose in plan.poses:
-        steps.append(_travel(plan, settings, pose.id - 1, pose.id))
+    stop = HOME_AT_START
+    for pose in [plan.poses[number] for number in order] or plan.poses:
+        steps.append(_travel(plan, settings, stop, pose.id))
+        stop = pose.id
         visit = visit_steps(
             settings.procedure,
             settings.near_contact,
@@ -227,25 +258,29 @@ def itinerary(plan: PlanResult, settings: RunSettings) -> tuple[PlannedStep, ...
             pose.seen_by or "",
         )
         steps += (PlannedStep(pose.id, Step(s.name), s.what, s.seconds) for s in visit)
-    steps.append(_travel(plan, settings, len(plan.poses) - 1, len(plan.poses)))
+    steps.append(_travel(plan, settings, stop, home_stop(plan, stop)))
     return tuple(steps)
 
 
-def remaining_times(plan: PlanResult, settings: RunSettings) -> FloatArray:
+def remaining_times(
+    plan: PlanResult, settings: RunSettings, order: Sequence[int] = ()
+) -> FloatArray:
     """Return the time from before each pose to the end, shape (pose + 1,), in s.
 
-    The last is that of the path HOME.
+    The last is that of the path HOME. The order is as for `itinerary`.
     """
     seconds = np.zeros(len(plan.poses) + 1)
-    for step in itinerary(plan, settings):
+    for step in itinerary(plan, settings, order):
         seconds[-1 if step.pose is None else step.pose] += step.seconds
-    return seconds[::-1].cumsum()[::-1]
+    visits = [*(order or range(len(plan.poses))), -1]
+    seconds[visits] = seconds[visits][::-1].cumsum()[::-1]
+    return seconds
 
 
 def _travel(plan: PlanResult, settings: RunSettings, start: int, end: int) -> PlannedStep:
     legs = route(plan, start, end)
     seconds = settings.axes.along(np.array([stop_joints(plan, start), *legs]))
-    home = end == len(plan.poses)
+    home = end in (HOME_AT_START, len(plan.poses))
     target = "HOME" if home else "approach pose"
     via = len(legs) - 1
     stops = f" by way of {via} via pose{'s' if via > 1 else ''}" if via else ""

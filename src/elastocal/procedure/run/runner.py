@@ -55,7 +55,13 @@ from elastocal.procedure.run._attempt import (
 from elastocal.procedure.run._supervisor import DEVICE_ERRORS, TIME_SLACK, Observers, Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
 from elastocal.procedure.run.leaving import LeavingWatch
-from elastocal.procedure.run.routes import HOME_AT_START, ApproachLine, remaining_times, route
+from elastocal.procedure.run.routes import (
+    HOME_AT_START,
+    ApproachLine,
+    home_stop,
+    remaining_times,
+    route,
+)
 from elastocal.procedure.run.session import RunEnd, Session, SessionHooks, SessionResult
 from elastocal.procedure.run.steps import (
     EXPECTED_ERRORS,
@@ -643,7 +649,9 @@ class Runner:
         self._log = Logbook(journal, devices.clock)
         observers = Observers(self._report, hooks.interrupted, hooks.fault)
         self._supervisor = Supervisor(devices, session.settings, self._log, observers)
-        self._left = remaining_times(session.plan, session.settings)
+        self._left = remaining_times(session.plan, session.settings, session.order)
+        self._number = {pose.id: place for place, pose in enumerate(session.visits, start=1)}
+        self._enough = ""
         self._attempt: Attempt | None = None
         self._attempts = dict(session.attempts)
         self._given_up: list[int] = []
@@ -666,7 +674,8 @@ class Runner:
             self._begin()
             self._visit_all()
             self._go_home()
-            result = self._result(RunEnd.DONE, ArmLocation.HOME, self._given_up_message())
+            message = "; ".join(filter(None, (self._enough, self._given_up_message())))
+            result = self._result(RunEnd.DONE, ArmLocation.HOME, message)
         except AttemptFailedError as error:
             result = self._failure(error, error.location)
         except EXPECTED_ERRORS as error:
@@ -737,13 +746,24 @@ class Runner:
 
     def _visit_all(self) -> None:
         in_a_row = 0
-        for pose in self._plan.poses:
+        for pose in self._session.visits:
             if pose.id in self._session.committed:
                 continue
             failure = self._visit(pose)
             in_a_row = 0 if failure is None else in_a_row + 1
+            if failure is None and self._has_enough():
+                return
             if failure is not None and in_a_row == _MOST_GIVEN_UP:
                 raise failure
+
+    def _has_enough(self) -> bool:
+        """Return whether the poses so far are enough, and write down why."""
+        self._enough = self._hooks.enough(present(self._attempt, "attempt").log())
+        # A look takes longer than a cycle; the arm stands at the approach pose meanwhile.
+        self._supervisor.pause()
+        if self._enough:
+            self._log.write(Event.ENOUGH, text=self._enough)
+        return bool(self._enough)
 
     def _visit(self, pose: PoseRecord) -> AttemptFailedError | None:
         """Commit a pose, or return why it was given up."""
@@ -821,13 +841,13 @@ class Runner:
     def _go_home(self) -> None:
         self._attempt, self._location = None, ArmLocation.BETWEEN_POSES
         self._log.pose = self._log.attempt = self._log.step = None
-        end = len(self._plan.poses)
         if self._stop == HOME_AT_START:
             self._location = ArmLocation.HOME
             return
         self._enable()
         self._pose_start = self._supervisor.now
         guard = Guard(self._free_limit, free=True)
+        end = home_stop(self._plan, self._stop)
         drive(self._supervisor, route(self._plan, self._stop, end), guard)
         self._location = ArmLocation.HOME
 
@@ -875,7 +895,7 @@ class Runner:
         force = seen.force_tcp[-1] if shown else np.zeros(3)
         return Progress(
             time=seen.time,
-            number=count if pose is None else pose + 1,
+            number=count if pose is None else self._number[pose],
             count=count,
             pose=pose,
             attempt=0 if a is None else a.number,
@@ -899,7 +919,8 @@ class Runner:
         return self._result(end, location, str(fault))
 
     def _result(self, end: RunEnd, location: ArmLocation, message: str) -> SessionResult:
-        return SessionResult(end, location, message, tuple(self._given_up), self._failed)
+        enough = bool(self._enough)
+        return SessionResult(end, location, message, tuple(self._given_up), self._failed, enough)
 
     def _finish(self, result: SessionResult) -> None:
         disarm(self._supervisor)

@@ -13,11 +13,12 @@ from elastocal import __version__
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import ProcedureError
 from elastocal.files import read_text, sha256
-from elastocal.planning import PlanResult
+from elastocal.planning import PlanResult, PoseRecord
 from elastocal.procedure.record import (
     Action,
     Entry,
     Event,
+    PoseLog,
     RunFolder,
     RunRecord,
     StreamRecorder,
@@ -53,6 +54,13 @@ class Session:
     """Path to HOME, which comes first."""
     resumes: bool = False
     """Whether it goes on with a run: a tool that an earlier session left pressing is freed."""
+    order: tuple[int, ...] = ()
+    """Ids of all poses in the order of their visits; empty: the plan's."""
+
+    @property
+    def visits(self) -> tuple[PoseRecord, ...]:
+        """All poses of the plan, in the order of their visits."""
+        return tuple(self.plan.poses[pose] for pose in self.order) or self.plan.poses
 
 
 @dataclass(frozen=True)
@@ -67,13 +75,16 @@ class SessionHooks:
     """Whether the run was asked to stop."""
     fault: Callable[[str], None] = lambda _: None
     """Called at once when a fault is seen; what follows may take long. It must not wait."""
+    enough: Callable[[PoseLog], str] = lambda _: ""
+    """Called after each pose is committed, while the arm stands still off the surface; returns why
+    the run has enough poses, or nothing."""
 
 
 class RunEnd(Enum):
     """Reason for the end of a session."""
 
     DONE = "done"
-    """Every pose was tried; the arm is at HOME."""
+    """Every pose was tried, or enough of them; the arm is at HOME."""
     STOPPED = "stopped"
     """A fault."""
     INTERRUPTED = "interrupted"
@@ -93,6 +104,8 @@ class SessionResult:
     """Poses of this session that failed."""
     failed_attempts: int
     """Attempts of this session that failed."""
+    enough: bool = False
+    """Whether it ended because there were enough poses."""
 
 
 @brief_repr
