@@ -25,8 +25,6 @@ _MOST = 100
 """Poses that are added at most."""
 _LEAST = 3
 """Poses from which stations are registered."""
-_BY_POSES = {each.name for each in (STILL_FALLING, NOT_SETTLED, NOT_COVERED)}
-"""Kinds of findings that further poses settle."""
 
 FOR_THE_LIGHT = Kind(
     "plan.more-reason", "{poses} more: {reason}", shown={"poses": as_count("pose")}
@@ -104,10 +102,11 @@ class PosesNeeded:
         coverage = evidence.coverage
         if coverage is not None and not coverage.is_enough:
             counts.append((_LEAST, coverage.sentence()))
+        settled = {each.name for each in (STILL_FALLING, NOT_SETTLED, NOT_COVERED)}
         others = tuple(
             str(each)
             for each in judged.reasons
-            if isinstance(each, Finding) and each.kind not in _BY_POSES
+            if isinstance(each, Finding) and each.kind not in settled
         )
         return cls(tuple(counts), beside, why_not, others)
 
