@@ -1,16 +1,25 @@
 """Functions of each joint: found where an arm has them, and only there."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from elastocal.geometry import GeometryModel, GeometryProblem, errors_at, geometry_model
+from elastocal.errors import SchemaError
+from elastocal.geometry import (
+    GeometryModel,
+    GeometryProblem,
+    errors_at,
+    geometry_model,
+    read_geometry,
+)
 from elastocal.geometry.arm import ArmErrors, motion_terms, series, waves
 from elastocal.geometry.joint_functions import beyond_low_orders
 from elastocal.geometry.ladder import climb, joint_regions
 from elastocal.geometry.solve import register
 from elastocal.progress import silent
+from elastocal.records import write_json
 from support.measured_arms import (
     Measured,
     kuka,
@@ -123,6 +132,24 @@ def test_another_day_needs_frame_and_marker_alone(model, measured):
         markers=unseen.markers + np.array([0.3, 0.0, -0.1]),
     )  # fmt: skip
     assert errors_at(model, seen, later).mean() < 1.7 * FLOOR
+
+
+def test_the_file_keeps_them_and_older_files_are_read(model, tmp_path):
+    path = tmp_path / "model.json"
+    write_json(path, model)
+    again = read_geometry(path)
+    assert np.array_equal(again.motion, model.motion)
+    assert again.functions[0].order == model.functions[0].order
+    data = json.loads(path.read_text(encoding="utf-8"))
+    data["motion"] = [row[:6] + row[-1:] for row in data["motion"]]
+    del data["functions"]
+    data["schema"] = "elastocal.geometry/3"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    assert read_geometry(path).motion.shape == (6, 7)
+    data["motion"] = [row[:6] for row in data["motion"]]
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(SchemaError, match=r"motion has shape \(6, 6\), not \(6, 7\)"):
+        read_geometry(path)
 
 
 def test_a_urdf_does_without_them(model):

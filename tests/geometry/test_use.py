@@ -134,6 +134,10 @@ def test_predict_and_compensate_take_the_geometry(tmp_path):
     assert abs(told[1]["deviation"]["mean"] - told[0]["deviation"]["mean"]) > 1e-5
     lone = elastocal("compensate", model, rows, "--out", tmp_path / "c.csv", "--payload", "1 kg")
     assert "give --geometry" in lone.reason
+    notes = json.loads(elastocal("export", model, "--c", tmp_path / "c", *built, "--json").out)
+    assert any("elastocal_arm_error" in note for note in notes["notes"])
+    header = (tmp_path / "c" / "elastocal_model.h").read_text(encoding="utf-8")
+    assert "void elastocal_arm_error(const double q[], double error[3]);" in header
 
 
 @pytest.mark.parametrize("largest", [0.0, 0.15, 0.5])

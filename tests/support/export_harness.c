@@ -40,6 +40,19 @@ static int loads(void)
     return 0;
 }
 
+#ifdef ELASTOCAL_ARM_ERROR
+static int arm_errors(void)
+{
+    double row[N];
+    double out[3];
+    while (fread(row, sizeof(double), N, stdin) == N) {
+        elastocal_arm_error(row, out);
+        (void)fwrite(out, sizeof(double), 3, stdout);
+    }
+    return 0;
+}
+#endif
+
 static int steps(void)
 {
     double row[N + 8];
@@ -144,6 +157,11 @@ int main(int argc, char **argv)
 {
     int result = 2;
     const char *const mode = (argc > 1) ? argv[1] : "selftest";
+#ifdef ELASTOCAL_ARM_ERROR
+    if (strcmp(mode, "arm") == 0) {
+        return arm_errors();
+    }
+#endif
     if (strcmp(mode, "loads") == 0) {
         result = loads();
     } else if (strcmp(mode, "steps") == 0) {

@@ -205,11 +205,8 @@ class GeometryModel:
         GeometryError
             If it is another arm.
         """
-        own, errors = self.robot, self.errors
-        T_tcp_tool = self._way_to(robot)
+        own, errors, T_tcp_tool = self.robot, self.errors, self.tools(robot)[1]
         weight = Payload() if payload is None else payload
-        if self.T_tcp_built is not None:
-            T_tcp_tool = self.T_tcp_built @ T_tcp_tool
 
         def stands(q: FloatArray) -> FloatArray:
             torque = joint_torques(own, Positions.unloaded(q, weight))
@@ -217,6 +214,17 @@ class GeometryModel:
             return np.asarray((T @ T_tcp_tool)[:, :3, 3])
 
         return stands
+
+    def tools(self, robot: Robot) -> tuple[FloatArray, FloatArray]:
+        """Return the tool of the same arm in the nominal tcp, as drawn and as built, (4, 4), in m.
+
+        Raises
+        ------
+        GeometryError
+            If it is another arm.
+        """
+        drawn = self._way_to(robot)
+        return drawn, drawn if self.T_tcp_built is None else self.T_tcp_built @ drawn
 
     def as_drawn(self, robot: Robot) -> Robot:
         """Return the arm with a robot's tool as its controller knows it.

@@ -51,6 +51,8 @@ from elastocal.wording import listed
 
 if TYPE_CHECKING:
     from elastocal.compensation import ArmGrowth
+    from elastocal.compensation.kernel import BuiltArm
+    from elastocal.geometry import GeometryModel, Payload
 
 _LONGEST_TOOL = 10.0
 """In m: no tool of a robot is longer; a longer one was meant in mm."""
@@ -197,16 +199,41 @@ class ArmAsBuilt:
         UnitError
             If a unit is missing or wrong.
         """
+        known = self._geometry()
+        if known is None:
+            return robot, None
+        found, payload = known
+        return found.as_drawn(robot), found.tool_of(robot, payload)
+
+    def built(self, robot: Robot) -> "BuiltArm | None":
+        """Return the arm as it was built, for a program of its errors; None: it is unknown.
+
+        Raises
+        ------
+        GeometryError, UnitError
+            As for `unloaded`.
+        """
+        known = self._geometry()
+        if known is None:
+            return None
+        from elastocal.compensation.kernel import BuiltArm
+
+        found, payload = known
+        errors, tools = found.errors, found.tools(robot)
+        return BuiltArm(
+            found.robot, errors.place, errors.motion, *tools, payload.mass, payload.centre
+        )
+
+    def _geometry(self) -> "tuple[GeometryModel, Payload] | None":
         if self.geometry is None:
             if self.payload is not None or self.payload_centre is not None:
                 raise GeometryError("a payload needs the arm that it bends: give --geometry")
-            return robot, None
+            return None
         from elastocal.geometry import Payload, read_geometry
 
         mass = 0.0 if self.payload is None else parse_quantity(self.payload, "mass")
         x, y, z = (0.0,) * 3 if self.payload_centre is None else parse_point(self.payload_centre)
-        found = read_geometry(self.geometry)
-        return found.as_drawn(robot), found.tool_of(robot, Payload(mass, (x, y, z)))
+        return read_geometry(self.geometry), Payload(mass, (x, y, z))
 
 
 @dataclass(frozen=True, kw_only=True)

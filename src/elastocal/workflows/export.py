@@ -11,18 +11,20 @@ from elastocal.cell import Cell, PathLimits, load_cell
 from elastocal.compensation import CorrectionLimits, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.export import LinuxTarget, linux_files, write_c
+from elastocal.compensation.kernel import Routine, compiled
 from elastocal.compensation.online import design
 from elastocal.drivers.kuka_rsi import DRIVER as KUKA, PostureReader
 from elastocal.drivers.net_ft import NetFtSettings
-from elastocal.errors import CompensationError, nearest
+from elastocal.errors import CompensationError, nearest, present
 from elastocal.identification import PredictionDoubt
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result
-from elastocal.robot import Robot
+from elastocal.robot import Robot, probe_configurations
 from elastocal.units import quantity
 from elastocal.workflows._inputs import (
+    ArmAsBuilt,
     NewTool,
     TouchedArm,
     coverage_notes,
@@ -40,7 +42,7 @@ EXPORT_TARGETS = ("linux",)
 
 
 @dataclass(frozen=True)
-class ExportSettings(NewTool, TouchedArm):
+class ExportSettings(NewTool, ArmAsBuilt, TouchedArm):
     """Settings of an export: the model and the compensator."""
 
     model: Annotated[str | PathLike[str], Option(argument=True)]
@@ -63,6 +65,12 @@ _NO_TOOL = (
     "no tool file: wrenches are taken as at the tool centre point, in its axes, bias and tool"
     " weight removed"
 )
+_ARM_ERROR = (
+    "elastocal_arm_error gives what the unloaded arm as built is off by; the step corrects the"
+    " deflection alone"
+)
+_AGREEMENT = 1e-12
+"""Largest difference between statements and the geometry itself, in m: rounding is some 1e-15."""
 
 
 @record()
@@ -139,10 +147,13 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         chosen = settings_within(settings.compensator, *around[1:])
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     state = settings.growth(calibrated.model.robot)
+    built = settings.built(calibrated.model.robot)
     try:
-        numbers = design(calibrated, chosen, load, state)
+        numbers = design(calibrated, chosen, load, state, built)
     except CompensationError as error:
         raise CompensationError(f"{model}: {error}") from error
+    if numbers.arm_error is not None:
+        _require_agreement(settings, calibrated.model.robot, numbers.arm_error)
     on_production = calibrated.on_production
     beside = {} if around is None else linux_files(numbers, around[0])
     files = write_c(settings.out, numbers, settings.force, beside)
@@ -161,9 +172,23 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
             *(on_production.warnings if on_production else ()),
             *((_NO_TOOL,) if settings.tool is None else ()),
             *growth_notes(state),
+            *((_ARM_ERROR,) if built is not None else ()),
         ),
         on_production=on_production,
     )
+
+
+def _require_agreement(settings: ExportSettings, robot: Robot, error: Routine) -> None:
+    """Refuse statements that give something else than the geometry, before C is made of them."""
+    controller, unloaded = settings.unloaded(robot)
+    q = probe_configurations(controller)
+    known = present(unloaded, "geometry")(q) - controller.forward(q)[:, :3, 3]
+    of = compiled(error, len(robot.joint_names), loaded=False)
+    off = float(np.abs(np.array([of(each) for each in q.tolist()]) - known).max())
+    if not off <= _AGREEMENT:
+        raise CompensationError(
+            f"the program of the arm's errors differs from its geometry by {1e3 * off:.3g} mm"
+        )
 
 
 def _around(settings: ExportSettings, model: Robot) -> tuple[LinuxTarget, PathLimits, Cell] | None:

@@ -12,11 +12,15 @@ import pytest
 
 from elastocal.compensation import ArmGrowth
 from elastocal.compensation.export import write_c
+from elastocal.compensation.kernel import BuiltArm
 from elastocal.compensation.online import Compensator, Reading, Status, design
 from elastocal.elastic import OneAxisSpring, Parameter, Unit, unit_of
 from elastocal.elastic.layouts import SpringEntry, custom
 from elastocal.elastic.springs.hinge import axial
 from elastocal.errors import CompensationError
+from elastocal.geometry import Payload, Positions
+from elastocal.geometry.arm import ArmErrors, frames
+from elastocal.geometry.positions import joint_torques
 from elastocal.identification import RobotRecord
 from elastocal.records import record
 from elastocal.robot import Robot
@@ -211,6 +215,32 @@ def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
         step, told = compensator.step(step, reading)
         expected = [*told.correction, *told.deflection, told.half_width, told.status]
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize(("orders", "payload"), [(40, 30.0), (2, 0.0)])
+def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, payload):
+    """Places, zeros, functions of the joints, weight and payload, a tool of its own."""
+    model = compensated.arm("on a rail")
+    robot, rng = model.model.robot, np.random.default_rng(orders)
+    joints = len(robot.joint_names)
+    place, motion = rng.normal(size=(joints, 6)), rng.normal(size=(joints, 3 + 2 * orders))
+    motion[~np.array(robot.revolute), 2:-1] = 0.0
+    # The compiler takes its time: one joint has all orders.
+    motion[2:, 14:-1] = 0.0
+    errors = ArmErrors(1e-3 * place, 1e-4 * motion)
+    errors.motion[:, -1] *= 1e-3
+    T_drawn, T_built = np.eye(4), np.eye(4)
+    T_drawn[:3, 3], T_built[:3, 3] = (0.1, 0.0, 0.2), (0.1, 1e-3, 0.2)
+    arm = BuiltArm(robot, errors.place, errors.motion, T_drawn, T_built, payload, (0.0, 0.1, 0.2))
+    numbers = design(model, compensated.settings(), compensated.load(), built=arm)
+    executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
+    assert executable.selftest() == 0
+    q = rng.uniform(-3.0, 3.0, (200, joints))
+    data = Positions.unloaded(q, Payload(payload, (0.0, 0.1, 0.2)))
+    real = frames(robot, q, joint_torques(robot, data), errors).T_base_tcp @ T_built
+    expected = (real - robot.forward(q) @ T_drawn)[:, :3, 3]
+    assert np.abs(expected).max() > 1e-3
+    np.testing.assert_allclose(executable.numbers("arm", q), expected, rtol=0.0, atol=1e-12)
 
 
 def test_every_way_of_the_step_is_taken_by_that_course(tmp_path):

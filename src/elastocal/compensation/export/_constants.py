@@ -177,6 +177,7 @@ def _model(numbers: Design) -> list[Constant]:
         **numbers.block.constants,
         **numbers.rest.constants,
         **(numbers.growth.constants if numbers.growth else {}),
+        **(numbers.arm_error.constants if numbers.arm_error else {}),
     }
     return [
         *(_one(name.upper(), number, comments.get(name, "")) for name, number in named.items()),

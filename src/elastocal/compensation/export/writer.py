@@ -46,14 +46,20 @@ def template(name: str) -> str:
     return (resources.files(__package__) / "templates" / name).read_text(encoding="utf-8")
 
 
-def filled(name: str, values: dict[str, str], remembers: bool = False, grown: bool = False) -> str:
+def filled(
+    name: str,
+    values: dict[str, str],
+    remembers: bool = False,
+    grown: bool = False,
+    built: bool = False,
+) -> str:
     """Return a template with its places filled.
 
     Lines that begin with ``@FRICTION@`` are for models that remember friction only, those with
     ``@PLAIN@`` for the others; those with ``@GROWN@`` for arms that have grown, with ``@COLD@`` for
-    the others.
+    the others; those with ``@BUILT@`` for arms whose geometry is known.
     """
-    marks = {"@FRICTION@": remembers, "@PLAIN@": not remembers, "@GROWN@": grown}
+    marks = {"@FRICTION@": remembers, "@PLAIN@": not remembers, "@GROWN@": grown, "@BUILT@": built}
     text = "".join(_meant(template(name), marks | {"@COLD@": not grown}))
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
@@ -159,7 +165,8 @@ def c_files(numbers: Design) -> dict[str, str]:
         ]
     )
     values |= _readme_values(numbers)
-    beside = {name: filled(name, values, remembers, grown) for name in _BESIDE}
+    built = numbers.arm_error is not None
+    beside = {name: filled(name, values, remembers, grown, built) for name in _BESIDE}
     return {"elastocal_model.c": model} | beside
 
 
@@ -258,6 +265,7 @@ def _routines(numbers: Design) -> str:
             "/* Rotation of the tool centre point in base, by rows. */",
             _function(head, numbers.orientation, rotation, inputs[:1], joints),
             *_growth(numbers),
+            *_arm_error(numbers),
             *begins,
             _function(total, numbers.deflection, deflection, inputs, joints),
             _function(columns, of_block, block, inputs, joints),
@@ -272,6 +280,14 @@ def _growth(numbers: Design) -> Iterator[str]:
         head = "static void growth(const double q[], double shift[3])"
         outputs = [f"shift[{i}]" for i in range(3)]
         yield _function(head, numbers.growth, outputs, ("q",), numbers.joints)
+
+
+def _arm_error(numbers: Design) -> Iterator[str]:
+    """Yield the function of the unloaded tool's error, where the geometry is known."""
+    if numbers.arm_error is not None:
+        head = "void elastocal_arm_error(const double q[], double error[3])"
+        outputs = [f"error[{i}]" for i in range(3)]
+        yield _function(head, numbers.arm_error, outputs, ("q",), numbers.joints)
 
 
 def _function(

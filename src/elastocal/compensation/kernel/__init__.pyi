@@ -1,3 +1,7 @@
+from ._arm_error import (
+    BuiltArm as BuiltArm,
+    arm_error as arm_error,
+)
 from ._statics import (
     deflection as deflection,
     growth as growth,

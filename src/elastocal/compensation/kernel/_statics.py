@@ -256,7 +256,7 @@ def _numbered(lengths: Sequence[int]) -> list[range]:
 
 
 NOTHING: Vector = (ZERO, ZERO, ZERO)
-_IDENTITY: Matrix = ((ONE, ZERO, ZERO), (ZERO, ONE, ZERO), (ZERO, ZERO, ONE))
+IDENTITY: Matrix = ((ONE, ZERO, ZERO), (ZERO, ONE, ZERO), (ZERO, ZERO, ONE))
 _FORCE: Vector = (Value(1, "fx"), Value(1, "fy"), Value(1, "fz"))
 """Force on the robot at the tool centre point, in base."""
 _MOMENT: Vector = (Value(1, "mx"), Value(1, "my"), Value(1, "mz"))
@@ -297,28 +297,28 @@ def write_chain(program: Program, chain: SerialChain) -> ChainFrames:
     (behind it), ``o<k>`` (origin before), ``d<k>`` (origin behind a linear motion).
     """
     # From the base out: what is 0 or 1 in the first frames leaves no statement in those behind.
-    here = Frame(_IDENTITY, NOTHING)
+    here = Frame(IDENTITY, NOTHING)
     joints = []
     for k, joint in enumerate(chain.joints, start=1):
         program.remark(f"joint {k}, {joint.name}")
-        place = _constant_frame(program, f"place{k}", joint.placement)
-        proximal = _behind(program, here, place, (f"p{k}", f"o{k}"))
-        distal = _moved(program, proximal, joint, k)
+        place = constant_frame(program, f"place{k}", joint.placement)
+        proximal = behind(program, here, place, (f"p{k}", f"o{k}"))
+        distal = turned(program, proximal, joint, str(k), Value(1, f"q{k}"))
         joints.append(_JointFrames(proximal, distal))
         here = distal
     program.remark(f"tool centre point, {chain.tip}")
-    tip = _constant_frame(program, "tip", chain.T_last_tip)
-    return ChainFrames(tuple(joints), _behind(program, here, tip, ("t", "tcp")))
+    tip = constant_frame(program, "tip", chain.T_last_tip)
+    return ChainFrames(tuple(joints), behind(program, here, tip, ("t", "tcp")))
 
 
-def _constant_frame(program: Program, name: str, T: FloatArray) -> Frame:
+def constant_frame(program: Program, name: str, T: FloatArray) -> Frame:
     x, y, z = (
         program.constant_vector(f"{name}_{a}", row) for a, row in zip("xyz", T[:3, :3], strict=True)
     )
     return Frame((x, y, z), program.constant_vector(name, T[:3, 3]))
 
 
-def _behind(program: Program, here: Frame, place: Frame, names: tuple[str, str]) -> Frame:
+def behind(program: Program, here: Frame, place: Frame, names: tuple[str, str]) -> Frame:
     """Return ``here @ place``."""
     rotation, origin = names
     return Frame(
@@ -327,17 +327,32 @@ def _behind(program: Program, here: Frame, place: Frame, names: tuple[str, str])
     )
 
 
-def _moved(program: Program, proximal: Frame, joint: ChainJoint, k: int) -> Frame:
-    """Return the frame behind the joint's motion."""
-    axis = program.constant_vector(f"axis{k}", joint.axis)
+def turned(program: Program, proximal: Frame, joint: ChainJoint, label: str, angle: Value) -> Frame:
+    """Return the frame behind a joint's motion, whose names end in a label.
+
+    Parameters
+    ----------
+    program : Program
+        Gets the statements.
+    proximal : Frame
+        The frame before the motion.
+    joint : ChainJoint
+        The joint.
+    label : str
+        A number, perhaps with letters before it.
+    angle : Value
+        Angle or way of the joint.
+    """
+    axis = program.constant_vector(f"axis{label}", joint.axis)
     if joint.revolute:
-        sine, cosine = program.turn(k, f"q{k}")
-        turn = _rotation(program, f"turn{k}", axis, sine, cosine)
-        return Frame(program.product(f"r{k}", proximal.rotation, turn), proximal.origin)
-    travel = Value(1, f"q{k}")
-    slid = [program.total(f"slide{k}_{a}", [(x, travel)]) for a, x in zip("xyz", axis, strict=True)]
+        sine, cosine = program.turn(label, angle.name)
+        turn = _rotation(program, f"turn{label}", axis, sine, cosine)
+        return Frame(program.product(f"r{label}", proximal.rotation, turn), proximal.origin)
+    slid = [
+        program.total(f"slide{label}_{a}", [(x, angle)]) for a, x in zip("xyz", axis, strict=True)
+    ]
     along = (slid[0], slid[1], slid[2])
-    origin = program.transformed(f"d{k}", proximal.rotation, along, proximal.origin)
+    origin = program.transformed(f"d{label}", proximal.rotation, along, proximal.origin)
     return Frame(proximal.rotation, origin)
 
 
@@ -421,7 +436,7 @@ def orientation(model: ElasticModel) -> Routine:
     """Return the program of the rotation of the tool centre point in base, row by row."""
     program = Program()
     tcp = write_chain(program, model.robot.chain).tcp
-    return _routine(program, [value for row in tcp.rotation for value in row])
+    return routine(program, [value for row in tcp.rotation for value in row])
 
 
 def growth(robot: Robot, share: float, offset: Sequence[float]) -> Routine:
@@ -432,7 +447,7 @@ def growth(robot: Robot, share: float, offset: Sequence[float]) -> Routine:
     s = program.quantity("growth_share", share)
     rest = program.constant_vector("growth_offset", np.asarray(offset, dtype=float))
     terms = [(s, chain.tcp.origin), (-s, foot), (ONE, rest)]
-    return _routine(program, program.weighted_sum("growth", terms))
+    return routine(program, program.weighted_sum("growth", terms))
 
 
 def deflection(model: ElasticModel, compliance: Sequence[float]) -> Routine:
@@ -470,7 +485,7 @@ def deflection(model: ElasticModel, compliance: Sequence[float]) -> Routine:
         for ready in [each for each in waiting if moved.keys() >= set(each.numbers)]:
             waiting.remove(ready)
             total = _displaced(program, total, ready, moved)
-    return _routine(program, [*total, *laws.remembered()], laws.memory.names)
+    return routine(program, [*total, *laws.remembered()], laws.memory.names)
 
 
 def observation_block(model: ElasticModel, compliance: Sequence[float] = ()) -> Routine:
@@ -502,7 +517,7 @@ def observation_block(model: ElasticModel, compliance: Sequence[float] = ()) -> 
     outputs = [columns[p][row] for row in range(3) for p in range(len(model.parameters))]
     if len(model.friction) and len(compliance):
         outputs += [*_unknown(program, laws, jacobian, compliance), *laws.remembered()]
-    return _routine(program, outputs, laws.memory.names)
+    return routine(program, outputs, laws.memory.names)
 
 
 def rest(model: ElasticModel) -> Routine:
@@ -519,7 +534,7 @@ def rest(model: ElasticModel) -> Routine:
         weights |= {axis.number: axis.weight for axis in place.loaded()}
     free = [-weights[axis] for axis in model.friction.axis.tolist()]
     ranges = {axis: (weights[axis], weights[axis], ZERO) for axis in laws.memory.axes}
-    return _routine(program, laws.memory.values(free, ranges))
+    return routine(program, laws.memory.values(free, ranges))
 
 
 def _unknown(
@@ -632,6 +647,6 @@ def _frame(chain: ChainFrames, joint: int, behind: bool) -> Frame:
     return chain.joints[joint].distal if behind else chain.joints[joint].proximal
 
 
-def _routine(program: Program, outputs: Iterable[Value], memory: tuple[str, ...] = ()) -> Routine:
+def routine(program: Program, outputs: Iterable[Value], memory: tuple[str, ...] = ()) -> Routine:
     every = tuple(outputs)
     return Routine(tuple(program.statements), every, program.constants, memory).leading(len(every))

@@ -119,7 +119,7 @@ class Program:
         self.constants[name] = number
         return Value(1, name)
 
-    def turn(self, index: int, angle: str) -> tuple[Value, Value]:
+    def turn(self, index: str, angle: str) -> tuple[Value, Value]:
         """Return sine and cosine of an angle."""
         sine, cosine = f"s{index}", f"c{index}"
         self.statements.append(Turn(sine, cosine, angle))
@@ -228,6 +228,31 @@ class Routine:
     memory: tuple[str, ...] = ()
     """Names of the numbers that it remembers from one call to the next."""
 
+    def prefixed(self, prefix: str) -> "Routine":
+        """Return the same program, its constants named apart from those of others."""
+        names = {name: f"{prefix}{name}" for name in self.constants}
+
+        def value(old: Value) -> Value:
+            return Value(old.sign, names.get(old.name, old.name))
+
+        def statement(old: Statement) -> Statement:
+            match old:
+                case Assignment(name, terms):
+                    named = ((sign, tuple(names.get(f, f) for f in each)) for sign, each in terms)
+                    return Assignment(name, tuple(named))
+                case Turn(sine, cosine, angle):
+                    return Turn(sine, cosine, names.get(angle, angle))
+                case Call(name, function, arguments):
+                    return Call(name, function, tuple(map(value, arguments)))
+            return old
+
+        return Routine(
+            tuple(map(statement, self.statements)),
+            tuple(map(value, self.outputs)),
+            {names[name]: number for name, number in self.constants.items()},
+            self.memory,
+        )
+
     def leading(self, count: int) -> "Routine":
         """Return the program of its first outputs alone."""
         outputs = self.outputs[:count]
@@ -264,6 +289,7 @@ def needed(statements: Sequence[Statement], outputs: Iterable[Value]) -> tuple[S
             case Remark():
                 kept.append(statement)
             case Turn() if {statement.sine, statement.cosine} & wanted:
+                wanted.add(statement.angle)
                 kept.append(statement)
             case Assignment() | Call() if statement.name in wanted:
                 wanted |= statement_uses(statement)

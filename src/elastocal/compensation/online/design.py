@@ -10,8 +10,10 @@ from elastocal.cell import SENSOR_CORRECTED, SensorLoad
 from elastocal.compensation.conditioning import FilterChain
 from elastocal.compensation.growth import ArmGrowth
 from elastocal.compensation.kernel import (
+    BuiltArm,
     ModelFunctions,
     Routine,
+    arm_error,
     compiled,
     deflection,
     growth,
@@ -66,6 +68,8 @@ class Design:
     """Growth of the arm; None: unknown, or there is nothing to correct."""
     growth: Routine | None = None
     """Program of the growth; None if it is unknown."""
+    arm_error: Routine | None = None
+    """Program of the error of the unloaded tool; None where the geometry of the arm is unknown."""
 
     @property
     def joints(self) -> int:
@@ -135,6 +139,7 @@ def design(
     settings: CompensatorSettings | None = None,
     load: SensorLoad | None = None,
     state: ArmGrowth | None = None,
+    built: BuiltArm | None = None,
 ) -> Design:
     """Work out a compensator.
 
@@ -149,6 +154,8 @@ def design(
         the tool centre point with both removed.
     state : ArmGrowth, optional
         How far the arm has grown; by default it is as when its path was taught.
+    built : BuiltArm, optional
+        The calibrated geometry of the arm. The online step does not correct its errors.
 
     Raises
     ------
@@ -179,6 +186,7 @@ def design(
         frame=np.eye(3) if frame is None else frame,
         state=state if grown else None,
         growth=growth(model.robot, state.share, state.offset) if state and grown else None,
+        arm_error=None if built is None else arm_error(built),
     )
 
 

@@ -101,6 +101,12 @@ void elastocal_block(const double q[], const double force[3], const double momen
 @FRICTION@double elastocal_half_width(const double q[], const double force[3], const double moment[3],
 @FRICTION@                            const double memory[ELASTOCAL_MEMORY]);
 
+@BUILT@#define ELASTOCAL_ARM_ERROR 1
+@BUILT@/* Where the unloaded tool centre point is less where its controller has it, at joints q, base, m: the
+@BUILT@ * calibrated geometry of the arm, its weight and payload. The step does not correct it: subtract it
+@BUILT@ * from what is programmed, once. */
+@BUILT@void elastocal_arm_error(const double q[], double error[3]);
+@BUILT@
 /* Before the first reading: no correction, filters at rest. The correction is zero at once: call it
  * only while corrections are switched off, never to recover in motion. */
 void elastocal_start(elastocal_state *state);

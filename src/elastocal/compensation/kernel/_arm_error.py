@@ -1,0 +1,150 @@
+"""Error of the unloaded tool of an arm whose geometry was calibrated, as statements.
+
+The chain is that of the drawing with each joint's place corrected, and turns by
+
+    q' = q + o + s q + sum_k (a_k sin kq + b_k cos kq) + c tau
+
+(`elastocal.geometry.arm`). The series takes no sine of its own: by Horner's rule in the complex
+number ``cos q + i sin q``, of which the chain of the drawing has both parts.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.arrays import FloatArray
+from elastocal.compensation.kernel._statics import (
+    IDENTITY,
+    NOTHING,
+    ChainFrames,
+    Frame,
+    behind,
+    constant_frame,
+    routine,
+    turned,
+    write_chain,
+    write_weights,
+)
+from elastocal.compensation.kernel.program import ONE, ZERO, Program, Routine, Value
+from elastocal.results import brief_repr
+from elastocal.robot import Robot
+
+_PREFIX = "arm_"
+"""Of its constants: those of the arm that the springs were fitted on may be others."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class BuiltArm:
+    """An arm as it was built, with its tool."""
+
+    drawn: Robot
+    """As drawn, with the tcp of its geometry."""
+    place: FloatArray
+    """Errors of the joints' places, shape (joint, 6), in m and rad."""
+    motion: FloatArray
+    """Errors of their motion, shape (joint, 3 + 2 orders): offset, scale, sine and cosine of each
+    order, compliance."""
+    T_tcp_drawn: FloatArray
+    """The tool in that tcp as its controller knows it, shape (4, 4), in m."""
+    T_tcp_built: FloatArray
+    """The tool where it really is, shape (4, 4), in m."""
+    payload: float = 0.0
+    """Mass of the tool beyond what the drawing has, in kg."""
+    payload_centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Its centre in that tcp, in m."""
+
+
+def arm_error(arm: BuiltArm) -> Routine:
+    """Return the program of where the unloaded tool is less where its controller has it.
+
+    In base, in m, under weight and payload.
+    """
+    program = Program()
+    drawn = write_chain(program, arm.drawn.chain)
+    torques = _torques(program, arm, drawn)
+    here = Frame(IDENTITY, NOTHING)
+    for k, joint in enumerate(arm.drawn.chain.joints, start=1):
+        program.remark(f"joint {k} as built")
+        error = np.eye(4)
+        error[:3, :3] = Rotation.from_rotvec(arm.place[k - 1, 3:]).as_matrix()
+        error[:3, 3] = arm.place[k - 1, :3]
+        place = constant_frame(program, f"built{k}", joint.placement @ error)
+        proximal = behind(program, here, place, (f"pb{k}", f"ob{k}"))
+        moved = _moved(program, k, arm.motion[k - 1], torques[k - 1], turns=joint.revolute)
+        here = turned(program, proximal, joint, f"b{k}", moved)
+    program.remark("tool")
+    T_last_tip = arm.drawn.chain.T_last_tip
+    real = behind(
+        program, here, constant_frame(program, "tool", T_last_tip @ arm.T_tcp_built), ("tb", "tcpb")
+    )
+    way = program.constant_vector("drawn_tool", arm.T_tcp_drawn[:3, 3])
+    known = program.transformed("known", drawn.tcp.rotation, way, drawn.tcp.origin)
+    off = program.weighted_sum("off", [(ONE, real.origin), (-ONE, known)])
+    return routine(program, off).prefixed(_PREFIX)
+
+
+def _moved(program: Program, k: int, motion: FloatArray, torque: Value, *, turns: bool) -> Value:
+    """Write how far a joint really moves when its controller says ``q``."""
+    q, (offset, scale), compliance = Value(1, f"q{k}"), motion[:2].tolist(), float(motion[-1])
+    terms = [(q,)]
+    if offset:
+        terms.append((program.quantity(f"zero{k}", offset),))
+    if scale:
+        terms.append((program.quantity(f"scale{k}", scale), q))
+    if turns:
+        terms.append((_series(program, k, motion[2:-1].reshape(-1, 2)),))
+    if compliance:
+        terms.append((program.quantity(f"yield{k}", compliance), torque))
+    return program.total(f"moved{k}", terms)
+
+
+def _series(program: Program, k: int, terms: FloatArray) -> Value:
+    """Write the sum of sines and cosines of a joint's angle, the highest order first."""
+    sine, cosine, x, y = Value(1, f"s{k}"), Value(1, f"c{k}"), ZERO, ZERO
+    there = np.flatnonzero(terms.any(axis=1))
+    for n in range(int(there[-1]) + 1 if len(there) else 0, 0, -1):
+        a, b = (
+            program.quantity(f"{name}{k}_{n}", float(number)) if number else ZERO
+            for name, number in zip(("sine", "cosine"), terms[n - 1], strict=True)
+        )
+        u = program.total(f"u{k}_{n}", [(x,), (b,)])
+        v = program.total(f"v{k}_{n}", [(y,), (-a,)])
+        x = program.total(f"x{k}_{n}", [(u, cosine), (-v, sine)])
+        y = program.total(f"y{k}_{n}", [(u, sine), (v, cosine)])
+    return x
+
+
+def _torques(program: Program, arm: BuiltArm, drawn: ChainFrames) -> list[Value]:
+    """Write the torque of weight and payload about each joint that yields, in N·m (N)."""
+    robot, found = arm.drawn, []
+    yields = [float(row[-1]) != 0.0 for row in arm.motion]
+    heavy = robot.has_masses and any(yields)
+    weights = write_weights(program, robot, drawn) if heavy else None
+    pull = program.constant_vector("payload", arm.payload * np.asarray(robot.gravity))
+    centre = program.constant_vector("payload_centre", arm.payload_centre)
+    at = program.transformed("hung", drawn.tcp.rotation, centre, drawn.tcp.origin)
+    for k, (joint, frames) in enumerate(zip(robot.chain.joints, drawn.joints, strict=True)):
+        if not yields[k]:
+            found.append(ZERO)
+            continue
+        proximal, label = frames.proximal, f"y{k + 1}"
+        axis = program.transformed(
+            f"axis_{label}",
+            proximal.rotation,
+            program.constant_vector(f"along{k + 1}", joint.axis),
+            NOTHING,
+        )
+        lever = program.weighted_sum(f"to_{label}", [(ONE, at), (-ONE, proximal.origin)])
+        load = program.cross(f"of_{label}", lever, pull) if joint.revolute else pull
+        terms = list(zip(axis, load, strict=True))
+        if weights is not None:
+            own = (
+                weights.moment(label, k, proximal.origin)
+                if joint.revolute
+                else weights.force(label, k)
+            )
+            terms += zip(axis, own, strict=True)
+        found.append(program.total(f"torque{k + 1}", terms))
+    return found
