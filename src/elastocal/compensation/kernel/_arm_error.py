@@ -88,7 +88,7 @@ def arm_error(arm: BuiltArm) -> Routine:
 def _moved(program: Program, k: int, motion: FloatArray, torque: Value, *, turns: bool) -> Value:
     """Write how far a joint really moves when its controller says ``q``."""
     q, (offset, scale), compliance = Value(1, f"q{k}"), motion[:2].tolist(), float(motion[-1])
-    terms = [(q,)]
+    terms: list[tuple[Value, ...]] = [(q,)]
     if offset:
         terms.append((program.quantity(f"zero{k}", offset),))
     if scale:
