@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi
 
+from elastocal.blocks import Bullets, Table
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Hinge, Parameter, layout
 from elastocal.elastic.layouts import bearing_joint
 from elastocal.identification import (
+    CalibrateResult,
+    CalibrationSummary,
+    Choice,
     FitOptions,
     Observability,
     Prior,
@@ -18,16 +22,24 @@ from elastocal.identification import (
     attainable_rank,
     build,
     calibrate,
+    choose_model,
     describe,
     describe_briefly,
     factor,
     observability,
     solve,
+    summary,
+    with_knowledge,
 )
+from elastocal.identification.calibration import Calibration
 from elastocal.identification.observability import FaintParameter, find_faint, left_open
+from elastocal.identification.show import show_calibration
 from elastocal.identification.solve import Factored
+from elastocal.identification.spring_sums import sum_text
+from elastocal.records import from_data, to_data
 from elastocal.robot import Robot
-from support.problems import campaign, elastic, made_up
+from support.cells import robot
+from support.problems import campaign, elastic, linear_readings, made_up
 from support.shared import GOLDEN, needs_shared
 
 HINGE = Hinge("j.x", "j", (1.0, 0.0, 0.0)).parameters[0].unit
@@ -355,3 +367,97 @@ class TestDirectionsThatBoundsLeaveOpen:
         found = left_open(null_space, *room)
         assert np.isfinite(found).all()
         assert 0 <= found.shape[1] <= k
+
+
+def fitted(readings: Readings, springs: str) -> tuple[Choice, CalibrationSummary, Calibration]:
+    """Return a choice of springs and a calibration with them."""
+    choice = choose_model(robot(), readings, springs, FitOptions(trust_conventions=True))
+    options = FitOptions(trust_conventions=True)
+    options = with_knowledge(options, choice.known, choice.model, readings)
+    made = calibrate(choice.model, readings, np.random.default_rng(0), options)
+    return choice, summary(made, None, choice.known), made
+
+
+def test_springs_that_noise_mixes_are_named_with_the_sum_that_the_readings_tell():
+    """Axis 3 tilts as axis 4 does, but for the short way between them."""
+    readings, truth = linear_readings("bearing", 20e-6, poses=8)
+    planted = dict(zip(elastic("bearing").parameter_names, truth, strict=True))
+    _, found, made = fitted(readings, "bearing")
+    (group,) = found.hidden
+    assert {term.spring for term in group} == {"joint_3.x", "joint_3.z", "joint_4.x"}
+    rows = {row.name: row for row in found.springs}
+    number = len(found.unobservable) + 1
+    assert all(rows[term.spring].group == number for term in group)
+    for each in found.sums:
+        value = sum(term.weight * planted[term.spring] for term in each.terms)
+        assert each.low <= value <= each.high
+    # The sum of two is told some times better than either.
+    best = min(found.sums, key=lambda each: (each.high - each.low) / each.compliance)
+    names = {term.spring for term in best.terms}
+    alone = min(rows[name].high - rows[name].low for name in names)
+    assert best.high - best.low < 0.5 * alone
+    shown = list(show_calibration(found))
+    items = [item for block in shown if isinstance(block, Bullets) for item in block.items]
+    assert any(str(item).startswith(f"group {number}, hidden by noise: ") for item in items)
+    firsts = [row[0] for block in shown if isinstance(block, Table) for row in block.rows]
+    assert sum_text(best.terms) in firsts
+    kept = from_data(CalibrateResult, to_data(CalibrateResult.of(made.calibrated, found)), "m")
+    assert kept.observability == made.calibrated.observability
+
+
+def payloads(seed: int, turned: tuple[int, ...]) -> tuple[Readings, np.ndarray]:
+    """Return weights hung at the tool of six postures that differ in some joints only."""
+    model, rng = elastic("actuated"), np.random.default_rng(seed)
+    middle = campaign(31).joint_position[0]
+    q = np.tile(middle, (6, 1))
+    q[:, turned] += rng.uniform(-0.5, 0.5, (6, len(turned)))
+    q += 1e-4 * rng.standard_normal(q.shape)
+    q = np.repeat(q, 2, axis=0)
+    force = np.tile([[0.0, 0.0, -600.0], [0.0, 0.0, -1200.0]], (6, 1))
+    truth = np.array([0.45, 0.35, 0.4, 1.2, 1.5, 2.5]) * 1e-6
+    marker = model.deflection(truth, q, force) + 10e-6 * rng.standard_normal(force.shape)
+    readings = Readings(
+        pose=np.repeat(np.arange(6), 2),
+        load_case=np.tile(["60 kg", "120 kg"], 6),
+        joint_position=q,
+        force=force,
+        controller_displacement=np.zeros_like(force),
+        marker_displacement=marker,
+        reference_joint_position=q.copy(),
+    )
+    return readings, truth
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_parallel_loads_at_postures_turned_about_the_base_make_no_value_out_of_nothing(seed):
+    """Two weights and a vertical axis: the loads are one, and the levers those of one posture."""
+    readings, truth = payloads(seed, turned=(0,))
+    choice, found, _ = fitted(readings, "actuated")
+    # Springs by name have no prior, unless they could be anything.
+    assert choice.known
+    for row, value in zip(found.springs, truth, strict=True):
+        assert row.high < 20 * value
+        assert not row.observable or row.low <= value <= row.high
+    assert not any(row.observable for row in found.springs[4:])
+
+
+def test_springs_by_name_have_no_prior_where_every_spring_turns():
+    readings, truth = payloads(0, turned=(0, 1, 3, 5))
+    choice, found, _ = fitted(readings, "actuated")
+    assert choice.known == ()
+    inside = [row.low <= c <= row.high for row, c in zip(found.springs, truth, strict=True)]
+    assert sum(inside[1:]) >= 4
+
+
+def test_what_the_prior_alone_made_is_not_known():
+    """The wrist's springs bend the arm by far more than the noise, but as those before them do."""
+    readings, truth = payloads(1, turned=(0,))
+    choice, found, made = fitted(readings, "actuated")
+    sizes = np.array([each.sigma for each in choice.known])
+    spread = np.std(made.calibrated.draws, axis=0)
+    known = np.array([row.observable for row in found.springs])
+    assert known.tolist() == [False, True, True, True, False, False]
+    assert np.all(spread[known] < 0.5 * np.maximum(sizes, truth)[known])
+    assert np.all(spread[~known] > 0.5 * sizes[~known])
+    weak = {each.name: each for each in made.calibrated.observability.faint}
+    assert weak["joint_5.axial"].deflection > 5.0 * 10e-6

@@ -12,7 +12,7 @@ AT_BOUND = SpringSummary(
 
 
 def told(*springs: SpringSummary) -> str:
-    return " ".join(str(block) for block in show_unseen(springs, (), (2, 2, 2), 12.0))
+    return " ".join(str(block) for block in show_unseen(springs, ((), ()), (2, 2, 2), 12.0))
 
 
 def test_a_spring_that_a_bound_decides_is_not_said_to_be_observable():

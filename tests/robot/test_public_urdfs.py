@@ -530,6 +530,9 @@ class TestAGripper:
             (["prismatic"], ["mimic"]),
             (["prismatic", "fixed"], ["prismatic", "fixed"]),
             (["revolute", "revolute", "fixed"], ["revolute", "mimic"], ["revolute", "mimic"]),
+            # Bars of which one is driven: as many joints in none.
+            (["revolute", "fixed", "mimic"], ["mimic"], ["mimic", "fixed", "mimic"], ["mimic"]),
+            (["revolute"], ["mimic", "mimic"]),
         ],
     )
     def test_the_hand_and_not_a_finger_is_the_tip(self, fingers):
@@ -539,6 +542,20 @@ class TestAGripper:
         robot = Robot.from_urdf(text, tool_link(text))
         assert len(robot.joint_names) == len(joints)
         assert robot.external_axes == self.shape.external
+
+    @pytest.mark.parametrize("finger", ["more_0_0", "more_1_0"])
+    def test_a_finger_as_tip_adds_no_axes(self, finger):
+        text = with_branches(self.shape.text(), "tool0", ["prismatic"], ["mimic"])
+        hand = Robot.from_urdf(text, "tool0")
+        robot = Robot.from_urdf(text, finger)
+        assert robot.joint_names == hand.joint_names
+        assert robot.external_axes == hand.external_axes
+        q = np.linspace(0.1, 0.6, len(hand.joint_names))
+        np.testing.assert_allclose(
+            np.linalg.inv(hand.forward(q)) @ robot.forward(q),
+            np.linalg.inv(hand.forward(0 * q)) @ robot.forward(0 * q),
+            atol=1e-12,
+        )
 
     def test_the_arms_of_a_torso_are_no_fingers(self):
         arm = ["revolute"] * 5

@@ -28,6 +28,7 @@ from elastocal.geometry.ladder import GeometryLadder, climb
 from elastocal.geometry.position_file import AXES
 from elastocal.geometry.positions import LEAST_READINGS, Positions
 from elastocal.geometry.problem import GeometryProblem
+from elastocal.geometry.sessions import undo_changes
 from elastocal.geometry.solve import register
 from elastocal.progress import Progress, silent
 from elastocal.robot import Robot, catalogue, other_joint_readings
@@ -280,6 +281,18 @@ def _changes(robot: Robot, data: Positions) -> Iterator[Undone]:
         yield Undone(message, robot, replace(data, markers=np.concatenate(pair, axis=1)))
 
 
+def _sessions(robot: Robot, data: Positions) -> Iterator[Undone]:
+    """Undo several changes of stations and markers."""
+    rows, undone = undo_changes(GeometryProblem(robot, data))
+    if len(rows) > 1:
+        named = listed([str(row) for row in rows])
+        message = (
+            f"stations or markers are elsewhere from rows {named} on (counted from 0): give the"
+            " rows from each on a name of their own in the column 'session'"
+        )
+        yield Undone(message, robot, undone)
+
+
 def _other_robots(robot: Robot, data: Positions) -> Iterator[Undone]:
     """Undo the choice of a robot: every one of the catalogue with as many joints."""
     for name in catalogue.names():
@@ -524,7 +537,7 @@ def _explanations(problem: GeometryProblem, limit: float) -> list[tuple[str, flo
     of_joints = [*undone_joints(robot, data, joints), *_late_rows(robot, data)]
     likely = sorted(of_joints, key=joints)[:_TRIED]
     of_markers = [*undone_markers(robot, data), *_late_markers(robot, data), *_changes(robot, data)]
-    every = [*likely, *of_markers]
+    every = [*likely, *of_markers, *_sessions(robot, data)]
     distances = [_as_drawn(each.robot, each.data) for each in every]
     found: list[tuple[str, float]] = []
     nearest = np.inf

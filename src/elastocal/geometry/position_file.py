@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, UnitError, nearest
 from elastocal.geometry.positions import LEAST_READINGS, Positions
+from elastocal.geometry.sessions import in_sessions
 from elastocal.records import read_arrays
 from elastocal.robot import Robot
 from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
@@ -34,7 +35,7 @@ def read_positions(path: Path, robot: Robot) -> Positions:
     ----------
     path : Path
         Columns ``<joint>[deg|rad|mm|m]``, ``marker_x[mm] …`` (or ``marker1_x[mm] …`` of several),
-        optional ``station``, ``campaign``, ``pose``, ``payload[kg]`` with its centre
+        optional ``station``, ``session``, ``campaign``, ``pose``, ``payload[kg]`` with its centre
         ``payload_x[mm] …`` in the tcp, ``force_x[N] …`` on the robot in base. A marker that was
         hidden is empty. ``.nc``: variables of these names along one dimension, their unit in the
         attribute ``units``.
@@ -152,7 +153,7 @@ def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Position
     _require_markers(markers, rows.lines)
     zeros = np.zeros((count, 3))
     has_centre = "payload_x" in columns.found
-    return Positions(
+    positions = Positions(
         q=q,
         markers=markers,
         station=columns.words("station", "tracker"),
@@ -163,6 +164,7 @@ def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Position
         force=columns.vectors("force", "force") if "force_x" in columns.found else zeros,
         lines=tuple(rows.lines),
     )
+    return in_sessions(positions, columns.words("session", ""))
 
 
 def _or_hidden(cell: str) -> float:

@@ -39,6 +39,7 @@ from .figures import (
     ladder_sentence as ladder_sentence,
     rung_summary as rung_summary,
     spring_summaries as spring_summaries,
+    sum_summaries as sum_summaries,
     summary as summary,
 )
 from .frames import (
@@ -126,6 +127,7 @@ from .rungs import (
 from .show import (
     show_budget as show_budget,
     show_ladder as show_ladder,
+    show_sums as show_sums,
     show_unseen as show_unseen,
     spring_table as spring_table,
     suspicious_table as suspicious_table,

@@ -20,6 +20,7 @@ from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
+from elastocal.identification.knowledge import expected_sizes
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.mistakes import (
     find_implausible,
@@ -29,6 +30,7 @@ from elastocal.identification.mistakes import (
 from elastocal.identification.observability import (
     attainable_rank,
     find_faint,
+    find_hidden,
     observability,
 )
 from elastocal.identification.options import FitOptions
@@ -191,11 +193,14 @@ def calibrate(
     compliance, plain = solution.compliance[springs], weighted.without_frames()
     # A prior makes nothing observable: what was believed before is not measured.
     seen = observability(factor(plain.without_prior()), model.springs, plain, compliance)
+    seen = find_faint(seen, plain, compliance, model.parameters)
+    sizes, held = expected_sizes(options.prior, plain, model.parameters)
+    seen = find_hidden(seen, plain, compliance, model.parameters, sizes, held)
     calibrated = CalibratedModel(
         model,
         compliance,
         widened[:, springs],
-        find_faint(seen, plain, compliance, model.parameters),
+        seen,
         provenance,
         held_out.misfit,
         unexplained=unexplained,

@@ -20,7 +20,7 @@ from elastocal.identification.load_check import LoadCheck
 from elastocal.identification.options import FitOptions, FitSettings, bounds
 from elastocal.identification.prediction_doubt import PredictionDoubt
 from elastocal.identification.production import ProductionCoverage
-from elastocal.identification.spring_sums import Term
+from elastocal.identification.spring_sums import Term, sum_weights
 from elastocal.identification.suspicious import Screening
 from elastocal.identification.uncertainty import Coverage, HeldOut, interval
 from elastocal.records import record
@@ -47,13 +47,28 @@ class SpringSummary:
     observable: bool
     """Whether the data determine it separately."""
     group: int | None = None
-    """Number of the first unobservable combination that leaves it open."""
+    """Number of the first combination that leaves it open: an unobservable one or, behind them, one
+    that noise hides."""
     at_bound: bool = False
     """Whether the fit ends at a bound of every parameter that it is made of."""
     too_weak: bool = False
     """Whether the deflection that a sensible value of it makes stays below the noise."""
     prior: bool = False
     """Whether a stiffness known beforehand contributes to it (`CalibrationSummary.known`)."""
+
+
+@record()
+class SumSummary:
+    """A sum of springs that the readings tell, though not each of its springs."""
+
+    terms: tuple[Term, ...]
+    unit: str
+    """SI unit of the compliance."""
+    compliance: float
+    low: float
+    """Lower end of the 95 % interval."""
+    high: float
+    """Upper end of the 95 % interval."""
 
 
 @brief_repr
@@ -192,6 +207,10 @@ class CalibrationSummary:
     """Prior knowledge of springs from the spring file."""
     budget: ErrorBudget | None = None
     """Parts of the error at left-out poses, if requested."""
+    hidden: tuple[tuple[Term, ...], ...] = ()
+    """Combinations that noise hides; their numbers follow those of `unobservable`."""
+    sums: tuple[SumSummary, ...] = ()
+    """What the readings tell of their springs."""
     check: LoadCheck | None = None
     """The error at load cases that are kept out of every fit, where there are any."""
 
@@ -220,6 +239,8 @@ def summary(
         spring_count=len(calibrated.model.springs),
         condition=seen.condition,
         unobservable=seen.unobservable,
+        hidden=seen.hidden,
+        sums=sum_summaries(calibrated),
         residual=ResidualSummary(
             mean=float(residual.mean()),
             max=float(residual.max()),
@@ -265,7 +286,7 @@ def spring_summaries(
     lower, upper = bounds(options, len(natural), natural)
     dust = _DUST * np.array([parameter.scale for parameter in calibrated.model.parameters])
     room = np.minimum(calibrated.compliance - lower, upper - calibrated.compliance)
-    at_bound = room <= dust
+    at_bound, at_lower = room <= dust, calibrated.compliance - lower <= dust
     first, rows = 0, list[SpringSummary]()
     for spring in calibrated.model.springs:
         own = slice(first, first + len(spring.parameters))
@@ -282,6 +303,9 @@ def spring_summaries(
                 # means anything.
                 low = min(low, max(value - reach, _least(spring, weights)))
                 high = max(high, value + reach)
+            bounded = bool(np.all(at_bound[own][weights != 0.0]))
+            if bounded and np.all(at_lower[own][weights != 0.0]):
+                high = max(high, value + seen.reach_of(weights, own))
             rows.append(
                 SpringSummary(
                     name=each.name,
@@ -292,12 +316,26 @@ def spring_summaries(
                     high=high,
                     observable=group is None and reach is None,
                     group=group,
-                    at_bound=bool(np.all(at_bound[own][weights != 0.0])),
+                    at_bound=bounded,
                     too_weak=group is None and reach is not None,
                     prior=each.name in expected,
                 )
             )
     return tuple(rows)
+
+
+def sum_summaries(calibrated: CalibratedModel) -> tuple[SumSummary, ...]:
+    """Return what the readings tell of springs that noise hides (`Observability.seen_beside`)."""
+    parameters = calibrated.model.parameters
+    units = {each.name: each.unit.si for each in parameters}
+    sums = calibrated.observability.seen_beside(parameters)
+    rows = sum_weights(sums, list(units))
+    values = (rows @ calibrated.compliance).tolist()
+    ends = interval(calibrated.draws @ rows.T)
+    return tuple(
+        SumSummary(terms, units[terms[0].spring], value, float(low), float(high))
+        for terms, value, low, high in zip(sums, values, *ends, strict=True)
+    )
 
 
 def _least(spring: Spring, weights: FloatArray) -> float:

@@ -6,7 +6,8 @@ spring, a fit with bounds alone gives it a compliance that depends on the noise,
 production turns it the predicted deflection would be wrong by millimetres. So a compliance is
 expected to be at most of the size of the compliance of its joint's drive: a normal prior about zero
 of that width, for all springs alike. It hardly changes what the data determine. See
-docs/decisions/0066-ladder.md.
+docs/decisions/0066-ladder.md. What the prior alone made is not called known
+(docs/decisions/0124-known-by-readings.md).
 """
 
 from collections.abc import Sequence
@@ -17,17 +18,22 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, KnownSpring, actuated
+from elastocal.elastic import ElasticModel, KnownSpring, Parameter, actuated
 from elastocal.errors import IdentificationError
+from elastocal.identification.observability import find_hidden, likely_sizes, observability
 from elastocal.identification.options import MEDIAN_NORM, FitOptions, Prior, bounds
-from elastocal.identification.problem import build
-from elastocal.identification.solve import solve
+from elastocal.identification.problem import Problem, build
+from elastocal.identification.solve import factor, solve
 from elastocal.identification.uncertainty import leave_poses_out
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 _SURE = 2.0
 """Standard errors above zero from which the compliance of a drive is known."""
+
+_WRIST = 5.0
+"""Compliance of a wrist's drive over what all springs of an arm have together, which its long
+levers at the base decide; 2.5 to 8 on the four arms of `tests/independent`."""
 
 
 @brief_repr
@@ -38,7 +44,7 @@ class DriveCompliances:
     joints: tuple[str, ...]
     softness: FloatArray
     """Compliance of the drive over the usual one for its kind; that of the softest where the
-    readings do not determine it or the joint slides, shape (joint,)."""
+    readings do not determine it or the joint slides, at least that of a wrist, shape (joint,)."""
 
     @classmethod
     def of(
@@ -47,8 +53,8 @@ class DriveCompliances:
         readings: Readings,
         options: FitOptions,
         marker_offset: ArrayLike | None = None,
-    ) -> "DriveCompliances | None":
-        """Return those estimated by a spring at each joint alone; None where none is determined.
+    ) -> "DriveCompliances":
+        """Return those estimated by a spring at each joint alone.
 
         Parameters
         ----------
@@ -61,13 +67,15 @@ class DriveCompliances:
         left = leave_poses_out(problem).compliance[:, problem.springs]
         folds = len(left)
         error = np.sqrt((folds - 1) / folds * np.sum(np.square(left - c), axis=0))
-        softness = c / np.array([parameter.scale for parameter in model.parameters])
-        known = c > _SURE * error
-        if not known.any():
-            return None
+        scale = np.array([parameter.scale for parameter in model.parameters])
+        plain = problem.without_frames()
+        usual = likely_sizes(plain, model.parameters)
+        seen = observability(factor(plain), model.springs, plain, c)
+        seen = find_hidden(seen, plain, c, model.parameters, usual)
+        known = (c > _SURE * error) & np.array(seen.observable)
         own = known & np.array(robot.revolute)
-        softest = float(softness[known].max())
-        return cls(tuple(robot.joint_names), np.where(own, softness, softest))
+        softest = max([_WRIST * float(usual[0] / scale[0]), *(c / scale)[known].tolist()])
+        return cls(tuple(robot.joint_names), np.where(own, c / scale, softest))
 
     def known_springs(self, model: ElasticModel) -> tuple[KnownSpring, ...]:
         """Return the prior knowledge of every parameter of a model of the arm."""
@@ -136,6 +144,39 @@ def with_knowledge(
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
     noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
     return replace(bounded, prior=Prior(mean, sigma, noise, rows))
+
+
+def expected_sizes(
+    prior: Prior | None, problem: Problem, parameters: Sequence[Parameter]
+) -> tuple[FloatArray, bool]:
+    """Return the size that was expected of each parameter, and whether the fit has it as prior.
+
+    That of the prior of the drives; without one, that of all springs of the arm together. What a
+    spring file states is no expectation for a class of arms.
+
+    Parameters
+    ----------
+    prior : Prior or None
+        That of the fit.
+    problem : Problem
+        Problem of the springs, without frames.
+    parameters : sequence of Parameter
+        In column order.
+
+    Returns
+    -------
+    sizes : ndarray, shape (parameter,)
+        In the units of the parameters.
+    held : bool
+        Whether a prior of these sizes is part of the fit.
+    """
+    sizes = likely_sizes(problem, parameters)
+    if prior is None or prior.rows is None or np.any(prior.mean):
+        return sizes, False
+    if not np.array_equal(prior.rows, np.eye(len(sizes))):
+        return sizes, False
+    sigma = np.asarray(prior.sigma, dtype=float)
+    return (sigma, True) if np.isfinite(sigma).all() else (sizes, False)
 
 
 def _columns_of(known: KnownSpring, model: ElasticModel) -> list[int]:

@@ -133,10 +133,11 @@ class CalibrateResult(Result):
     def _require_known_names(self) -> None:
         """Refuse combinations of parameters, or a calibrated tcp, that the model does not have."""
         names = {parameter.name for spring in self.springs for parameter in spring.parameters}
-        for term in (term for group in self.observability.unobservable for term in group):
+        seen = self.observability
+        for term in (term for group in (*seen.unobservable, *seen.hidden) for term in group):
             if term.spring not in names:
                 raise SchemaError(
-                    f"observability.unobservable names {term.spring!r}, which the model does not"
+                    f"observability names a spring {term.spring!r}, which the model does not"
                     f" have{nearest(term.spring, sorted(names))}"
                 )
         if self.tool is not None:

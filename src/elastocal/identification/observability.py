@@ -2,7 +2,8 @@
 
 With forces only and positions only, springs that share an origin add up to one symmetric tensor and
 consecutive wrist frames share axes, so some springs are never separately observable, however many
-poses are taken. Predictions need only the combinations that are observable; tables must say which
+poses are taken. Others are told apart in theory, but by less than noise hides: few loads that are
+nearly parallel. Predictions need only the combinations that are observable; tables must say which
 springs are not (docs/explanation/observability.md).
 """
 
@@ -12,14 +13,22 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import nnls
+from scipy.sparse.csgraph import connected_components
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic import ElasticModel, Parameter, Spring
 from elastocal.identification._least_squares import rank
 from elastocal.identification.options import MEDIAN_NORM
 from elastocal.identification.problem import Problem, relative_sizes, unit_columns
 from elastocal.identification.solve import Factored
-from elastocal.identification.spring_sums import Term, sparse_basis
+from elastocal.identification.spring_sums import (
+    MOST_TERMS,
+    Term,
+    complement,
+    eliminated,
+    sparse_basis,
+    sum_weights,
+)
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -44,6 +53,18 @@ _PROBES, _PROBE_SEED = 60, 0
 
 _CANCELS = 1e-6
 """Share of its parts that a sum may leave over and still count as none."""
+_MUCH_OPEN = 0.5
+"""The same of combinations that noise hides, over the largest part."""
+_TOLD = 0.5
+"""Standard deviation of a spring over its likely size, or over its value, up to which the readings
+tell it."""
+_VAGUE = 1e-6
+"""Information over that of the likely size below which values are no springs of any arm: a
+standard deviation of a thousand likely sizes."""
+_LINKED = 0.1
+"""Correlation above which springs are hidden together."""
+_SMALL_PART = 0.02
+"""Smaller parts of a hidden combination are not named, in likely sizes."""
 
 
 @brief_repr
@@ -76,9 +97,18 @@ class Observability:
     `attainable_rank` shows whether it changes others."""
     faint: tuple[FaintParameter, ...] = ()
     """Parameters that are too weak to see; not in a group, since only noise hides them."""
+    hidden: tuple[tuple[Term, ...], ...] = ()
+    """Combinations that noise hides: along them the readings say less than the likely size of a
+    spring does. Their numbers follow those of `unobservable`."""
+    reach: tuple[float, ...] = ()
+    """Half-width of the 95 % interval of each parameter by noise alone, in its unit, since draws of
+    one at a bound agree with one another. Empty in older files."""
 
     def group_of(self, weights: Mapping[str, float]) -> int | None:
         """Return the number, from 1, of the first combination that leaves a sum of parameters open.
+
+        Combinations that noise hides are estimates themselves, so that they count only if they
+        leave half of the sum's largest part open.
 
         Parameters
         ----------
@@ -93,6 +123,10 @@ class Observability:
         for number, group in enumerate(self.unobservable, start=1):
             parts = [weights.get(term.spring, 0.0) * term.weight for term in group]
             if abs(sum(parts)) > _CANCELS * sum(map(abs, parts)):
+                return number
+        for number, group in enumerate(self.hidden, start=len(self.unobservable) + 1):
+            parts = [weights.get(term.spring, 0.0) * term.weight for term in group]
+            if abs(sum(parts)) > _MUCH_OPEN * max(map(abs, parts)):
                 return number
         return None
 
@@ -114,6 +148,49 @@ class Observability:
         if not all(name in reach for name in used):
             return None
         return float(np.linalg.norm([weights[name] * reach[name] for name in used]))
+
+    def reach_of(self, weights: FloatArray, own: slice) -> float:
+        """Return the half-width of the 95 % interval of a sum of a spring's parameters, by noise.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (parameter of the spring,)
+            Weights of the sum.
+        own : slice
+            Which of all parameters they are.
+        """
+        return float(np.linalg.norm(weights * self.reach[own])) if self.reach else 0.0
+
+    def seen_beside(self, parameters: Sequence[Parameter]) -> tuple[tuple[Term, ...], ...]:
+        """Return what the readings do tell of the springs that noise hides: sums of them.
+
+        A sum is told if no hidden combination changes it. Those that are too long to read, or add
+        up numbers of different units, are left out.
+
+        Parameters
+        ----------
+        parameters : sequence of Parameter
+            In column order.
+        """
+        names = [each.name for each in parameters]
+        joints = list(dict.fromkeys(each.joint for each in parameters))
+        found = list[tuple[Term, ...]]()
+        open_ = sum_weights((*self.unobservable, *self.hidden), names)
+        together = (open_ != 0.0).astype(float) @ (open_ != 0.0).T.astype(float)
+        _, label = connected_components(together > 0.0)
+        for number in dict.fromkeys(label[len(self.unobservable) :].tolist()):
+            rows = open_[label == number]
+            own = np.flatnonzero(np.any(rows != 0.0, axis=0)).tolist()
+            if len({parameters[i].unit for i in own}) > 1:
+                continue
+            basis = sparse_basis(
+                complement(rows[:, own]), [joints.index(parameters[i].joint) for i in own]
+            )
+            for vector in basis:
+                members = np.flatnonzero(np.abs(vector) > _NOTICEABLE).tolist()
+                if len(members) <= MOST_TERMS:
+                    found.append(tuple(Term(names[own[m]], float(vector[m])) for m in members))
+        return tuple(found)
 
     @property
     def parameters(self) -> int:
@@ -210,6 +287,152 @@ def find_faint(
         for known, parameter in zip(seen.observable, parameters, strict=True)
     )
     return replace(seen, observable=observable, faint=tuple(faint))
+
+
+def likely_sizes(problem: Problem, parameters: Sequence[Parameter]) -> FloatArray:
+    """Return how large the parameters of this class of arm are, shape (parameter,), in their units.
+
+    One number, common to all springs in sensible sizes, is what any readings determine: it is about
+    1 for an arm of some tonnes, and 100 for one that a person can lift.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of the springs, without frames.
+    parameters : sequence of Parameter
+        In column order.
+    """
+    scale = np.array([parameter.scale for parameter in parameters])
+    positive = np.array([parameter.lower >= 0.0 for parameter in parameters])
+    together = (problem.O @ np.where(positive, scale, 0.0) * problem.weight).ravel()
+    square = float(together @ together)
+    softness = float(together @ (problem.d * problem.weight).ravel()) / square if square else 0.0
+    return np.asarray(scale * (softness if softness > 0.0 else 1.0))
+
+
+def find_hidden(
+    seen: Observability,
+    problem: Problem,
+    compliance: FloatArray,
+    parameters: Sequence[Parameter],
+    sizes: FloatArray,
+    held: bool = False,
+) -> Observability:
+    """Return the observability with the combinations that noise hides.
+
+    A spring is known if its standard deviation is at most half of its likely size, or of its value:
+    the readings then say three times as much as the likely size does. That of a fit with a normal
+    prior is the posterior's (A. Gelman and others, *Bayesian Data Analysis*, 2013, section 14.8).
+    Readings at one pose share their errors, so poses count. Bounds are not looked at: one that
+    holds a spring at zero gives its share to those beside it.
+
+    Parameters
+    ----------
+    seen : Observability
+        Observability of the data, with faint parameters.
+    problem : Problem
+        What was fitted; its prior is not looked at.
+    compliance : ndarray, shape (parameter,)
+        The estimate.
+    parameters : sequence of Parameter
+        In column order.
+    sizes : ndarray, shape (parameter,)
+        Likely sizes of the parameters, in their units.
+    held : bool
+        Whether a prior of these sizes is part of the fit.
+    """
+    Vt, information = _information(problem, compliance, sizes)
+    spread = 1.0 / (information + float(held))
+    variance = np.square(Vt.T) @ spread
+    known, usual = np.array(seen.observable), np.maximum(1.0, np.abs(compliance) / sizes)
+    unsure = known & (variance > np.square(_TOLD * usual))
+    seen = replace(seen, reach=tuple((_TWICE * sizes * np.sqrt(variance)).tolist()))
+    members = np.flatnonzero(unsure)
+    if not len(members):
+        return seen
+    left = Vt[spread > _TOLD**2][:, members].T
+    hidden, faint = list[tuple[Term, ...]](), list[FaintParameter]()
+    for component in _linked(left):
+        own = members[component]
+        for vector in _combinations(left[component]):
+            parts = [(i, vector[j]) for j, i in enumerate(own) if abs(vector[j]) > _SMALL_PART]
+            if len(parts) == 1:
+                faint.append(_faint(parts[0][0], problem, parameters, sizes, variance))
+                continue
+            weights = np.array([part * sizes[i] for i, part in parts])
+            weights /= weights[np.abs(weights).argmax()]
+            names = [parameters[i].name for i, _ in parts]
+            hidden.append(tuple(map(Term, names, weights.tolist())))
+    return replace(
+        seen,
+        observable=tuple((known & ~unsure).tolist()),
+        faint=(*seen.faint, *faint),
+        hidden=tuple(hidden),
+    )
+
+
+def is_vague(problem: Problem, compliance: FloatArray, sizes: FloatArray) -> bool:
+    """Return whether readings leave a combination open by a thousand likely sizes of springs.
+
+    Parameters
+    ----------
+    problem, compliance, sizes
+        As for `find_hidden`.
+    """
+    _, information = _information(problem, compliance, sizes)
+    return bool(np.any(information < _VAGUE))
+
+
+def _information(
+    problem: Problem, compliance: FloatArray, sizes: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return directions in likely sizes, a row each, and what the readings tell of each.
+
+    The information is that of a normal prior where it is 1. Directions that no reading changes are
+    left out: `observability` judges them.
+    """
+    residual = problem.residuals(compliance) * problem.weight
+    noise = float(np.median(np.linalg.norm(residual, axis=1))) / MEDIAN_NORM
+    # Readings without any noise tell what they tell, but not infinitely well.
+    noise = max(noise, np.finfo(float).eps * float(np.abs(problem.d).max()))
+    poses = len(np.unique(problem.block))
+    scaled = problem.scaled()
+    unit = scaled.rows.reshape(-1, len(sizes))
+    determined = rank(np.asarray(np.linalg.svd(unit, compute_uv=False), dtype=float))
+    s, Vt = np.linalg.svd(unit * scaled.scale * sizes, full_matrices=False)[1:]
+    return Vt[:determined], np.square(s[:determined] / noise) * poses / len(problem)
+
+
+def _linked(left: FloatArray) -> list[IndexArray]:
+    """Return the springs that directions, shape (spring, k), mix with one another."""
+    together = left @ left.T
+    size = np.sqrt(np.diag(together))
+    count, label = connected_components(np.abs(together) > _LINKED * np.outer(size, size))
+    return [np.flatnonzero(label == number) for number in range(count)]
+
+
+def _combinations(left: FloatArray) -> FloatArray:
+    """Return a basis of directions, shape (spring, k), each led by a spring of its own.
+
+    Shape (combination, spring); the largest part of each is 1.
+    """
+    U, s, _ = np.linalg.svd(left, full_matrices=False)
+    basis = U[:, s > _TOLD] if np.any(s > _TOLD) else U[:, :1]
+    return np.array(list(eliminated(basis)))
+
+
+def _faint(
+    index: int,
+    problem: Problem,
+    parameters: Sequence[Parameter],
+    sizes: FloatArray,
+    variance: FloatArray,
+) -> FaintParameter:
+    """Return a parameter that noise hides alone, since others make like deflections."""
+    reach = _TWICE * float(sizes[index] * np.sqrt(variance[index]))
+    column = float(np.sqrt(np.mean(np.square(problem.O[:, :, index]).sum(axis=1))))
+    size = float(sizes[index])
+    return FaintParameter(parameters[index].name, size * column, reach * column, reach)
 
 
 def attainable_rank(model: ElasticModel, marker_offset: ArrayLike | None = None) -> int:

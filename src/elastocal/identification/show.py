@@ -13,12 +13,13 @@ from elastocal.identification.figures import (
     CalibrationSummary,
     RungSummary,
     SpringSummary,
+    SumSummary,
     SuspiciousReading,
     ladder_sentence,
 )
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.rungs import AUTO
-from elastocal.identification.spring_sums import Term, describe_briefly
+from elastocal.identification.spring_sums import Term, describe_briefly, sum_text
 from elastocal.identification.uncertainty import Coverage
 from elastocal.wording import (
     counted,
@@ -71,10 +72,11 @@ def show_calibration(figures: CalibrationSummary) -> Iterator[Block]:
     yield spring_table(figures.springs)
     yield from show_unseen(
         figures.springs,
-        figures.unobservable,
+        (figures.unobservable, figures.hidden),
         (figures.rank, figures.rank_attainable, figures.springs_total),
         figures.condition,
     )
+    yield from show_sums(figures.sums)
     yield from _frames(figures.frames)
     yield from show_budget(figures.budget)
     yield from _suspicious(figures.suspicious)
@@ -239,7 +241,7 @@ def _at_bound(value: float, low: float, high: float) -> str:
 
 def show_unseen(
     springs: Sequence[SpringSummary],
-    groups: Sequence[Sequence[Term]],
+    open_: tuple[Sequence[Sequence[Term]], Sequence[Sequence[Term]]],
     ranks: tuple[int, int, int],
     condition: float,
 ) -> Iterator[Block]:
@@ -249,27 +251,32 @@ def show_unseen(
     ----------
     springs : sequence of SpringSummary
         In the order of the model.
-    groups : sequence of sequence of Term
-        Combinations that change no deflection that was measured.
+    open_ : tuple of two sequences of sequence of Term
+        Combinations that change no deflection that was measured, and those that noise hides.
     ranks : tuple of int
         The rank, the rank that any number of poses would reach, and the number of parameters.
     condition : float
         Condition number of the column-scaled system; its last digits mean nothing.
     """
-    rank, _, total = ranks
+    (rank, _, total), (groups, hidden) = ranks, open_
     text = phrase(
         "Rank {rank} of {total}, condition number {condition}.",
         rank=rank,
         total=total,
         condition=f"{float(f'{condition:.3g}'):.0f}",
     )
-    yield Paragraph(phrase("{rank} {meaning}", rank=text, meaning=_meaning(springs, groups, ranks)))
-    if groups:
-        numbered = enumerate(map(describe_briefly, groups), start=1)
+    yield Paragraph(phrase("{rank} {meaning}", rank=text, meaning=_meaning(springs, open_, ranks)))
+    if groups or hidden:
         yield Bullets(
             tuple(
-                phrase("group {number}, not by itself: {springs}", number=number, springs=each)
-                for number, each in numbered
+                phrase(
+                    "group {number}, not by itself: {springs}"
+                    if number <= len(groups)
+                    else "group {number}, hidden by noise: {springs}",
+                    number=number,
+                    springs=describe_briefly(each),
+                )
+                for number, each in enumerate((*groups, *hidden), start=1)
             )
         )
         yield Paragraph(
@@ -288,12 +295,37 @@ def show_unseen(
         )
 
 
+def show_sums(sums: Sequence[SumSummary]) -> Iterator[Block]:
+    """Yield what the readings tell of springs that noise hides, a row a sum."""
+    if not sums:
+        return
+    rows = list[Row]()
+    for each in sums:
+        unit = unit_of(each.unit)
+        name = "" if unit == _USUAL_UNIT else f" {unit.shown}"
+        value, low, high = (unit.factor * part for part in (each.compliance, each.low, each.high))
+        rows.append((sum_text(each.terms), f"{value:.4f}{name}", f"{low:.3f} … {high:.3f}"))
+    heads = (
+        phrase("Sum"),
+        phrase("Compliance, {unit}", unit=_USUAL_UNIT.shown),
+        phrase("95 % interval"),
+    )
+    yield Table(
+        phrase("Sums that the readings tell of springs hidden by noise"), heads, tuple(rows)
+    )
+
+
 def _meaning(
     springs: Sequence[SpringSummary],
-    groups: Sequence[Sequence[Term]],
+    open_: tuple[Sequence[Sequence[Term]], Sequence[Sequence[Term]]],
     ranks: tuple[int, int, int],
 ) -> str:
-    rank, attainable, total = ranks
+    (rank, attainable, total), (groups, hidden) = ranks, open_
+    if hidden and not groups:
+        return phrase(
+            "Noise hides some springs: the readings tell them less well than the size that is"
+            " likely of such an arm does."
+        )
     if not groups:
         if rank < total:
             return phrase("What the readings leave open, the bounds of the springs settle.")

@@ -21,7 +21,10 @@ _ZERO = 1e-6
 """Components below this part of the largest count as zero."""
 _MOST_SETS = 20_000
 """Largest number of coordinate sets to try; beyond it elimination gives a sparse enough basis."""
-_MOST_TERMS = 6
+_SAME = 1e-4
+"""Singular value, over the largest, below which combinations count as the same."""
+MOST_TERMS = 6
+"""Most springs of a combination that is written out."""
 
 
 @record()
@@ -53,7 +56,7 @@ def sparse_basis(null_space: FloatArray, joints: Sequence[int]) -> FloatArray:
         return np.zeros((0, n))
     involved = np.flatnonzero(np.abs(null_space).max(axis=1) > _ZERO)
     if comb(len(involved), k - 1) > _MOST_SETS:
-        candidates = list(_eliminated(null_space))
+        candidates = list(eliminated(null_space))
     else:
         candidates = list(_circuits(null_space, involved))
     candidates.sort(key=lambda vector: _complexity(vector, joints))
@@ -80,7 +83,7 @@ def _circuits(null_space: FloatArray, involved: IndexArray) -> Iterator[FloatArr
             yield vector
 
 
-def _eliminated(null_space: FloatArray) -> Iterator[FloatArray]:
+def eliminated(null_space: FloatArray) -> Iterator[FloatArray]:
     """Yield the basis whose vectors are 1 at one of ``k`` springs and 0 at the others.
 
     The springs are taken in the order of their part in the null space outside the vectors of those
@@ -129,6 +132,24 @@ def _independent(candidates: Sequence[FloatArray], k: int) -> list[FloatArray]:
     return chosen
 
 
+def sum_weights(sums: Sequence[Sequence[Term]], names: Sequence[str]) -> FloatArray:
+    """Return the weights of sums over named numbers, shape (sum, number)."""
+    table = np.zeros((len(sums), len(names)))
+    for row, terms in zip(table, sums, strict=True):
+        for term in terms:
+            row[list(names).index(term.spring)] = term.weight
+    return table
+
+
+def complement(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of what is orthogonal to some rows, shape (n, k)."""
+    if not rows.shape[1]:
+        return np.zeros((0, 0))
+    _, s, Vt = np.linalg.svd(rows, full_matrices=True)
+    determined = int(np.sum(s > _SAME * s[0]))
+    return np.asarray(Vt[determined:].T, dtype=float)
+
+
 def describe(group: Sequence[Term]) -> str:
     """Return an unobservable combination in words.
 
@@ -143,9 +164,20 @@ def describe(group: Sequence[Term]) -> str:
     return " - ".join(written)
 
 
+def sum_text(terms: Sequence[Term]) -> str:
+    """Return a sum in words.
+
+    >>> sum_text([Term("a4.axial", 1.0), Term("a5.x", 1.0)])
+    'a4.axial + a5.x'
+    """
+    text = describe(terms)
+    bare = len(terms) > 1 and all(term.weight > 0.0 for term in terms)
+    return text[1:-1] if bare else text
+
+
 def describe_briefly(group: Sequence[Term]) -> str:
     """Return an unobservable combination for a line of text, a long one by its size."""
-    return describe(group) if len(group) <= _MOST_TERMS else f"{len(group)} springs mixed"
+    return describe(group) if len(group) <= MOST_TERMS else f"{len(group)} springs mixed"
 
 
 def _written(term: Term) -> str:

@@ -418,6 +418,17 @@ def tip_links(root: ElementTree.Element) -> dict[str, int]:
         If there is none, with the reason; or if the URDF is damaged.
     """
     check_elements(root)
+    moved, refusal = _moved(root)
+    fingers = _fingers(root, moved)
+    ends = dict.fromkeys(fingers.get(leaf, leaf) for leaf in leaf_links(root))
+    tips = {link: moved[link] for link in ends if moved.get(link)}
+    if not tips:
+        raise refusal
+    return tips
+
+
+def _moved(root: ElementTree.Element) -> tuple[dict[str, int], RobotError]:
+    """Return the number of joints of the chain to each link, and why others have none."""
     joint_to, refusal = joints_by_child(root), RobotError("URDF has no joint that moves")
     first, *others = _links_downward(root)
     moved = {first: 0}
@@ -429,20 +440,16 @@ def tip_links(root: ElementTree.Element) -> dict[str, int]:
                 moved[link] = before + is_movable(joint)
         except RobotError as error:
             refusal = error
-    fingers = _fingers(root, moved)
-    tips = {leaf: moved[leaf] for leaf in leaf_links(root) if moved.get(leaf)}
-    tips = {fingers.get(leaf, leaf): moved[fingers.get(leaf, leaf)] for leaf in tips}
-    if not tips:
-        raise refusal
-    return tips
+    return moved, refusal
 
 
 def _fingers(root: ElementTree.Element, moved: Mapping[str, int]) -> dict[str, str]:
     """Return the links of grippers' fingers, each with the link that carries its fingers.
 
-    That is one at the end of an arm from which two or more chains go on, of as many joints each,
-    and few. The arms of a torso have more; a wrist beside which something turns ends in a link of a
-    name that tools are mounted on, or has another number of joints.
+    That is one at the end of an arm from which two or more chains go on, few joints each: as many
+    in each, or of which one mimics another. The arms of a torso have more; a wrist beside which
+    something turns ends in a link of a name that tools are mounted on, or has another number of
+    joints.
 
     Parameters
     ----------
@@ -468,12 +475,17 @@ def _fingers(root: ElementTree.Element, moved: Mapping[str, int]) -> dict[str, s
         while above is not None:
             named.add(above)
             above = link_of(joint_to[above], "parent") if above in joint_to else None
+    mimics = {link for link, joint in joint_to.items() if joint.find("mimic") is not None}
+    coupled = set[str]()
+    for link in reversed(downward[1:]):
+        if link in mimics or link in coupled:
+            coupled.add(link_of(joint_to[link], "parent"))
     hands = {
         link
         for link, inner in branches.items()
         if len(inner) > 1
-        and len({behind[each] for each in inner}) == 1
-        and behind[inner[0]] < _MOST_OF_A_FINGER
+        and (len({behind[each] for each in inner}) == 1 or link in coupled)
+        and max(behind[each] for each in inner) < _MOST_OF_A_FINGER
         and moved.get(link, 0) >= _FEWEST_OF_AN_ARM
         and not named & set(inner)
     }
@@ -518,6 +530,9 @@ def assumptions(root: ElementTree.Element) -> tuple[Assumption, ...]:
 def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
     """Return the serial chain from ``base`` to ``tip``.
 
+    Joints of a gripper's finger are no axes of the arm: with a tip on one they are fixed at zero,
+    as they are with one on the hand.
+
     Parameters
     ----------
     text : str
@@ -543,7 +558,8 @@ def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
                 f" (links: {listed(links)})"
             )
     root_link(root)
-    joints = joints_between(joints_by_child(root), base, tip)
+    fingers = _fingers(root, _moved(root)[0])
+    joints = joints_between(joints_by_child(root), base, fingers.get(tip, tip))
     serial = serial_urdf(root, [joint.get("name", "") for joint in joints])
     try:
         model = pin.buildModelFromXML(serial)

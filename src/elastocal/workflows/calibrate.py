@@ -15,6 +15,7 @@ from elastocal.elastic import ElasticModel, KnownSpring, Spring, known_springs
 from elastocal.errors import DatasetError, ElastocalError, IdentificationError, present
 from elastocal.findings import Finding, Kind
 from elastocal.identification import (
+    AUTO,
     CalibratedModel,
     CalibrateResult,
     Climbed,
@@ -189,7 +190,9 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         coverage, doubt = _on_production(path, calibration.calibrated)
         warnings = (*figures.warnings, *(doubt.warnings if doubt else ()))
         figures = replace(figures, production=coverage, doubt=doubt, warnings=warnings)
-    figures = replace(figures, warnings=(*figures.warnings, *unknown, *unbuilt))
+    by_name = settings.springs not in (AUTO, "gears")
+    held = (HELD(),) if chosen.by_drives and by_name else ()
+    figures = replace(figures, warnings=(*figures.warnings, *held, *unknown, *unbuilt))
     found_model = replace(calibration.calibrated, on_production=figures.doubt)
     result = replace(CalibrateResult.of(found_model, figures), made_from=made_from)
     if settings.out is not None:
@@ -274,6 +277,8 @@ class _Chosen(NamedTuple):
     model: ElasticModel
     ladder: tuple[Climbed, ...] = ()
     known: tuple[KnownSpring, ...] = ()
+    by_drives: bool = False
+    """Whether the drives say it, and no spring file."""
 
 
 def _chosen(
@@ -287,7 +292,10 @@ def _chosen(
         return _Chosen(ElasticModel(arm, settings.given))
     name, options = str(settings.springs), settings.options()
     choice = choose_model(arm, readings, name, options, marker, production=rows)
-    return _Chosen(choice.model, choice.ladder, known_springs(arm, name) or choice.known)
+    stated = known_springs(arm, name)
+    return _Chosen(
+        choice.model, choice.ladder, stated or choice.known, bool(choice.known) and not stated
+    )
 
 
 def _as_built(
@@ -323,6 +331,11 @@ def _rebuilt(
     return measured, tuple(dict.fromkeys(note for each in rebuilt for note in each.findings))
 
 
+HELD = Kind(
+    "calibration.held-by-likely-size",
+    "the readings leave combinations of springs open by more than a thousand times the likely size"
+    " of a spring: here the size of the drives holds them",
+)
 PRODUCTION_UNKNOWN = Kind(
     "calibration.production-unknown",
     "production is not known, though the cell of {folder} may name it: {error};"

@@ -6,9 +6,8 @@ from elastocal.identification import Term
 from elastocal.identification.recertification._sums import (
     common_springs,
     comparable_sums,
-    sum_text,
-    weights,
 )
+from elastocal.identification.spring_sums import sum_text, sum_weights
 from support.cells import linear_truth
 from support.recertified import calibrated, made_up
 
@@ -39,19 +38,22 @@ def test_a_spring_that_is_not_seen_at_all_is_in_no_comparison():
 def test_every_sum_vanishes_on_what_neither_model_sees_and_there_are_as_many_as_the_rank():
     old, new = (calibrated(linear_truth(), seed) for seed in (0, 1))
     sums = comparable_sums(old, new)
-    assert len(sums) == old.observability.rank == new.observability.rank == 14
-    W = weights(sums, old.model.spring_names)
-    assert np.linalg.matrix_rank(W) == 14
-    unseen = weights(old.observability.unobservable, old.model.spring_names)
-    np.testing.assert_allclose(W @ unseen.T, 0.0, atol=1e-6)
+    assert old.observability.rank == new.observability.rank == 14
+    W = sum_weights(sums, old.model.spring_names)
+    assert np.linalg.matrix_rank(W) == len(sums)
+    for seen in (old.observability, new.observability):
+        left = (*seen.unobservable, *seen.hidden, *([Term(each.name, 1.0)] for each in seen.faint))
+        unseen = sum_weights(left, old.model.spring_names)
+        assert len(sums) <= 18 - np.linalg.matrix_rank(unseen)
+        np.testing.assert_allclose(W @ unseen.T, 0.0, atol=1e-6)
 
 
 def test_a_sum_is_the_same_for_every_solution_that_the_data_allow():
     old, new = (calibrated(linear_truth(), seed) for seed in (0, 1))
     sums = comparable_sums(old, new)
     names = old.model.spring_names
-    moved = old.compliance + 3e-6 * weights(old.observability.unobservable, names).sum(axis=0)
-    W = weights(sums, names)
+    moved = old.compliance + 3e-6 * sum_weights(old.observability.unobservable, names).sum(axis=0)
+    W = sum_weights(sums, names)
     np.testing.assert_allclose(W @ moved, W @ old.compliance, atol=1e-11)
 
 

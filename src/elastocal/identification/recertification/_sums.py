@@ -23,11 +23,12 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic import OneAxisSpring, Parameter, Spring, SpringLoad
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.spring_sums import Term, describe, sparse_basis
-
-_SAME = 1e-4
-"""Singular value, over the largest, below which unobservable combinations of the two models
-count as the same."""
+from elastocal.identification.spring_sums import (
+    Term,
+    complement,
+    sparse_basis,
+    sum_weights,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +182,7 @@ def comparable_sums(
     for i in mixed:
         sums[int(i)] = []
     joints = list(dict.fromkeys(number.joint for number in numbers))
-    determined = _complement(unseen[:, mixed])
+    determined = complement(unseen[:, mixed])
     for vector in sparse_basis(
         determined, [joints.index(numbers[i].joint) for i in mixed.tolist()]
     ):
@@ -189,26 +190,6 @@ def comparable_sums(
         terms = tuple(Term(numbers[mixed[m]].name, float(vector[m])) for m in members)
         sums[int(mixed[members[0]])].append(terms)
     return tuple(each for i in sorted(sums) for each in sums[i])
-
-
-def sum_text(terms: Sequence[Term]) -> str:
-    """Return a sum in words.
-
-    >>> sum_text([Term("a4.axial", 1.0), Term("a5.x", 1.0)])
-    'a4.axial + a5.x'
-    """
-    text = describe(terms)
-    bare = len(terms) > 1 and all(term.weight > 0.0 for term in terms)
-    return text[1:-1] if bare else text
-
-
-def weights(sums: Sequence[Sequence[Term]], names: Sequence[str]) -> FloatArray:
-    """Return the weights of sums over named numbers, shape (sum, number)."""
-    table = np.zeros((len(sums), len(names)))
-    for row, terms in zip(table, sums, strict=True):
-        for term in terms:
-            row[list(names).index(term.spring)] = term.weight
-    return table
 
 
 def _unobservable(
@@ -219,23 +200,14 @@ def _unobservable(
     Shape (combination, number), from the numbers' weights over its parameters.
     """
     seen, own = calibrated.observability, calibrated.model.parameter_names
-    for term in (term for group in seen.unobservable for term in group):
+    for term in (term for group in (*seen.unobservable, *seen.hidden) for term in group):
         if term.spring not in own:
             raise IdentificationError(
                 f"unobservable combination names spring {term.spring!r}, which the model does not"
                 f" have (springs: {', '.join(own)})"
             )
-    groups = list(seen.unobservable)
+    groups = [*seen.unobservable, *seen.hidden]
     # What is too weak to see has no value to compare. A gear has: its other parameters.
     parameters = {number.name for number in numbers}
     groups += [(Term(each.name, 1.0),) for each in seen.faint if each.name in parameters]
-    return weights(groups, own) @ rows.T
-
-
-def _complement(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of what is orthogonal to some rows, shape (n, k)."""
-    if not rows.shape[1]:
-        return np.zeros((0, 0))
-    _, s, Vt = np.linalg.svd(rows, full_matrices=True)
-    rank = int(np.sum(s > _SAME * s[0]))
-    return np.asarray(Vt[rank:].T, dtype=float)
+    return sum_weights(groups, own) @ rows.T

@@ -53,8 +53,6 @@ from elastocal.identification.recertification._sums import (
     common_springs,
     comparable_sums,
     shared_numbers,
-    sum_text,
-    weights,
 )
 from elastocal.identification.recertification.arms import (
     ComparedRows,
@@ -73,6 +71,7 @@ from elastocal.identification.recertification.result import (
     SpringChange,
     Verdict,
 )
+from elastocal.identification.spring_sums import sum_text, sum_weights
 from elastocal.identification.uncertainty import CONFIDENCE, interval
 from elastocal.records import read_json
 from elastocal.robot import Robot
@@ -353,7 +352,7 @@ def compare_springs(
     sums = comparable_sums(old, new, numbers)
     if not sums:
         return ()
-    W = weights(sums, [each.name for each in numbers])
+    W = sum_weights(sums, [each.name for each in numbers])
     rows = [W @ [each.old for each in numbers], W @ [each.new for each in numbers]]
     values = [W @ each.compliance for W, each in zip(rows, (old, new), strict=True)]
     ends = [interval(each.draws @ W.T) for W, each in zip(rows, (old, new), strict=True)]

@@ -8,9 +8,11 @@ from elastocal.identification import (
     CalibrationSummary,
     show_budget,
     show_ladder,
+    show_sums,
     show_unseen,
     spring_summaries,
     spring_table,
+    sum_summaries,
 )
 from elastocal.identification.recertification import show_comparison
 from elastocal.report.document.section import Section
@@ -47,7 +49,8 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
     yield spring_table(rows)
     attainable = found.figures.rank_attainable if found.figures else seen.rank
     ranks = seen.rank, attainable, seen.parameters
-    yield from show_unseen(rows, seen.unobservable, ranks, seen.condition)
+    yield from show_unseen(rows, (seen.unobservable, seen.hidden), ranks, seen.condition)
+    yield from show_sums(sum_summaries(found.model))
     yield from show_budget(found.figures.budget if found.figures else None)
 
 
