@@ -7,18 +7,25 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, UnitError, nearest
 from elastocal.geometry.positions import LEAST_READINGS, Positions
 from elastocal.geometry.sessions import in_sessions
 from elastocal.records import read_arrays
-from elastocal.robot import Robot
+from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
 from elastocal.units import factor, impossible, split_column
 
 AXES = ("x", "y", "z")
 _MARKER = re.compile(r"marker(\d*)_x")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_NO_UNIT = 1e-3
+"""Distance of a quaternion's length from 1 that rounding does not make."""
+_LEVER = 0.2
+"""Distance in m at which the orientation of a target is measured as a position is: trackers see
+0.01 deg (VDI/VDE 2617-10), which are 35 um there."""
 _SAME_POSE = 1e-2
 """Joints that differ by less, in rad or m, are of one pose, whatever the payload."""
 _FAR = 100.0
@@ -35,6 +42,8 @@ def read_positions(path: Path, robot: Robot) -> Positions:
     ----------
     path : Path
         Columns ``<joint>[deg|rad|mm|m]``, ``marker_x[mm] …`` (or ``marker1_x[mm] …`` of several),
+        or ``target_x[mm] …`` of a target with ``target_a[deg], target_b[deg], target_c[deg]``
+        (Z-Y'-X'') or ``target_qw, target_qx, target_qy, target_qz``,
         optional ``station``, ``session``, ``campaign``, ``pose``, ``payload[kg]`` with its centre
         ``payload_x[mm] …`` in the tcp, ``force_x[N] …`` on the robot in base. A marker that was
         hidden is empty. ``.nc``: variables of these names along one dimension, their unit in the
@@ -119,6 +128,15 @@ class _Columns:
                 raise GeometryError(f"row {line}, column {name!r}: {problem}")
         return values
 
+    def plain(self, name: str) -> FloatArray:
+        """Return the numbers of a column without a unit, shape (row,); NaN where empty."""
+        if name not in self.found:
+            raise GeometryError(f"column {name!r} is missing (columns: {', '.join(self.found)})")
+        index, unit = self.found[name]
+        if unit is not None:
+            raise GeometryError(f"column {name!r} has no unit, found {unit!r}")
+        return self.rows.numbers(Column(index, name, "", 1.0), _or_hidden)
+
     def vectors(self, name: str, dimension: str, *, blank: bool = False) -> FloatArray:
         """Return three columns, shape (row, 3)."""
         each = [self.numbers(f"{name}_{axis}", dimension, blank=blank) for axis in AXES]
@@ -141,15 +159,7 @@ def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Position
     q = np.column_stack([columns.numbers(name, kind) for name, kind in names])
     in_rad = [columns.found[name][1] == "rad" for name in robot.joint_names]
     _require_within_limits(q, robot, rows.lines, in_rad)
-    found = sorted(m[1] for name in columns.found if (m := _MARKER.fullmatch(name)))
-    if not found:
-        raise GeometryError(
-            "no column 'marker_x[…]' (or 'marker1_x[…]' of several markers); columns:"
-            f" {', '.join(columns.found)}"
-        )
-    markers = np.stack(
-        [columns.vectors(f"marker{number}", "length", blank=True) for number in found], axis=1
-    )
+    markers = _markers(columns)
     _require_markers(markers, rows.lines)
     zeros = np.zeros((count, 3))
     has_centre = "payload_x" in columns.found
@@ -165,6 +175,52 @@ def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Position
         lines=tuple(rows.lines),
     )
     return in_sessions(positions, columns.words("session", ""))
+
+
+def _markers(columns: _Columns) -> FloatArray:
+    """Return the markers of a table, shape (row, marker, 3), in m; NaN where hidden."""
+    found = sorted(m[1] for name in columns.found if (m := _MARKER.fullmatch(name)))
+    if "target_x" in columns.found:
+        if found:
+            raise GeometryError("columns of a target and of markers: give one of them")
+        return _target(columns)
+    if not found:
+        raise GeometryError(
+            "no column 'marker_x[…]' (or 'marker1_x[…]' of several markers, or 'target_x[…]' of a"
+            f" target with its orientation); columns: {', '.join(columns.found)}"
+        )
+    return np.stack(
+        [columns.vectors(f"marker{number}", "length", blank=True) for number in found], axis=1
+    )
+
+
+def _target(columns: _Columns) -> FloatArray:
+    """Return a target that was seen with its orientation as three markers, shape (row, 3, 3).
+
+    They are its origin and points on its x and y axes, so that its orientation counts as `_LEVER`
+    makes it: what a fit of points finds of them is what one of poses finds.
+    """
+    places = columns.vectors("target", "length", blank=True)
+    if any(f"target_{name}" in columns.found for name in _QUATERNION):
+        q = np.column_stack([columns.plain(f"target_{name}") for name in _QUATERNION])
+        size = np.linalg.norm(q, axis=1)
+        bad = np.flatnonzero(np.abs(size - 1.0) > _NO_UNIT)
+        if len(bad):
+            raise GeometryError(
+                f"row {columns.rows.lines[bad[0]]}: target_qw … target_qz have the length"
+                f" {size[bad[0]]:.4g}: a quaternion of a rotation has 1"
+            )
+        seen = np.isfinite(size)
+        turned = np.full((len(q), 3, 3), np.nan)
+        # SciPy's scalar is the last.
+        turned[seen] = Rotation.from_quat(np.roll(q[seen], -1, axis=1)).as_matrix()
+    else:
+        a, b, c = (columns.numbers(f"target_{name}", "angle", blank=True) for name in "abc")
+        turned = T_from_xyzabc(0.0 * a, 0.0 * a, 0.0 * a, a, b, c)[:, :3, :3]
+    points = [places, *(places + _LEVER * turned[:, :, axis] for axis in (0, 1))]
+    markers = np.stack(points, axis=1)
+    markers[~np.isfinite(markers).all(axis=(1, 2))] = np.nan
+    return markers
 
 
 def _or_hidden(cell: str) -> float:
