@@ -10,6 +10,7 @@ from .collision import (
     find_meshes as find_meshes,
     is_relative as is_relative,
 )
+from .dh_table import is_dh_table as is_dh_table
 from .identity import (
     BUILT_MARK as BUILT_MARK,
     link_gap as link_gap,

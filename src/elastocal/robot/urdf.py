@@ -28,6 +28,7 @@ import pinocchio as pin
 from elastocal.errors import FileAccessError, RobotError, nearest
 from elastocal.files import read_bytes
 from elastocal.robot.chain import ChainJoint, SerialChain
+from elastocal.robot.dh_table import urdf_of_table
 from elastocal.units import impossible, parse_number
 from elastocal.wording import listed
 
@@ -282,11 +283,16 @@ def refusals_naming(path: Path) -> Iterator[None]:
 def read_urdf(path: Path) -> str:
     """Return the text of a URDF file, in the encoding that it declares (UTF-8 by default).
 
+    Of a table of Denavit and Hartenberg's numbers, ``.csv``, that of its arm
+    (`elastocal.robot.dh_table`).
+
     Raises
     ------
     FileAccessError
         If the file is missing, unreadable, or not text in that encoding.
     """
+    if path.suffix.lower() == ".csv":
+        return urdf_of_table(path)
     data = read_bytes(path)
     for encoding in _encodings(data):
         try:

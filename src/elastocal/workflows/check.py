@@ -29,6 +29,7 @@ from elastocal.robot import (
     Robot,
     catalogue,
     find_meshes,
+    is_dh_table,
     leaf_links,
     parse_urdf,
     read_urdf,
@@ -345,9 +346,14 @@ def _kind(path: Path, stated: object, known: Mapping[str, _Describe]) -> _Descri
     raise SchemaError(f"{path} {found}{nearest(name, known)} (known: {', '.join(sorted(known))})")
 
 
+def _table(path: Path) -> FileDescription:
+    """Describe a table: one of Denavit and Hartenberg's numbers is a robot."""
+    return _robot(path) if is_dh_table(path) else table_file(path)
+
+
 _BY_SUFFIX: dict[str, _Describe] = {
     ".nc": _netcdf,
-    ".csv": table_file,
+    ".csv": _table,
     ".json": _json,
     **dict.fromkeys(ROBOT_SUFFIXES, _robot),
     ".jsonl": kinds.journal_file,
