@@ -230,7 +230,7 @@ def _best_change(
     """Yield the change at the best split of some positions, where there are enough."""
     if len(points) < 2 * _LEAST_ROWS:
         return
-    A, whole = found.J[points][:, :, columns], found.residual[points]
+    A, whole = found.derivatives.dense[points][:, :, columns], found.residual[points]
     # Single broken beams make no session, but a session may lie as far away as they do.
     size = np.linalg.norm(whole, axis=1, keepdims=True)
     r = whole * np.minimum(1.0, _CLIPPED * found.sigma / np.maximum(size, np.finfo(float).tiny))
