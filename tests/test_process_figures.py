@@ -92,13 +92,27 @@ def test_touches_before_production_are_held_against_springs_alone_on_the_same_se
     assert float(typical[1][2]) < 5.0
 
 
+@pytest.mark.parametrize("kind", ["afp", "machining"])
+def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone(tables, kind):
+    rows = [row.strip("| ").split(" | ") for row in tables.procedures(kind).splitlines()[2:]]
+    assert {row[1] for row in rows} <= set(tables.MORE.values())
+    for row in rows:
+        assert "min" in row[2]
+        assert ("course" in row[1]) == ("s a course" in row[2])
+    offset = {row[0]: row for row in rows if "offset" in row[1]}
+    assert kind != "afp" or "typical" in offset
+    for row in offset.values():
+        # What the offset is for: the mean over components, and half the load.
+        assert float(row[6].partition("%")[0]) > float(row[5].partition("%")[0])
+
+
 @pytest.mark.slow
 def test_a_case_measured_anew_gives_the_figures_that_are_quoted(tables, tmp_path):
     from gallery.process_figures import SHORTER, Case, Measurement
 
     tables.quoted()
     (campaign,) = (each for each in SHORTER if each.name == "i_optimal 8")
-    (found,) = Measurement(tmp_path).of(Case("afp", "typical", 1), (campaign,), (1.0,))
+    (found,) = Measurement(tmp_path).of(Case("afp", "typical", 1), (campaign,))
     (stated,) = (
         each
         for each in tables.quoted()

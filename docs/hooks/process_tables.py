@@ -3,6 +3,7 @@
 The figures stand in ``gallery/process_figures.json``, which ``make process-figures`` measures; the
 paper's row comes from the report's own copy of it. ``<!-- process campaigns: afp -->`` becomes the
 table of shorter campaigns, ``<!-- process touched: afp -->`` that of touches before production,
+``<!-- process procedures: afp -->`` what every procedure beside the springs costs and brings,
 ``<!-- process summary: typical -->`` the sentences that the README has,
 ``<!-- process demos: typical -->`` what every example cell reaches on a truth (``all``: on each).
 """
@@ -21,15 +22,26 @@ if TYPE_CHECKING:
     from mkdocs.structure.pages import Page
 
 _QUOTED = Path(__file__).parent / "gallery" / "process_figures.json"
-_MARK = re.compile(r"<!-- process (table|campaigns|touched|summary|short|demos): (\S+) -->")
+_MARK = re.compile(
+    r"<!-- process (table|campaigns|touched|procedures|summary|short|demos): (\S+) -->"
+)
 _HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
          "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
 _CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out error, µm",
               "left of the mean, µm", "reduction", "seeds")  # fmt: skip
 _TOUCHED = ("truth", "correction", "minutes before production", "reduction of the mean",
             "3-D", "at half load", "seeds")  # fmt: skip
+_PROCEDURES = ("truth", "procedure", "time in the cell, beside springs alone",
+               "mean: springs alone", "with it", "3-D: springs alone", "with it",
+               "half load: springs alone", "with it", "seeds")  # fmt: skip
 TOUCHED = "touched"
 """Name of the campaign whose growth was touched."""
+MORE = {
+    TOUCHED: "touches, cold and warm",
+    "conditioned": "press before every reference",
+    "course offset": "press before every reference, and the offset of each course",
+}
+"""Procedures beside the springs, by the name of their campaign."""
 _README = Path(__file__).parents[2] / "README.md"
 _NAMES = {"afp": "fibre placement", "machining": "roughing"}
 TRUTHS = ("kind", "typical", "harsh")
@@ -56,8 +68,8 @@ DEMOS = {
 def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: ARG001 (mkdocs')
     """Return the page with the tables in place of their marks."""
     made: dict[str, Callable[[str], str]] = {
-        "table": table, "campaigns": campaigns, "touched": touched, "summary": summary,
-        "short": short, "demos": demos,
+        "table": table, "campaigns": campaigns, "touched": touched,
+        "procedures": procedures, "summary": summary, "short": short, "demos": demos,
     }  # fmt: skip
     return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
 
@@ -86,7 +98,7 @@ _INTERVALS = (
 
 def campaigns(kind: str) -> str:
     """Return what shorter campaigns reach on the typical truth, on the seeds that all have."""
-    found = [each for each in _of(quoted(), kind, "typical") if each["campaign"] != TOUCHED]
+    found = [each for each in _of(quoted(), kind, "typical") if each["campaign"] not in MORE]
     seeds_of: dict[str, set[int]] = {}
     for each in found:
         seeds_of.setdefault(each["campaign"], set()).add(each["case"]["seed"])
@@ -127,6 +139,41 @@ def touched(kind: str) -> str:
             ]
             rows.append((truth, name, _span(minutes, ".1f"), *cells, str(len(some))))
     return _markdown(_TOUCHED, rows)
+
+
+def procedures(kind: str) -> str:
+    """Return what each procedure costs and brings, on the seeds that were run with and without."""
+    rows = []
+    for truth in TRUTHS:
+        alone = _by_seed(kind, truth, campaign="template", springs="auto")
+        for name, title in MORE.items():
+            found = _by_seed(kind, truth, campaign=name)
+            pairs = [(alone[seed], found[seed]) for seed in sorted(alone.keys() & found.keys())]
+            if pairs:
+                cells = [
+                    _mean([_reduction(_measure(each, which, load)["mean"]) for each in side], ".1%")
+                    for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
+                    for side in zip(*pairs, strict=True)
+                ]
+                rows.append((truth, title, _cost(pairs), *cells, str(len(pairs))))
+    return _markdown(_PROCEDURES, rows)
+
+
+def _by_seed(kind: str, truth: str, **which: str) -> dict[int, Figures]:
+    return {each["case"]["seed"]: each for each in _of(quoted(), kind, truth, **which)}
+
+
+def _cost(pairs: list[tuple[Figures, Figures]]) -> str:
+    """Return what a procedure takes of the cell's time more than springs alone."""
+    campaign = {round(with_it["minutes"] - alone["minutes"], 1) for alone, with_it in pairs}
+    touches = {found for _, each in pairs if (found := each.get("touch_minutes"))}
+    landings = {found for _, each in pairs if (found := each.get("landing_seconds"))}
+    parts = [
+        f"{_span(campaign, '.1f')} min in the campaign" if any(campaign) else "",
+        f"{_span(touches, '.1f')} min before production" if touches else "",
+        f"{_span(landings, '.1f')} s a course" if landings else "",
+    ]
+    return ", ".join(part for part in parts if part)
 
 
 def _measure(figures: Figures, which: int, load: float) -> Figures:

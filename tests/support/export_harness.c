@@ -77,6 +77,35 @@ static int steps(void)
     return 0;
 }
 
+/* As steps, with what comes before the reading: 1 a course begins with a deviation, 2 it ends. */
+static int courses(void)
+{
+    double row[N + 12];
+    double out[5];
+    elastocal_state state;
+    elastocal_start(&state);
+    while (fread(row, sizeof(double), N + 12, stdin) == N + 12) {
+        elastocal_reading reading;
+        elastocal_correction told;
+        reading.time = row[0];
+        (void)memcpy(reading.q, &row[1], sizeof reading.q);
+        (void)memcpy(reading.force, &row[N + 1], sizeof reading.force);
+        (void)memcpy(reading.moment, &row[N + 4], sizeof reading.moment);
+        reading.ok = (row[N + 7] != 0.0) ? 1 : 0;
+        out[4] = 0.0;
+        if (row[N + 8] == 1.0) {
+            out[4] = (double)elastocal_begin_course(&state, reading.q, &row[N + 9]);
+        } else if (row[N + 8] == 2.0) {
+            elastocal_end_course(&state);
+        }
+        elastocal_step(&state, &reading, &told);
+        (void)memcpy(out, told.correction, sizeof told.correction);
+        out[3] = (double)told.status;
+        (void)fwrite(out, sizeof(double), 5, stdout);
+    }
+    return 0;
+}
+
 static double now(void)
 {
     return (double)clock() / CLOCKS_PER_SEC;
@@ -166,6 +195,8 @@ int main(int argc, char **argv)
         result = loads();
     } else if (strcmp(mode, "steps") == 0) {
         result = steps();
+    } else if (strcmp(mode, "courses") == 0) {
+        result = courses();
     } else if (strcmp(mode, "timing") == 0) {
         result = timing();
 #ifdef COUNT

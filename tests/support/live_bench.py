@@ -7,11 +7,13 @@ import numpy as np
 import yaml
 
 from elastocal.cell import (
+    BeamState,
     CycleStatistics,
     DeviceSet,
     DeviceSettings,
     PathCycle,
     PathLimits,
+    PointBlock,
     SensorStatus,
     WrenchSample,
     load_cell,
@@ -74,15 +76,16 @@ class BenchArm:
 
 
 class BenchDriver:
-    """Arm and sensor; `arm` is the last that was made."""
+    """Arm, sensor and tracker; `arm` is the last that was made."""
 
-    kinds = frozenset({"arm", "sensor"})
+    kinds = frozenset({"arm", "sensor", "metrology"})
     real = True
     rate = 1000.0
     force = (0.0, 0.0, 0.0)
 
     def __init__(self) -> None:
         self.time, self.arm = 100.0, None
+        self.marker, self.station, self.looked = np.zeros(3), "", 100.0
 
     def settings(self, _kind: str) -> type[DeviceSettings]:
         return _Settings
@@ -91,7 +94,20 @@ class BenchDriver:
         zero = np.zeros(3)
         return WrenchSample(self.time, np.array(self.force), zero, SensorStatus.OK)
 
-    def connect(self, _cell, _wanted, _context) -> DeviceSet:
+    def look(self, station: str) -> None:
+        self.station = station
+
+    def read(self) -> PointBlock:
+        if self.marker is None:
+            raise DeviceError("bench: the tracker does not answer")
+        time, self.looked = np.arange(self.looked, self.time, 0.05), self.time
+        position = np.tile(self.marker, (len(time), 1))
+        sigma = np.full(position.shape, 5e-6)
+        return PointBlock(time, position, sigma, BeamState.LOCKED, self.station, "bench")
+
+    def connect(self, _cell, wanted, _context) -> DeviceSet:
+        if "metrology" in wanted:
+            return DeviceSet(metrology=self)
         return DeviceSet(sensor=self, feed=self)
 
     def path_limits(self, cell, settings) -> PathLimits:
@@ -115,10 +131,16 @@ def install(folder: Path, monkeypatch) -> None:
     )
 
 
-def write_cell(path: Path, arm: object = "live_bench", sensor: object = "live_bench") -> Path:
+def write_cell(
+    path: Path,
+    arm: object = "live_bench",
+    sensor: object = "live_bench",
+    metrology: object = "simulated",
+) -> Path:
     """Write the example cell with such devices; return its file."""
     cell = example_cell("afp")
-    data = yaml.safe_load(cell.path.read_text()) | {"devices": {"arm": arm, "sensor": sensor}}
+    devices = {"arm": arm, "sensor": sensor, "metrology": metrology}
+    data = yaml.safe_load(cell.path.read_text()) | {"devices": devices}
     data["surface"]["file"] = str(cell.path.parent / data["surface"]["file"])
     path.write_text(yaml.safe_dump(data))
     return path

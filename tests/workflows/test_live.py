@@ -11,7 +11,8 @@ import yaml
 from elastocal import workflows
 from elastocal.cell import AnswerTimes, DeviceSet, PathLimits, load_cell
 from elastocal.errors import CompensationError, DeviceError, RobotError, UnitError
-from support import live_bench
+from elastocal.procedure.derive.touches import TaughtMarkers
+from support import compensated, live_bench
 from support.cli import elastocal
 from support.live_bench import DRIVER
 
@@ -230,3 +231,74 @@ def test_times_are_counted_to_five_microseconds_whatever_their_number():
         assert times.quantile(share) == pytest.approx(np.quantile(drawn, share), abs=1.1e-5)
     assert times.longest == drawn.max()
     assert AnswerTimes().quantile(0.5) is None
+
+
+class TestCourses:
+    """Offsets of courses: the tool says when one begins, the tracker what it is."""
+
+    LEVER, TAUGHT = np.array([0.1, 0.0, -0.1]), np.array([2e-4, 1e-4, -3e-4])
+    MOVED = np.array([1e-4, -5e-5, 8e-5])
+
+    @pytest.fixture
+    def landed(self, tmp_path, files, monkeypatch):
+        """Return what makes a live compensation of a tool that lands, and the cell's arm."""
+        cell = live_bench.write_cell(tmp_path / "cell.yaml", metrology="live_bench")
+        described = load_cell(cell)
+        T = described.robot.forward(described.home)
+        station = described.file.trackers[0].name
+
+        def taught(folders):
+            assert folders == (tmp_path / "taught",)
+            place = T[None, :3, 3] + np.array([0.0, 0.0, 5e-3])
+            return TaughtMarkers(
+                described.robot, place, self.TAUGHT[None], np.eye(4), station, self.LEVER
+            )
+
+        monkeypatch.setattr(sys.modules["elastocal.workflows.live"], "read_taught_markers", taught)
+        DRIVER.marker = T[:3, 3] + T[:3, :3] @ self.LEVER + self.TAUGHT + self.MOVED
+        light = described.file.procedure.contact_force
+
+        def correct(marker=DRIVER.marker):
+            DRIVER.marker, begun = marker, DRIVER.time
+
+            def lands() -> bool:
+                passed = DRIVER.time - begun
+                pressed = 15.0 * light if passed < 6.0 else light
+                DRIVER.force = (0.0, 0.0, 0.0 if passed < 3.0 else -pressed)
+                return passed > 15.0
+
+            return workflows.live(
+                cell,
+                model=files[1],
+                arm=True,
+                course_offset=(tmp_path / "taught",),
+                interrupted=lands,
+            )
+
+        return correct, described
+
+    def test_what_the_tracker_shows_in_light_contact_is_corrected_within_the_limits(self, landed):
+        correct, described = landed
+        loop = correct().loop
+        assert (loop.courses, loop.offsets_refused) == (1, 0)
+        # What the light contact bends is predicted, and no part of the offset.
+        model = compensated.calibrated(described.robot)
+        R = described.robot.forward(described.home)[:3, :3]
+        force = R @ np.array([0.0, 0.0, -described.file.procedure.contact_force])
+        bent = model.model.deflection(model.compliance, described.home, force)
+        assert loop.largest_offset == pytest.approx(np.linalg.norm(self.MOVED - bent), rel=0.05)
+        assert loop.largest_step <= 0.02 * 0.004 * (1.0 + 1e-9)
+
+    def test_an_offset_beyond_any_is_refused_and_a_tracker_that_is_silent_ends_nothing(
+        self, landed
+    ):
+        correct, _ = landed
+        far = correct(DRIVER.marker + np.array([0.0, 5e-3, 0.0]))
+        assert (far.loop.courses, far.loop.offsets_refused) == (0, 1)
+        assert far.loop.largest_offset == 0.0
+        assert dict(far.facts())["courses"].endswith("1 offsets refused")
+        silent = correct(None)
+        assert silent.ended == "interrupted"
+        assert silent.problem is None
+        assert (silent.loop.courses, silent.loop.offsets_refused) == (0, 0)
+        assert any("kept the offset before them: the tracker gave 0" in n for n in silent.notes)

@@ -10,7 +10,7 @@ import pytest
 from elastocal.cell import load_cell
 from elastocal.errors import ProcedureError
 from elastocal.procedure import read_journal, read_touches
-from elastocal.procedure.derive import touches as touches_module
+from elastocal.procedure.derive import read_taught_markers, touches as touches_module
 from elastocal.sim import truth_of
 from elastocal.workflows import check, derive, run, touch
 from support.cli import elastocal
@@ -57,6 +57,23 @@ def test_the_state_is_what_the_simulated_arm_has_grown(touched):
     assert np.abs(off).max() < 2.0 * state.half_width
     # Nothing random of the cold run comes back in the warm one.
     assert 5e-6 < state.noise < 60e-6
+
+
+def test_cold_touches_teach_where_marker_and_controller_are_where_courses_begin(touched):
+    folder, made, _ = touched
+    cell, robot = load_cell(made.cell), load_cell(made.cell).robot
+    found = read_taught_markers((folder / "cold", folder / "cold"))
+    assert found.station == cell.file.trackers[0].name
+    assert found.place.shape == found.offset.shape == (POSES, 3)
+    once = read_taught_markers((folder / "cold",))
+    np.testing.assert_allclose(found.offset, once.offset, atol=1e-15)
+    # Warm readings against them show what the arm has grown, as `touch` has it.
+    warm = read_taught_markers((folder / "state-run",))
+    assert warm.place.shape == (0, 3)
+    shift = read_touches(folder / "cold", folder / "state-run").shift
+    assert np.linalg.norm(found.offset, axis=1).max() < 2e-3
+    assert np.linalg.norm(shift, axis=1).max() < 1e-3
+    assert robot.joint_names == found.robot.joint_names
 
 
 def test_only_the_contact_force_is_pressed_with(touched):

@@ -8,7 +8,8 @@ A case is an example cell with a preset and a seed. The procedure is run, calibr
 layout of springs, the tool is weighed, and the process simulated at the programmed, half and turned
 load, as `elastocal simulate-process` does. On `typical` the same is done, at the programmed load,
 with shorter campaigns and with that of the paper; on every truth with the growth of the arm that is
-touched before production. Of `ur20`, an example without a process, the deflection at left-out poses
+touched before production, and with a press before every reference: alone, and with the offset of
+each course. Of `ur20`, an example without a process, the deflection at left-out poses
 is measured, and what its prediction leaves of it.
 """
 
@@ -17,7 +18,7 @@ import json
 import re
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -26,9 +27,10 @@ from process_tables import renew_readme
 from elastocal.cell import PROCESS_FILE, SensorLoad, load_cell
 from elastocal.compensation import ArmGrowth, process
 from elastocal.compensation.conditioning import read_sensor_load
-from elastocal.compensation.process import DeviationComparison
+from elastocal.compensation.process import Course, DeviationComparison
 from elastocal.errors import CompensationError
 from elastocal.identification import CalibrateResult
+from elastocal.procedure import RunFolder, read_summary
 from elastocal.progress import silent
 from elastocal.records import from_data, record, to_data
 from elastocal.robot import Robot
@@ -39,6 +41,7 @@ KINDS = (*process.PROCESSES, "ur20")
 TYPICAL, OTHERS = "typical", ("kind", "harsh")
 SEEDS = (1, 2, 3, 4, 5)
 _LOADS = (1.0, 0.5, -1.0)
+_CONDITIONING = "procedure:\n  reference: light_contact\n  conditioning: true"
 
 
 @dataclass(frozen=True)
@@ -51,16 +54,29 @@ class Campaign:
     springs: tuple[str, ...]
     points: int = 0
     """Points that are touched cold and warm, so that the growth of the arm is corrected too."""
+    loads: tuple[float, ...] = _LOADS
+    """Shares of the force that the process is run under."""
+    conditioned: bool = False
+    """Whether a full press goes before the reference, which is read in light contact."""
+    offset: bool = False
+    """Whether every course begins with a press and a reading of its offset."""
+
+    @property
+    def cell(self) -> str:
+        """The word for its cell and its run; campaigns that measure alike share them."""
+        return CONDITIONED.name if self.conditioned else self.name
 
 
 TEMPLATE = Campaign("template", {}, ("bearing", "auto"))
 SHORTER = (
-    Campaign("cover 30", {"technique": "cover", "poses": "30"}, ("bearing",)),
-    Campaign("i_optimal 8", {"poses": "8"}, ("auto",)),
-    Campaign("i_optimal 6", {"poses": "6"}, ("auto",)),
+    Campaign("cover 30", {"technique": "cover", "poses": "30"}, ("bearing",), loads=(1.0,)),
+    Campaign("i_optimal 8", {"poses": "8"}, ("auto",), loads=(1.0,)),
+    Campaign("i_optimal 6", {"poses": "6"}, ("auto",), loads=(1.0,)),
 )
 
 TOUCHED = Campaign("touched", {}, ("auto",), points=12)
+CONDITIONED = Campaign("conditioned", {}, ("auto",), conditioned=True)
+OFFSET = Campaign("course offset", {}, ("auto",), conditioned=True, offset=True)
 
 
 @record()
@@ -103,13 +119,16 @@ class ProcessFigures:
     deviations: tuple[Deviation, ...]
     touch_minutes: float | None = None
     """Time of the touches before production; none where nothing is touched."""
+    landing_seconds: float | None = None
+    """Longest time of a course's landing; none where courses begin at once."""
 
 
 def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
     """Yield every case with what is measured of it, in an order that may be cut anywhere.
 
     `typical`, the truth that the README quotes, comes first, its first seed with all campaigns;
-    then a seed of each other truth, their other seeds, and the shorter campaigns.
+    then a seed of each other truth, their other seeds, the shorter campaigns, and those with more
+    than springs.
     """
     order = [(TYPICAL, seed) for seed in SEEDS] + [(preset, 1) for preset in OTHERS]
     every = [(preset, seed) for preset in OTHERS for seed in SEEDS]
@@ -121,10 +140,11 @@ def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
     for seed in SEEDS[1:]:
         for kind in process.PROCESSES:
             yield Case(kind, TYPICAL, seed), SHORTER
-    for preset in (TYPICAL, *OTHERS):
-        for seed in SEEDS:
-            for kind in process.PROCESSES:
-                yield Case(kind, preset, seed), (TOUCHED,)
+    for campaigns in ((TOUCHED,), (CONDITIONED, OFFSET)):
+        for preset in (TYPICAL, *OTHERS):
+            for seed in SEEDS:
+                for kind in process.PROCESSES:
+                    yield Case(kind, preset, seed), campaigns
 
 
 def quoted() -> list[ProcessFigures]:
@@ -152,6 +172,7 @@ class _Model:
     """None of a cell without a process."""
     state: ArmGrowth | None = None
     """Growth of the arm by touches."""
+    landing_seconds: float | None = None
     deviations: list[Deviation] = field(default_factory=list)
 
     def figures(self, case: Case) -> ProcessFigures:
@@ -163,6 +184,7 @@ class _Model:
             case, self.campaign.name, self.springs, taken[0] if taken else self.springs,
             self.poses, self.minutes, _rounded(found.held_out.mean), tuple(self.deviations),
             None if self.state is None else round(self.state.seconds / 60.0, 2),
+            self.landing_seconds,
         )  # fmt: skip
 
 
@@ -171,55 +193,53 @@ class Measurement:
     """Measures cases, with the plans that it has made so far."""
 
     folder: Path
+    """Plans and runs that are in it are taken, not made again."""
     jobs: int = 1
-    _plans: dict[tuple[str, str], Path] = field(default_factory=dict)
+    _results: dict[tuple[Path, str], CalibrateResult] = field(default_factory=dict)
 
-    def of(
-        self, case: Case, campaigns: tuple[Campaign, ...], loads: tuple[float, ...] = _LOADS
-    ) -> list[ProcessFigures]:
-        """Return the figures of a case, one for each campaign and layout of springs.
-
-        Loads other than the programmed one are run with the first campaign alone.
-        """
+    def of(self, case: Case, campaigns: tuple[Campaign, ...]) -> list[ProcessFigures]:
+        """Return the figures of a case, one for each campaign and layout of springs."""
         models = [each for campaign in campaigns for each in self._models(case, campaign)]
         if case.kind in process.PROCESSES:
-            self._run_process(case, models, campaigns, loads)
+            models = self._run_process(case, models, campaigns)
         else:
             for each in models:
                 each.deviations.append(_left_out(each.result))
         return [model.figures(case) for model in models]
 
     def _run_process(
-        self,
-        case: Case,
-        models: list[_Model],
-        campaigns: tuple[Campaign, ...],
-        loads: tuple[float, ...],
-    ) -> None:
+        self, case: Case, models: list[_Model], campaigns: tuple[Campaign, ...]
+    ) -> list[_Model]:
         courses = process.process_courses(case.kind, models[0].trial.cell, case.seed, None)
         name = process.PROCESSES[case.kind].direction
         for campaign in campaigns:
             some = [each for each in models if each.campaign == campaign]
-            asked = loads if campaign == campaigns[0] else loads[:1]
-            found = run_loads([each.trial for each in some], courses, asked, silent)
+            found = run_loads([each.trial for each in some], courses, campaign.loads, silent)
             for load, runs in found.items():
                 for model, own in zip(some, runs, strict=True):
                     model.deviations.append(_deviation(own.line(name), load))
                     model.deviations.append(_deviation(own.spatial("3-D"), load))
+        return [_landed(each, courses) for each in models]
 
     def _models(self, case: Case, campaign: Campaign) -> Iterator[_Model]:
         """Run a campaign, and yield a model for each of its layouts of springs."""
         cell = self._cell(case, campaign)
-        made = self.folder / f"{campaign.name} {case.kind} {case.preset} {case.seed}"
-        ended = run(cell, plan=cell.parent / "plan", out=made / "run", seed=case.seed)
-        poses, minutes = ended.figures.committed, round(ended.figures.seconds / 60.0, 2)
+        made = self.folder / f"{campaign.cell} {case.kind} {case.preset} {case.seed}"
+        folder = RunFolder(made / "run")
+        if not folder.summary.is_file():
+            run(cell, plan=cell.parent / "plan", out=folder.path, seed=case.seed)
+        summary = read_summary(folder.summary)
+        poses, minutes = summary.poses.committed, round(summary.times.total / 60.0, 2)
         path = cell.parent / PROCESS_FILE if case.kind in process.PROCESSES else None
         state = self._touched(case, cell, campaign, made) if campaign.points else None
         for springs in campaign.springs:
-            result = calibrate(made / "run" / "dataset.nc", springs=springs, process=path)
+            result = self._results.get((made, springs))
+            result = result or calibrate(folder.dataset, springs=springs, process=path)
+            self._results[made, springs] = result
             trial = self._trial(case, cell, result, made) if path else None
             if trial is not None:
-                trial = replace(trial, state=state)
+                landing = process.Landing.of(trial.cell) if campaign.offset else None
+                trial = replace(trial, state=state, landing=landing)
             yield _Model(campaign, springs, poses, minutes, result, trial, state)
 
     def _touched(self, case: Case, cell: Path, campaign: Campaign, made: Path) -> ArmGrowth:
@@ -242,17 +262,17 @@ class Measurement:
 
     def _cell(self, case: Case, campaign: Campaign) -> Path:
         """Return the cell file of a case beside its plan; presets share a plan."""
-        key = case.kind, campaign.name
-        folder = self.folder / " ".join(key)
-        if key not in self._plans:
-            init(folder, kind=case.kind)
+        folder = self.folder / f"{case.kind} {campaign.cell}"
+        if not (folder / "plan" / "plan.json").is_file():
+            init(folder, kind=case.kind, force=True)
             cell = folder / "cell.yaml"
             text = cell.read_text(encoding="utf-8")
             for name, value in campaign.search.items():
                 text = re.sub(rf"(?m)^  (# )?{name}: \S+", f"  {name}: {value}", text)
+            if campaign.conditioned:
+                text = re.sub(r"(?m)^# procedure:.*$", _CONDITIONING, text)
             cell.write_text(text, encoding="utf-8")
             plan(cell, out=folder / "plan", compare="none")
-            self._plans[key] = folder
         text = (folder / "cell.yaml").read_text(encoding="utf-8")
         cell = folder / f"{case.preset}.yaml"
         cell.write_text(text.replace("preset: typical", f"preset: {case.preset}"), encoding="utf-8")
@@ -268,6 +288,15 @@ def _load(path: Path, robot: Robot) -> SensorLoad | None:
         return read_sensor_load(path, robot)
     except CompensationError:
         return None
+
+
+def _landed(model: _Model, courses: Sequence[Course]) -> _Model:
+    """Return a model with the longest time of its courses' landings."""
+    landing = None if model.trial is None else model.trial.landing
+    if landing is None:
+        return model
+    longest = max(landing.seconds(course) for course in courses)
+    return replace(model, landing_seconds=round(longest, 1))
 
 
 def _left_out(result: CalibrateResult) -> Deviation:
@@ -295,18 +324,17 @@ def _rounded(length: float) -> float:
     return round(length, 8)
 
 
-def measure(seeds: int, kinds: list[str], anew: bool) -> None:
-    """Measure what is not yet written down, or all of it."""
+def measure(seeds: int, kinds: list[str], anew: bool, keep: Path | None) -> None:
+    """Measure what is not yet written down, or all of it; a folder keeps plans and runs."""
     figures = [each for each in quoted() if not (anew and each.case.kind in kinds)]
     done = {(each.case, each.campaign) for each in figures}
     with tempfile.TemporaryDirectory() as folder:
-        measurement = Measurement(Path(folder))
+        measurement = Measurement(keep or Path(folder))
         for case, campaigns in all_turns():
             missing = tuple(each for each in campaigns if (case, each.name) not in done)
             if not missing or case.kind not in kinds or case.seed > seeds:
                 continue
-            loads = _LOADS if missing[0] in (TEMPLATE, TOUCHED) else _LOADS[:1]
-            figures += measurement.of(case, missing, loads)
+            figures += measurement.of(case, missing)
             write(figures)
             renew_readme()
             sys.stdout.write(f"{case}\n")
@@ -318,5 +346,6 @@ if __name__ == "__main__":
     parser.add_argument("--anew", action="store_true", help="measure also what is written down")
     parser.add_argument("--seeds", type=int, default=len(SEEDS), help="how many seeds")
     parser.add_argument("--kinds", nargs="*", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--keep", type=Path, help="folder for plans and runs; default: none")
     given = parser.parse_args()
-    measure(given.seeds, given.kinds, given.anew)
+    measure(given.seeds, given.kinds, given.anew, given.keep)

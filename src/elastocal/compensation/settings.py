@@ -42,6 +42,8 @@ _SCHEMA = "elastocal.compensator/1"
 
 _LARGEST_CORRECTION = 0.05
 """In m: no arm in use deflects by more."""
+_LARGEST_OFFSET = 2e-3
+"""In m: more than an arm grows in a shift, as `growth` has it."""
 _LARGEST_RATE = 1.0
 """In m/s."""
 _LONGEST_HOLD = 1.0
@@ -61,6 +63,9 @@ class CorrectionLimits(StrictModel):
     """Speed at which it changes, in m/s."""
     fade: Speed = 0.005
     """Speed at which it goes to zero when readings fail, in m/s; at most `rate`."""
+    offset: Annotated[PositiveLength, Field(le=_LARGEST_OFFSET)] = 1e-3
+    """Largest offset of a course that a reading in light contact may ask for, in m; a larger one is
+    not taken."""
 
     @model_validator(mode="after")
     def _fades_within_the_rate(self) -> "CorrectionLimits":

@@ -18,6 +18,7 @@ from elastocal.cell import (
     CorrectedArm,
     CycleStatistics,
     DeviceSet,
+    Metrology,
     PathDriver,
     PathLimits,
     RigContext,
@@ -26,7 +27,9 @@ from elastocal.cell import (
 )
 from elastocal.compensation.online import (
     Compensator,
+    CourseWatch,
     Design,
+    LightContact,
     LiveCounts,
     LiveCycle,
     LiveLog,
@@ -34,10 +37,11 @@ from elastocal.compensation.online import (
     LivePhase,
     Status,
     Tare,
+    TaughtCourses,
     every_sample,
     newest_sample,
 )
-from elastocal.errors import CompensationError, DeviceError, present
+from elastocal.errors import CompensationError, DeviceError, ElastocalError, present
 from elastocal.identification import CalibratedModel
 from elastocal.units import in_unit, quantity
 from elastocal.workflows._operator_and_devices import ReservedRig, Rig
@@ -117,6 +121,8 @@ class Prepared:
     tares: bool
     """Whether the sensor's bias is taken at the beginning."""
     notes: tuple[str, ...]
+    taught: TaughtCourses | None = None
+    """Where courses begin, and what the marker showed there; None: their offsets are not read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,6 +219,9 @@ class LiveSession:
         self._log: LiveLog | None = None
         self._rows: list[LiveCycle] = []
         self._stride = self._looks = 0
+        self._tracker: Metrology | None = None
+        self._courses: CourseWatch | None = None
+        self._missed_courses: list[str] = []
 
     def run(self, log: Path | None, started: str = "") -> LiveEnd:
         """Correct until it ends; the devices are closed whatever happens.
@@ -235,6 +244,8 @@ class LiveSession:
                 self._log = LiveLog(log, ready.cell.robot.joint_names, self._facts(started))
                 self._log.start()
                 opened.callback(self._log.close)
+            if ready.taught is not None:
+                opened.callback(self._watch_courses(ready.taught, context))
             tare, loop = self._loop(sensor)
             opened.enter_context(quiet_interpreter())
             arm = ready.driver.correct_path(
@@ -283,6 +294,18 @@ class LiveSession:
             self._begin,
         )
 
+    def _watch_courses(self, taught: TaughtCourses, context: RigContext) -> Callable[[], None]:
+        """Connect the tracker that sees courses begin; return how it is closed."""
+        cell = self._ready.cell
+        own = cell.file.procedure
+        with threads_first():
+            found = self._rig.connect_tracker(context)
+        self._tracker = present(found.metrology, "metrology")
+        self._tracker.look(taught.station)
+        contact = LightContact(own.contact_force, own.dwell, own.average, own.marker_sigma)
+        self._courses = CourseWatch(cell.robot, taught, contact)
+        return found.close
+
     def _begin(self) -> None:
         self._scheduling = ask_priority()
 
@@ -325,6 +348,7 @@ class LiveSession:
                 return "interrupted"
             arm.require()
             self._remember(loop)
+            self._look_at_courses(loop)
             if now >= shown:
                 self._tell(self._report(arm, loop, now - begun))
                 shown += _REPORT
@@ -360,6 +384,24 @@ class LiveSession:
         if len(self._rows) > _MOST_ROWS:
             self._rows, self._stride = self._rows[::2], self._stride + 1
 
+    def _look_at_courses(self, loop: LiveLoop) -> None:
+        """Tell the loop where a course begins or ends; nothing here may end the correction."""
+        cycle, courses = loop.last, self._courses
+        if courses is None or cycle is None or loop.phase is not LivePhase.CORRECTING:
+            return
+        try:
+            points = present(self._tracker, "tracker").read()
+        except (ElastocalError, OSError):
+            points = None
+        deviation = courses.see(cycle, points)
+        if deviation is not None:
+            loop.begin_course(deviation)
+        elif courses.refusal:
+            self._missed_courses.append(courses.refusal)
+            courses.refusal = ""
+        if courses.is_free(cycle):
+            loop.end_course()
+
     def _found(self, tare: Tare | None) -> Iterator[str]:
         """Yield what has come to light meanwhile."""
         if tare is not None and tare.bias is None:
@@ -367,6 +409,11 @@ class LiveSession:
             yield f"nothing was corrected: the sensor's bias was never quiet{scatter}"
         if self._log is not None and self._log.failure:
             yield f"the log ends early: {self._log.failure}"
+        if self._missed_courses:
+            yield (
+                f"{len(self._missed_courses)} courses kept the offset before them:"
+                f" {self._missed_courses[-1]}"
+            )
         robot, rows = self._ready.calibrated.model.robot, self._rows
         loads = np.array([row.wrench for row in rows]).reshape(-1, 6)
         loaded = np.linalg.norm(loads[:, :3], axis=1) > _LOADED

@@ -230,6 +230,23 @@ class ReservedRig:
             )
         return found
 
+    def connect_tracker(self, context: RigContext) -> DeviceSet:
+        """Return the tracker alone; the caller closes it.
+
+        Raises
+        ------
+        DeviceError
+            If it cannot be used.
+        """
+        name = self.rig.cell.file.devices.metrology.driver
+        found = self.rig.drivers[name].connect(
+            self.rig.cell, {"metrology": self.rig.wanted[name]["metrology"]}, context
+        )
+        if found.metrology is None:
+            found.close()
+            raise DeviceError(f"{self.rig.cell.path}: devices.metrology: driver {name!r} made none")
+        return found
+
     def _only(self, kind: str, made: Sequence[DeviceSet]) -> Any:
         (device,) = (
             getattr(each, kind)

@@ -1,6 +1,6 @@
 """``live``: a programmed path corrected while it is run: wrench in, correction out, each cycle."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from os import PathLike
@@ -12,12 +12,12 @@ import numpy as np
 from elastocal.cell import Arming, Cell, CycleStatistics, PathLimits, load_cell
 from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
-from elastocal.compensation.online import LiveCounts, design
+from elastocal.compensation.online import LiveCounts, TaughtCourses, design
 from elastocal.errors import CompensationError, DeviceError
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel
 from elastocal.options import Option
-from elastocal.procedure.derive import sensor_load
+from elastocal.procedure.derive import read_taught_markers, sensor_load
 from elastocal.progress import Progress
 from elastocal.records import record, validate, write_json
 from elastocal.results import Result
@@ -65,6 +65,10 @@ class LiveSettings(NewTool, TouchedArm):
     tool: Path | None = None
     """Tool file of `tool`; none: the tool of the cell file, and the bias that the sensor has at
     the beginning, when the tool must be free."""
+    course_offset: Annotated[tuple[Path, ...], Option("--course-offset", metavar="RUN")] = ()
+    """Runs that say how the tracker stands; cold touches (`run --touch cold`) also teach where
+    courses begin. The tracker is read in light contact at the start of each course, after a press,
+    and what it shows beyond what was taught there and is predicted is corrected over it."""
     force: bool = False
     """Replace files in the folder."""
     report: Callable[[LiveReport], None] = lambda _report: None
@@ -130,10 +134,21 @@ class LiveResult(Result):
                 f"{loop.limited} cycles by the limit, {loop.rate_limited} by the rate,"
                 f" {self.line.saturated} at the arm; sensor {loop.saturated}",
             ),
+            *self._courses(),
             ("scheduling", self.scheduling),
             ("log", f"{self.logged} cycles, {self.dropped} dropped"),
             *(("note", text) for text in self.notes),
         )
+
+    def _courses(self) -> Iterator[tuple[str, str]]:
+        loop = self.loop
+        if loop.courses or loop.offsets_refused:
+            largest = quantity(loop.largest_offset, "mm", ".3f")
+            yield (
+                "courses",
+                f"{loop.courses} with an offset of their own, at most {largest};"
+                f" {loop.offsets_refused} offsets refused",
+            )
 
 
 @workflow(LiveSettings)
@@ -172,7 +187,8 @@ def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG
             " --arm when somebody has looked at the cell"
         )
     started = datetime.now(UTC).isoformat(timespec="seconds")
-    with ready.rig.reserved("live", ("arm", "sensor")) as rig:
+    kinds = ("arm", "sensor") if ready.taught is None else ("arm", "sensor", "metrology")
+    with ready.rig.reserved("live", kinds) as rig:
         session = LiveSession(
             ready, rig, Arming.of(ready.cell), settings.report, settings.interrupted
         )
@@ -227,6 +243,23 @@ def _prepare(settings: LiveSettings) -> Prepared:
             *_notes(settings, cell, calibrated),
             *growth_notes(state),
         ),
+        taught=_taught(settings, cell),
+    )
+
+
+def _taught(settings: LiveSettings, cell: Cell) -> TaughtCourses | None:
+    """Return what was read where courses begin; None: their offsets are not read."""
+    if not settings.course_offset:
+        return None
+    found = read_taught_markers(settings.course_offset)
+    require_same_robot(found.robot, cell.robot, (str(settings.course_offset[0]), cell.name))
+    if found.station not in (names := [each.name for each in cell.file.trackers]):
+        raise CompensationError(
+            f"{settings.course_offset[0]}: measured by station {found.station}; {cell.path} has"
+            f" {', '.join(names) or 'none'}"
+        )
+    return TaughtCourses(
+        found.place, found.offset, found.T_base_tracker, found.station, found.lever
     )
 
 

@@ -5,7 +5,7 @@ effects of the truth off, one after the other. Beside ``study`` this is the only
 brings simulator and estimator together.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
@@ -63,6 +63,8 @@ class ProcessTrial:
     seed: int
     state: ArmGrowth | None = None
     """Growth of the arm; None: it was not measured by touches."""
+    landing: process.Landing | None = None
+    """How a course begins, where its offset is read; None: it is not read."""
     controller: process.Controller = field(default_factory=process.Controller)
     jobs: int | None = None
     """Processes; by default all cores."""
@@ -169,7 +171,8 @@ def run_loads(
     Parameters
     ----------
     trials : sequence of ProcessTrial
-        Of one cell, seed and controller, with settings that sample alike; their models differ.
+        Of one cell, seed, controller and landing, with settings that sample alike; their models
+        differ.
     courses : tuple of Course
         The process.
     loads : sequence of float
@@ -294,7 +297,8 @@ def _run_side_by_side(
         )
         air = airs[course.name]
         passages += [process.Passage(course, air, each) for each in (None, *correctors)]
-    runs, count = process.run_courses(truth, robot, passages, first.clocked), 1 + len(trials)
+    runs = process.run_courses(truth, robot, passages, first.clocked, first.landing)
+    count = 1 + len(trials)
     return [runs[n * count :][:count] for n in range(len(courses))]
 
 
@@ -378,6 +382,9 @@ class SimulateProcessSettings(NewTool):
     """Tool files; as ``models``. None: the cell's tool, and a sensor zeroed in the air."""
     arm_states: Annotated[tuple[Path, ...], Option("--arm-state", metavar="STATE.json")] = ()
     """States of the arm by `touch`; as ``models``. None: the arm counts as when it was cold."""
+    course_offset: bool = False
+    """Land, press and read marker and controller in light contact where each course begins: what
+    they show beyond the prediction is corrected over the course."""
     posture: Annotated[str, Option(choices="posture", default="programmed")] = PROGRAMMED
     """``programmed``, or ``stiffest``: the tool turned about its axis as the first model says."""
     seeds: Annotated[tuple[int, ...], Option("--seed", least=0)] = (0,)
@@ -567,10 +574,29 @@ class _SeedRuns:
             process_stiffness=simulation.contact.process_stiffness,
             notes=(
                 *_notes(settings, self.programmed, len(self.runs), covered),
+                *self._landing_note(),
                 *(doubt.warnings if doubt else ()),
             ),
             coverage=covered,
+            landing_seconds=self._landing_seconds(),
         )
+
+    def _landing_note(self) -> Iterator[str]:
+        seconds = self._landing_seconds()
+        if seconds is not None:
+            yield phrase(
+                "each corrected course begins with a press and a reading in light contact, which"
+                " takes up to {seconds} s: its offset is corrected, as far as"
+                " limits.offset allows",
+                seconds=f"{seconds:.1f}",
+            )
+
+    def _landing_seconds(self) -> float | None:
+        """Return the longest time of a course's landing, in s; None: courses begin at once."""
+        landing = self.trials[0].landing
+        if landing is None:
+            return None
+        return max(landing.seconds(course) for course in self.programmed)
 
     def _posture_gain(self) -> process.PostureGain | None:
         found, plain = self.stiffest, self.unturned
@@ -706,6 +732,7 @@ def _trial(
     require_same_robot(robot, cell.robot, (run.model, cell.name))
     load = read_sensor_load(Path(run.tool) if run.tool else None, robot)
     state = None if run.arm_state is None else read_arm_growth(Path(run.arm_state), robot)
+    landing = process.Landing.of(cell) if settings.course_offset else None
     return ProcessTrial(
-        cell, calibrated, load, compensator, run.seed, state=state, jobs=settings.jobs
+        *(cell, calibrated, load, compensator, run.seed, state, landing), jobs=settings.jobs
     )

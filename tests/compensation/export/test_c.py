@@ -191,15 +191,19 @@ def test_steps_are_those_of_python_and_clean_under_the_sanitizers(
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
 
 
+def grown_arm(robot):
+    """Return a state of an arm that has grown by a fifth of a millimetre a metre."""
+    date = "2026-11-02T06:00:00+00:00"
+    return ArmGrowth(
+        *("cell", RobotRecord.of(robot), date, date, 160.0, 0.2e-3, (1e-4, -2e-4, 3e-4), 1e-6),
+        *((1e-5,) * 3, (), 2e-5, 1e-4, 3e-5, 2e-5),
+    )
+
+
 @pytest.mark.parametrize("name", ["hinges", "gears"])
 def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
     model = geared() if name == "gears" else compensated.arm("on a rail")
-    robot = RobotRecord.of(model.model.robot)
-    date = "2026-11-02T06:00:00+00:00"
-    state = ArmGrowth(
-        *("cell", robot, date, date, 160.0, 0.2e-3, (1e-4, -2e-4, 3e-4), 1e-6, (1e-5,) * 3),
-        *((), 2e-5, 1e-4, 3e-5, 2e-5),
-    )
+    state = grown_arm(model.model.robot)
     numbers = design(model, compensated.settings(), compensated.load(), state)
     executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
     assert executable.selftest() == 0
@@ -243,12 +247,57 @@ def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, paylo
     np.testing.assert_allclose(executable.numbers("arm", q), expected, rtol=0.0, atol=1e-12)
 
 
+def beginnings(rng, deflection, limit):
+    """Return what comes before readings: courses that begin and end, with sound and bad offsets."""
+    rows = np.zeros((len(deflection), 4))
+    begins = rng.random(len(rows)) < 0.05
+    rows[begins, 0] = 1.0
+    rows[1:, 1:] = deflection[:-1] + rng.normal(0.0, 0.6 * limit, (len(rows) - 1, 3))
+    rows[rng.random(len(rows)) < 0.005, 0] = 2.0
+    for bad in (np.nan, np.inf, -np.inf, 1e308):
+        rows[rng.choice(np.flatnonzero(begins), 3), rng.integers(1, 4, 3)] = bad
+    return rows
+
+
+@pytest.mark.parametrize("name", ["hinges", "gears, grown"])
+def test_offsets_of_courses_are_those_of_python(tmp_path, name):
+    model = compensated.arm("on a rail") if name == "hinges" else geared()
+    state = None if name == "hinges" else grown_arm(model.model.robot)
+    limits = {"correction": "3 mm", "rate": "30 mm/s", "fade": "5 mm/s", "offset": "1.5 mm"}
+    numbers = design(model, compensated.settings(limits=limits), compensated.load(), state)
+    executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
+    assert executable.selftest() == 0
+    rng, n = np.random.default_rng(8), numbers.joints
+    rows = course(rng, n)
+    deflection = executable.numbers("steps", rows)[:, 3:6]
+    rows = np.hstack([rows, beginnings(rng, deflection, numbers.settings.limits.offset)])
+    found = executable.numbers("courses", rows)
+    assert np.linalg.norm(found[:, :3], axis=1).max() <= 3e-3 * (1.0 + 1e-12)
+    moves = np.linalg.norm(np.diff(found[:, :3], axis=0, prepend=0.0), axis=1)
+    assert moves.max() <= numbers.largest_step * (1.0 + 1e-12)
+    compensator, taken = Compensator(numbers), 0
+    step = compensator.start()
+    for row, got in zip(rows.tolist(), found, strict=True):
+        q, begins = row[1 : n + 1], row[n + 8]
+        if begins == 1.0:
+            step = compensator.begin_course(step, q, row[n + 9 :])
+            assert step.refused == got[4]
+            taken += not step.refused
+        elif begins == 2.0:
+            step = compensator.end_course(step)
+        reading = Reading(row[0], q, row[n + 1 : n + 4], row[n + 4 : n + 7], row[n + 7])
+        step, told = compensator.step(step, reading)
+        np.testing.assert_allclose(got[:4], [*told.correction, told.status], rtol=1e-12, atol=1e-15)
+    assert taken >= 20
+    assert (found[:, 4] > 0.0).sum() >= 20
+
+
 def test_every_way_of_the_step_is_taken_by_that_course(tmp_path):
     numbers = design(compensated.arm("on a rail"), compensated.settings(), compensated.load())
     executable = build(written(tmp_path, numbers), "-O2")
     rows = course(np.random.default_rng(3), numbers.joints)
     seen = np.bitwise_or.reduce(executable.numbers("steps", rows)[:, 7].astype(int))
-    assert seen & ~32 == 1023 & ~32
+    assert seen & ~32 == 1023 & ~32  # the last flag is of courses, which begin in another test
 
 
 @pytest.fixture(scope="module")
@@ -318,6 +367,10 @@ class TestSelfTest:
             ("state->correction[i] *= share", "state->correction[i] *= 0.5", 3),
             ("state->z1[s][i] *= share", "state->z1[s][i] *= 1.0", 3),
             ("state->missed += 1", "state->missed += 2", 3),
+            ("deflection[i] + offset[i]", "deflection[i]", 3),
+            ("o[i] = deviation[i] - o[i]", "o[i] = deviation[i]", 3),
+            ("<= LARGEST_OFFSET)", "<= (2.0 * LARGEST_OFFSET))", 3),
+            ("state->offset[i] = 0.0;\n    }\n    state->refused", "}\n    state->refused", 3),
             ("1000.0 * correction[i]", "1001.0 * correction[i]", 3),
             ("if (is_number(value) == 0) {", "if (0) {", 3),
             ("if (is_number(&reading->time) != 0) {\n        state", "if (1) {\n        state", 3),

@@ -287,3 +287,65 @@ class TestAfterAGap:
         after, told = fed(compensator, state, pushed()._replace(ok=False), 5)
         assert told[-1].status & Status.HELD
         assert (after.wrench, after.memory) == (state.wrench, state.memory)
+
+
+class TestCourses:
+    LIGHT = ((0.0, 0.0, -60.0), (0.0, 0.0, 0.0))
+    SHOWN = np.array([2e-4, -1e-4, 3e-4])
+
+    def begun(self, shown=SHOWN, **changes):
+        """Return a compensator, and its state in light contact before and after a beginning."""
+        compensator = plain(**changes)
+        state, told = fed(compensator, compensator.start(), pushed(*self.LIGHT), 100)
+        begun = compensator.begin_course(state, Q, told[-1].deflection + np.array(shown))
+        return compensator, state, begun
+
+    def test_what_the_marker_shows_beyond_the_deflection_is_corrected_over_the_course(self):
+        compensator, _, state = self.begun()
+        plain_state, _ = fed(compensator, compensator.start(), pushed(*self.LIGHT), 100)
+        _, without = fed(compensator, plain_state, pushed(), 200)
+        _, told = fed(compensator, state, pushed(), 200)
+        moved = np.subtract(told[-1].correction, without[-1].correction)
+        np.testing.assert_allclose(moved, -self.SHOWN, atol=1e-15)
+        assert told[-1].deflection == without[-1].deflection
+        _, gone = fed(compensator, compensator.end_course(state), pushed(), 200)
+        np.testing.assert_allclose(gone[-1].correction, without[-1].correction, atol=1e-15)
+
+    def test_it_goes_in_at_the_rate_and_the_limit_holds_for_the_sum(self):
+        limits = {"correction": "0.25 mm", "rate": "10 mm/s", "fade": "5 mm/s"}
+        compensator, before, state = self.begun(limits=limits)
+        _, told = fed(compensator, state, pushed(*self.LIGHT), 40)
+        way = np.array([before.correction, *(each.correction for each in told)])
+        assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() <= 1e-5 * 10 * CYCLE * 1e3
+        assert np.linalg.norm(way, axis=1).max() <= 0.25e-3 * (1.0 + 1e-12)
+        assert told[-1].status & Status.LIMITED
+
+    @pytest.mark.parametrize(
+        "shown", [(np.nan, 0.0, 0.0), (0.0, np.inf, 0.0), (1.1e-3, 0.0, 0.0), (1e308, 1e308, 0.0)]
+    )
+    def test_what_is_no_offset_is_refused_and_the_one_before_stays(self, shown):
+        compensator, _, state = self.begun()
+        refused = compensator.begin_course(state, Q, shown)
+        assert refused.offset == state.offset
+        _, told = fed(compensator, refused, pushed(), 5)
+        assert told[-1].status & Status.OFFSET
+        assert compensator.begin_course(refused, Q, self.SHOWN).refused == 0
+
+    @pytest.mark.parametrize("fault", [{"ok": False}, {"force": (np.nan, 0.0, 0.0)}])
+    def test_without_a_wrench_nothing_is_known_of_an_offset(self, fault):
+        compensator, state, _ = self.begun()
+        bad = pushed(*self.LIGHT)._replace(time=state.time + CYCLE, **fault)
+        state, _ = compensator.step(state, bad)
+        begun = compensator.begin_course(state, Q, self.SHOWN)
+        assert begun.refused == Status.OFFSET
+        assert begun.offset == (0.0, 0.0, 0.0)
+
+    def test_nothing_begins_before_the_first_reading(self):
+        compensator = plain()
+        assert compensator.begin_course(compensator.start(), Q, self.SHOWN).refused
+
+    def test_it_fades_with_the_correction_when_readings_fail(self):
+        compensator, _, state = self.begun()
+        state, _ = fed(compensator, state, pushed(*self.LIGHT), 50)
+        state, told = fed(compensator, state, pushed(*self.LIGHT)._replace(ok=False), 600)
+        assert told[-1].correction == (0.0, 0.0, 0.0)

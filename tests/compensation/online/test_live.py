@@ -276,3 +276,47 @@ def test_a_full_disk_ends_the_log_and_not_the_loop(tmp_path):
     log.close()
     assert log.failure == "No space left on device"
     assert log.dropped == 1
+
+
+def test_the_offset_of_a_course_comes_and_goes_at_the_rate():
+    bench = started()
+    before = np.array(bench.run(0.1)[-1])
+    shown = np.array([2e-4, 0.0, -1e-4])
+    bench.loop.begin_course(tuple(np.array(bench.cycles[-1].deflection) + shown))
+    begun = bench.run(0.5)
+    np.testing.assert_allclose(begun[-1] - before, -1e3 * shown, atol=1e-6)
+    largest = 1e3 * bench.settings.limits.rate * CYCLE * (1.0 + 1e-9)
+    assert steps(begun).max() <= largest
+    bench.loop.end_course()
+    ended = bench.run(0.5)
+    np.testing.assert_allclose(ended[-1], before, atol=1e-6)
+    assert steps(ended).max() <= largest
+    counts = bench.loop.counts()
+    assert (counts.courses, counts.offsets_refused) == (1, 0)
+    assert counts.largest_offset == pytest.approx(np.linalg.norm(shown))
+
+
+def test_an_offset_that_is_none_or_comes_without_a_wrench_is_refused_and_counted():
+    bench = started()
+    before = bench.run(0.1)[-1]
+    for deviation in ((np.nan, 0.0, 0.0), (5e-3, 0.0, 0.0)):
+        bench.loop.begin_course(deviation)
+        np.testing.assert_allclose(bench.run(0.2)[-1], before, atol=1e-9)
+    assert bench.cycles[-1].status & Status.OFFSET
+    bench.streams = False
+    bench.run(0.02)
+    bench.loop.begin_course((1e-4, 0.0, 0.0))
+    bench.run(0.02)
+    assert bench.loop.counts().offsets_refused == 3
+    assert bench.loop.counts().courses == 0
+
+
+def test_a_program_that_begins_anew_has_no_offset():
+    bench = started()
+    shown = np.array([2e-4, 0.0, 0.0])
+    bench.loop.begin_course(tuple(np.array(bench.cycles[-1].deflection) + shown))
+    bench.run(0.5)
+    bench.loop.begin_course((1e-4, 0.0, 0.0))
+    bench.step(begins=True)
+    expected = started()
+    np.testing.assert_allclose(bench.run(1.0)[-1], expected.run(0.1)[-1], atol=1e-6)

@@ -21,8 +21,10 @@ advance = strategies.one_of(
 reading = strategies.tuples(
     advance, strategies.tuples(*[joint] * 6), triple, triple, strategies.booleans()
 )
+shown = strategies.floats(-1e-3, 1e-3)
+deviation = strategies.one_of(strategies.none(), strategies.tuples(shown, shown, shown), triple)
 course = strategies.lists(
-    strategies.tuples(reading, strategies.integers(1, 15)), min_size=1, max_size=12
+    strategies.tuples(reading, strategies.integers(1, 15), deviation), min_size=1, max_size=12
 )
 
 
@@ -33,7 +35,10 @@ def test_the_correction_never_exceeds_its_limit_nor_jumps(frame, course):
     chosen = compensated.settings(frame=frame)
     compensator = Compensator.of(compensated.arm(), chosen, compensated.load())
     state, time, before = compensator.start(), 0.0, (0.0, 0.0, 0.0)
-    for (dt, q, force, moment, ok), times in course:
+    for (dt, q, force, moment, ok), times, shown in course:
+        if shown is not None:
+            state = compensator.begin_course(state, q, shown)
+            assert np.linalg.norm(state.offset) <= chosen.limits.offset * SLACK
         for _ in range(times):
             time += dt
             state, told = compensator.step(state, Reading(time, q, force, moment, ok))
@@ -51,7 +56,7 @@ def test_the_correction_never_exceeds_its_limit_nor_jumps(frame, course):
 def test_whatever_came_before_good_readings_are_corrected_again(course):
     compensator = Compensator.of(compensated.arm(), compensated.settings())
     state, time = compensator.start(), 0.0
-    for (dt, q, force, moment, ok), _ in course:
+    for (dt, q, force, moment, ok), *_ in course:
         state, _ = compensator.step(state, Reading(time + dt, q, force, moment, ok))
     good = Reading(0.0, [0.1, -0.8, 1.2, 0.3, 0.6, 0.2], (100.0, 0.0, -800.0), (0.0, 5.0, 0.0))
     for k in range(250):

@@ -8,6 +8,7 @@ import pytest
 from elastocal.compensation.process import (
     Controller,
     Course,
+    Landing,
     Passage,
     PerfectCorrector,
     air_shifts,
@@ -43,11 +44,33 @@ class Spring:
 
     def press(self, q, force, path_base=None, outward_base=None):  # noqa: ARG002
         self.joints.append(q[0])
+        self.pressed = force
         felt = np.concatenate([force, np.zeros_like(force)], axis=-1)
         return Pressed(self.free_shift(q) + COMPLIANCE * force, felt + 5.0, felt)
 
     def read(self, since, wrench):  # noqa: ARG002
         return wrench
+
+    def taught(self, q, time, visits):  # noqa: ARG002
+        return np.broadcast_to([0.0, 0.0, 1e-4], (len(q), 3))
+
+    def marker(self, time):  # noqa: ARG002
+        return np.array([[0.0, 3e-4, 1e-4]] * len(self.pressed)) + COMPLIANCE * self.pressed
+
+
+class Landed(PerfectCorrector):
+    """Corrects the offset of its course alone, and keeps what it was told of it."""
+
+    def start(self) -> None:
+        super().start()
+        self.offset, self.force = np.zeros(3), []
+
+    def correct(self, cycle):
+        self.force.append(cycle.raw[-1, 0] - 5.0)
+        return -self.offset
+
+    def begin_course(self, q, deviation):  # noqa: ARG002
+        self.offset = deviation
 
 
 class Listener(PerfectCorrector):
@@ -126,6 +149,29 @@ def test_courses_side_by_side_are_run_as_each_alone():
         assert len(alone.time) == 10 * (len(passage.course.q) - 1)
         np.testing.assert_allclose(each.shift, alone.shift, rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(each.deviation, alone.deviation, rtol=0.0, atol=1e-12)
+
+
+def test_a_landing_presses_and_reads_what_the_marker_shows_in_light_contact():
+    cell, corrector = Spring(), Landed(0)
+    made = [course(np.full(30, force)) for force in (100.0, 40.0)]
+    made = [replace(each, normal=each.direction) for each in made]
+    landing = Landing(light=20.0, ramp=500.0, settle=0.1, average=0.2)
+    correctors = corrector, Landed(0)
+    passages = [
+        Passage(each, air_shifts(cell, each), one)
+        for each, one in zip((made[0], *made), (None, *correctors), strict=True)
+    ]
+    bare, first, second = run_courses(cell, robot(), passages, PROMPT, landing)
+    assert landing.seconds(made[0]) == pytest.approx(0.2 + 0.16 + 0.3)
+    forces = np.array(corrector.force)
+    assert forces.max() == pytest.approx(100.0)
+    assert forces[110:160] == pytest.approx(20.0)
+    # What the reference shows along z goes; the 20 N of the light contact are in the reading.
+    for each in correctors:
+        np.testing.assert_allclose(each.offset, [20e-6, 3e-4, 0.0], atol=1e-12)
+    np.testing.assert_allclose(bare.shift[-1], [100e-6, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(first.shift[-1], [80e-6, -3e-4, 0.0], atol=1e-12)
+    np.testing.assert_allclose(second.shift[-1], [20e-6, -3e-4, 0.0], atol=1e-12)
 
 
 def test_courses_at_other_steps_of_time_cannot_go_side_by_side():

@@ -213,6 +213,7 @@ def _compensation(numbers: Design) -> list[Constant]:
         _one("DEADBAND", settings.deadband, "m"),
         _one("DEADBAND_SLOPE", numbers.deadband_slope, "1/m"),
         _one("LARGEST_CORRECTION", settings.limits.correction, "m"),
+        _one("LARGEST_OFFSET", settings.limits.offset, "of a course, m"),
         _one("LARGEST_STEP", numbers.largest_step, "m in a cycle"),
         _one("FADE_STEP", numbers.fade_step, "m in a cycle"),
         _one("UNCERTAIN_ABOVE", settings.uncertain_above, "m"),

@@ -11,6 +11,7 @@ import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -219,6 +220,7 @@ def _readme_values(numbers: Design) -> dict[str, str]:
         "CYCLE_MS": f"{1e3 * settings.cycle:g}",
         "SAMPLE_MS": f"{1e3 * numbers.filters.sample:g}",
         "LARGEST_MM": f"{1e3 * limits.correction:g}",
+        "OFFSET_MM": f"{1e3 * limits.offset:g}",
         "RATE_MM": f"{1e3 * limits.rate:g}",
         "FADE_MM": f"{1e3 * limits.fade:g}",
         "HOLD_MS": f"{1e3 * settings.hold:g}",
@@ -375,13 +377,30 @@ class _LoadCase(NamedTuple):
     half_width: float
 
 
-@dataclass(frozen=True)
-class _Episode:
-    """A reading that comes some times in a row, with the last correction."""
+class _Course(Enum):
+    """What happens to the offset of the course before a reading; the C has the same numbers."""
+
+    GOES_ON = 0
+    BEGINS = 1
+    ENDS = 2
+
+
+class _Stretch(NamedTuple):
+    """A reading that comes some times in a row."""
 
     times: int
     reading: Reading
-    """Its time is added to the course's clock. One of its numbers at most is a NaN or infinite."""
+    """Its time is added to the course's clock. One of all numbers at most is a NaN or infinite."""
+    course: _Course = _Course.GOES_ON
+    deviation: tuple[float, ...] = (0.0, 0.0, 0.0)
+    """At the beginning of a course, beyond what is predicted before it has been played, in m."""
+
+
+@dataclass(frozen=True)
+class _Episode:
+    """A stretch with its last correction."""
+
+    stretch: _Stretch
     correction: tuple[float, ...]
     status: int
 
@@ -556,21 +575,37 @@ def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
     )
     arriving = min(_MOST_TIMES, int(2.0 * limits.correction / numbers.largest_step) + 60)
     course = [
-        *((times, reading) for reading in (first, middle) for times in (1, 2, 5)),
-        (arriving, large),
-        (settings.hold_cycles, middle._replace(ok=False)),
-        (3, middle._replace(force=[2.0 * x for x in settings.sensor.force])),
-        (1, large),
-        (1, middle._replace(time=-1e3)),
-        (2, middle),
-        (4, middle),
+        *(_Stretch(times, reading) for reading in (first, middle) for times in (1, 2, 5)),
+        _Stretch(arriving, large),
+        _Stretch(settings.hold_cycles, middle._replace(ok=False)),
+        _Stretch(3, middle._replace(force=[2.0 * x for x in settings.sensor.force])),
+        _Stretch(1, large),
+        _Stretch(1, middle._replace(time=-1e3)),
+        _Stretch(2, middle),
+        _Stretch(4, middle),
         *_without_numbers(middle),
+        *_courses(numbers, first),
         *_free_motion(numbers, (first, large)),
     ]
     return _played(Compensator(numbers, model), course)
 
 
-def _without_numbers(good: Reading) -> list[tuple[int, Reading]]:
+def _courses(numbers: Design, light: Reading) -> list[_Stretch]:
+    """Return courses whose offset is taken, refused for each reason, and gone."""
+    limit, still = numbers.settings.limits.offset, light._replace(ok=False)
+    part = [
+        (0.5 * limit, -0.3 * limit, 0.2 * limit),
+        (1.5 * limit, 0.0, 0.0),
+        (math.nan, 0.0, 0.0),
+        (0.0, 0.0, -math.inf),
+        (0.1 * limit, 0.2 * limit, -0.3 * limit),
+    ]
+    begun = [_Stretch(20, light, _Course.BEGINS, each) for each in part]
+    return [_Stretch(40, light), *begun, _Stretch(2, still), *begun[:1],
+            _Stretch(20, light, _Course.ENDS)]  # fmt: skip
+
+
+def _without_numbers(good: Reading) -> list[_Stretch]:
     """Return readings with a NaN or an infinity, each followed by one that is good."""
     course = []
     for bad in (math.nan, math.inf, -math.inf):
@@ -580,11 +615,11 @@ def _without_numbers(good: Reading) -> list[tuple[int, Reading]]:
             good._replace(force=[*good.force[:-1], bad]),
             good._replace(moment=[bad, *good.moment[1:]]),
         ):
-            course += [(1, spoilt), (2, good)]
+            course += [_Stretch(1, spoilt), _Stretch(2, good)]
     return course
 
 
-def _free_motion(numbers: Design, pressed: tuple[Reading, Reading]) -> list[tuple[int, Reading]]:
+def _free_motion(numbers: Design, pressed: tuple[Reading, Reading]) -> list[_Stretch]:
     """Return presses before, within and after a motion in the air."""
     if not numbers.light_loads:
         return []
@@ -593,16 +628,26 @@ def _free_motion(numbers: Design, pressed: tuple[Reading, Reading]) -> list[tupl
     raw = _raw(numbers, np.zeros(6), R)
     air = first._replace(force=raw[:3].tolist(), moment=raw[3:].tolist())
     free = min(_MOST_TIMES, numbers.settings.free_cycles + 60)
-    return [(3, first), (5, large), (5, first), (5, air), (5, first), (free, air), (5, first)]
+    way = (3, first), (5, large), (5, first), (5, air), (5, first), (free, air), (5, first)
+    return [_Stretch(*each) for each in way]
 
 
-def _played(compensator: Compensator, course: list[tuple[int, Reading]]) -> list[_Episode]:
+def _played(compensator: Compensator, course: list[_Stretch]) -> list[_Episode]:
     state, clock, played = compensator.start(), 0.0, []
-    for times, reading in course:
-        for _ in range(times):
+    robot, grows = compensator.design.calibrated.model.robot, compensator.design.state
+    for stretch in course:
+        reading = stretch.reading
+        if stretch.course is _Course.BEGINS:
+            grown = np.zeros(3) if grows is None else grows.shift(robot, reading.q)
+            known = np.array(state.deflection) + grown
+            stretch = stretch._replace(deviation=_floats(known + stretch.deviation))
+            state = compensator.begin_course(state, reading.q, stretch.deviation)
+        if stretch.course is _Course.ENDS:
+            state = compensator.end_course(state)
+        for _ in range(stretch.times):
             clock += compensator.design.filters.sample
             state, corrected = compensator.step(state, reading._replace(time=reading.time + clock))
-        played.append(_Episode(times, reading, corrected.correction, corrected.status))
+        played.append(_Episode(stretch, corrected.correction, corrected.status))
     return played
 
 
@@ -647,18 +692,20 @@ def _configurations(numbers: Design, rng: Generator, count: int) -> FloatArray:
 
 def _episode_row(episode: _Episode) -> str:
     """Return an episode as C: what is no number as its place in the reading, and its bits."""
-    reading = episode.reading
-    numbers = [reading.time, *reading.q, *reading.force, *reading.moment]
+    stretch, reading = episode.stretch, episode.stretch.reading
+    numbers = [reading.time, *reading.q, *reading.force, *reading.moment, *stretch.deviation]
     spoilt = [(place, x) for place, x in enumerate(numbers, start=1) if not math.isfinite(x)]
     place, bad = spoilt[0] if spoilt else (0, 0.0)
     (bits,) = struct.unpack("<Q", struct.pack("<d", bad))
-    time, q, force, moment = (
+    time, q, force, moment, deviation = (
         [x if math.isfinite(x) else 0.0 for x in part]
-        for part in ([reading.time], reading.q, reading.force, reading.moment)
+        for part in ([reading.time], reading.q, reading.force, reading.moment, stretch.deviation)
     )
     return _struct(
-        str(episode.times),
+        str(stretch.times),
         _struct(time[0], q, force, moment, str(int(reading.ok))),
+        str(stretch.course.value),
+        deviation,
         str(place),
         f"UINT64_C(0x{bits:016X})",
         episode.correction,

@@ -1,6 +1,11 @@
 from .compensator import (
     Compensator as Compensator,
 )
+from .courses import (
+    CourseWatch as CourseWatch,
+    LightContact as LightContact,
+    TaughtCourses as TaughtCourses,
+)
 from .design import (
     JOINT_RANGE as JOINT_RANGE,
     LONG_AGO as LONG_AGO,

@@ -166,6 +166,7 @@ class Compensator:
         self._deadband, self._slope = numbers.settings.deadband, numbers.deadband_slope
         self._gain, self._uncertain = numbers.settings.gain, numbers.settings.uncertain_above
         self._light, self._free = numbers.light_loads, numbers.settings.free_cycles
+        self._farthest = limits.offset
 
     @classmethod
     def of(
@@ -228,14 +229,14 @@ class Compensator:
             deflection, half_width, friction, unloaded = self._remembering(q, load, state)
         else:
             (deflection, half_width), friction, unloaded = self._predicted(q, load), (), self._free
-        off = deflection if self._growth is None else _sum(deflection, self._growth(q))
+        off = self._off(deflection, state.offset, q)
         target, status = self._target(off, rotation)
         if half_width > self._uncertain:
             status |= Status.UNCERTAIN.value
         # The rate limit is last, from the correction before: whatever the model, the deadband or
         # the end of a gap asks for, the arm moves no farther than a step.
         correction, late = _towards(state.correction, target, self._step)
-        status |= late | state.problem
+        status |= late | state.problem | state.refused
         answer = Correction(correction, deflection, half_width, status)
         return State(
             state.time,
@@ -248,7 +249,49 @@ class Compensator:
             half_width,
             friction,
             unloaded,
+            *state[12:],
         ), answer
+
+    def begin_course(self, state: State, q: Sequence[float], deviation: Sequence[float]) -> State:
+        """Take what marker and controller show in light contact at the start of a course.
+
+        The offset of the course is what they show beyond the predicted deflection and growth,
+
+            o = d - C(q) f - g(q),
+
+        and is corrected until the next course begins. The correction goes there at its rate, as
+        everywhere. A reading is not taken, and the offset stays what it was, where it or the
+        present wrench is not known, or where it asks for more than ``limits.offset``.
+
+        Parameters
+        ----------
+        state : State
+            In light contact, after a correction of the present load.
+        q : sequence of float
+            Joint positions, in rad or m.
+        deviation : sequence of float
+            Displacement of the marker less that of the controller since the path was taught, in
+            base, in m.
+        """
+        known = _are_joints(q) and not state.missed and not state.problem
+        if not known:
+            return state._replace(refused=Status.OFFSET.value)
+        px, py, pz = self._off(state.deflection, _ORIGIN, q)
+        x, y, z = deviation
+        x, y, z = x - px, y - py, z - pz
+        # A NaN fails the test.
+        if not math.sqrt(x * x + y * y + z * z) <= self._farthest:
+            return state._replace(refused=Status.OFFSET.value)
+        return state._replace(offset=(x, y, z), refused=0)
+
+    def end_course(self, state: State) -> State:
+        """Return the state without the offset of a course; the correction loses it at its rate."""
+        return state._replace(offset=_ORIGIN, refused=0)
+
+    def _off(self, deflection: Triple, offset: Triple, q: Sequence[float]) -> Triple:
+        """Return how far the tool is off: by the load, by the arm's growth, and in this course."""
+        known = _sum(deflection, offset)
+        return known if self._growth is None else _sum(known, self._growth(q))
 
     def _predicted(self, q: Sequence[float], load: _Load) -> tuple[Triple, float]:
         """Return the deflection in base, and half its 95 % interval where that is widest."""
@@ -321,7 +364,7 @@ class Compensator:
                 tuple([([*_scaled(a, share)], [*_scaled(b, share)]) for a, b in state.memory]),
                 _scaled(state.wrench, share),
             )
-        status = (Status.FADED if faded else Status.HELD).value | problem
+        status = (Status.FADED if faded else Status.HELD).value | problem | state.refused
         answer = Correction(correction, state.deflection, state.half_width, status)
         # The load while nothing was measured is not known, so friction is as unknown as at the
         # start.
@@ -335,6 +378,7 @@ class Compensator:
             correction,
             *state[8:11],
             unloaded,
+            *state[12:],
         ), answer
 
 
@@ -359,10 +403,9 @@ def _in_base(rotation: tuple[float, ...], wrench: tuple[float, ...]) -> _Load:
     )
 
 
-def _sum(deflection: Triple, growth: Sequence[float]) -> Triple:
-    """Return how far the tool is off: what the load bends, and what the arm has grown."""
-    (dx, dy, dz), (gx, gy, gz) = deflection, growth
-    return dx + gx, dy + gy, dz + gz
+def _sum(one: Triple, other: Sequence[float]) -> Triple:
+    (x, y, z), (u, v, w) = one, other
+    return x + u, y + v, z + w
 
 
 def _squares(rows: FloatArray) -> list[float]:

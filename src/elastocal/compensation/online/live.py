@@ -103,6 +103,12 @@ class LiveCounts:
     program begins."""
     largest_half_width: float
     """Half the widest 95 % interval of a predicted deflection, in m."""
+    courses: int = 0
+    """Number of courses whose offset was taken."""
+    offsets_refused: int = 0
+    """Number of readings of an offset that were not taken."""
+    largest_offset: float = 0.0
+    """In m."""
 
 
 _FLAGS = {
@@ -216,7 +222,10 @@ class LiveLoop:
         self._bias: tuple[float, ...] = (0.0,) * 6
         self._ending = False
         self._statuses: dict[int, int] = {}
-        self._restarts = 0
+        self._restarts = self._courses = self._not_taken = 0
+        self._largest_offset = 0.0
+        self._begins: Triple | None = None
+        self._ends = False
         self._longest = self._farthest = self._widest = 0.0
         self.phase = LivePhase.WAITING
         self.over = threading.Event()
@@ -230,6 +239,14 @@ class LiveLoop:
         """Fade out from now on; from any thread, any number of times."""
         self._ending = True
 
+    def begin_course(self, deviation: Triple) -> None:
+        """Take an offset in the next cycle, from any thread; see `Compensator.begin_course`."""
+        self._begins = deviation
+
+    def end_course(self) -> None:
+        """Let the offset of a course go from the next cycle on, from any thread."""
+        self._ends = True
+
     def correction(self, cycle: PathCycle) -> Shift | None:
         """Return the correction of a cycle; None once it has faded out."""
         if self.phase is LivePhase.WAITING and self._begin is not None:
@@ -237,6 +254,7 @@ class LiveLoop:
             self._begin = None
         if cycle.begins:
             self._state = self._compensator.start()
+            self._begins, self._ends = None, False
             self._restarts += 1
         if cycle.effect is not None:
             # Answers get lost: the ramp goes on from what the controller holds.
@@ -283,6 +301,8 @@ class LiveLoop:
         here = self._state.correction
         before = here if self.last is None or cycle.begins else self.last.correction
         self._state, answer = self._compensator.correct(self._state, cycle.q)
+        if self._ends or self._begins is not None:
+            self._take_course(cycle.q)
         correction, status = here if cycle.holds else answer.correction, answer.status
         self._statuses[status] = self._statuses.get(status, 0) + 1
         self._farthest = max(self._farthest, math.dist(before, correction))
@@ -301,6 +321,18 @@ class LiveLoop:
         if self._log is not None:
             self._log(self.last)
         return correction
+
+    def _take_course(self, q: Sequence[float]) -> None:
+        """Begin or end a course, as another thread has asked."""
+        begins, ends, self._begins, self._ends = self._begins, self._ends, None, False
+        if ends:
+            self._state = self._compensator.end_course(self._state)
+        if begins is None:
+            return
+        self._state = self._compensator.begin_course(self._state, q, begins)
+        self._courses += not self._state.refused
+        self._not_taken += bool(self._state.refused)
+        self._largest_offset = max(self._largest_offset, math.hypot(*self._state.offset))
 
     def _faded(self, cycle: PathCycle, sample: LiveSample | None) -> Triple:
         self.phase = LivePhase.ENDING
@@ -328,4 +360,7 @@ class LiveLoop:
             largest_correction=self._longest,
             largest_step=self._farthest,
             largest_half_width=self._widest,
+            courses=self._courses,
+            offsets_refused=self._not_taken,
+            largest_offset=self._largest_offset,
         )

@@ -34,6 +34,8 @@ class Status(IntFlag):
     """The last reading holds a NaN or an infinity, or a joint far beyond any travel."""
     SENSOR = 512
     """The sensor called the last reading bad."""
+    OFFSET = 1024
+    """The reading at the start of the course was not taken: its offset stays what it was."""
 
 
 class Reading(NamedTuple):
@@ -78,6 +80,10 @@ class State(NamedTuple):
     """State of the friction memory, in the order of the kernel; empty: none."""
     unloaded: int = 0
     """Corrections in a row without a load, at most as many as wear the memory off."""
+    offset: Triple = (0.0, 0.0, 0.0)
+    """Of the course: how far the tool is off beyond deflection and growth, in base, in m."""
+    refused: int = 0
+    """`Status.OFFSET` where the last reading of a course was not taken, else 0."""
 
 
 class Correction(NamedTuple):

@@ -1,5 +1,6 @@
 from .course import (
     Course as Course,
+    Landing as Landing,
     arc_length as arc_length,
     at_load as at_load,
 )

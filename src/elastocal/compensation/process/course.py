@@ -13,6 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
+from elastocal.cell import Cell
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
@@ -63,6 +64,50 @@ class Course:
         for ripple in self.ripple:
             swing += ripple.share * np.sin(2.0 * np.pi * ripple.frequency * time)
         return swing
+
+
+@dataclass(frozen=True)
+class Landing:
+    """How a course begins where its offset is read: a press, then light contact.
+
+    The tool lands with the force of the process along the surface's normal, which brings the
+    friction of the gears where every course begins, and lets go to light contact. There marker and
+    controller are read.
+    """
+
+    light: float
+    """Force of the light contact, in N."""
+    ramp: float
+    """Rate at which force is put on and taken off, in N/s."""
+    settle: float
+    """Time in light contact before it is read, in s."""
+    average: float
+    """Time over which it is read, in s."""
+    visits: int = 4
+    """Readings in the air, when the path was taught, that the reference is the mean of."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "Landing":
+        """Return the landing by a cell's contact force, ramp, dwell and average."""
+        own = cell.file.procedure
+        return cls(own.contact_force, own.ramp, own.dwell, own.average)
+
+    def seconds(self, course: Course) -> float:
+        """Return the time that it takes a course, in s."""
+        return float(self._corners(course)[0][-1])
+
+    def forces(self, course: Course) -> FloatArray:
+        """Return the force along the normal at the steps of a course, shape (row,), in N."""
+        time, force = self._corners(course)
+        forces: FloatArray = np.interp(np.arange(course.step, time[-1], course.step), time, force)
+        return forces
+
+    def _corners(self, course: Course) -> tuple[FloatArray, FloatArray]:
+        """Return time in s and force in N at the corners of the landing, shape (4,)."""
+        along = np.einsum("rk,rk->r", course.force, course.outward)
+        press = max(float(along.max()), self.light)
+        passed = press / self.ramp, (press - self.light) / self.ramp, self.settle + self.average
+        return np.cumsum([0.0, *passed]), np.array([0.0, press, self.light, self.light])
 
 
 @dataclass(frozen=True)

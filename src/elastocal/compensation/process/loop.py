@@ -21,8 +21,8 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.compensation.online import Compensator, Reading
-from elastocal.compensation.process.course import Course
-from elastocal.errors import CompensationError
+from elastocal.compensation.process.course import Course, Landing
+from elastocal.errors import CompensationError, present
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
@@ -50,6 +50,9 @@ class Corrector(Protocol):
 
     def correct(self, cycle: CycleInput) -> FloatArray:
         """Return the correction in base, shape (3,), in m."""
+
+    def begin_course(self, q: FloatArray, deviation: FloatArray) -> None:
+        """Take what marker and controller show in light contact, in base, shape (3,), in m."""
 
 
 class ModelCorrector:
@@ -81,6 +84,10 @@ class ModelCorrector:
         self._state, answer = self._compensator.correct(state, joints)
         return np.array(answer.correction)
 
+    def begin_course(self, q: FloatArray, deviation: FloatArray) -> None:
+        """Take the offset of the course."""
+        self._state = self._compensator.begin_course(self._state, q.tolist(), deviation.tolist())
+
 
 class PerfectCorrector:
     """Knows the deflection exactly, and says so late: what a perfect model would reach."""
@@ -101,6 +108,9 @@ class PerfectCorrector:
         late, before = self._line.popleft(), self._last
         self._last = late
         return late + self._lead * (late - before)
+
+    def begin_course(self, q: FloatArray, deviation: FloatArray) -> None:
+        """Learn nothing: the deflection is known."""
 
 
 class LoadedRobot(Protocol):
@@ -142,6 +152,15 @@ class TrueCell(Protocol):
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return the sensor's readings of true wrenches, shape (..., sample, 6)."""
+
+    def taught(self, q: FloatArray, time: float, visits: int) -> FloatArray:
+        """Return marker less controller as read in the air when the path was taught, (..., 3).
+
+        The mean over a time in s, of some visits.
+        """
+
+    def marker(self, time: float) -> FloatArray:
+        """Return marker less controller as read now, the mean over a time in s, (..., 3), in m."""
 
 
 @dataclass(frozen=True)
@@ -278,7 +297,11 @@ def air_shifts(cell: TrueCell, course: Course) -> FloatArray:
 
 
 def run_courses(
-    cell: TrueCell, robot: Robot, passages: Sequence[Passage], controller: Controller
+    cell: TrueCell,
+    robot: Robot,
+    passages: Sequence[Passage],
+    controller: Controller,
+    landing: Landing | None = None,
 ) -> list[CourseRun]:
     """Run courses side by side, and return what the tool does on each.
 
@@ -292,38 +315,87 @@ def run_courses(
         Their courses have rows at the same step of time; no two share a corrector.
     controller : Controller
         Cycle and delays.
+    landing : Landing, optional
+        How corrected courses begin, where their offset is read; by default it is not.
 
     Raises
     ------
     CompensationError
         If the controller's cycle does not divide the time between rows, or courses differ in it.
     """
-    course = passages[0].course
-    cycles = _cycles([each.course for each in passages], controller)
-    rows, drives = _Rows.of(robot, passages), _Drives(controller, len(passages))
-    parts = np.arange(1, cycles + 1)[:, None, None] / cycles
-    cell.lift([each.course.name for each in passages], rows.q[0])
-    for each in passages:
-        if each.corrector is not None:
-            each.corrector.start()
-    before = cell.press(rows.q[0], rows.force[0], rows.path[0], rows.outward[0])
-    shifts = np.empty((len(rows.q) - 1, cycles, len(passages), 3))
-    for row in range(1, len(rows.q)):
-        q = rows.joints(row, rows.q[row], drives.done)
-        now = cell.press(q, rows.force[row], rows.path[row], rows.outward[row])
-        count = cycles * controller.readings
-        time = course.step * (row - 1 + np.arange(1, count + 1) / count)
-        raw = _readings(cell, passages, time, before, now).reshape(len(passages), cycles, -1, 6)
-        deflection = _between(before.shift - rows.air[row - 1], now.shift - rows.air[row], parts)
-        joints = _between(rows.q[row - 1], rows.q[row], parts)
-        for n, times in enumerate(time.reshape(cycles, -1)):
-            # The correction of this cycle acts from the next on, later by the dead cycles.
-            q = rows.joints(row, joints[n], drives.done)
-            drives.command(_corrections(rows, row, times, q, raw[:, n], deflection[n]))
-            shifts[row - 1, n] = deflection[n] + drives.done
-        before = now
+    ride = _Ride(cell, robot, passages, controller)
+    if landing is not None:
+        ride.land(landing)
+    rows = ride.rows
+    shifts = np.stack([ride.go_on(row) for row in range(1, len(rows.q))])
     own = zip(passages, rows.last, shifts.transpose(2, 0, 1, 3), strict=True)
     return [_course_run(each.course, controller, shift[:last]) for each, last, shift in own]
+
+
+class _Ride:
+    """Passages side by side on their way; see `run_courses`."""
+
+    def __init__(
+        self, cell: TrueCell, robot: Robot, passages: Sequence[Passage], controller: Controller
+    ) -> None:
+        self._cell, self._controller, self._passages = cell, controller, passages
+        self._step = passages[0].course.step
+        cycles = _cycles([each.course for each in passages], controller)
+        self.rows, self._drives = _Rows.of(robot, passages), _Drives(controller, len(passages))
+        self._parts = np.arange(1, cycles + 1)[:, None, None] / cycles
+        rows = self.rows
+        cell.lift([each.course.name for each in passages], rows.q[0])
+        for each in passages:
+            if each.corrector is not None:
+                each.corrector.start()
+        self._before = cell.press(rows.q[0], rows.force[0], rows.path[0], rows.outward[0])
+
+    def go_on(self, row: int) -> FloatArray:
+        """Run to a row, and return the shifts in the cycles up to it, shape (cycle, run, 3)."""
+        rows = self.rows
+        q = rows.joints(row, rows.q[row], self._drives.done)
+        now = self._cell.press(q, rows.force[row], rows.path[row], rows.outward[row])
+        return self._cycles_to(row - 1, row, now, self._step * (row - 1))
+
+    def land(self, landing: Landing) -> None:
+        """Press where corrected courses begin, and read their offsets in light contact."""
+        rows, cell, runs = self.rows, self._cell, list(enumerate(self._passages))
+        lands = [run for run, each in runs if each.corrector is not None]
+        forces = [landing.forces(self._passages[run].course) for run in lands]
+        count = max(map(len, forces), default=0)
+        along = np.zeros((count, len(runs), 1))
+        for run, force in zip(lands, forces, strict=True):
+            # One that needs less force waits in the air until the others land.
+            along[count - len(force) :, run, 0] = force
+        for step, force in enumerate(along, start=1):
+            now = cell.press(self._joints(), force * rows.outward[0])
+            self._cycles_to(0, 0, now, self._step * (step - count - 1))
+        taught = cell.taught(rows.q[0], landing.average, landing.visits)
+        deviation, q = cell.marker(landing.average) - taught, self._joints()
+        for run in lands:
+            present(self._passages[run].corrector, "corrector").begin_course(q[run], deviation[run])
+
+    def _joints(self) -> FloatArray:
+        """Return the joints of every run where its course begins, corrected, (run, joint)."""
+        return self.rows.joints(0, self.rows.q[0], self._drives.done)
+
+    def _cycles_to(self, last: int, row: int, now: LoadedRobot, since: float) -> FloatArray:
+        """Run the cycles from a row to another, which the truth was solved at."""
+        rows, before, parts = self.rows, self._before, self._parts
+        runs, count = len(self._passages), len(parts) * self._controller.readings
+        time = since + self._step * np.arange(1, count + 1) / count
+        raw = _readings(self._cell, self._passages, time, before, now)
+        raw = raw.reshape(runs, len(parts), -1, 6)
+        deflection = _between(before.shift - rows.air[last], now.shift - rows.air[row], parts)
+        joints = _between(rows.q[last], rows.q[row], parts)
+        shifts = np.empty((len(parts), runs, 3))
+        for n, times in enumerate(time.reshape(len(parts), -1)):
+            # The correction of this cycle acts from the next on, later by the dead cycles.
+            q = rows.joints(row, joints[n], self._drives.done)
+            self._drives.command(_corrections(rows, row, times, q, raw[:, n], deflection[n]))
+            shifts[n] = deflection[n] + self._drives.done
+        self._before = now
+        return shifts
 
 
 def _corrections(

@@ -102,6 +102,9 @@ class SimulateProcessResult(Result):
     coverage: ProductionCoverage | None = None
     """Share of the process that the first model's calibration covers; None where it is not
     known."""
+    landing_seconds: float | None = None
+    """Longest time that press and reading of its offset take a course, in s; None: courses begin at
+    once."""
 
     def __post_init__(self) -> None:
         """Refuse a table of nothing."""

@@ -33,6 +33,7 @@ from .tool import (
     sensor_load as sensor_load,
 )
 from .touches import (
+    read_taught_markers as read_taught_markers,
     read_touches as read_touches,
     require_cold_touches as require_cold_touches,
 )

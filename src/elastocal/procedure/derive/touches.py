@@ -12,6 +12,7 @@ registration of its own would take a part of the growth up. The tooling itself i
 along its normal ``n``: where it stands still, in contact ``n . d = -n . (x_warm - x_cold)``.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +33,7 @@ from elastocal.procedure.derive.readings import (
 from elastocal.procedure.record import ReadingStatus, RunRecord
 from elastocal.procedure.registration import Registration, register
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 
 
 @brief_repr
@@ -105,6 +107,80 @@ def read_touches(cold: Path, warm: Path) -> TouchedShifts:
         after.entries[-1].time - after.entries[0].time,
         tuple(each.id for each in before.plan.poses if each.id not in touched),
     )
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class TaughtMarkers:
+    """How a tracker stands, and marker less controller off the surface at points touched cold."""
+
+    robot: Robot
+    place: FloatArray
+    """Tool centre points by the controller, in light contact, shape (point, 3), in m."""
+    offset: FloatArray
+    """Mean of all readings of a point, in base, shape (point, 3), in m."""
+    T_base_tracker: FloatArray
+    """Of the first run, shape (4, 4)."""
+    station: str
+    lever: FloatArray
+    """Marker in the tcp frame, shape (3,), in m."""
+
+
+def read_taught_markers(folders: Sequence[Path]) -> TaughtMarkers:
+    """Return where marker and controller were by runs of one station, by the first registration.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Folders of runs with the tracker where it stands now. Cold touches teach their points;
+        another run says how the tracker stands.
+
+    Raises
+    ------
+    ProcedureError
+        If they are of several robots or stations, the tracker of the first cannot be registered, or
+        it moved.
+    SchemaError, FileAccessError
+        If a file of a run is damaged or cannot be read.
+    """
+    runs = [read_run(folder) for folder in folders]
+    first, registration = runs[0], _registered_cold(runs[0])
+    names = sorted(each.station for each in registration.stations)
+    if len(names) != 1:
+        raise ProcedureError(
+            f"{first.folder.path}: measured by {' and '.join(names)}: where courses begin one"
+            " station measures"
+        )
+    rows: dict[tuple[str, int], list[tuple[FloatArray, FloatArray]]] = {}
+    for run in runs:
+        _registered(run)
+        if run.record.touch == "cold":
+            for pose in run.poses:
+                fit = registration.station_of(_station(pose), pose.pose)
+                found = [] if fit is None else _markers_off(pose, fit.T_base_tracker, registration)
+                rows.setdefault((run.record.plan, pose.pose), []).extend(found)
+    # A point's readings count as one place, however many there are.
+    means = [np.mean(each, axis=0) for each in rows.values() if each]
+    place, offset = np.reshape(means, (-1, 2, 3)).transpose(1, 0, 2)
+    return TaughtMarkers(
+        *(first.cell.robot, place, offset, registration.stations[0].T_base_tracker),
+        *(names[0], registration.lever_arm),
+    )
+
+
+def _markers_off(
+    pose: PoseReadings, T_base_tracker: FloatArray, registration: Registration
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return where a point was touched, and marker less controller off it, for each reading."""
+    light = _usable(pose.light)
+    if light is None:
+        return []
+    read = [found for each in (pose.reference, pose.released) if (found := _usable(each))]
+    seen = [T_base_tracker[:3, :3] @ marker.value + T_base_tracker[:3, 3] for _, marker in read]
+    return [
+        (light[0].T_base_tcp[:3, 3], point - _at(tool.T_base_tcp, registration.lever_arm))
+        for (tool, _), point in zip(read, seen, strict=True)
+    ]
 
 
 def require_cold_touches(cold: Path) -> None:

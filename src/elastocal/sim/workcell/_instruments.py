@@ -302,10 +302,29 @@ class SimulatedTracker(_SimulatedInstrument):
         T = self.T_base_station(self._station)
         marker = (segment.seen(times)[:, :3] - T[:3, 3]) @ T[:3, :3]
         distance = np.sqrt(np.sum(marker**2, axis=1, keepdims=True))
-        sigma = (self._entry.noise + self._entry.noise_per_metre * distance) / COVERAGE
+        sigma = self._sigma(distance)
         if times[0] >= segment.end:
             self._still = (segment, self._station, marker, sigma)
         return marker, sigma
+
+    def _sigma(self, distance: FloatArray) -> FloatArray:
+        """Return the standard deviation of a sample along an axis, at distances in m."""
+        sigma: FloatArray = (self._entry.noise + self._entry.noise_per_metre * distance) / COVERAGE
+        return sigma
+
+    def scatter(self, point_base: FloatArray, time: float) -> FloatArray:
+        """Return the standard deviation of a mean over a time, each axis, shape (...), in m.
+
+        Parameters
+        ----------
+        point_base : ndarray, shape (..., 3)
+            Where the marker is, in m.
+        time : float
+            In s.
+        """
+        distance = np.linalg.norm(point_base - self.T_base_station(self._station)[:3, 3], axis=-1)
+        entry = self._entry
+        return self._sigma(distance) * averaged_noise(entry.turbulence, time, entry.rate)
 
     def T_base_station(self, station: str) -> FloatArray:
         """Return the true present transform of a station, shape (4, 4), in m."""

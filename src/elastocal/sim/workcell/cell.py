@@ -46,6 +46,7 @@ from elastocal.sim.workcell._instruments import (
 )
 from elastocal.sim.workcell._paths import ForceControl, guarded_move, joint_path, retract_path
 from elastocal.sim.workcell._plant import FOREVER, Plant
+from elastocal.sim.workcell._quasistatics import Quasistatics
 from elastocal.sim.workcell._timeline import (
     MICROSECONDS,
     RobotState,
@@ -373,6 +374,7 @@ class ProcessCell:
         self._stop = np.zeros(3)
         self._noise = _Noise(seed, "")
         self._slope = np.zeros(6)
+        self._tracker = run.tracker
 
     def lift(self, course: str | Sequence[str], q: FloatArray) -> None:
         """Begin a course in the air: strains, noise, drift and stop error of its own.
@@ -485,11 +487,59 @@ class ProcessCell:
         force = force_base - self._stiffness * beyond * outward
         return statics.rested(state, q, force, self._stop, rest, attack)
 
+    def taught(self, q: FloatArray, time: float, visits: int) -> FloatArray:
+        """Return how far the marker was from where the controller had it when the path was taught.
+
+        Read in the air, the arm cold, in base, shape (..., 3), in m: the mean of some visits, each
+        with its own stop, friction and noise.
+
+        Parameters
+        ----------
+        q : ndarray, shape (joint,) or (run, joint)
+            In rad or m.
+        time : float
+            Time that each visit is averaged over, in s.
+        visits : int
+            Number of visits.
+        """
+        cold = np.zeros(self._chance.warmth.shape)
+        total = np.zeros((*q.shape[:-1], 3))
+        for visit in range(visits):
+            noise = self._noise.of(f"taught {visit}")
+            statics = self._statics.visited(noise.chance(), cold)
+            stop = self._repeatability * noise.each(lambda rng: rng.standard_normal(3))
+            state = statics.free(q, stop, None)
+            total += self._marker_off(statics, state) + self._marker_noise(state, time, noise)
+        return total / visits
+
+    def marker(self, time: float) -> FloatArray:
+        """Return how far the marker is from where the controller has it, shape (..., 3), in m.
+
+        In base, averaged over a time in s, at the joints and the force of the last `press`.
+        """
+        state = present(self._state, "state of a lifted arm")
+        noise = self._noise.of("landed")
+        return self._marker_off(self._statics, state) + self._marker_noise(state, time, noise)
+
+    def _marker_off(self, statics: Quasistatics, state: RobotState) -> FloatArray:
+        """Return the true displacement of the marker against the controller, shape (..., 3)."""
+        T = statics.robot.forward(state.q)
+        believed = T[..., :3, 3] + T[..., :3, :3] @ statics.marker_tcp
+        return self._knots(statics, state)[..., :3] - believed
+
+    def _marker_noise(self, state: RobotState, time: float, noise: "_Noise") -> FloatArray:
+        scatter = self._tracker.scatter(self._statics.robot.forward(state.q)[..., :3, 3], time)
+        return scatter[..., None] * noise.each(lambda rng: rng.standard_normal(3))
+
     def _seen(self, state: RobotState) -> FloatArray:
         """Return the true wrench at the sensor, shape (..., 6)."""
+        return self._knots(self._statics, state)[..., 3:]
+
+    def _knots(self, statics: Quasistatics, state: RobotState) -> FloatArray:
+        """Return the marker and the wrench at the sensor, shape (..., 9)."""
         columns = [np.atleast_2d(x) for x in (state.q, state.twist, state.force, state.moment)]
-        seen = self._statics.knots(np.zeros(len(columns[0])), *columns).seen[:, 3:]
-        return seen.reshape(*state.force.shape[:-1], 6)
+        seen = statics.knots(np.zeros(len(columns[0])), *columns).seen
+        return seen.reshape(*state.force.shape[:-1], seen.shape[-1])
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return the sensor's samples: cross-talk, zero, drift, noise, end of its range.
@@ -519,6 +569,11 @@ class _Noise:
         """Return a draw for each run, shape (..., *draw)."""
         drawn = {name: draw(rng) for name, rng in self._rngs.items()}
         return drawn[self._names[0]] if self._alone else np.stack([drawn[n] for n in self._names])
+
+    def of(self, purpose: str) -> "_Noise":
+        """Return other random numbers of the same runs."""
+        names = [f"{name} {purpose}" for name in self._names]
+        return _Noise(self._seed, names[0] if self._alone else names)
 
     def chance(self) -> VisitChance:
         """Return the random errors of the visit of each run."""

@@ -130,7 +130,9 @@ void elastocal_start(elastocal_state *state)
     for (i = 0; i < 3; i++) {
         state->correction[i] = 0.0;
         state->deflection[i] = 0.0;
+        state->offset[i] = 0.0;
     }
+    state->refused = 0U;
 }
 
 void elastocal_condition(elastocal_state *state, const elastocal_reading *reading)

@@ -93,13 +93,27 @@ static unsigned int aim(const double d[3], const double rotation[9], double targ
 @FRICTION@    }
 @FRICTION@}
 @FRICTION@
+/* How far the tool is off: by the load, in this course, and as the arm has grown. */
+static void off_by(const double q[], const double deflection[3], const double offset[3],
+                   double off[3])
+{
+    int i;
+@GROWN@    double grown[3];
+@GROWN@    growth(q, grown);
+@COLD@    (void)q;
+    for (i = 0; i < 3; i++) {
+        off[i] = deflection[i] + offset[i];
+@GROWN@        off[i] = off[i] + grown[i];
+    }
+}
+
 static unsigned int follow(elastocal_state *state, const double q[])
 {
     double r[9];
     double force[3];
     double moment[3];
+    double off[3];
     double target[3];
-@GROWN@    double off[3];
     unsigned int status;
     int i;
     orientation(q, r);
@@ -117,12 +131,8 @@ static unsigned int follow(elastocal_state *state, const double q[])
 @FRICTION@    elastocal_deflection(q, force, moment, state->memory, state->deflection);
 @FRICTION@    state->half_width = elastocal_half_width(q, force, moment, state->memory);
 @FRICTION@    watch(state);
-@COLD@    status = aim(state->deflection, r, target);
-@GROWN@    growth(q, off);
-@GROWN@    for (i = 0; i < 3; i++) {
-@GROWN@        off[i] = state->deflection[i] + off[i];
-@GROWN@    }
-@GROWN@    status = aim(off, r, target);
+    off_by(q, state->deflection, state->offset, off);
+    status = aim(off, r, target);
     if (state->half_width > UNCERTAIN_ABOVE) {
         status |= ELASTOCAL_UNCERTAIN;
     }
@@ -175,7 +185,7 @@ void elastocal_correct(elastocal_state *state, const double q[], elastocal_corre
 {
     int usable = state->fresh;
     int i;
-    out->status = state->problem;
+    out->status = state->problem | state->refused;
     if (are_joints(q) == 0) {
         usable = 0;
         out->status |= ELASTOCAL_INVALID;
@@ -198,6 +208,45 @@ void elastocal_step(elastocal_state *state, const elastocal_reading *reading,
 {
     elastocal_condition(state, reading);
     elastocal_correct(state, reading->q, out);
+}
+
+unsigned int elastocal_begin_course(elastocal_state *state, const double q[],
+                                    const double deviation[3])
+{
+    static const double nothing[3] = {0.0, 0.0, 0.0};
+    double o[3] = {0.0, 0.0, 0.0};
+    int known = are_joints(q);
+    int i;
+    if ((state->missed != 0) || (state->problem != 0U)) {
+        known = 0;
+    }
+    for (i = 0; i < 3; i++) {
+        known = (is_number(&deviation[i]) != 0) ? known : 0;
+    }
+    if (known != 0) {
+        off_by(q, state->deflection, nothing, o);
+        for (i = 0; i < 3; i++) {
+            o[i] = deviation[i] - o[i];
+        }
+        if (!(sqrt((o[0] * o[0]) + (o[1] * o[1]) + (o[2] * o[2])) <= LARGEST_OFFSET)) {
+            known = 0;
+        }
+    }
+    state->refused = ELASTOCAL_OFFSET;
+    if (known != 0) {
+        (void)memcpy(state->offset, o, sizeof o);
+        state->refused = 0U;
+    }
+    return state->refused;
+}
+
+void elastocal_end_course(elastocal_state *state)
+{
+    int i;
+    for (i = 0; i < 3; i++) {
+        state->offset[i] = 0.0;
+    }
+    state->refused = 0U;
 }
 
 void elastocal_rkorr(const double correction[3], double rkorr[6])

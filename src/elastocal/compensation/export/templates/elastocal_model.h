@@ -42,6 +42,7 @@ extern "C" {
 #define ELASTOCAL_SATURATED 128U /* the reading is beyond the sensor's range */
 #define ELASTOCAL_INVALID 256U /* the reading holds a NaN, an infinity or no joint position */
 #define ELASTOCAL_SENSOR 512U /* the sensor called the reading bad */
+#define ELASTOCAL_OFFSET 1024U /* the offset of the course was not taken: it is what it was */
 
 /* What arm and sensor say. */
 typedef struct {
@@ -65,6 +66,8 @@ typedef struct {
     double correction[3];
     double deflection[3];
     double half_width;
+    double offset[3]; /* of the course, base, m */
+    unsigned int refused; /* ELASTOCAL_OFFSET, or 0 */
 @FRICTION@    double memory[ELASTOCAL_MEMORY]; /* of friction */
 @FRICTION@    int unloaded; /* corrections in a row without load */
 } elastocal_state;
@@ -121,6 +124,17 @@ void elastocal_correct(elastocal_state *state, const double q[], elastocal_corre
 /* Both, where sensor and controller have the same cycle. */
 void elastocal_step(elastocal_state *state, const elastocal_reading *reading,
                     elastocal_correction *out);
+
+/* Begin a course, in light contact and between two corrections: the offset of the course is what
+ * marker and controller show (displacement of the marker less that of the controller since the path
+ * was taught, base, m) beyond deflection and growth. The correction goes there at its rate. Returns
+ * ELASTOCAL_OFFSET where it is not taken: no number, more than the largest offset, or the last
+ * reading of the sensor could not be used; the offset is then what it was. */
+unsigned int elastocal_begin_course(elastocal_state *state, const double q[],
+                                    const double deviation[3]);
+
+/* End a course: its offset goes, at the rate of the correction. */
+void elastocal_end_course(elastocal_state *state);
 
 /* A correction as KUKA's RKorr: X, Y, Z in mm, A, B, C in degrees (always 0). */
 void elastocal_rkorr(const double correction[3], double rkorr[6]);

@@ -10,13 +10,15 @@ typedef struct {
     double half_width;
 } load_case;
 
-/* A reading that comes some times in a row, with the last correction that elastocal gave. One of
- * its numbers may be a NaN or an infinity, made from bits: C has no literal that every compiler
- * leaves alone. */
+/* A reading that comes some times in a row, with the last correction that elastocal gave; before it
+ * a course may begin or end. One of the numbers may be a NaN or an infinity, made from bits: C has
+ * no literal that every compiler leaves alone. */
 typedef struct {
     int times;
     elastocal_reading reading;
-    int place; /* of that number: 0 none, 1 time, then q, force, moment */
+    int course; /* 0 goes on, 1 begins, 2 ends */
+    double deviation[3];
+    int place; /* of that number: 0 none, 1 time, then q, force, moment, deviation */
     uint64_t bits;
     double correction[3];
     unsigned int status;
@@ -53,11 +55,13 @@ static int agree(const double *found, double expected, double tolerance)
     return ((is_number(found) != 0) && (fabs(*found - expected) <= tolerance)) ? 1 : 0;
 }
 
-/* Put bits in the place of a number of a reading. */
-static void spoil(elastocal_reading *reading, int place, uint64_t bits)
+/* Put bits in the place of a number of a reading or a deviation. */
+static void spoil(elastocal_reading *reading, double deviation[3], int place, uint64_t bits)
 {
     double *number;
-    if (place > (ELASTOCAL_JOINTS + 4)) {
+    if (place > (ELASTOCAL_JOINTS + 7)) {
+        number = &deviation[place - (ELASTOCAL_JOINTS + 8)];
+    } else if (place > (ELASTOCAL_JOINTS + 4)) {
         number = &reading->moment[place - (ELASTOCAL_JOINTS + 5)];
     } else if (place > (ELASTOCAL_JOINTS + 1)) {
         number = &reading->force[place - (ELASTOCAL_JOINTS + 2)];
@@ -109,10 +113,20 @@ static int episodes_agree(void)
     elastocal_start(&state);
     for (k = 0; k < @EPISODES@; k++) {
         elastocal_reading reading = EPISODES[k].reading;
+        double deviation[3];
+        (void)memcpy(deviation, EPISODES[k].deviation, sizeof deviation);
+        spoil(&reading, deviation, EPISODES[k].place, EPISODES[k].bits);
+        if (EPISODES[k].course == 1) {
+            (void)elastocal_begin_course(&state, reading.q, deviation);
+        }
+        if (EPISODES[k].course == 2) {
+            elastocal_end_course(&state);
+        }
+        reading.time = EPISODES[k].reading.time;
         for (i = 0; i < EPISODES[k].times; i++) {
             time += ELASTOCAL_SAMPLE;
             reading.time += time;
-            spoil(&reading, EPISODES[k].place, EPISODES[k].bits);
+            spoil(&reading, deviation, EPISODES[k].place, EPISODES[k].bits);
             elastocal_step(&state, &reading, &out);
             reading.time = EPISODES[k].reading.time;
         }
