@@ -56,6 +56,22 @@ def test_it_writes_the_table_and_every_point_of_it(folder):
     assert not figures["budget"]
 
 
+def test_the_offset_of_a_course_is_read_and_its_time_said(folder):
+    given = "--seed", 2, "--json"
+    bare, read = (
+        json.loads(run(folder, out, *given, *option).out)
+        for out, option in (("bare", ()), ("offset", ("--course-offset",)))
+    )
+    # 1100 N and a swing, up and down at 400 N/s, then dwell and average of the cell's procedure.
+    assert read["landing_seconds"] == pytest.approx(2 * 1100 / 400 + 1.5, abs=0.5)
+    assert bare["landing_seconds"] is None
+    assert any("reading in light contact" in note for note in read["notes"])
+    # The uncorrected path begins at once, as before; another reading of noise in the sensor's.
+    assert read["lines"][0]["before"] == pytest.approx(bare["lines"][0]["before"])
+    # A model that is made up is wrong by more than the cell: its offset is worth much.
+    assert read["spatial"][0]["after"]["mean"] < bare["spatial"][0]["after"]["mean"]
+
+
 def test_check_knows_the_table_and_the_folder(folder):
     result = run(folder, "checked", "--seed", 4)
     assert result.code == 0, result.err

@@ -20,7 +20,7 @@ from elastocal.options import Option
 from elastocal.procedure.derive import read_taught_markers, sensor_load
 from elastocal.progress import Progress
 from elastocal.records import record, validate, write_json
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.units import in_unit, quantity
 from elastocal.workflows._inputs import (
     NewTool,
@@ -46,6 +46,7 @@ _FADE = 0.005
 """Default speed of the fade, in m/s, where the limits allow it."""
 
 
+@brief_repr
 @dataclass(frozen=True)
 class LiveSettings(NewTool, TouchedArm):
     """Settings of a live compensation: cell, model and observers."""

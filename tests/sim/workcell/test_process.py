@@ -114,3 +114,26 @@ def test_runs_side_by_side_are_where_each_alone_is(q, preset):
             np.testing.assert_allclose(each.felt[run], alone.felt, rtol=0.0, atol=1e-5)
         own = cell.read(time, np.repeat(alone.wrench[None], 5, axis=0))
         np.testing.assert_allclose(read[run], own, rtol=0.0, atol=1e-5)
+
+
+def test_the_marker_shows_the_deflection_and_in_the_air_as_taught_next_to_nothing(q):
+    cell = quiet()
+    cell.lift("a", q)
+    pressed = cell.press(q, np.zeros(3))
+    taught = cell.taught(q, 1.0, 2)
+    np.testing.assert_allclose(cell.marker(1.0) - taught, 0.0, atol=1e-5)
+    pressed = cell.press(q, FORCE)
+    shown = cell.marker(1.0) - taught
+    moved = pressed.shift - cell.free_shift(q)
+    # The marker sits beside the tool: the turn of the wrist moves it besides.
+    assert np.linalg.norm(shown - moved) < 0.5 * np.linalg.norm(moved)
+    assert np.linalg.norm(shown) > 0.3 * np.linalg.norm(moved)
+
+
+def test_readings_when_the_path_was_taught_scatter_as_stops_and_friction_do(q):
+    cell = ProcessCell(example_cell("afp", simulation={"preset": "typical"}), 3)
+    names = [f"course {n}" for n in range(12)]
+    cell.lift(names, np.tile(q, (12, 1)))
+    once, often = (cell.taught(np.tile(q, (12, 1)), 1.0, visits) for visits in (1, 9))
+    assert 10e-6 < once.std(axis=0).mean() < 60e-6
+    assert often.std(axis=0).mean() < 0.6 * once.std(axis=0).mean()
