@@ -181,6 +181,10 @@ def drag_it(page, cell, told):
     )
     page.wait(f"{moved} 1")
     told["slid"] = (page.text("tool"), page.text("cases"))
+    page.get('document.querySelector("#place [name=x]").value = "99000"')
+    page.click("#place button")
+    page.wait("document.getElementById('message').textContent.includes('reach')")
+    told["out of reach"] = page.get(BESIDE)
     page.keep("dragged")
 
 
@@ -194,7 +198,41 @@ def edit_it(page, cell, told):
     page.click("#loads button")
     page.wait("document.getElementById('message').textContent.includes('unit')")
     told["refused"] = (page.text("message"), cell.read_text("utf-8"))
+    told["beside"] = page.get(BESIDE)
+    told["marked"] = page.get(
+        "[...document.querySelectorAll('[aria-invalid]')]"
+        ".map((each) => [each.name, each.value, each.title])"
+    )
     page.keep("cell")
+    # What is typed in another form outlives what is saved here.
+    page.get(
+        """(() => {
+          const field = document.getElementById("region").elements.min0;
+          field.value = "17 mm";
+          field.dispatchEvent(new Event("input", { bubbles: true }));
+          document.getElementById("loads").elements.fz.value = "1050 N";
+        })()"""
+    )
+    page.click("#loads button")
+    page.wait("document.getElementById('text').value.includes('1050 N')")
+    told["kept"] = page.get(
+        """(() => {
+          const { value, title } = document.getElementById("region").elements.min0;
+          return [value, title, document.querySelectorAll("[aria-invalid]").length];
+        })()"""
+    )
+
+
+BESIDE = """(() => {
+  const message = document.getElementById("message"), box = message.getBoundingClientRect();
+  const { position } = getComputedStyle(message), before = message.previousElementSibling;
+  const seen = box.height > 0 && box.top >= 0 && box.bottom <= innerHeight;
+  return { after: before.textContent, pinned: position, seen };
+})()"""
+"""Where the message is: after which button, and whether it is in sight."""
+NAMES = (
+    """[...document.querySelectorAll("button")].map((each) => each.ariaLabel || each.textContent)"""
+)
 
 
 def survey_it(page, cell, told):
@@ -226,6 +264,9 @@ def plan_it(page, cell, told):
     page.wait("document.documentElement.dataset.work !== 'plan busy'")
     page.wait("document.getElementById('poses').children.length > 0")
     told["planned"] = (page.text("plan-text"), page.text("poses"))
+    page.click("#plan-form button")
+    page.wait("/there already|in it|holds/.test(document.getElementById('message').textContent)")
+    told["planned again"] = (page.text("message"), page.get(BESIDE))
     page.click("#poses button:nth-child(2)")
     page.wait("document.getElementById('tool').textContent.includes('on the tooling')")
     told["at a pose"] = page.text("tool")
@@ -247,7 +288,7 @@ def run_it(page, cell, told):
     page.wait("document.getElementById('run-plan').options.length > 0")
     page.get("document.getElementById('run-form').elements.rate.value = '20'")
     page.click("#run-form button")
-    page.wait("/settle|average/.test(document.getElementById('live-figures').textContent)")
+    page.wait("/Force/.test(document.getElementById('live-figures').textContent)")
     told["live"] = page.text("live-figures")
     page.keep("run")
     stopped = time.monotonic()
@@ -258,6 +299,17 @@ def run_it(page, cell, told):
     page.wait("document.getElementById('record-state').textContent !== ''")
     told["record"] = page.text("record-state")
     page.keep("stopped")
+    page.get("document.getElementById('run-form').elements.resume.checked = false")
+    page.click("#run-form > button")
+    page.wait("document.documentElement.dataset.work === 'run failed'")
+    told["begun anew"] = page.text("message")
+    page.get("document.getElementById('run-form').elements.resume.checked = true")
+    page.get("document.getElementById('live-figures').replaceChildren()")
+    page.click("#run-form > button")
+    page.wait("/Force/.test(document.getElementById('live-figures').textContent)")
+    page.click("#run-stop")
+    page.wait("document.documentElement.dataset.work === 'run stopped'")
+    told["names"] = page.get(NAMES)
 
 
 def test_the_page_complains_of_nothing_and_asks_nobody_else(told):
@@ -343,3 +395,33 @@ def test_a_run_is_watched_and_stopped_in_position_control_and_can_be_gone_on_wit
     assert entries[-1].text.startswith("interrupted, ")
     resumed = workflows.dry_run(cell, plan=cell.with_name("planned"), out=cell.with_name("run"))
     assert resumed.poses == 3
+
+
+def test_a_refusal_is_in_sight_beside_its_button_and_marks_what_was_not_saved(told):
+    assert told["beside"] == {"after": "Save load cases", "pinned": "sticky", "seen": True}
+    assert told["refused"][0].startswith("Not saved: ")
+    assert told["marked"] == [["fz", "1000", "not saved: the file has 1000 N"]]
+    assert told["out of reach"]["after"] == "Bring the tool there"
+    assert told["out of reach"]["seen"]
+
+
+def test_what_is_typed_in_one_form_outlives_what_is_saved_in_another(told):
+    value, title, invalid = told["kept"]
+    assert (value, invalid) == ("17 mm", 0)
+    assert title.startswith("not saved: ")
+
+
+def test_where_the_page_has_a_box_its_messages_name_the_box(told):
+    message, beside = told["planned again"]
+    assert "Replace a plan that is there" in message
+    assert beside["seen"]
+    assert "Go on with the run that is there" in told["begun anew"]
+    assert "--" not in message + told["begun anew"]
+
+
+def test_no_two_buttons_have_one_name(told):
+    assert sorted(told["names"]) == sorted(set(told["names"]))
+
+
+def test_an_interval_says_where_it_may_not_hold(told):
+    assert "the interval may not hold here" in told["springs"][1]

@@ -2,6 +2,7 @@
 
 import base64
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from elastocal.studio import Session, default_springs
 from elastocal.studio.cell_edit import form_of
 from elastocal.studio.posture import CellView
 from elastocal.studio.recorded import RunView, find_runs
+from elastocal.studio.springs import _caveats
 from elastocal.studio.trials import compare_techniques, survey_reach
 from elastocal.studio.worker import Worker, WorkState
 from elastocal.workflows.check import describe_file
@@ -104,6 +106,30 @@ def test_a_press_is_a_pose_that_planning_would_take(view):
     assert all(each.passes for each in found.checks)
     edge = view.press(view.cell.home, (1.85, 0.55, 3.0), (0.0, 0.0, -1.0))
     assert edge.refusal == "" or "refused by" in edge.refusal
+
+
+def test_a_press_moves_the_rail_only_where_it_must_and_says_so(view):
+    line = (1.85, 0.1, 3.0), (0.0, 0.0, -2.0)
+    stays = view.press(view.cell.home, *line)
+    assert (stays.q[0], stays.note) == (view.cell.home[0], "")
+    far = np.array(view.cell.home)
+    far[0] = view.cell.robot.limits.lower[0]
+    moved = view.press(far, *line)
+    assert moved.q[0] != far[0]
+    assert moved.note.startswith("rail moved from ")
+    assert f"to {1e3 * moved.q[0]:.1f} mm" in moved.note
+
+
+@pytest.mark.parametrize(
+    ("near", "load", "said"),
+    [(True, True, ""), (False, True, "this posture was"), (True, False, "this load was"),
+     (False, False, "posture and load were")],
+)  # fmt: skip
+def test_an_interval_has_its_caveat_where_nothing_was_calibrated(near, load, said):
+    rows = SimpleNamespace(near=np.array([near]), within_load=np.array([load]))
+    model = SimpleNamespace(covered_rows=lambda *_: rows)
+    (caveat,) = _caveats(model, np.zeros((1, 6)), np.zeros((1, 3)))
+    assert caveat == (said and f"{said} not calibrated: the interval may not hold here")
 
 
 def test_an_edit_is_written_with_its_comments_and_seen(session):

@@ -97,6 +97,8 @@ class PostureFigures:
     cases: tuple[CaseFigure, ...]
     refusal: str = ""
     """Why the posture is not the one that was asked for; empty where it is."""
+    note: str = ""
+    """What else was moved to get there; empty where nothing was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +143,7 @@ class CellView:
         probes = sample_uniform(self.surface, _PROBES, np.random.default_rng(0))
         return self.builder.rank(probes)
 
-    def at(self, q: ArrayLike, refusal: str = "") -> PostureFigures:
+    def at(self, q: ArrayLike, refusal: str = "", note: str = "") -> PostureFigures:
         """Return the figures of a posture; joints beyond their limits are set to them.
 
         Raises
@@ -172,6 +174,7 @@ class CellView:
             stiffness=self.springs.stiffness(inside, T),
             cases=self.springs.cases(inside, T, self.cell.file.load_cases.levels),
             refusal=refusal,
+            note=note,
         )
 
     def towards(self, q: Sequence[float], T_base_tcp: FloatArray) -> PostureFigures:
@@ -190,6 +193,8 @@ class CellView:
         self, q: Sequence[float], origin: Sequence[float], direction: Sequence[float]
     ) -> PostureFigures:
         """Return the posture with which planning would press where a line meets the tooling.
+
+        External axes stay where they are if a pose is had there; else the note says where they go.
 
         Parameters
         ----------
@@ -210,10 +215,25 @@ class CellView:
         point = self.surface.points(np.array([face]), weights[None])
         if not self.surface.in_region(point).all():
             return self.at(q, "outside the region")
-        pool = self.builder.pool(self._placements, point)
-        if len(pool.postures):
-            return self.at(pool.postures.q[0])
+        before = self.cell.robot.check_positions(q)[: self.cell.robot.external_axes]
+        stays = BasePlacement(tuple(before.tolist()))
+        for placements in ((stays,), self._placements):
+            pool = self.builder.pool(placements, point)
+            if len(pool.postures):
+                found = pool.postures.q[0]
+                return self.at(found, note=self._moved(before, found))
         return self.at(q, f"no pose here, refused by {pool.refusals[pool.refused_by[0]]}")
+
+    def _moved(self, before: FloatArray, after: FloatArray) -> str:
+        """Return which external axes were moved, in words; empty where none was."""
+        robot = self.cell.robot
+        axes = zip(robot.joint_names, robot.revolute, before.tolist(), after.tolist(), strict=False)
+        moved = [
+            f"{name} moved from {joint_text(old, turns)} to {joint_text(new, turns)}"
+            for name, turns, old, new in axes
+            if old != new
+        ]
+        return f"{', '.join(moved)}: from where it was, no pose is had here" if moved else ""
 
     def _nearest(self, q: FloatArray, T_base_tcp: FloatArray) -> FloatArray | None:
         robot = self.cell.robot

@@ -318,6 +318,9 @@ class Session:
                     "the page shows another state of the cell file: look at the new one first"
                 )
             message = replace(message, rate=0.0)
+        else:
+            # Nothing can be hurt, so nobody has to look before a run is continued.
+            message = replace(message, confirmed=True)
         # The worker reads the file again: it must be this one.
         arming = Arming(cell.sha256, real)
         self.worker.begin("run", self._work.run(self._path, message, arming))

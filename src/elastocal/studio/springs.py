@@ -21,6 +21,12 @@ makers of gears for robots state 1 to 3 mrad."""
 _DRIVE = 4e7
 """Stiffness of a linear drive, in N/m."""
 _MICROMETRES = 1e-6
+_NOT_CALIBRATED = {
+    (False, True): "this posture was",
+    (True, False): "this load was",
+    (False, False): "posture and load were",
+}
+"""What was not, by whether posture and load were."""
 _RIGID = 1e-12
 """Compliance in m/N below which a spring counts as rigid."""
 
@@ -40,6 +46,8 @@ class CaseFigure:
     """95 % of a measurement along each axis; empty where nothing is known of it."""
     deflection: tuple[float, float, float]
     """In base, in m."""
+    caveat: str = ""
+    """Why the interval may not hold; empty where posture and load were calibrated."""
 
 
 @record()
@@ -99,7 +107,7 @@ class StudioSprings:
         """
         force_tcp = np.array(list(levels.values()))
         rows, force = np.tile(q, (len(force_tcp), 1)), force_tcp @ T[:3, :3].T
-        intervals = [""] * len(levels)
+        intervals, caveats = [""] * len(levels), [""] * len(levels)
         if self.calibrated is None:
             deflection = self.model.deflection(self.compliance, rows, force)
         else:
@@ -107,6 +115,7 @@ class StudioSprings:
             deflection = found.deflection
             ends = zip(found.measured_low, found.measured_high, strict=True)
             intervals = [_interval_text(low, high) for low, high in ends]
+            caveats = _caveats(self.calibrated, rows, force)
         return tuple(
             CaseFigure(
                 name=name,
@@ -115,11 +124,27 @@ class StudioSprings:
                 parts=", ".join(f"{in_unit(part, 'mm') + 0.0:.3f}" for part in each),
                 interval=interval,
                 deflection=(float(each[0]), float(each[1]), float(each[2])),
+                caveat=caveat,
             )
-            for (name, load), each, interval in zip(
-                levels.items(), deflection, intervals, strict=True
+            for (name, load), each, interval, caveat in zip(
+                levels.items(), deflection, intervals, caveats, strict=True
             )
         )
+
+
+def _caveats(calibrated: CalibratedModel, q: FloatArray, force: FloatArray) -> list[str]:
+    """Return for each row what of it was not calibrated, in words; empty where all of it was."""
+    found = calibrated.covered_rows(q, force)
+    if found is None:
+        return ["where this model was calibrated is not known: the interval may not hold here"] * (
+            len(q)
+        )
+    return [
+        ""
+        if near and within
+        else f"{_NOT_CALIBRATED[near, within]} not calibrated: the interval may not hold here"
+        for near, within in zip(found.near.tolist(), found.within_load.tolist(), strict=True)
+    ]
 
 
 def calibrated_springs(calibrated: CalibratedModel, file: str) -> StudioSprings:

@@ -4,6 +4,7 @@ import { $, ask, attempt, element, fill, move, say, showPosture, state, view } f
 
 const REFUSED = ["#7b3294", "#c2571a", "#8c8c8c", "#b8860b", "#a6324a", "#3b6ea8", "#6b6b2f", "#555555"];
 const KINDS = { plan: "Planning", compare: "Comparing", survey: "Trying points", watch: "Watching the devices", run: "Run" };
+const ORIGINS = { plan: "#plan-form button", compare: "#compare", survey: "#survey", watch: "#watch", run: "#run-form > button" };
 let seen = "", curves = null, record = null;
 
 export function showWork(work) {
@@ -25,15 +26,18 @@ export function showWork(work) {
 }
 
 function ended({ kind, state: how, result, message }) {
-  if (how === "failed") say(`${KINDS[kind]}: ${message}`);
-  else if (how === "stopped" && kind !== "run") say(`${KINDS[kind]} was stopped.`, true);
+  const tell = (text, good) => say(text, good, document.querySelector(ORIGINS[kind]));
+  if (how === "failed") tell(`${KINDS[kind]}: ${message}`, false);
+  else if (how === "stopped" && kind !== "run") tell(`${KINDS[kind]} was stopped.`, true);
   else if (kind === "survey") showSurvey(result);
   else if (kind === "compare") showTechniques(result);
-  else if (kind === "plan") { showFolders().then(() => openPlan(result.folder)); say("The plan is made.", true); }
+  else if (kind === "plan") { showFolders().then(() => openPlan(result.folder)); tell("The plan is made.", true); }
   else if (kind === "run") {
     const { figures, interrupted } = result;
     const poses = `${figures.committed} of ${figures.poses} poses committed`;
-    say(interrupted ? `The run was stopped: ${poses}, the arm is ${figures.arm}. It can be gone on with.` : `The run is ${figures.state}: ${poses}, the arm is ${figures.arm}.`, true);
+    // What was stopped is there to be gone on with: the next start does that.
+    $("run-form").elements.resume.checked = interrupted;
+    tell(interrupted ? `The run was stopped: ${poses}, the arm is ${figures.arm}. Start goes on with it.` : `The run is ${figures.state}: ${poses}, the arm is ${figures.arm}.`, true);
     showFolders().then(() => openRecord(result.folder));
   }
 }
@@ -100,7 +104,7 @@ async function openPlan(folder) {
   view.set("survey");
   view.set("poses", { kind: "tags", poses: true, at: plan.poses.map((pose) => pose.position), texts: plan.poses.map((pose) => String(pose.id)), hints: plan.poses.map((pose) => `pose ${pose.id}, seen by ${pose.station}`), colour: "--region" });
   $("poses").replaceChildren(...plan.poses.map((pose) => {
-    const button = element("button", String(pose.id), { type: "button", title: `seen by ${pose.station}` });
+    const button = element("button", String(pose.id), { type: "button", title: `seen by ${pose.station}`, ariaLabel: `Pose ${pose.id} of the plan` });
     button.setAttribute("aria-pressed", "false");
     button.addEventListener("click", () => {
       for (const each of $("poses").children) each.setAttribute("aria-pressed", String(each === button));
@@ -113,7 +117,7 @@ async function openPlan(folder) {
 }
 
 function showLive(live) {
-  if (live.warnings) say(live.warnings.join(" · "));
+  if (live.warnings) say(live.warnings.join(" · "), false, $("run-stop"));
   if (live.time === undefined) return;
   const marker = live.marker ? `${live.marker.map((x) => (1e3 * x).toFixed(2)).join(", ")} mm, in ${live.station}` : "not seen";
   fill($("live-figures"), [
@@ -147,7 +151,7 @@ async function openRecord(folder) {
   $("record-state").textContent = `${record.folder}: ${record.state}`;
   $("record-lines").replaceChildren(...[...record.lines, ...record.last].map((line) => element("li", line)));
   $("record-poses").replaceChildren(...record.poses.map(({ pose, text }) => {
-    const button = element("button", String(pose), { type: "button", title: text });
+    const button = element("button", String(pose), { type: "button", title: text, ariaLabel: `Pose ${pose} of ${folder}` });
     button.setAttribute("aria-pressed", "false");
     button.addEventListener("click", () => openPose(folder, pose, button));
     return button;

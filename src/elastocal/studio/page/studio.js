@@ -22,19 +22,43 @@ export async function ask(action, message = {}) {
   throw new Refusal(kind.includes("json") ? (await response.json()).refusal : (await response.text()).trim());
 }
 
-export function say(text, good = false) {
-  $("message").hidden = !text;
-  $("message").textContent = text;
-  $("message").classList.toggle("good", good);
+// Where the page has a box, a message names the box and not the option of the command line.
+function onPage(text) {
+  for (const label of document.querySelectorAll("[data-option]")) {
+    const { option } = label.dataset, box = `\u201c${label.textContent.trim()}\u201d`;
+    text = text.replaceAll(`leave ${option} out`, `do not tick ${box}`).replaceAll(`give ${option}`, `tick ${box}`)
+      .replaceAll(`\`${option}\``, box).replaceAll(option, box);
+  }
+  return text;
 }
 
-// Runs something that may be refused, and says why.
-export async function attempt(work) {
+// What is said stands beside the button that asked for it, and stays in sight; without one, on top.
+export function say(text, good = false, beside = origin) {
+  const message = $("message"), row = beside?.closest("[role=tabpanel]") && (beside.closest(".row, .buttons") || beside);
+  if (row) row.after(message);
+  else $("work").after(message);
+  message.hidden = !text;
+  message.textContent = onPage(text);
+  message.classList.toggle("good", good);
+  if (text) message.scrollIntoView({ block: "nearest" });
+}
+
+// The button that was used last.
+export let origin = null;
+document.addEventListener("click", (event) => {
+  origin = event.target.closest?.("button") || null;
+  // What was said of the last thing that was done goes with the next one.
+  say("", false, null);
+}, true);
+
+// Runs something that may be refused, and says why, beside the button that asked for it.
+export async function attempt(work, refused = (text, beside) => say(text, false, beside)) {
+  const beside = origin;
   try {
     return await work();
   } catch (error) {
     if (!(error instanceof Refusal)) throw error;
-    say(error.message);
+    refused(error.message, beside);
     return undefined;
   }
 }
@@ -61,8 +85,11 @@ export async function move(action, message) {
     while (waiting) {
       const wish = waiting;
       waiting = null;
-      const answer = await attempt(() => ask(wish.action, wish.message));
+      // What was done in the view is refused there.
+      const inView = (text) => { $("refusal").textContent = onPage(text); };
+      const answer = await attempt(() => ask(wish.action, wish.message), wish.message.position && !wish.message.orientation || wish.action === "press" ? inView : undefined);
       if (answer && !waiting) showPosture(answer.posture);
+      if (answer?.posture.refusal && wish.message.orientation) say(answer.posture.refusal);
     }
   } finally {
     asking = false;
@@ -75,6 +102,7 @@ export function showPosture(posture) {
   view.handle = [3, 7, 11].map((k) => posture.tcp[k]);
   view.place(posture.places);
   $("refusal").textContent = posture.refusal;
+  $("moved").textContent = posture.note;
   showJoints(posture.joints);
   fill($("tool"), [["Position in base", posture.position], ["a, b, c", posture.orientation], ["Tooling", posture.surface]]);
   for (const [k, text] of posture.position.replace(" mm", "").split(", ").entries()) $("place").elements["xyz"[k]].placeholder = text;
@@ -112,6 +140,7 @@ function showCases(posture) {
     button.addEventListener("click", () => { state.chosen = each.name; showCases(state.posture); [...$("cases").querySelectorAll("button")].find((b) => b.textContent === each.name).focus(); });
     name.append(button);
     row.append(name, element("td", each.size), element("td", each.interval ? `${each.parts} (95 %: ${each.interval})` : each.parts));
+    if (each.caveat) row.lastElementChild.append(element("span", `; ${each.caveat}`, { className: "bad" }));
     return row;
   }));
   const from = view.handle, { deflection } = cases.find((each) => each.name === state.chosen);
@@ -208,8 +237,6 @@ function listen() {
   });
 }
 
-// What was said of the last thing that was done goes with the next one.
-document.addEventListener("click", () => say(""), true);
 openTabs();
 openPosture();
 openForms();
