@@ -14,11 +14,32 @@ from elastocal.logs.recordings import is_recording, read_recording, read_topics
 from elastocal.logs.streams import read_table
 from elastocal.logs.table import LogTable
 from elastocal.results import brief_repr
+from elastocal.wording import listed
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$|_(mm|m|um|deg|rad|N|kN|Nm|s|ms)$")
-_TIME = re.compile(r"(?i)(time|zeit|t|timestamp|stamp|date ?time|ms|ipoc|uhrzeit)")
-_AXIS = re.compile(r"(?i)((?:.*[._ ])?(?:joint|achse|axis|ax|a|j|q|theta)[_ ]?a?)(\d)")
-_EXTERNAL = re.compile(r"(?i)(?:.*[._ ])?(?:e1|rail|linear|track)")
+_TIME = re.compile(
+    r"(?i)(time|zeit|t|time ?stamp|stamp|date[ _]?time|ms|ipoc|uhrzeit|utc|(?:utc|local)[ _]?time)"
+)
+_DATE = re.compile(r"(?i)(date|datum|created)")
+"""A date counts where no column is named after a time."""
+_AXIS = re.compile(
+    r"(?i)((?:.*[._ ])?(?:joint|jnt|achse|axis|r?ax|jt|a|j|q|theta)[_ ]?a?)(\d)"
+    r"(?:[_ ](?:angle|pos|position|act|actual))?"
+)
+"""Numbered: KUKA A1; FANUC, Staubli, Denso, Nachi J1; Kawasaki JT1; ABB rax_1; UR actual_q_0."""
+_LETTERED = {
+    "Yaskawa": ("S", "L", "U", "R", "B", "T"),
+    "Hyundai or Nachi": ("S", "H", "V", "R2", "B", "R1"),
+}
+"""Axes that makers name by letters, from the base on."""
+_LETTER = re.compile(r"(?i)((?:.*[._ ])?)(r[12]|[slurbthv])(?:[-_ ]?(?:axis|ax))?")
+_EXTERNAL = re.compile(r"(?i)(?:.*[._ ])?(?:e1|eax_a|rail|linear|track)")
+_MADE_UP = 8e9
+"""ABB writes 9E+09 for an external axis that is not there."""
+_TURNS_OF = {"FANUC": ("r", "p", "w"), "Yaskawa": ("rz", "ry", "rx")}
+"""Angles about z, y and x, in the order of the map's a, b, c, as makers name them."""
+_TURN = re.compile(r"(?i)(.*?)(r[xyz]|[wpr])")
+_NO_TIMES = ("deg", "rad", "mm", "m", "N", "kN", "N*m", "N*mm")
 _FORCE = re.compile(r"(?i)(.*?)(?:f|force)[._ ]?([xyz])")
 _MOMENT = re.compile(r"(?i)(.*?)(?:t|m|torque|moment)[._ ]?([xyz])")
 _SIGMA = re.compile(r"(?i)(.*?)(?:u95|u|sigma|unc)[._ ]?([xyz])|()([xyz])[._ ]?(?:u95|unc)")
@@ -34,7 +55,14 @@ _OF_BOXES = {
 }  # fmt: skip
 """Units of the boxes of sensors: SI unit, and its number in one of theirs."""
 _STEP = re.compile(r"(?i)(step|reading|handshake|plateau|messpunkt)")
-_PLAIN_UNITS = {"°": "deg", "degrees": "deg", "nm": "N*m", "nmm": "N*mm", "sec": "s"}
+_PLAIN_UNITS = {
+    "°": "deg",
+    "degrees": "deg",
+    "degree": "deg",
+    "nm": "N*m",
+    "nmm": "N*mm",
+    "sec": "s",
+}
 _LEAST_AXES = 5
 """Columns with numbers that are the joints of an arm."""
 _SURELY_DEGREES = 7.0
@@ -89,6 +117,8 @@ class GuessedLog:
     log: str
     topic: str | None
     columns: tuple[GuessedColumns, ...] = ()
+    unused: tuple[str, ...] = ()
+    """Columns whose meaning is not known."""
 
     def answered(self, ask: Callable[[str], str]) -> "GuessedLog":
         """Return the same with the units that a person gave; an empty answer leaves one open."""
@@ -115,6 +145,8 @@ class GuessedLog:
                 found += [f"      {e.key.split('.')[1]}: {e.yaml}  # {e.why}" for e in own]
             else:
                 found += [f"    {key}: {each.yaml}  # {each.why}" for each in own]
+        if self.unused:
+            found.append(f"    # not used: {listed(self.unused)}")
         return found
 
 
@@ -164,13 +196,17 @@ def guess_log(log: str, topic: str | None, table: LogTable) -> GuessedLog:
     if all(name.isdigit() for name in table.header):
         return GuessedLog(log, topic, _without_names(table))
     names = {name: _bare(name) for name in table.header}
-    when = _when(table, names)
-    arm = _joints(table, names)
-    rest = _without(names, when + arm)
+    # Yaskawa's T is an axis, where no unit says that it is a time.
+    lettered = _by_letters(table, names)
+    when = _when(table, _without(names, lettered))
+    rest = _without(names, when)
+    arm = [*_rail(table, rest), *lettered] if lettered else _joints(table, rest)
+    rest = _without(rest, arm)
     force = _force(table, rest)
     rest = _without(rest, force)
     where = [] if force else _places(table, rest, of_tool=bool(arm))
-    return GuessedLog(log, topic, (*when, *arm, *force, *where))
+    unused = tuple(_without(rest, where))
+    return GuessedLog(log, topic, (*when, *arm, *force, *where), unused)
 
 
 def _without(names: dict[str, str], taken: Sequence[GuessedColumns]) -> dict[str, str]:
@@ -181,7 +217,12 @@ def _without(names: dict[str, str], taken: Sequence[GuessedColumns]) -> dict[str
 
 def _when(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
     """Return the columns that say when a row was taken."""
-    times = [name for name, bare in names.items() if _TIME.fullmatch(bare)][:1]
+    times = [
+        name
+        for heading in (_TIME, _DATE)
+        for name, bare in names.items()
+        if heading.fullmatch(bare) and _stated(name) not in _NO_TIMES
+    ][:1]
     steps = [name for name, bare in names.items() if _STEP.fullmatch(bare)][:1]
     return [
         *(GuessedColumns("time", (name,), *_time_unit(table, name)) for name in times),
@@ -195,16 +236,45 @@ def _joints(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
     for name, bare in names.items():
         if match := _AXIS.fullmatch(bare):
             by_word.setdefault(match[1].lower(), []).append((match[2], name))
-    axes = max(by_word.values(), key=len, default=[])
-    if len(axes) < _LEAST_AXES:
+    # Measured angles before those that were aimed at.
+    words = sorted(by_word, key=lambda word: ("target" in word or "cmd" in word, "act" not in word))
+    word = max(words, key=lambda each: len(by_word[each]), default="")
+    axes = by_word.get(word, [])
+    # A seventh axis in mm is the rail below the arm, whatever its number.
+    slides = tuple(name for _, name in axes if _stated(name) in ("mm", "m"))
+    arm = tuple(name for _, name in sorted(axes) if name not in slides)
+    if len(arm) < _LEAST_AXES:
         return []
-    rail = tuple(name for name, bare in names.items() if _EXTERNAL.fullmatch(bare))
-    arm = tuple(name for _, name in sorted(axes))
+    rail = [GuessedColumns("joints", slides, *_unit(table, slides, "length"))] if slides else []
     return [
-        GuessedColumns("joints", group, *_unit(table, group, kind))
-        for group, kind in ((rail, "length"), (arm, "angle"))
-        if group
+        *(rail or _rail(table, names)),
+        GuessedColumns("joints", arm, *_unit(table, arm, "angle")),
     ]
+
+
+def _rail(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
+    """Return the column of the linear axis that carries the arm, if there is one."""
+    found = tuple(
+        name
+        for name, bare in names.items()
+        if _EXTERNAL.fullmatch(bare) and _largest(table, (name,)) < _MADE_UP
+    )
+    return [GuessedColumns("joints", found, *_unit(table, found, "length"))] if found else []
+
+
+def _by_letters(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
+    """Return the columns of joints whose maker names them by letters, from the base on."""
+    groups: dict[str, dict[str, str]] = {}
+    for name, bare in names.items():
+        if match := _LETTER.fullmatch(bare):
+            groups.setdefault(match[1].lower(), {})[match[2].upper()] = name
+    for maker, letters in _LETTERED.items():
+        for own in groups.values():
+            if all(letter in own for letter in letters):
+                arm = tuple(own[letter] for letter in letters)
+                unit, why = _unit(table, arm, "angle")
+                return [GuessedColumns("joints", arm, unit, f"axes of {maker}, {why}")]
+    return []
 
 
 def _force(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
@@ -245,9 +315,26 @@ def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[Gu
     found = [GuessedColumns("pose.position", places[0], *_unit(table, places[0], "length"))]
     if angles := _triples(_ANGLE, names):
         found.append(GuessedColumns("pose.angles", angles[0], *_unit(table, angles[0], "angle")))
+    elif turned := _turns_of_makers(names):
+        maker, columns = turned
+        unit, why = _unit(table, columns, "angle")
+        found.append(GuessedColumns("pose.angles", columns, unit, f"{why}; angles of {maker}"))
     elif turns := _quaternion(names):
         found.append(GuessedColumns("pose.quaternion", turns, None, "w, x, y, z"))
     return found
+
+
+def _turns_of_makers(names: dict[str, str]) -> tuple[str, tuple[str, ...]] | None:
+    """Return the maker whose angles about fixed x, y and z these are, and the columns a, b, c."""
+    groups: dict[str, dict[str, str]] = {}
+    for name, bare in names.items():
+        if match := _TURN.fullmatch(bare):
+            groups.setdefault(match[1].lower(), {})[match[2].lower()] = name
+    for maker, axes in _TURNS_OF.items():
+        for own in groups.values():
+            if all(axis in own for axis in axes):
+                return maker, tuple(own[axis] for axis in axes)
+    return None
 
 
 def _quaternion(names: dict[str, str]) -> tuple[str, ...]:

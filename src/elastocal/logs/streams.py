@@ -83,7 +83,7 @@ def read_streams_of(log_map: LogMap, files: Sequence[Path], robot: Robot) -> tup
         If a file cannot be read.
     """
     found = {
-        index: [path for path in files if fnmatch.fnmatch(path.name, entry.log)]
+        index: [path for path in files if _is_named(path, entry.log)]
         for index, entry in enumerate(log_map.logs)
     }
     for index, entry in enumerate(log_map.logs):
@@ -103,6 +103,15 @@ def read_streams_of(log_map: LogMap, files: Sequence[Path], robot: Robot) -> tup
         _streams(entry, [read_table(path, entry.topic) for path in sorted(found[index])], robot)
         for index, entry in enumerate(log_map.logs)
     )
+
+
+def _is_named(path: Path, log: str) -> bool:
+    """Return whether a map means a file: by its name, or by the end of its path with folders."""
+    if fnmatch.fnmatch(path.name, log):
+        return True
+    # Relative to the map, which may lie elsewhere: what leads upwards says nothing of the file.
+    parts = [part for part in Path(log).parts if part not in (".", "..")]
+    return len(parts) > 1 and fnmatch.fnmatch(path.resolve().as_posix(), f"*/{'/'.join(parts)}")
 
 
 def read_table(path: Path, topic: str | None) -> LogTable:
