@@ -342,6 +342,12 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
         file.
     FileAccessError
         If the file, or one that it names, cannot be read.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> ec.load_cell(ec.init("cell").cell).robot.joint_names[:2]
+    ('rail', 'joint_a1')
     """
     path = Path(path)
     text = read_text(path)

@@ -20,6 +20,7 @@ from .merging import (
 from .path_columns import (
     LARGEST_FORCE as LARGEST_FORCE,
     LARGEST_MOMENT as LARGEST_MOMENT,
+    PathColumns as PathColumns,
     find_columns as find_columns,
     find_posture_columns as find_posture_columns,
     find_wrench_columns as find_wrench_columns,
@@ -27,6 +28,7 @@ from .path_columns import (
     joint_dimensions as joint_dimensions,
 )
 from .path_table import (
+    Columns as Columns,
     PathRows as PathRows,
     PathTable as PathTable,
     in_file as in_file,

@@ -7,12 +7,13 @@ columns are carried through unchanged. Only finite numbers are written.
 """
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
@@ -28,6 +29,8 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.tables import Column, TableError, TableLayout, TableRows, new_table, opened_table
 
+Columns = Mapping[str, ArrayLike]
+"""Columns by their headings, each of shape (row,): a dictionary, or a data frame."""
 _TURN = 2.0 * np.pi * (1.0 + 1e-6)
 """In rad; controllers write orientations within half a turn, some within a full one."""
 _UNIT_NORM = 2e-3
@@ -148,6 +151,39 @@ class PathTable:
     path: Path
     layout: TableLayout
     columns: PathColumns
+    held: TableRows | None = None
+    """Rows that are of no file."""
+
+    @classmethod
+    def of(cls, table: Columns, find: Callable[[Sequence[str]], PathColumns]) -> "PathTable":
+        """Return the table of columns that are given, such as those of a data frame.
+
+        Parameters
+        ----------
+        table : mapping
+            Column of each heading; the headings are those of a file, with their units.
+        find : callable
+            As in `open`.
+
+        Raises
+        ------
+        PathError
+            If a column is none, columns differ in length, or the headings do not fit.
+        """
+        columns = {str(name): np.asarray(table[name]) for name in table}
+        for name, column in columns.items():
+            if column.ndim != 1 or len(column) != len(next(iter(columns.values()))):
+                raise PathError(
+                    f"column {name!r} has shape {column.shape}: every column has one value a row,"
+                    " and all are of one length"
+                )
+        values = [column.tolist() for column in columns.values()]
+        cells = [list(map(str, row)) for row in zip(*values, strict=True)]
+        layout = TableLayout(tuple(columns))
+        if not cells:
+            raise PathError("rows have no row")
+        held = TableRows(cells, list(range(1, len(cells) + 1)))
+        return cls(Path("rows"), layout, find(layout.header), held)
 
     @classmethod
     def open(cls, path: Path, find: Callable[[Sequence[str]], PathColumns]) -> "PathTable":
@@ -224,6 +260,12 @@ class PathTable:
         )
 
     def _pieces(self, size: int) -> Iterator[TableRows]:
+        if self.held is not None:
+            held, cells = self.held, self.held.cells
+            for start in range(0, len(held), min(size, len(held))):
+                part = slice(start, start + min(size, len(held)))
+                yield replace(held, cells=cells[part], lines=held.lines[part])
+            return
         width, empty = len(self.layout.header), True
         with _as_path_errors(), opened_table(self.path) as table:
             for block in table.pieces(size):

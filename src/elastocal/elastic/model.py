@@ -29,10 +29,11 @@ A free motion of the joint clears the memory: after it the state is assumed near
 changes the torque by more than ``2 r`` erases all earlier history.
 """
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -258,10 +259,38 @@ class CartesianCompliance:
     force."""
 
 
+class SavedRobot(Protocol):
+    """A robot as a file of results holds it."""
+
+    def read(self) -> Robot:
+        """Return the robot."""
+
+
 @brief_repr
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class ElasticModel:
-    """A robot with springs; compliances are arguments, so that one model serves many fits."""
+    """A robot with springs; compliances are arguments, so that one model serves many fits.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot up to its tool centre point, or what a result of `calibrate` has as ``robot``.
+    springs : iterable of Spring
+        In the order of every compliance vector.
+
+    Raises
+    ------
+    SpringError
+        If two springs have one name, or a spring names a joint that the robot does not have.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> result = ec.calibrate(ec.datasets.fanuc_r2000ic(), springs="actuated", draws=40)
+    >>> model = ec.ElasticModel(result.robot, result.springs)
+    >>> model.deflection(result.compliance, [0.0] * 6, [0.0, 0.0, 500.0]).round(6).tolist()
+    [-0.000548, 7e-06, 0.002038]
+    """
 
     robot: Robot
     springs: tuple[Spring, ...]
@@ -273,8 +302,10 @@ class ElasticModel:
     _columns: IndexArray = field(init=False, repr=False)
     _groups: tuple[AlikeSprings, ...] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "springs", tuple(self.springs))
+    def __init__(self, robot: Robot | SavedRobot, springs: Iterable[Spring]) -> None:
+        found = robot if isinstance(robot, Robot) else robot.read()
+        object.__setattr__(self, "robot", found)
+        object.__setattr__(self, "springs", tuple(springs))
         check_springs(self.springs, self.robot.joint_names)
         chain, columns = insert_springs(self.robot, self.springs)
         parameters = tuple(p for spring in self.springs for p in spring.parameters)

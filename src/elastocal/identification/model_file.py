@@ -260,6 +260,14 @@ def read_model(source: ModelSource) -> CalibratedModel:
         If springs or frames do not fit the robot.
     FileAccessError
         If it cannot be read.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> readings = ec.datasets.fanuc_r2000ic()
+    >>> _ = ec.calibrate(readings, springs="actuated", draws=40, out="model.json")
+    >>> ec.read_model("model.json").model.spring_names[0]
+    'joint_1.axial'
     """
     if isinstance(source, CalibratedModel):
         return source

@@ -243,6 +243,14 @@ def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: 
     ElastocalError
         If the contents are not valid, a tcp is asked for and is no link of a robot, or a preview
         of what is no cell, or of a cell that no pose can be found for.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> readings = ec.datasets.fanuc_r2000ic()
+    >>> _ = ec.calibrate(readings, springs="actuated", draws=40, out="model.json")
+    >>> dict(ec.check("model.json").facts())["kind"]
+    'calibrated model'
     """
     path = Path(settings.file)
     if settings.tcp is None:

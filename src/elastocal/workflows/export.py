@@ -136,6 +136,14 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
         If model, settings or tool do not fit.
     FileAccessError
         If a file cannot be read or written, or the folder holds files and ``force`` is not given.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> readings = ec.datasets.fanuc_r2000ic()
+    >>> _ = ec.calibrate(readings, springs="actuated", draws=40, out="model.json")
+    >>> dict(ec.export("model.json", out="c").facts())["cycle"]
+    '4 ms'
     """
     model = Path(settings.model)
     calibrated = settings.read_model(model)

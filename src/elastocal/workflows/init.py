@@ -70,6 +70,12 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
         If there is no such example.
     FileAccessError
         If a file is there already or cannot be written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> ec.init("cell").facts()[0]
+    ('cell', 'cell/cell.yaml')
     """
     path = Path(settings.out) / PROCESS_FILE
     if path.exists() and not settings.force:

@@ -1,14 +1,25 @@
 """``predict``: the deflection of each row of joints and force."""
 
+from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.dataset import PathTable, find_columns, in_file, new_rows
+from elastocal.dataset import (
+    Columns,
+    Dataset,
+    PathColumns,
+    PathTable,
+    find_columns,
+    in_file,
+    new_rows,
+)
 from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
@@ -21,6 +32,7 @@ from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
+from elastocal.robot import Robot
 from elastocal.units import quantity
 from elastocal.workflows._inputs import ArmAsBuilt, NewTool, coverage_notes
 from elastocal.workflows._workflow import workflow
@@ -31,14 +43,16 @@ _NO_MISFIT = (
 )
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PredictSettings(NewTool, ArmAsBuilt):
     """Settings of a prediction: the model and the rows."""
 
     model: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
     """Model file of `calibrate`; in Python also what it returned."""
-    rows: Annotated[str | PathLike[str], Option(argument=True)]
-    """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``."""
+    rows: Annotated[str | PathLike[str] | Dataset | Columns, Option(argument=True)]
+    """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``; in
+    Python also such columns by their headings (a dictionary, a data frame), or a dataset."""
     out: Annotated[Path | None, Option(required=True, help="CSV to write.")] = None
     """CSV to write: the rows with their deflections and intervals."""
     force: bool = False
@@ -100,7 +114,7 @@ class PredictResult(Result):
 
 @workflow(PredictSettings, marks=("deflection_x_low[m]",))
 def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # noqa: ARG001 - done in an instant
-    r"""Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
+    """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
 
     Parameters
     ----------
@@ -118,22 +132,22 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> import elastocal as ec
-    >>> model = ec.calibrate(ec.datasets.fanuc_r2000ic(), springs="actuated")
-    >>> joints = ",".join(f"joint_{n}[deg]" for n in range(1, 7))
-    >>> rows = Path("rows.csv")
-    >>> heads = f"{joints},force_x[N],force_y[N],force_z[N]"
-    >>> _ = rows.write_text(f"{heads}\n0,0,0,0,-60,0,0,0,500\n")
-    >>> ec.predict(model, rows).prediction.deflection.shape
-    (1, 3)
+    >>> readings = ec.datasets.fanuc_r2000ic()
+    >>> model = ec.calibrate(readings, springs="actuated", draws=40)
+    >>> rows = {f"joint_{n}[deg]": [0.0, 10.0] for n in range(1, 7)}
+    >>> rows |= {"force_x[N]": [0.0, 0.0], "force_y[N]": [0.0, 0.0], "force_z[N]": [500.0, 900.0]}
+    >>> ec.predict(model, rows).prediction.deflection.round(6).tolist()
+    [[-0.000548, 7e-06, 0.002038], [0.000595, -0.000164, 0.003256]]
+    >>> ec.predict(model, readings).prediction.deflection.shape
+    (43, 3)
     """
-    rows = Path(settings.rows)
     calibrated = settings.read_model(settings.model)
     robot = calibrated.model.robot
     controller, unloaded = settings.unloaded(robot)
-    with in_file(rows):
-        table = PathTable.open(rows, lambda header: find_columns(header, robot, poses=False))
+    file = settings.rows
+    with in_file(Path(file)) if isinstance(file, str | PathLike) else nullcontext():
+        table = _table(settings.rows, robot)
         loads = table.rows()
         T_base_tcp = controller.forward(loads.joints)
         wrench = loads.wrench_in_base(T_base_tcp)
@@ -163,6 +177,32 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
         coverage=coverage,
     )
     return PredictResult(prediction, summary)
+
+
+def _table(rows: str | PathLike[str] | Dataset | Columns, robot: Robot) -> PathTable:
+    """Return the table of a file, of columns, or of the usable readings of a dataset."""
+
+    def find(header: Sequence[str]) -> PathColumns:
+        return find_columns(header, robot, poses=False)
+
+    if isinstance(rows, str | PathLike):
+        return PathTable.open(Path(rows), find)
+    return PathTable.of(_readings(rows, robot) if isinstance(rows, Dataset) else rows, find)
+
+
+def _readings(dataset: Dataset, robot: Robot) -> Columns:
+    """Return the usable readings of a dataset as columns with headings."""
+    found = dataset.readings(robot.joint_names)
+    columns: dict[str, ArrayLike] = {
+        f"{name}[{'rad' if turns else 'm'}]": values
+        for name, turns, values in zip(
+            robot.joint_names, robot.revolute, found.joint_position.T, strict=True
+        )
+    }
+    for name, unit, vectors in (("force", "N", found.force), ("moment", "N*m", found.moment)):
+        if vectors is not None:
+            columns |= {f"{name}_{axis}[{unit}]": vectors[:, i] for i, axis in enumerate("xyz")}
+    return columns
 
 
 def _columns(
