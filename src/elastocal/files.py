@@ -103,6 +103,9 @@ def replacing(path: Path) -> Iterator[Path]:
             raise IsADirectoryError(_NO_FILE)
         if rule is not None:
             rule.require(path)
+            # A command makes the folder that an output is named in; a function of the library
+            # writes where it is told.
+            path.parent.mkdir(parents=True, exist_ok=True)
         with _under_way(path, _make_file, path.suffix) as temporary:
             yield temporary
             _flush_to_disk(temporary)
@@ -126,16 +129,17 @@ def require_place(path: Path) -> None:
     Raises
     ------
     FileAccessError
-        If its folder is not there or cannot be written into, or it is itself no file.
+        If its folder cannot be made or written into, or it is itself no file.
     """
     path = Path(path)
     try:
-        if not stat.S_ISDIR(path.parent.stat().st_mode):
-            raise NotADirectoryError(f"{path.parent} is a file, not a folder")
+        folder = next((each for each in path.parents if os.path.lexists(each)), Path())
+        if not stat.S_ISDIR(folder.stat().st_mode):
+            raise NotADirectoryError(f"{folder} is a file, not a folder")
         if path.exists() and not path.is_file():
             raise IsADirectoryError(_NO_FILE)
-        if not os.access(path.parent, os.W_OK | os.X_OK):
-            raise PermissionError(f"nobody may write into {path.parent}")
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(f"nobody may write into {folder}")
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
 

@@ -34,6 +34,7 @@ def test_only_what_is_missing_is_asked_for():
         ("sensor.colour=red", "colour"),
         ("wether=fine", "wether"),
         ("temperature=21", "temperature with its unit"),
+        ("temperature=21.5 F", "temperature with its unit"),
         ("tracker.uncertainty=20", "tracker.uncertainty"),
         ("date=yesterday", "must be a day"),
     ],
@@ -47,3 +48,8 @@ def test_statements_are_read_by_key():
     assert read_statements(("place= Hall 3", "sensor.serial=a=b")) == {
         "place": "Hall 3", "sensor.serial": "a=b",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("typed", ["21.5 C", "21.5C", "21.5 degC", "21.5 °C", "21.5deg C"])
+def test_a_temperature_is_read_as_it_is_typed(typed):
+    assert certificate_of(CertificateEntry(), {"temperature": typed}).temperature == "21.5 °C"

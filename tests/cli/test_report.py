@@ -181,9 +181,10 @@ def test_a_report_never_takes_the_place_of_a_file_of_another_kind(finished, copi
     assert model.read_bytes() == before
 
 
-def test_a_folder_that_is_not_there_is_refused_before_the_work(tmp_path):
+def test_a_folder_that_cannot_be_is_refused_before_the_work(tmp_path):
+    (tmp_path / "no").write_text("a file")
     out = tmp_path / "no" / "r.html"
-    assert "there is no folder" in elastocal("report", tmp_path / "x", "--out", out).reason
+    assert "is a file, not a folder" in elastocal("report", tmp_path / "x", "--out", out).reason
 
 
 def test_a_pdf_that_is_there_is_not_replaced_without_force(finished, tmp_path, monkeypatch):

@@ -275,7 +275,7 @@ def test_an_impossible_option_is_refused_by_name(tmp_path, options, message):
 def test_an_output_that_cannot_be_written_is_refused_and_nothing_is_left(tmp_path):
     path = tmp_path / "data.nc"
     dataset.write(good(), path)
-    result = elastocal("calibrate", path, "--out", tmp_path / "missing" / "model.json")
+    result = elastocal("calibrate", path, "--out", path / "model.json")
     assert "cannot write" in result.err.strip().splitlines()[-1]
     assert result.code == 1
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["data.nc"]

@@ -17,10 +17,11 @@ from elastocal.records import StrictModel, validate
 
 
 def _temperature(text: str) -> str:
-    text = text.replace("degC", "°C")
-    if not re.search(r"\d\s*(°C|K)$", text):
-        raise ValueError("must be a temperature with its unit, such as '21.5 °C' or '21 degC'")
-    return text
+    # A keyboard has no degree sign.
+    found = re.fullmatch(r"(.*\d)\s*(?:deg|°)?\s*([CK])", text)
+    if not found:
+        raise ValueError("must be a temperature with its unit, such as '21.5 °C' or '21.5 C'")
+    return f"{found[1]} {'°C' if found[2] == 'C' else 'K'}"
 
 
 def _day(text: str) -> str:
@@ -74,8 +75,8 @@ class CertificateEntry(StrictModel):
 
 
 ASKED = (
-    "operator", "place", "temperature", "robot.serial", "controller.serial", "tool.serial",
-    "sensor.serial", "sensor.certificate", "tracker.serial", "tracker.certificate",
+    "number", "operator", "place", "temperature", "robot.serial", "controller.serial",
+    "tool.serial", "sensor.serial", "sensor.certificate", "tracker.serial", "tracker.certificate",
 )  # fmt: skip
 """Entries that are asked for before a run if neither cell file nor options state them."""
 

@@ -186,6 +186,8 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
+_SKIP = "skip"
+"""Answer that leaves out all further questions."""
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
 """Signals by which a person, a terminal or a system ends or halts a program, which would leave the
 arm pressing without supervision. Not every system has all of them."""
@@ -254,12 +256,16 @@ class TerminalOperator:
         found: dict[str, str] = {}
         if not (missing and self._asks and sys.stdin.isatty()):
             return found
-        self._console.print("For the certificate. Enter leaves one out, Ctrl-D all that follow.")
+        self._console.print(
+            "For the certificate. Enter leaves one out; skip, or Ctrl-D, all that follow."
+        )
         waiting = list(missing)
         while waiting:
-            self._console.print(f"  {waiting[0].replace('.', ', ')}: ", end="")
+            number = len(missing) - len(waiting) + 1
+            name = waiting[0].replace(".", ", ")
+            self._console.print(f"  {number} of {len(missing)}  {name}: ", end="")
             line = sys.stdin.readline()
-            if not line:
+            if not line or line.strip().lower() == _SKIP:
                 break
             try:
                 found |= read_statements((f"{waiting[0]}={line}",)) if line.strip() else {}

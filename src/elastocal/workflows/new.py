@@ -20,6 +20,7 @@ from elastocal.planning.motion import Mover, mover_for
 from elastocal.planning.surface import Surface, SurfaceError, sample_uniform
 from elastocal.progress import Progress
 from elastocal.results import Result
+from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for
 from elastocal.templating import templates
 from elastocal.units import in_unit, parse_quantity, quantity
@@ -198,6 +199,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         urdf=_quoted(_relative(str(settings.robot), out)) if settings.is_urdf else "",
         robot=_quoted(robot.name),
         flange=_quoted(settings.flange),
+        masses=_masses(robot),
         tcp=_frame(str(settings.tcp)),
         tool_mass=_quoted(settings.tool_mass),
         tool_centre=_listed(str(settings.tool_centre)),
@@ -213,10 +215,10 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         high=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in high)),
         flip=flip,
         floor=quantity(min(0.0, settings.lowest) - 0.1, "mm", ".0f"),
-        side=_quoted(f"{press / 3.0:.2g} N"),
+        side=_quoted(f"{_two_digits(press / 3.0)} N"),
         press=_quoted(settings.press),
-        contact=_quoted(f"{min(60.0, max(10.0, 0.2 * press)):.2g} N"),
-        ramp=_quoted(f"{min(400.0, max(20.0, 0.4 * press)):.2g} N/s"),
+        contact=_quoted(f"{_two_digits(min(60.0, max(10.0, 0.2 * press)))} N"),
+        ramp=_quoted(f"{_two_digits(min(400.0, max(20.0, 0.4 * press)))} N/s"),
         disk=_quoted(f"{settings.disk_radius:g} mm"),
         payload=_quoted(f"{2.0 * parse_quantity(settings.tool_mass, 'mass'):g} kg"),
         torques=", ".join(f'{_quoted(name)}: "{value:g} N*m"' for name, value in torques),
@@ -227,6 +229,17 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         tolerance="" if tolerance == NONE else _quoted(tolerance),
     )  # fmt: skip
     return _REMARK.sub(lambda found: f"{found[1]:<{_COLUMN - 3}}   {found[2]}", text)
+
+
+def _masses(robot: Robot) -> str:
+    """Return where the masses of an arm of one's own come from, for a remark in the file."""
+    if not robot.has_masses:
+        return (
+            "its links have no masses (<inertial>), so the arm's own weight is left out of torques;"
+            " the maker's data sheet, or `elastocal robots NAME` of a like arm, has some"
+        )
+    moved = sum(joint.mass for joint in robot.chain.joints)
+    return f"its moved links weigh {moved:.4g} kg together, by <inertial> of the URDF: not checked"
 
 
 def _shape(tip: FloatArray, radius: float) -> str:
@@ -257,6 +270,15 @@ def _relative(file: str, out: Path) -> str:
         return Path(os.path.relpath(file, out.parent)).as_posix()
     except ValueError:  # on another drive
         return Path(file).resolve().as_posix()
+
+
+def _two_digits(value: float) -> str:
+    """Return a number with two significant digits and no exponent.
+
+    >>> _two_digits(333.3), _two_digits(16.7), _two_digits(8.333), _two_digits(1e5 / 3)
+    ('330', '17', '8.3', '33000')
+    """
+    return f"{float(f'{value:.2g}'):.12g}"
 
 
 def _quoted(text: object) -> str:

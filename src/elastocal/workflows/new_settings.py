@@ -153,7 +153,7 @@ class NewSettings:
 
     def _with_devices(self) -> "NewSettings":
         """Return settings with the sensor's ranges, twice its largest load, and the tracker."""
-        centre = self.tool_centre or ", ".join(f"{500.0 * x:.0f} mm" for x in self.tip)
+        centre = self.tool_centre or ", ".join(_rounded(500.0 * x, "mm", 0) for x in self.tip)
         force, weight = parse_quantity(self.press, "force"), _GRAVITY * self._mass
         lever = float(np.linalg.norm(self.tip)) + 0.1
         moment = force * lever + weight * float(np.linalg.norm(parse_point(centre)))
@@ -164,7 +164,8 @@ class NewSettings:
             tool_centre=centre,
             force_range=self.force_range or _thrice(_rounded_up(2.0 * (force + weight)), "N"),
             moment_range=self.moment_range or _thrice(_rounded_up(2.0 * moment), "N*m"),
-            tracker=self.tracker or f"{x:.1f} m, {aside:.1f} m, {z + 1.0:.1f} m",
+            tracker=self.tracker
+            or ", ".join(_rounded(each, "m", 1) for each in (x, aside, z + 1.0)),
         )
 
     def offered(self, name: str) -> str:
@@ -332,6 +333,15 @@ def _rounded_up(value: float) -> float:
     """Return a value rounded up to its second digit."""
     step = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.ceil(value / step - 1e-9) * step
+
+
+def _rounded(value: float, unit: str, digits: int) -> str:
+    """Return a rounded quantity, never a negative zero.
+
+    >>> _rounded(-0.01, "m", 1), _rounded(-1.26, "m", 1), _rounded(-0.2, "mm", 0)
+    ('0.0 m', '-1.3 m', '0 mm')
+    """
+    return f"{round(value, digits) + 0.0:.{digits}f} {unit}"
 
 
 def _thrice(value: float, unit: str) -> str:

@@ -10,6 +10,7 @@ from typing import Annotated
 
 from elastocal.blocks import Block, Bullets, Facts, Paragraph
 from elastocal.errors import FileAccessError
+from elastocal.files import require_place
 from elastocal.identification.recertification import Estimate
 from elastocal.options import Option, Statements
 from elastocal.progress import Progress
@@ -250,8 +251,7 @@ def _require_page(out: Path) -> None:
     if out.suffix.lower() not in (".html", ".htm"):
         # Any other name could be that of a model.
         raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")
-    if not out.parent.is_dir():
-        raise FileAccessError(f"cannot write {out}: there is no folder {out.parent}")
+    require_place(out)
 
 
 def _require_free(places: tuple[Path | None, ...], force: bool) -> None:

@@ -416,13 +416,13 @@ def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
 def _draw_candidates(
     axes: Axes, place: FloatArray, distance: FloatArray, farthest: float
 ) -> PathCollection:
-    """Draw a dot a candidate, darkest at the distance ``farthest`` in m."""
+    """Draw a dot a candidate, brightest at the distance ``farthest`` in m."""
     # The farthest come last, so that no gap hides under near ones.
     order = np.argsort(distance)
     size = float(np.clip(12_000.0 / len(place), 0.5, 12.0))
     x, y = place[order].T
     return axes.scatter(
-        x, y, s=size, c=in_unit(distance[order], "mm"), cmap=f"{style.SEQUENTIAL}_r", vmin=0.0,
+        x, y, s=size, c=in_unit(distance[order], "mm"), cmap=style.SEQUENTIAL, vmin=0.0,
         vmax=in_unit(farthest, "mm"), linewidths=0, rasterized=len(order) > _MANY,
     )  # fmt: skip
 
