@@ -132,3 +132,16 @@ def test_one_campaign_has_presses_and_positions_in_one_program(tmp_path, cell):
 def test_options_of_one_campaign_that_contradict_are_refused(tmp_path, cell, options, message):
     assert message in elastocal("plan", cell.path, "--out", tmp_path / "plan", *options).reason
     assert not (tmp_path / "plan").exists()
+
+
+def test_it_says_how_many_poses_functions_of_each_joint_need(cell):
+    """With 24 poses every joint's function is mostly a guess, with 48 it is less of one."""
+    few = planned(cell, "random").functions
+    more = plan_positions(cell, 48, "random", seed=1).functions
+    assert [(each.joint, each.orders) for each in few[:3]] == [
+        ("joint_a1", 10), ("joint_a1", 20), ("joint_a1", 40)
+    ]  # fmt: skip
+    for before, after in zip(few, more, strict=True):
+        assert 1.0 > before.unknown > after.unknown > 0.0
+        assert before.poses % 100 == 0
+    assert all(each.unknown > 0.33 for each in few)

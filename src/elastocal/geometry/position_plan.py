@@ -11,6 +11,7 @@ al., IJRR 24, 2005), `cover` spreads the marker in space.
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -20,10 +21,12 @@ from elastocal.blocks import Block
 from elastocal.cell import Cell, fingerprint
 from elastocal.errors import PlanningError, present
 from elastocal.findings import Finding, Kind
-from elastocal.geometry.arm import ArmErrors
+from elastocal.geometry.arm import LOW_ORDERS, ORDERS, ArmErrors, waves
+from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.determined import told_apart
+from elastocal.geometry.joint_functions import beyond_low_orders
 from elastocal.geometry.positions import Payload, Positions
-from elastocal.geometry.problem import GeometryProblem, State
+from elastocal.geometry.problem import PRIOR_WIDTH, GeometryProblem, State, prior_weight
 from elastocal.planning import (
     CellRecord,
     CollisionScene,
@@ -44,7 +47,7 @@ from elastocal.progress import Progress, silent
 from elastocal.records import record
 from elastocal.results import brief_repr
 
-_SCHEMA = "elastocal.position-plan/2"
+_SCHEMA = "elastocal.position-plan/3"
 _RUNG = "weight"
 """The errors that the poses are chosen for: places and zeros of the joints, and what they yield."""
 _POOL, _BATCH, _MOST_DRAWN = 500, 1000, 60_000
@@ -55,10 +58,16 @@ _OF_PROCESS = 200
 _FEWEST = 2
 """Coordinates for each error of the arm, below which a plan says that they are few."""
 _REPLACEMENTS = 10
-_PRIOR = 30.0
-"""Width of the prior in likely sizes of an error, so that few poses have a figure too."""
 _FINEST = 3e-5
 """Standard deviation of a coordinate that the prior is weighed against, in m."""
+_ORDERS = (10, 20, 40)
+"""Waves a turn up to which a plan says what its poses show of functions of the joints."""
+_UNKNOWN = 1.0 / 3.0
+"""Part of a function that may stay unknown."""
+_SAMPLES = 200
+"""Angles at which a joint's function is judged."""
+_STEP = 100
+"""Step of the number of poses that such functions are said to need."""
 
 
 @brief_repr
@@ -86,8 +95,21 @@ class PosesNeeded:
     tracker measures: root mean square over the pool of the predicted distance."""
 
 
+@record()
+class FunctionsShown:
+    """What poses show of the function of a joint: errors of gear and encoder by its angle."""
+
+    joint: str
+    orders: int
+    """Up to so many waves a turn."""
+    unknown: float
+    """Part of such a function of likely size that these poses leave unknown."""
+    poses: int | None
+    """Drawn poses that leave less than a third; None: more than the pool has."""
+
+
 @brief_repr
-@record(_SCHEMA, reads=("elastocal.position-plan/1",))
+@record(_SCHEMA, reads=("elastocal.position-plan/1", "elastocal.position-plan/2"))
 class PositionPlan:
     """Poses for `elastocal geometry`, in visiting order; also its file."""
 
@@ -110,6 +132,8 @@ class PositionPlan:
     expected: tuple[PosesNeeded, ...]
     """Expected accuracy with a quarter, half and all of the poses, in the order of the search."""
     findings: tuple[Finding, ...]
+    functions: tuple[FunctionsShown, ...] = ()
+    """What they show of functions of the joints; empty in older files."""
 
     def show(self) -> Iterator[Block]:
         """Yield the poses to measure, and the expected accuracy."""
@@ -201,6 +225,7 @@ def plan_positions(
         fixed=knowledge.fixed,
         expected=tuple(PosesNeeded(n, knowledge.amplification(order[:n])) for n in fewer),
         findings=_findings(count, knowledge.errors),
+        functions=tuple(knowledge.functions(order)),
     )
 
 
@@ -241,11 +266,10 @@ class _Knowledge:
 
     marker: FloatArray
     """Marker in base, shape (posture, 3), in m."""
-    rows: FloatArray
-    """Derivatives of the marker by the unknowns that the pool determines, each in its likely size,
-    shape (posture, 3, unknown), in m."""
-    errors: int
-    """Number of them that are errors of the arm."""
+    problem: GeometryProblem
+    derivatives: Derivatives
+    columns: IndexArray
+    """Unknowns that the pool determines."""
     fixed: dict[str, str]
 
     @classmethod
@@ -260,11 +284,26 @@ class _Knowledge:
         nominal = State(stands, at_tcp[None], ArmErrors.none(pool.q.shape[1]))
         derivatives = problem.linearise(nominal)[1]
         columns, fixed = told_apart(derivatives, problem, _RUNG)
-        size = np.array([unknown.size for unknown in problem.unknowns])[columns]
-        rungs = [problem.unknowns[column].rung for column in columns.tolist()]
-        errors = sum(rung != "registration" for rung in rungs)
-        why = {each.name: each.why for each in fixed}
-        return cls(marker, derivatives.dense[:, :, columns] * size, errors, why)
+        return cls(marker, problem, derivatives, columns, {each.name: each.why for each in fixed})
+
+    @property
+    def errors(self) -> int:
+        """Number of unknowns that are errors of the arm."""
+        unknowns = self.problem.unknowns
+        return sum(unknowns[i].rung != "registration" for i in self.columns.tolist())
+
+    @property
+    def size(self) -> FloatArray:
+        """Likely size of every unknown, shape (unknown,)."""
+        return np.array([unknown.size for unknown in self.problem.unknowns])
+
+    @cached_property
+    def rows(self) -> FloatArray:
+        """Derivatives by unknowns that the pool determines, each in its likely size.
+
+        Shape (posture, 3, unknown), in m.
+        """
+        return np.asarray(self.derivatives.dense[:, :, self.columns] * self.size[self.columns])
 
     def candidates(self, left: IndexArray) -> Candidates:
         """Return some postures for a search that is to predict well all over the pool."""
@@ -276,9 +315,50 @@ class _Knowledge:
         """Return the error of predictions of some poses; see `PosesNeeded`."""
         unknowns = self.rows.shape[2]
         A, all_rows = self.rows[chosen].reshape(-1, unknowns), self.rows.reshape(-1, unknowns)
-        prior = (_FINEST / _PRIOR) ** 2 * np.eye(unknowns)
+        prior = np.diag(prior_weight(self.problem, _FINEST)[self.columns])
         variance = np.einsum("ru,uv,rv->r", all_rows, np.linalg.inv(A.T @ A + prior), all_rows)
         return float(np.sqrt(variance.reshape(-1, 3).sum(axis=1).mean()))
+
+    def functions(self, chosen: IndexArray) -> Iterator[FunctionsShown]:
+        """Yield what some poses show of the functions of each joint, and how many it takes."""
+        joints = [joint for joint in self.problem.robot.chain.joints if joint.revolute]
+        counts = range(_STEP, len(self.marker) + 1, _STEP)
+        drawn = np.array([self._unknown(np.arange(n)) for n in counts])
+        for j, (joint, here) in enumerate(zip(joints, self._unknown(chosen), strict=True)):
+            for k, orders in enumerate(_ORDERS):
+                enough = [n for n, each in zip(counts, drawn, strict=True) if each[j, k] < _UNKNOWN]
+                least = min(enough, default=None)
+                yield FunctionsShown(joint.name, orders, float(here[k]), least)
+
+    def _unknown(self, chosen: IndexArray) -> FloatArray:
+        """Return the part of each joint's function that poses leave unknown, (joint, orders)."""
+        dense, size = self.problem.dense, self.size
+        free = np.concatenate([self.columns, np.arange(dense, len(size))])
+        none, one = np.zeros((len(self.marker), 3)), np.ones(len(self.marker))
+        G = self.derivatives.normal(none, one, size, free, chosen)[0]
+        prior = prior_weight(self.problem, _FINEST)[free]
+        start = len(self.columns)
+        spread = (np.linalg.inv(G + np.diag(prior)) * _FINEST**2)[start:, start:]
+        count = len(spread) // self.derivatives.joints
+        found = []
+        for j, q in enumerate(self.derivatives.q.T):
+            own = slice(j * count, (j + 1) * count)
+            scaled = _waves_within(q) * size[dense:][own]
+            for orders in _ORDERS:
+                wave = scaled[:, : 2 * (orders - LOW_ORDERS)]
+                left = spread[own, own][: wave.shape[1], : wave.shape[1]]
+                known = PRIOR_WIDTH**2 * (wave**2).sum()
+                found.append(np.sqrt(np.einsum("sk,kl,sl->", wave, left, wave) / known))
+        return np.array(found).reshape(-1, len(_ORDERS))
+
+
+def _waves_within(q: FloatArray) -> FloatArray:
+    """Return the waves of a joint over the range of some angles, beyond low orders.
+
+    Outside that range nothing is known, and nothing need be.
+    """
+    angle = np.linspace(q.min(), q.max(), _SAMPLES)
+    return beyond_low_orders(angle, waves(angle[:, None], LOW_ORDERS + 1, ORDERS)[:, 0])
 
 
 def _choose(

@@ -95,6 +95,8 @@ def show_position_plan(plan: PositionPlan) -> Iterator[Block]:
         phrases("Poses", "In standard deviations of a measured coordinate"),
         tuple((each.poses, f"{each.amplification:.2f}") for each in plan.expected),
     )
+    if plan.functions:
+        yield _shown_functions(plan)
     refused = ", ".join(f"{name} {number}" for name, number in plan.refused.items())
     yield Facts(
         (
@@ -104,6 +106,24 @@ def show_position_plan(plan: PositionPlan) -> Iterator[Block]:
                 phrase("{drawn} drawn; refused by {refused}", drawn=plan.drawn, refused=refused),
             ),
         )
+    )
+
+
+def _shown_functions(plan: PositionPlan) -> Table:
+    """Return what the poses show of functions of the joints, a row a joint."""
+    by_joint: dict[str, list[str]] = {}
+    for each in plan.functions:
+        more = phrase("more than {pool}", pool=plan.pool)
+        cells = by_joint.setdefault(each.joint, [])
+        cells += [f"{100 * each.unknown:.0f} %", more if each.poses is None else str(each.poses)]
+    orders = dict.fromkeys(each.orders for each in plan.functions)
+    heads = [phrase("Joint")]
+    for order in orders:
+        heads += [phrase("Unknown up to {order} a turn", order=order), phrase("Poses for a third")]
+    return Table(
+        phrase("Functions of the joints (gears, encoders): what these poses leave unknown"),
+        tuple(heads),
+        tuple((joint, *cells) for joint, cells in by_joint.items()),
     )
 
 
