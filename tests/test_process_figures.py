@@ -101,9 +101,10 @@ def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone
         assert ("course" in row[1]) == ("s a course" in row[2])
     offset = {row[0]: row for row in rows if "offset" in row[1]}
     assert kind != "afp" or "typical" in offset
-    for row in offset.values():
-        # What the offset is for: the mean over components, and half the load.
-        assert float(row[6].partition("%")[0]) > float(row[5].partition("%")[0])
+    for truth, row in offset.items():
+        alone, with_it = (float(cell.partition("%")[0]) for cell in row[5:7])
+        # On `kind` there is next to nothing to learn, and nothing may be spoilt.
+        assert with_it > alone - 0.5 if truth == "kind" else with_it > alone + 2.0
 
 
 @pytest.mark.slow
