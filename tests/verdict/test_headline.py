@@ -8,7 +8,7 @@ import pytest
 from elastocal.identification import MOST_UNEXPLAINED, PredictionDoubt
 from elastocal.verdict import Evidence, find_everything, judge_evidence
 from elastocal.verdict.findings import NOT_SETTLED, STILL_FALLING
-from elastocal.verdict.headline import next_step, production_effect
+from elastocal.verdict.headline import next_step, poses_to_settle, production_effect
 from support.reported import MADE, POSES
 
 
@@ -110,7 +110,7 @@ def test_more_poses_come_with_their_time_and_what_the_last_ones_brought(parts, k
     curve = np.median(parts.codecs[0].data.errors(best.variant), axis=0)
     assert found.values["after"] == curve[best.last - 1]
     assert found.values["before"] == curve[best.last - 1 - found.values["poses"]]
-    assert found.values["more"] == POSES // 3
+    assert found.values["more"] == poses_to_settle(best, POSES)
 
 
 def test_an_open_point_is_counted_and_its_advice_given(parts):

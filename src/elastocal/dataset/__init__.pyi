@@ -16,6 +16,7 @@ from ._store import (
 from .dataset import Dataset as Dataset
 from .merging import (
     merge as merge,
+    merge_files as merge_files,
 )
 from .path_columns import (
     LARGEST_FORCE as LARGEST_FORCE,

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -304,6 +305,34 @@ def _check_marker(first: "Dataset", other: "Dataset", index: int) -> None:
             f" {_short(first.attributes.get('marker'))} in one and"
             f" {_short(other.attributes.get('marker'))} in the other"
         )
+
+
+def merge_files(found: Sequence[tuple[Path, "Dataset"]]) -> tuple["Dataset", str]:
+    """Return the readings of several files as one dataset, each a campaign, and their names.
+
+    Parameters
+    ----------
+    found : sequence of (Path, Dataset)
+        At least one, each with its file.
+
+    Raises
+    ------
+    DatasetError
+        If there is none, or they do not belong together; see `merge`.
+    """
+    if not found:
+        raise DatasetError("nothing to calibrate from: give at least one dataset")
+    files, read_ones = zip(*found, strict=True)
+    source = ", ".join(map(str, files))
+    if len(files) == 1:
+        return read_ones[0], source
+    # Two campaigns of one name in two folders are two campaigns.
+    stems = [path.stem for path in files]
+    names = stems if len(set(stems)) == len(stems) else [str(path) for path in files]
+    try:
+        return merge(read_ones, relabel=True, campaigns=names), source
+    except DatasetError as error:
+        raise DatasetError(f"{source}: {error}") from error
 
 
 def _check_poses_differ(datasets: Sequence["Dataset"]) -> None:

@@ -197,6 +197,7 @@ def verify_chain(evidence: Evidence, files: ChainFiles) -> tuple[Link, ...]:
         links += [] if logged.state is LinkState.BROKEN else _derived(evidence, files, ())
     if evidence.dataset is not None:
         dataset = content_sha256(evidence.dataset)
+        links += [*_campaigns(evidence, files)]
         links += [*_model(evidence, dataset), *_codecs(evidence, dataset)]
     return (*links, *_process(evidence))
 
@@ -357,6 +358,27 @@ def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -
         yield from _rewritten(files.run, summary)
 
 
+def _campaigns(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
+    """Yield whether each further campaign is what the streams of its own run give."""
+    for each in evidence.campaigns:
+        run, name = RunFolder(each.path.parent), f"campaign {each.path.parent.name}"
+        if run.dataset.name != each.path.name or not run.journal.is_file():
+            text = f"{name}: its dataset lies in no folder of a run"
+            yield Link("dataset", LinkState.UNSTATED, text)
+            continue
+        try:
+            again = derive_run(run.path, _sensor(evidence, each.dataset, files)).dataset
+        except ElastocalError as error:
+            text = f"{name}: its dataset cannot be made again from the streams"
+            yield _broken("dataset", f"{text}: {files.plain(error)}")
+            continue
+        if difference := changed_reading(each.dataset, again, False, "streams"):
+            text = f"{name}: its dataset is not what the streams give"
+            yield _broken("dataset", f"{text}: {difference}")
+        else:
+            yield _whole("dataset", f"{name}: its dataset is what its streams give")
+
+
 def _rewritten(run: RunFolder, summary: RunSummary) -> Iterator[Link]:
     """Yield what was written again, or edited too little to say something else."""
     if file_sha256(run.dataset) != summary.dataset_sha256:
@@ -404,7 +426,9 @@ def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:
     if evidence.calibrated is None:
         return
     stated = evidence.calibrated.made_from
-    if len(stated) > 1 and dataset in stated.values():
+    if evidence.merged is not None:
+        yield _whole("model", f"the model was made from these {len(stated)} datasets")
+    elif len(stated) > 1 and dataset in stated.values():
         others = f"the model was made from {len(stated)} datasets, of which only one is here"
         yield Link("model", LinkState.UNSTATED, others)
     else:

@@ -115,6 +115,15 @@ class CodecEvidence:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
+class Campaign:
+    """Another dataset that the model was made from."""
+
+    path: Path
+    dataset: Dataset
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """Everything that was found, and what was not."""
 
@@ -132,6 +141,11 @@ class Evidence:
     logs: tuple[Path, ...] = ()
     """Files of imported readings: their map, then the logs; none of those of a run."""
     dataset: Dataset | None = None
+    campaigns: tuple[Campaign, ...] = ()
+    """Other datasets that the model was made from, beside this one; none where it was made from
+    this alone, or where one of them is not here."""
+    merged: Dataset | None = None
+    """All of them, with this one; None without others."""
     summary: RunSummary | None = None
     """The summary of the run."""
     calibrated: ModelEvidence | None = None
@@ -209,6 +223,11 @@ class Evidence:
         if process is None or self.calibrated is None:
             return None
         return self.calibrated.model.doubt(process.joint_position, process.force, process.moment)
+
+    @property
+    def calibrated_from(self) -> Dataset | None:
+        """The readings of all campaigns of the calibration."""
+        return self.dataset if self.merged is None else self.merged
 
     @property
     def saturation(self) -> Saturation | None:
@@ -292,13 +311,20 @@ def check_codec(data: CodecData, evidence: Evidence, path: Path) -> CodecData:
     """
     if evidence.robot and data.robot and data.robot != evidence.robot:
         raise CodecError(f"{path} is a codec of {data.robot}, not of {evidence.robot}")
-    if evidence.dataset is None:
+    dataset = evidence.calibrated_from
+    if dataset is None:
         return data
-    known = set(evidence.dataset.poses)
+    if evidence.merged is not None and evidence.calibrated is not None:
+        wanted = set(evidence.calibrated.made_from.values())
+        if set(data.made_from.values()) != wanted:
+            raise CodecError(
+                f"{path} was made from other readings than the {len(wanted)} datasets of the model"
+            )
+    known = set(dataset.poses)
     foreign = [label for group in data.pose_labels for label in group if label not in known]
     if foreign:
         raise CodecError(f"{path} has pose {foreign[0]}, which the dataset does not have")
-    if not _same_places(data, evidence.dataset):
+    if not _same_places(data, dataset):
         raise CodecError(f"{path} has its poses at other places than the dataset")
     return data
 
@@ -352,7 +378,7 @@ def _doubts(evidence: Evidence) -> Iterator[str]:
 
 def _why_not_reproduced(evidence: Evidence) -> str:
     """Return the likely reason why a repeated calibration has other figures."""
-    figures, dataset = evidence.figures, evidence.dataset
+    figures, dataset = evidence.figures, evidence.calibrated_from
     if figures is None or figures.spring_count is not None:
         return (
             "the model is of other data or other settings, or was made by an earlier version of"

@@ -91,7 +91,7 @@ def fitted_readings(evidence: Evidence) -> FittedReadings | None:
     FittedReadings or None
         None where there are no readings, or no robot whose joints tell the tool's attitude.
     """
-    dataset, robot = evidence.dataset, _robot(evidence)
+    dataset, robot = evidence.calibrated_from, _robot(evidence)
     if dataset is None or robot is None:
         return None
     readings = dataset.readings(robot.joint_names)

@@ -16,8 +16,8 @@ from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, VERDICTS, judge, read_codec
 from elastocal.compensation.conditioning import ToolResult, read_tool
 from elastocal.compensation.process import TABLE, SimulatedProcess, read_process
-from elastocal.dataset import Dataset, read_made_from
-from elastocal.errors import CodecError, ElastocalError
+from elastocal.dataset import Dataset, content_sha256, merge_files, read_made_from
+from elastocal.errors import CodecError, ElastocalError, present
 from elastocal.files import read_text
 from elastocal.identification import CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
@@ -56,6 +56,7 @@ from elastocal.verdict._files import (
 from elastocal.verdict.chain import ChainFiles, Link, LinkState, verify_chain
 from elastocal.verdict.evidence import (
     AcceptanceLimits,
+    Campaign,
     CodecEvidence,
     Evidence,
     ModelEvidence,
@@ -262,15 +263,55 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
     evidence = replace(evidence, calibrated=calibrated)
     if calibrated is None or evidence.dataset is None:
         return evidence
+    evidence = _with_campaigns(evidence, reader, calibrated)
+    measured = present(evidence.calibrated_from, "readings")
     try:
         reproduction = reproduce_calibration(
-            calibrated.model, calibrated.figures, _as_calibrated(evidence.dataset, calibrated)
+            calibrated.model, calibrated.figures, _as_calibrated(measured, calibrated)
         )
     except ElastocalError as error:
         reason = " ".join(str(error).split())
         reader.note_missing("calibration made again", reason, damaged=True)
         return evidence
     return replace(evidence, reproduction=reproduction)
+
+
+def _with_campaigns(evidence: Evidence, reader: PartReader, found: ModelEvidence) -> Evidence:
+    """Return the evidence with all datasets of a model, if those that it names are here."""
+    own = content_sha256(present(evidence.dataset, "dataset"))
+    if len(found.made_from) < 2 or own not in found.made_from.values():
+        return evidence
+    campaigns: list[Campaign] = []
+    parts: list[tuple[Path, Dataset]] = []
+    for name, sha256 in found.made_from.items():
+        if sha256 == own:
+            parts.append((Path(name), present(evidence.dataset, "dataset")))
+            continue
+        campaign = _campaign(name, sha256, reader)
+        if campaign is None:
+            return evidence
+        campaigns.append(campaign)
+        parts.append((Path(name), campaign.dataset))
+        reader.use(campaign.path)
+    merged, _ = merge_files(parts)
+    return replace(evidence, campaigns=tuple(campaigns), merged=merged)
+
+
+def _campaign(name: str, sha256: str, reader: PartReader) -> Campaign | None:
+    """Return a dataset that a model names, where it was or beside the run; None if it is gone."""
+    parts = Path(name).parts
+    places = [Path(name)]
+    for root in reader.folders.roots:
+        places += [root.joinpath(*parts[-depth:]) for depth in (1, 2, 3) if depth < len(parts)]
+    for place in places:
+        if place.is_file():
+            try:
+                dataset = datasets.read(place)
+            except ElastocalError:
+                continue
+            if content_sha256(dataset) == sha256:
+                return Campaign(place, dataset)
+    return None
 
 
 def _as_calibrated(dataset: Dataset, found: ModelEvidence) -> Dataset:

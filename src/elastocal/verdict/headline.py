@@ -1,11 +1,13 @@
 """The first words of a verdict: the effect on production, and the next step with its figures."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from elastocal.codec import Saturation
 from elastocal.findings import Finding, Grade, Kind, as_count, as_number
 from elastocal.identification import MOST_UNEXPLAINED, UnseenErrors
 from elastocal.results import brief_repr
@@ -21,7 +23,9 @@ from elastocal.verdict.findings import (
 from elastocal.wording import Phrase, counted, mm, phrase
 
 _MORE = 3
-"""A next measurement is suggested with at least a third of the poses measured so far."""
+"""What the last third of the poses brought is stated."""
+_LARGER = 1.25
+"""How many times as many training poses a codec needs as those up to which the error may fall."""
 
 
 @brief_repr
@@ -135,8 +139,8 @@ LOOK_AT_POSE = _step(
 )
 MORE_POSES = _step(
     "more-poses",
-    "Measure {more} more and calibrate with both datasets: {time}. In the check, the last {poses}"
-    " changed the mean error from {before} to {after}",
+    "Measure {more} more, which `elastocal plan --more` chooses, and calibrate with both datasets:"
+    " {time}. In the check, the last {poses} changed the mean error from {before} to {after}",
     more=_POSES,
     poses=_POSES,
     **_LENGTHS,
@@ -280,7 +284,7 @@ def _more_poses(evidence: Evidence, held: Sequence[Finding]) -> Iterator[Finding
     curve = np.median(codec.data.errors(best.variant), axis=0)
     # What the last poses brought is the most that as many more can bring: the curve flattens.
     last = max(1, best.last // _MORE)
-    more = max(1, len(codec.data.contact) // _MORE)
+    more = poses_to_settle(best, len(codec.data.contact))
     yield MORE_POSES(
         more=more,
         time=_time(evidence, more),
@@ -288,6 +292,22 @@ def _more_poses(evidence: Evidence, held: Sequence[Finding]) -> Iterator[Finding
         before=float(curve[max(0, best.last - 1 - last)]),
         after=float(curve[best.last - 1]),
     )
+
+
+def poses_to_settle(found: Saturation, poses: int) -> int:
+    """Return how many poses let a codec show that the error no longer falls; 0: it does, or cannot.
+
+    Parameters
+    ----------
+    found : Saturation
+        What the codec shows.
+    poses : int
+        Poses that it has.
+    """
+    if found.settled or not found.explains:
+        return 0
+    training = math.ceil(_LARGER * (found.last if found.high is None else found.high))
+    return max(1, math.ceil(training * poses / found.last) - poses)
 
 
 def _time(evidence: Evidence, poses: int) -> Phrase:

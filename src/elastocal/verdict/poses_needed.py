@@ -16,11 +16,10 @@ from elastocal.findings import Finding, Kind, as_count
 from elastocal.identification import ProductionError
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import NOT_COVERED, NOT_SETTLED, STILL_FALLING
+from elastocal.verdict.headline import poses_to_settle
 from elastocal.verdict.judgement import Light, judge_evidence
 from elastocal.wording import mm
 
-_LARGER = 1.25
-"""How many times as many training poses a codec needs as those up to which the error may fall."""
 _MOST = 100
 """Poses that are added at most."""
 _LEAST = 3
@@ -97,8 +96,9 @@ class PosesNeeded:
             why_not = _why_no_number(evidence, tolerance)
         elif wider:
             counts.append((wider, "the interval of the 95 % error is to end within the tolerance"))
-        if training := _for_codec(evidence):
-            counts.append((training, "a codec is to show that the error no longer falls"))
+        best, data = evidence.saturation, evidence.calibrated_from
+        if best is not None and data is not None and (n := poses_to_settle(best, len(data.poses))):
+            counts.append((n, "a codec is to show that the error no longer falls"))
         coverage = evidence.coverage
         if coverage is not None and not coverage.is_enough:
             counts.append((_LEAST, coverage.sentence()))
@@ -138,13 +138,3 @@ def _why_no_number(evidence: Evidence, tolerance: float) -> str:
         f" springs leave too much for a tolerance of {mm(tolerance)}: no number of poses up to"
         f" {_MOST} makes the light green"
     )
-
-
-def _for_codec(evidence: Evidence) -> int:
-    """Return how many poses let a codec show that the error has stopped to fall; 0: it does."""
-    best = evidence.saturation
-    if best is None or best.settled or not best.explains:
-        return 0
-    poses = len(present(evidence.dataset, "dataset").poses)
-    training = math.ceil(_LARGER * (best.last if best.high is None else best.high))
-    return max(1, math.ceil(training * poses / best.last) - poses)

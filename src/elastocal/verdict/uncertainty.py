@@ -118,9 +118,10 @@ def _sensor(evidence: Evidence) -> UncertaintySource:
         phrase("Calibration of the force sensor"),
         evidence.certificate.sensor.uncertainty,
     )
-    if stated is None or evidence.dataset is None:
+    dataset = evidence.calibrated_from
+    if stated is None or dataset is None:
         return UncertaintySource(name, "B", None, _NOT_STATED)
-    readings = evidence.dataset.readings(evidence.dataset.joint_names)
+    readings = dataset.readings(dataset.joint_names)
     force = float(np.sqrt(np.mean(np.sum(readings.force**2, axis=1))))
     deflection = float(np.sqrt(np.mean(np.sum(readings.deflection**2, axis=1)) / 3.0))
     standard = stated / COVERAGE_FACTOR / force * deflection

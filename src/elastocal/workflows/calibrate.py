@@ -10,9 +10,9 @@ import numpy as np
 
 from elastocal import identification
 from elastocal.cell import ProcessFile, ProductionPath, read_production
-from elastocal.dataset import Dataset, Readings, content_sha256, merge, read, without
+from elastocal.dataset import Dataset, Readings, content_sha256, merge_files, read, without
 from elastocal.elastic import ElasticModel, KnownSpring, Spring, known_springs
-from elastocal.errors import DatasetError, ElastocalError, IdentificationError, present
+from elastocal.errors import ElastocalError, IdentificationError, present
 from elastocal.findings import Finding, Kind
 from elastocal.identification import (
     AUTO,
@@ -158,7 +158,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     options = settings.options()
     found = settings.read()
     made_from = {str(path): content_sha256(each) for path, each in found}
-    measured, source = _measured(found)
+    measured, source = merge_files(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     unbuilt: tuple[Finding, ...] = ()
     if settings.geometry is not None:
@@ -223,7 +223,7 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
     found = settings.read()
     made_from = {str(path): content_sha256(each) for path, each in found}
     _require_new(made_from, before, file)
-    measured, source = _measured(found)
+    measured, source = merge_files(found)
     calibrated = before.calibrated
     if settings.robot is not None or measured.robot_urdf:
         arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
@@ -327,7 +327,7 @@ def _rebuilt(
 
     rebuilt = [on_arm_as_built(each, arm, settings.marker) for _, each in found]
     paths = (path for path, _ in found)
-    measured, _ = _measured(list(zip(paths, (each.dataset for each in rebuilt), strict=True)))
+    measured, _ = merge_files(list(zip(paths, (each.dataset for each in rebuilt), strict=True)))
     return measured, tuple(dict.fromkeys(note for each in rebuilt for note in each.findings))
 
 
@@ -388,20 +388,3 @@ def _on_production(
     """Return the coverage of a production path by the calibration, and its uncertainty there."""
     loads = path.joint_position, path.force, path.moment
     return calibrated.coverage(*loads, path.course), calibrated.doubt(*loads)
-
-
-def _measured(found: Sequence[tuple[Path, Dataset]]) -> tuple[Dataset, str]:
-    """Return the readings of all campaigns as one dataset, and where they come from."""
-    if not found:
-        raise DatasetError("nothing to calibrate from: give at least one dataset")
-    files, read_ones = zip(*found, strict=True)
-    source = ", ".join(map(str, files))
-    if len(files) == 1:
-        return read_ones[0], source
-    # Two campaigns of one name in two folders are two campaigns.
-    stems = [path.stem for path in files]
-    names = stems if len(set(stems)) == len(stems) else [str(path) for path in files]
-    try:
-        return merge(read_ones, relabel=True, campaigns=names), source
-    except DatasetError as error:
-        raise DatasetError(f"{source}: {error}") from error

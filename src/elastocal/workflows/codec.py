@@ -1,6 +1,6 @@
 """``codec``: were there enough poses, and which technique is better (paper Algorithm 1)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
@@ -26,7 +26,7 @@ from elastocal.codec import (
     write_codec_summary,
     write_index_table,
 )
-from elastocal.dataset import content_sha256, read, without
+from elastocal.dataset import content_sha256, merge_files, read, without
 from elastocal.files import filling
 from elastocal.findings import group_alike
 from elastocal.options import Exclude, Marker, Option, ToolFrame
@@ -42,8 +42,8 @@ from elastocal.workflows._workflow import workflow
 class CodecSettings(CodecOptions):
     """The readings that are cross-validated, what is compared, and where the files go."""
 
-    data: Annotated[str | PathLike[str], Option(argument=True)]
-    """Dataset, ``.nc`` or ``.csv``."""
+    data: Annotated[str | PathLike[str] | Sequence[str | PathLike[str]], Option(argument=True)]
+    """Dataset, ``.nc`` or ``.csv``; several are campaigns, as for a calibration."""
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder to write the codec into."""
     compare: Annotated[
@@ -142,8 +142,10 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
         If a file cannot be read or written, or the folder holds files.
     """
     variants = make_variants(read_comparisons(settings.compare))
-    path = Path(settings.data)
-    measured = read(path)
+    given = settings.data
+    paths = [Path(given)] if isinstance(given, str | PathLike) else list(map(Path, given))
+    found = [(path, read(path)) for path in paths]
+    measured, source = merge_files(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
@@ -154,11 +156,11 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
             variants,
             settings.chosen,
             marker_offset=marker,
-            provenance=f"{path}; {measured.provenance}" if measured.provenance else str(path),
+            provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
             jobs=settings.jobs,
             progress=progress,
         )
-        data = replace(data, made_from={str(path): content_sha256(measured)})
+        data = replace(data, made_from={str(path): content_sha256(each) for path, each in found})
         verdicts = judge(data, settings.saturation)
         analysis = analyse(arm, readings, data, marker_offset=marker, with_indices=settings.indices)
         summary = codec_summary(data, verdicts, analysis.correlations)

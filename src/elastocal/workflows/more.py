@@ -77,7 +77,7 @@ def measured_run(run: Path, cell: Cell, poses: int | None) -> MeasuredRun:
         If there is no such run.
     """
     evidence = verdict.gather_evidence(EvidenceOptions(run), "")
-    plan, data = evidence.plan, evidence.dataset
+    plan, data = evidence.plan, evidence.calibrated_from
     if plan is None or data is None:
         raise PlanningError(f"{run} has no plan and dataset of a run: `elastocal derive` makes one")
     if plan.robot.joints != cell.robot.joint_names:
@@ -90,9 +90,10 @@ def measured_run(run: Path, cell: Cell, poses: int | None) -> MeasuredRun:
     count = poses if poses is not None else found.count
     if count is None:
         raise PlanningError(f"{run}: {found.why_none}; --poses N plans some all the same")
-    measured = np.array([plan.poses[pose].joints for pose in data.poses])
-    beside = np.array([plan.poses[pose].joints for pose in found.beside])
-    beside = beside.reshape(-1, len(plan.robot.joints))
+    readings = data.readings(cell.robot.joint_names)
+    numbers, first = np.unique(readings.pose, return_index=True)
+    measured = readings.joint_position[first]
+    beside = measured[np.isin(numbers, found.beside)]
     return MeasuredRun(str(run), measured, beside, count, tuple(found.findings()), error)
 
 
