@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from elastocal.errors import present
 from elastocal.findings import Finding, Kind, as_count
 from elastocal.identification import ProductionError
+from elastocal.results import brief_repr
 from elastocal.verdict.evidence import Evidence
 from elastocal.verdict.findings import NOT_COVERED, NOT_SETTLED, STILL_FALLING
 from elastocal.verdict.headline import poses_to_settle
@@ -31,6 +32,7 @@ FOR_THE_LIGHT = Kind(
 NOT_BY_POSES = Kind("plan.more-cannot", "no number of poses changes that {reason}")
 
 
+@brief_repr
 @dataclass(frozen=True)
 class PosesNeeded:
     """Numbers of poses that would bring a light to green, and what none would change."""
