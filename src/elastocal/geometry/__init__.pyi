@@ -27,6 +27,7 @@ from .plausibility import (
     position_mistake as position_mistake,
 )
 from .position_file import (
+    read_position_map as read_position_map,
     read_positions as read_positions,
 )
 from .position_plan import (

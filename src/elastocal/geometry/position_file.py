@@ -13,7 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, UnitError, nearest
 from elastocal.geometry.positions import LEAST_READINGS, Positions
 from elastocal.geometry.sessions import in_sessions
-from elastocal.records import read_arrays
+from elastocal.records import from_data, read_arrays, read_yaml_data, record
 from elastocal.robot import Robot, T_from_xyzabc
 from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
 from elastocal.units import factor, impossible, split_column
@@ -35,7 +35,65 @@ _BEYOND = 0.1
 """Distance beyond a joint's limit, in rad or m, that the limits of a drawing may be wrong by."""
 
 
-def read_positions(path: Path, robot: Robot) -> Positions:
+@record()
+class MappedColumn:
+    """A column of a table of others."""
+
+    column: str
+    """Its head, with or without a unit in brackets."""
+    unit: str | None = None
+    """Its unit, where the head has none or a wrong one."""
+
+
+@record("elastocal.position-map/1")
+class PositionMap:
+    """Which columns of a table of others hold joints, markers, stations."""
+
+    columns: dict[str, MappedColumn]
+    """By the names that `read_positions` knows."""
+
+    def heads(self, header: Sequence[str]) -> list[str]:
+        """Return the heads of a table by our names; columns that are not mapped have none.
+
+        Raises
+        ------
+        GeometryError
+            If a column is not in the table, or mapped twice.
+        """
+        there: dict[str, int] = {}
+        for index, cell in enumerate(header):
+            there.setdefault(cell.strip(), index)
+        for index, cell in enumerate(header):
+            there.setdefault(cell.partition("[")[0].strip(), index)
+        heads = [""] * len(header)
+        for name, each in self.columns.items():
+            found = there.get(each.column.strip())
+            if found is None:
+                raise GeometryError(
+                    f"the map takes {name!r} from a column {each.column!r}, which the table does"
+                    f" not have{nearest(each.column, there)} (columns: {', '.join(header)})"
+                )
+            if heads[found]:
+                raise GeometryError(f"the map takes column {each.column!r} twice")
+            unit = each.unit or split_column(header[found])[1]
+            heads[found] = f"{name}[{unit}]" if unit else name
+        return heads
+
+
+def read_position_map(path: Path) -> PositionMap:
+    """Return the map in a file.
+
+    Raises
+    ------
+    SchemaError
+        If it does not fit its schema.
+    FileAccessError
+        If it cannot be read.
+    """
+    return from_data(PositionMap, read_yaml_data(path), str(path))
+
+
+def read_positions(path: Path, robot: Robot, columns: PositionMap | None = None) -> Positions:
     """Return the rows of a CSV file, or of a NetCDF file of the same columns.
 
     Parameters
@@ -50,6 +108,8 @@ def read_positions(path: Path, robot: Robot) -> Positions:
         attribute ``units``.
     robot : Robot
         Whose joints they are.
+    columns : PositionMap, optional
+        Which columns they are, where they have other names.
 
     Raises
     ------
@@ -64,7 +124,8 @@ def read_positions(path: Path, robot: Robot) -> Positions:
         uneven = rows.uneven(len(header))
         if uneven is not None:
             raise GeometryError(f"row {uneven[0]} has {uneven[1]} cells, the header {len(header)}")
-        return _positions(header, rows, robot)
+        heads = header if columns is None else columns.heads(header)
+        return _positions(heads, rows, robot)
     except (GeometryError, TableError, UnitError) as error:
         raise GeometryError(f"{path}: {error}") from error
 

@@ -1,8 +1,9 @@
 """First map of logs, guessed from the names and sizes of their columns, for a person to correct."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,9 @@ _TURNS_OF = {"FANUC": ("r", "p", "w"), "Yaskawa": ("rz", "ry", "rx")}
 """Angles about z, y and x, in the order of the map's a, b, c, as makers name them."""
 _TURN = re.compile(r"(?i)(.*?)(r[xyz]|[wpr])")
 _NO_TIMES = ("deg", "rad", "mm", "m", "N", "kN", "N*m", "N*mm")
+_STATE = re.compile(r"(?i)(?:.*[./])?position\.(?![xyzw]$)")
+_RATE = re.compile(r"(?i)(?:.*[./])?(?:velocity|effort)\.")
+"""Places, velocities and efforts of joints by their names, as a JointState becomes columns."""
 _FORCE = re.compile(r"(?i)(.*?)(?:f|force)[._ ]?([xyz])")
 _MOMENT = re.compile(r"(?i)(.*?)(?:t|m|torque|moment)[._ ]?([xyz])")
 _SIGMA = re.compile(r"(?i)(.*?)(?:u95|u|sigma|unc)[._ ]?([xyz])|()([xyz])[._ ]?(?:u95|unc)")
@@ -150,8 +154,20 @@ class GuessedLog:
         return found
 
 
-def guess_logs(files: Sequence[Path]) -> tuple[GuessedLog, ...]:
+Joints = Mapping[str, bool]
+"""Names of an arm's joints in order, with whether each turns."""
+
+
+def guess_logs(files: Sequence[Path], joints: Joints | None = None) -> tuple[GuessedLog, ...]:
     """Return the apparent kind of each log, and of each topic of a recording.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        The logs.
+    joints : mapping of str to bool, optional
+        Joints of the arm, where it is known: columns of these names are joints, whatever they are
+        called.
 
     Raises
     ------
@@ -163,14 +179,14 @@ def guess_logs(files: Sequence[Path]) -> tuple[GuessedLog, ...]:
     found = []
     for path in files:
         if not is_recording(path):
-            found.append(guess_log(path.name, None, read_table(path, None)))
+            found.append(guess_log(path.name, None, read_table(path, None), joints))
             continue
         for topic in read_topics(path):
             try:
                 table = read_recording(path, topic)
             except LogError:
                 continue  # no numbers in it: a log of texts, pictures
-            found.append(guess_log(path.name, topic, table))
+            found.append(guess_log(path.name, topic, table, joints))
     known = tuple(each for each in found if any(c.key not in _ORDER for c in each.columns))
     if not known:
         raise LogError("no column looks like joints, a force or a marker: write the map by hand")
@@ -181,7 +197,9 @@ _ORDER = ("time", "handshake")
 """Kinds of columns that state a time, not a quantity."""
 
 
-def guess_log(log: str, topic: str | None, table: LogTable) -> GuessedLog:
+def guess_log(
+    log: str, topic: str | None, table: LogTable, joints: Joints | None = None
+) -> GuessedLog:
     """Return the apparent meaning of the columns of a table.
 
     Parameters
@@ -192,16 +210,20 @@ def guess_log(log: str, topic: str | None, table: LogTable) -> GuessedLog:
         Topic of a recording.
     table : LogTable
         Its columns.
+    joints : mapping of str to bool, optional
+        As for `guess_logs`.
     """
     if all(name.isdigit() for name in table.header):
         return GuessedLog(log, topic, _without_names(table))
     names = {name: _bare(name) for name in table.header}
     # Yaskawa's T is an axis, where no unit says that it is a time.
-    lettered = _by_letters(table, names)
-    when = _when(table, _without(names, lettered))
+    named = _named_joints(table, names, joints or {})
+    lettered = [] if named else _by_letters(table, names)
+    when = _when(table, _without(names, [*named, *lettered]))
     rest = _without(names, when)
-    arm = [*_rail(table, rest), *lettered] if lettered else _joints(table, rest)
-    rest = _without(rest, arm)
+    arm = named or ([*_rail(table, rest), *lettered] if lettered else _joints(table, rest))
+    arm = arm or _state(rest)
+    rest = _without(_of_places(rest) if arm else rest, arm)
     force = _force(table, rest)
     rest = _without(rest, force)
     where = [] if force else _places(table, rest, of_tool=bool(arm))
@@ -228,6 +250,52 @@ def _when(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
         *(GuessedColumns("time", (name,), *_time_unit(table, name)) for name in times),
         *(GuessedColumns("handshake", (name,), None, "its name") for name in steps),
     ]
+
+
+def _of_places(names: dict[str, str]) -> dict[str, str]:
+    """Return the columns without velocities and efforts of joints, which are no forces."""
+    return {name: bare for name, bare in names.items() if not _RATE.match(bare)}
+
+
+def _named_joints(table: LogTable, names: dict[str, str], joints: Joints) -> list[GuessedColumns]:
+    """Return the columns that are named as the joints of the arm, in its order; none if one is not.
+
+    ``actual/position.elbow_joint`` is ``elbow_joint``.
+    """
+    columns = dict[str, str]()
+    for name, bare in _of_places(names).items():
+        own = next((joint for joint in joints if _is_named(bare, joint)), None)
+        if own is not None:
+            columns.setdefault(own, name)
+    if not joints or len(columns) < len(joints):
+        return []
+    found = []
+    for turns, group in groupby(joints, key=joints.__getitem__):
+        own_columns = tuple(columns[joint] for joint in group)
+        # As ROS has it: rad and m.
+        stated = ("rad" if turns else "m", "named as the joints are, in SI as ROS has it")
+        kind = "angle" if turns else "length"
+        plain = all(_STATE.match(names[name]) for name in own_columns)
+        unit = stated if plain else _unit(table, own_columns, kind)
+        found.append(GuessedColumns("joints", own_columns, *unit))
+    return found
+
+
+def _is_named(column: str, joint: str) -> bool:
+    """Return whether a column has the name of a joint, perhaps behind a path."""
+    if column.lower() == joint.lower():
+        return True
+    path = column[: -len(joint)] if column.lower().endswith(joint.lower()) else ""
+    return bool(path) and path[-1] in "./:"
+
+
+def _state(names: dict[str, str]) -> list[GuessedColumns]:
+    """Return the columns of a ``JointState`` whose joints have names of their own."""
+    columns = tuple(name for name, bare in names.items() if _STATE.match(bare))
+    if len(columns) < _LEAST_AXES:
+        return []
+    why = "a JointState, in its order: is it that of the arm's joints?"
+    return [GuessedColumns("joints", columns, "rad", why)]
 
 
 def _joints(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:

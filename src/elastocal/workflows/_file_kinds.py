@@ -25,7 +25,7 @@ from elastocal.compensation.process import TABLE, read_process, read_table
 from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
-from elastocal.geometry import PositionPlan, read_geometry
+from elastocal.geometry import PositionPlan, read_geometry, read_position_map
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
@@ -159,6 +159,12 @@ def log_map_file(path: Path) -> FileDescription:
         "logs": [each.log for each in found.logs],
         "load_cases": list(found.load_cases),
     }
+
+
+def position_map_file(path: Path) -> FileDescription:
+    """Describe a map of positions."""
+    found = read_position_map(path)
+    return "map of positions", {"columns": {n: c.column for n, c in found.columns.items()}}
 
 
 def geometry_file(path: Path) -> FileDescription:

@@ -144,6 +144,7 @@ _YAML_KINDS: dict[str, _Describe] = {
     "elastocal.compensator": kinds.compensator_file,
     "elastocal.springs": kinds.springs_file,
     "elastocal.log-map": kinds.log_map_file,
+    "elastocal.position-map": kinds.position_map_file,
     "elastocal.catalogue": _catalogue,
 }
 """YAML files by their schema."""

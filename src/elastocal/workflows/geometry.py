@@ -22,6 +22,7 @@ from elastocal.geometry import (
     geometry_model,
     link_table,
     plausible_ladder,
+    read_position_map,
     read_positions,
     show_geometry,
 )
@@ -54,6 +55,8 @@ class GeometrySettings:
     """URDF file or catalogue name."""
     tcp: str | None = None
     """Link that carries the markers."""
+    map: Annotated[Path | None, Option(metavar="MAP.yaml")] = None
+    """Names and units of the columns, where they are not those of elastocal; also of ``test``."""
     out: Annotated[Path | None, Option(required=True, help="Model file (.json) to write.")] = None
     """Model file to write; none: the model is only returned."""
     urdf: Path | None = None
@@ -153,8 +156,9 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     language = language_of(settings.language)
     path = Path(settings.positions)
     robot = find_robot(settings.robot, settings.tcp, None)
-    problem = GeometryProblem(robot, read_positions(path, robot))
-    other = None if settings.test is None else read_positions(settings.test, robot)
+    columns = None if settings.map is None else read_position_map(settings.map)
+    problem = GeometryProblem(robot, read_positions(path, robot, columns))
+    other = None if settings.test is None else read_positions(settings.test, robot, columns)
     found = plausible_ladder(
         problem, settings.draws, np.random.default_rng(settings.seed), progress
     )

@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from elastocal import logs as foreign
+from elastocal.cell import load_cell
 from elastocal.dataset import MADE_FROM, Dataset, write
 from elastocal.errors import FileAccessError, LogError
 from elastocal.files import write_text
@@ -221,7 +222,9 @@ def guess_map(settings: GuessMapSettings, progress: Progress) -> GuessMapResult:
     if out is not None and out.exists() and not settings.force:
         raise FileAccessError(f"{out} is there already: name another file, or give --force")
     progress("logs", 0, 1)
-    guessed = foreign.guess_logs(files)
+    arm = None if settings.cell is None else load_cell(Path(settings.cell), production=False).robot
+    joints = None if arm is None else dict(zip(arm.joint_names, arm.revolute, strict=True))
+    guessed = foreign.guess_logs(files, joints)
     if settings.ask is not None:
         guessed = tuple(each.answered(settings.ask) for each in guessed)
     progress("logs", 1, 1)
