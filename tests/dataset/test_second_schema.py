@@ -8,8 +8,8 @@ from elastocal.errors import DatasetError
 from support.datasets import JOINTS, dataset, full_keywords, keywords, second_keywords, write_lines
 
 NEWS = (
-    *("sequence", "reference_joint_position", "reference_force", "link_joint_position"),
-    *("campaigns", "gravity", "conditioned", "check"),
+    *("sequence", "contacts", "reference_joint_position", "reference_force"),
+    *("link_joint_position", "campaigns", "gravity", "conditioned", "check"),
 )
 
 
@@ -59,8 +59,9 @@ def test_the_table_names_its_columns_after_joints_and_axes(tmp_path):
         for line in (tmp_path / "data.csv").read_text().splitlines()
         if not line.startswith("#")
     )
-    assert header.split(",")[:11] == [
-        *("pose", "load_case", "status", "sequence", "campaign", "joint_1[rad]", "joint_2[rad]"),
+    assert header.split(",")[:12] == [
+        *("pose", "load_case", "status", "sequence", "contacts", "campaign"),
+        *("joint_1[rad]", "joint_2[rad]"),
         *("reference_joint_1[rad]", "reference_joint_2[rad]"),
         *("link_joint_1[rad]", "link_joint_2[rad]"),
     ]
@@ -140,8 +141,69 @@ def test_metrology_may_be_absent_where_the_table_says_so(tmp_path):
     data = read(path)
     assert data.marker_displacement is None
     assert data.attributes["schema"] == "elastocal.dataset/2"
-    with pytest.raises(DatasetError, match=r"^dataset has no marker_displacement: to identify"):
-        data.readings(["a1"])
+    readings = data.readings(["a1"])
+    assert readings.contacts.tolist() == [1, 1]
+    np.testing.assert_array_equal(readings.deflection, -readings.controller_displacement)
+
+
+UNTRACKED = {
+    "marker_displacement": np.where(np.arange(3)[:, None, None] == 2, np.nan, 1e-4)
+    * np.ones((3, 2, 3))
+}
+
+
+def untracked(**changes):
+    """Return a dataset whose last pose no tracker measured."""
+    return Dataset.from_arrays(**keywords(**UNTRACKED | changes))
+
+
+def test_a_pose_that_no_tracker_measured_has_readings_held_by_the_contact(tmp_path):
+    data = untracked(contacts=[[1, 1], [1, 1], [1, 2]])
+    assert data.attributes["schema"] == "elastocal.dataset/2"
+    assert data.poses_unmeasured == (2,)
+    for name in ("data.nc", "data.csv"):
+        write(data, tmp_path / name)
+        assert read(tmp_path / name).to_xarray().identical(data.to_xarray())
+    readings = data.readings(JOINTS)
+    assert readings.contacts.tolist() == [0, 0, 0, 0, 1, 2]
+    np.testing.assert_array_equal(readings.marker_displacement[4:], 0.0)
+    assert readings.take([5, 0]).contacts.tolist() == [2, 0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"marker_displacement": np.full((3, 2, 3), np.nan)}, "marker_displacement has no number"),
+        (
+            {"marker_displacement": np.where(np.arange(3) == 1, np.nan, 1e-4) * np.ones((3, 2, 3))},
+            "marker_displacement y of pose 0, load case 'normal' is nan although the status is ok",
+        ),
+        ({"contacts": [[1, 0], [1, 1], [1, 1]]}, "contacts of pose 0, load case 'north' is 0: it"),
+        ({"contacts": [[1, 1.5], [1, 1], [1, 1]]}, "is 1.5: it must be a whole number from 1 to 9"),
+        (
+            {"contacts": [[1, 1], [np.nan, 1], [1, 1]]},
+            "contacts of pose 1, load case 'normal' is",
+        ),
+        ({"contacts": [1, 1]}, "contacts has shape"),
+    ],
+)
+def test_gaps_and_impossible_stacks_are_refused(changes, message):
+    with pytest.raises(DatasetError, match=message):
+        untracked(**changes)
+
+
+def test_the_first_schema_has_no_pose_without_a_number():
+    data = untracked().to_xarray().assign_attrs(schema="elastocal.dataset/1")
+    with pytest.raises(DatasetError, match="marker_displacement of pose 2 has no number although"):
+        Dataset.from_xarray(data)
+
+
+def test_campaigns_with_and_without_a_tracker_are_merged():
+    alone = Dataset.from_arrays(**keywords(marker_displacement=None))
+    merged = merge([dataset(contacts=np.full((3, 2), 2)), alone], relabel=True)
+    assert merged.poses_unmeasured == (3, 4, 5)
+    assert merged.contacts.tolist() == [[2, 2]] * 3 + [[1, 1]] * 3
+    assert merged.select(poses=[0, 4]).contacts.tolist() == [[2, 2], [1, 1]]
 
 
 def test_without_metrology_both_files_are_written_and_read(tmp_path):

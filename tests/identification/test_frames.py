@@ -188,11 +188,11 @@ def test_a_fit_with_frames_is_the_fit_of_what_no_frame_explains():
     assert n == len(model.parameters)
     assert problem.columns == n + 27
     whole = problem.O[:, :, :n] @ solve(problem).compliance[:n]
-    seen = problem.without_frames()
+    seen = problem.of_springs()
     assert not seen.frames
     apart = problem.O[:, :, :n] @ solve(seen).compliance
     # Springs are compared where they are seen: in what no frame explains.
-    rows = replace(problem, d=whole - apart).without_frames().d
+    rows = replace(problem, d=whole - apart).of_springs().d
     np.testing.assert_allclose(rows, 0.0, atol=1e-8)
 
 

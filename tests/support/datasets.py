@@ -66,6 +66,7 @@ def second_keywords(**changes: Any) -> dict[str, Any]:
     joints = arguments["joint_position"]
     return arguments | {
         "sequence": [[0, 1], [-1, 4], [7, 2]],
+        "contacts": [[1, 2], [1, 1], [3, 1]],
         "reference_joint_position": joints[:, 1] + 1e-3,
         "reference_force": [[0.0, 0.0, -5.0], [1.0, 0.0, -6.0], [0.0, 0.0, 0.0]],
         "link_joint_position": joints + 1e-4,

@@ -11,10 +11,12 @@ import numpy as np
 
 from elastocal.dataset._layout import (
     AXES,
+    CONTACTS,
     JOINT_POSITION,
     JOINT_UNITS,
     JOINT_VARIABLES,
     MISSING,
+    MOST_CONTACTS,
     SEQUENCE,
     SI_JOINT_UNITS,
     STATUS,
@@ -151,6 +153,23 @@ def read_sequence(data: LabelledArrays, status: StatusArray) -> IntArray | None:
             " whole number"
         )
     return values.astype(np.int64)
+
+
+def read_contacts(data: LabelledArrays, status: StatusArray) -> StatusArray | None:
+    """Return the disks stacked at each press, shape (pose, load_case); None where none is stated.
+
+    Where nothing was measured it may be NaN, or any number, and becomes 1.
+    """
+    if CONTACTS.name not in data:
+        return None
+    values = np.where(status == MISSING, 1.0, _aligned(data, CONTACTS, ()))
+    for pose, case in np.argwhere(~np.isin(values, range(1, MOST_CONTACTS + 1))):
+        raise DatasetError(
+            f"contacts of pose {data['pose'].values[pose]}, load case"
+            f" {str(data['load_case'].values[case])!r} is {values[pose, case]:g}: it must be a"
+            f" whole number from 1 to {MOST_CONTACTS}"
+        )
+    return values.astype(np.int8)
 
 
 def read_variables(data: LabelledArrays, joint_factors: FloatArray) -> dict[str, FloatArray]:

@@ -34,7 +34,7 @@ SCHEMA = "elastocal.dataset/1"
 
 SCHEMA_2 = "elastocal.dataset/2"
 """The schema with the order in time, the reference's joints and force, secondary encoders,
-campaigns, gravity; and without metrology."""
+campaigns, gravity; and without metrology, at some poses or at all."""
 
 SCHEMAS = (SCHEMA, SCHEMA_2)
 """The schemas that this version reads."""
@@ -220,13 +220,23 @@ SEQUENCE = Variable(
     "place of the reading in time among those of its pose",
     schema=SCHEMA_2,
 )
-INTEGERS: dict[Variable, DTypeLike] = {STATUS: np.int8, SEQUENCE: np.int64}
+CONTACTS = Variable(
+    "contacts",
+    ("pose", "load_case"),
+    "",
+    "",
+    "disks or tips stacked between tool and tooling at the press",
+    schema=SCHEMA_2,
+)
+MOST_CONTACTS = 9
+"""Disks or tips that can be stacked; a larger number is a mistake."""
+INTEGERS: dict[Variable, DTypeLike] = {STATUS: np.int8, SEQUENCE: np.int64, CONTACTS: np.int8}
 """The variables that hold whole numbers, with their types."""
 
 VARIABLE_NAMES = tuple(variable.name for variable in (*VARIABLES, *INTEGERS))
 COORDINATES = ("pose", "load_case", "axis", "joint", "joint_unit", "campaign")
 
-TEXT_COLUMNS = ("pose", "load_case", "status", "sequence", "campaign")
+TEXT_COLUMNS = ("pose", "load_case", "status", "sequence", "contacts", "campaign")
 """CSV columns without a unit."""
 
 COLUMN_NAMES = (*TEXT_COLUMNS, *(name for variable in VECTORS for name in variable.columns))

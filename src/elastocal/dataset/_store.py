@@ -21,6 +21,7 @@ from elastocal.dataset._layout import (
     ATTRIBUTES,
     CF_ATTRIBUTES,
     COLUMN_NAMES,
+    CONTACTS,
     JOINT_POSITION,
     JOINT_PREFIXES,
     JOINT_UNITS,
@@ -81,8 +82,8 @@ class Header:
     """The columns of a file, by what they hold."""
 
     text: dict[str, int]
-    """Position of ``pose``, ``load_case`` and, where present, ``status``, ``sequence`` and
-    ``campaign``."""
+    """Position of ``pose``, ``load_case`` and, where present, ``status``, ``sequence``,
+    ``contacts`` and ``campaign``."""
     joints: tuple[Column, ...]
     """Joint positions, in the order of the file."""
     vectors: dict[str, tuple[Column, ...]]
@@ -428,7 +429,11 @@ def read_table(path: Path) -> LabelledArrays:
     statuses = _statuses(table, header.text, empty)
     arrays["status"] = grid.spread(statuses, MISSING)
     if SEQUENCE.name in header.text:
-        arrays[SEQUENCE.name] = grid.spread(_sequence(table, header.text, statuses), -1)
+        places = _whole_numbers(table, header.text[SEQUENCE.name], SEQUENCE.name, statuses)
+        arrays[SEQUENCE.name] = grid.spread(places, -1)
+    if CONTACTS.name in header.text:
+        stacked = _whole_numbers(table, header.text[CONTACTS.name], CONTACTS.name, statuses)
+        arrays[CONTACTS.name] = grid.spread(stacked, 1)
     labels: dict[str, ArrayLike | None] = {
         "pose": grid.poses,
         "load_case": grid.load_cases,
@@ -457,6 +462,8 @@ def write_table(data: Dataset, path: Path) -> None:
         columns["status"] = [STATUSES[value] for value in data.status.ravel()]
     if data.sequence is not None:
         columns["sequence"] = list(data.sequence.ravel().tolist())
+    if data.contacts is not None:
+        columns["contacts"] = list(data.contacts.ravel().tolist())
     if data.campaigns:
         columns["campaign"] = [name for name in data.campaigns for _ in data.load_cases]
     prefixes = {variable: prefix for prefix, variable in JOINT_PREFIXES.items()}
@@ -542,14 +549,14 @@ def _statuses(table: TableText, text: Mapping[str, int], empty: BoolArray) -> St
     return statuses
 
 
-def _sequence(table: TableText, text: Mapping[str, int], statuses: StatusArray) -> IntArray:
-    """Return the place of each row in time, shape (row,); a missing reading may have none: -1."""
-    places = np.full(len(table.rows), -1, dtype=np.int64)
+def _whole_numbers(table: TableText, column: int, name: str, statuses: StatusArray) -> IntArray:
+    """Return a column of whole numbers, shape (row,); a missing reading may have none: -1."""
+    numbers = np.full(len(table.rows), -1, dtype=np.int64)
     for index, row in enumerate(table.rows.cells):
-        cell = row[text[SEQUENCE.name]]
+        cell = row[column]
         if cell.strip() or statuses[index] != MISSING:
-            places[index] = _integer(SEQUENCE.name, cell, table.rows.lines[index])
-    return places
+            numbers[index] = _integer(name, cell, table.rows.lines[index])
+    return numbers
 
 
 def _campaigns(table: TableText, grid: _Grid, text: Mapping[str, int]) -> list[str]:

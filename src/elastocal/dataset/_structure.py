@@ -13,6 +13,7 @@ from elastocal.dataset._layout import (
     INTEGERS,
     JOINT_VARIABLES,
     MADE_FROM,
+    OK,
     SCHEMA,
     SCHEMA_2,
     STATIONS,
@@ -21,6 +22,7 @@ from elastocal.dataset._layout import (
     VARIABLE_NAMES,
     VARIABLES,
     Arrays,
+    BoolArray,
     Labels,
     Variable,
     require_joint_names,
@@ -153,7 +155,21 @@ def needed_schema(labels: Labels, arrays: Arrays, attributes: Mapping[str, objec
     """Return the first schema that has all that a dataset has."""
     present = [*arrays, *(["campaign"] if labels["campaign"] else [])]
     complete = all(each.name in arrays for each in VARIABLES if each.required)
+    complete = complete and not unmeasured_poses(arrays).any()
     return SCHEMA if complete and not _news(present, attributes) else SCHEMA_2
+
+
+def unmeasured_poses(arrays: Arrays) -> BoolArray:
+    """Return whether each pose has usable readings that no tracker measured, shape (pose,).
+
+    A pose without any number is one that no tracker measured; a single reading without one is a gap
+    that its status must name.
+    """
+    usable = np.asarray(arrays[STATUS.name] == OK)
+    if "marker_displacement" not in arrays:
+        return np.asarray(usable.any(axis=1))
+    seen = np.isfinite(arrays["marker_displacement"]) & usable[..., np.newaxis]
+    return np.asarray(usable.any(axis=1) & ~seen.any(axis=(1, 2)))
 
 
 def _news(names: Collection[str], attributes: Mapping[str, object]) -> list[str]:

@@ -21,6 +21,7 @@ from elastocal.dataset._labelled import (
     campaign_labels,
     labelled_from_xarray,
     pose_labels,
+    read_contacts,
     read_joint_units,
     read_sequence,
     read_status,
@@ -31,6 +32,7 @@ from elastocal.dataset._labelled import (
 from elastocal.dataset._layout import (
     AXES,
     CONDITIONED,
+    CONTACTS,
     INTEGERS,
     JOINT_POSITION,
     JOINT_VARIABLES,
@@ -60,7 +62,13 @@ from elastocal.dataset._layout import (
     write_stations,
     write_vector,
 )
-from elastocal.dataset._structure import assemble, check_names, check_structure, needed_schema
+from elastocal.dataset._structure import (
+    assemble,
+    check_names,
+    check_structure,
+    needed_schema,
+    unmeasured_poses,
+)
 from elastocal.dataset.merging import selected, usable_readings
 from elastocal.dataset.readings import Readings
 from elastocal.errors import DatasetError
@@ -106,24 +114,35 @@ def check_numbers(labels: Labels, arrays: Arrays) -> None:
     """
     ok = arrays["status"] == OK
     _check_coverage(labels, arrays["status"], ok)
+    if "marker_displacement" in arrays and unmeasured_poses(arrays)[ok.any(axis=1)].all():
+        raise DatasetError(
+            "marker_displacement has no number: leave it out where no tracker measured"
+        )
     for variable in VARIABLES:
         if variable.name in arrays:
             values = arrays[variable.name]
             needed = ok if "load_case" in variable.dims else ok.any(axis=1)
             if variable == LINK_JOINT_POSITION:
                 values = _without_absent_encoders(values)
+            if variable.name in _OF_METROLOGY:
+                seen = ~unmeasured_poses(arrays)
+                needed = needed & (seen[:, np.newaxis] if needed.ndim > 1 else seen)
             for place, value in _offences(labels, variable, values, ~np.isfinite(values), needed):
                 raise DatasetError(
                     f"{place} is {value} although the status is ok: give a finite number, or the"
                     " status 'missing'"
                 )
             if variable.name.endswith("_sigma"):
-                for place, value in _offences(labels, variable, values, ~(values > 0), ok):
+                for place, value in _offences(labels, variable, values, ~(values > 0), needed):
                     raise DatasetError(
                         f"{place} is {value}: a standard deviation must be greater than 0"
                     )
     if SEQUENCE.name in arrays:
         _check_sequence(labels, arrays[SEQUENCE.name], arrays["status"])
+
+
+_OF_METROLOGY = ("marker_displacement", "marker_sigma", "marker_position")
+"""Variables that have no number at a pose that no tracker measured."""
 
 
 def check_plausible(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) -> None:
@@ -151,7 +170,8 @@ def check_plausible(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) 
         "controller_displacement", _norms(controller), _MAX_MEDIAN_DISPLACEMENT, "m", "mm"
     )
     if "marker_displacement" in arrays:
-        marker = arrays["marker_displacement"][ok]
+        seen = ok & np.isfinite(arrays["marker_displacement"]).all(axis=2)
+        marker = arrays["marker_displacement"][seen]
         _check_median("marker_displacement", _norms(marker), _MAX_MEDIAN_DISPLACEMENT, "m", "mm")
     _check_median("force", force, _MAX_MEDIAN_FORCE, "N", "mN")
     if not force.any():
@@ -159,7 +179,8 @@ def check_plausible(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) 
     if "reference_force" in arrays:
         _check_reference(labels, arrays["reference_force"], arrays["force"], ok)
     if "marker_displacement" in arrays:
-        _check_compliance(_norms(marker - controller), force)
+        away = marker - arrays["controller_displacement"][seen]
+        _check_compliance(_norms(away), _norms(arrays["force"][seen]))
 
 
 def _check_reference(
@@ -337,7 +358,8 @@ class Dataset(Result):
     status: StatusArray
     """Index into ``STATUSES`` of each reading, shape (pose, load_case)."""
     marker_displacement: FloatArray | None = None
-    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; None: none."""
+    """Displacement by the tracker (P^m), in base, shape (pose, load_case, 3), in m; NaN at poses
+    that none measured, None where none measured any."""
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (pose, load_case, 3), in N·m."""
     force_sigma: FloatArray | None = None
@@ -352,6 +374,9 @@ class Dataset(Result):
     sequence: IntArray | None = None
     """Place of each reading in time among those of its pose, shape (pose, load_case); None: the
     order of the load cases."""
+    contacts: StatusArray | None = None
+    """Disks or tips stacked between tool and tooling at each press, shape (pose, load_case); None:
+    one at all."""
     reference_joint_position: FloatArray | None = None
     """Joint positions when the zero of both displacements was read, shape (pose, joint)."""
     reference_force: FloatArray | None = None
@@ -373,9 +398,9 @@ class Dataset(Result):
                 freeze(values)
                 object.__setattr__(self, variable.name, values)
         attributes = canonical_attributes(self.attributes)
+        check_structure(self._labels, self._variables, self.joint_units)
         schema = needed_schema(self._labels, self._variables, attributes)
         object.__setattr__(self, "attributes", attributes | {"schema": schema})
-        check_structure(self._labels, self._variables, self.joint_units)
         check_numbers(self._labels, self._variables)
 
     def facts(self) -> tuple[tuple[str, str], ...]:
@@ -406,6 +431,7 @@ class Dataset(Result):
         tcp_position: ArrayLike | None = None,
         marker_position: ArrayLike | None = None,
         sequence: ArrayLike | None = None,
+        contacts: ArrayLike | None = None,
         reference_joint_position: ArrayLike | None = None,
         reference_force: ArrayLike | None = None,
         link_joint_position: ArrayLike | None = None,
@@ -428,7 +454,7 @@ class Dataset(Result):
         joint_position, force, controller_displacement, marker_displacement : array_like
             As the fields of these names. Displacements are those of the TCP, or both of the marker
             where ``marker`` is given; the tracker's is left out where there was no metrology.
-        moment, tcp_position, marker_position, sequence : array_like, optional
+        moment, tcp_position, marker_position, sequence, contacts : array_like, optional
         reference_joint_position, reference_force, link_joint_position : array_like, optional
             As the fields of these names.
         joint_names, load_cases : sequence of str
@@ -473,6 +499,7 @@ class Dataset(Result):
             "tcp_position": tcp_position,
             MARKER_POSITION.name: marker_position,
             "sequence": sequence,
+            CONTACTS.name: contacts,
             "reference_joint_position": reference_joint_position,
             "reference_force": reference_force,
             "link_joint_position": link_joint_position,
@@ -514,7 +541,7 @@ class Dataset(Result):
         joint_names = text_labels(arrays, "joint")
         joint_units, factors = read_joint_units(arrays, len(joint_names))
         status = read_status(arrays)
-        return cls(
+        dataset = cls(
             poses=pose_labels(arrays),
             load_cases=tuple(text_labels(arrays, "load_case")),
             joint_names=tuple(joint_names),
@@ -522,9 +549,17 @@ class Dataset(Result):
             **read_variables(arrays, factors),
             status=status,
             sequence=read_sequence(arrays, status),
+            contacts=read_contacts(arrays, status),
             campaigns=tuple(campaign_labels(arrays)),
             attributes=attributes,
         )
+        if attributes["schema"] == SCHEMA and dataset.poses_unmeasured:
+            raise DatasetError(
+                f"marker_displacement of pose {dataset.poses_unmeasured[0]} has no number although"
+                " its status is ok: give finite numbers, the status 'missing', or, where no tracker"
+                f" measured, the schema {SCHEMA_2!r}"
+            )
+        return dataset
 
     @classmethod
     def from_xarray(cls, data: "xr.Dataset") -> "Dataset":
@@ -560,7 +595,7 @@ class Dataset(Result):
 
     @property
     def arrays(self) -> dict[str, FloatArray]:
-        """The quantities that are present, by name: all variables but status and sequence."""
+        """The quantities that are present, by name: all variables but those of whole numbers."""
         return {each.name: v for each in VARIABLES if (v := getattr(self, each.name)) is not None}
 
     @property
@@ -582,6 +617,12 @@ class Dataset(Result):
     def usable(self) -> BoolArray:
         """Whether each reading has the status ok, shape (pose, load_case)."""
         return np.asarray(self.status == OK)
+
+    @property
+    def poses_unmeasured(self) -> tuple[int, ...]:
+        """Labels of the poses with usable readings that no tracker measured."""
+        unmeasured = unmeasured_poses(self._variables)
+        return tuple(pose for pose, none in zip(self.poses, unmeasured, strict=True) if none)
 
     @property
     def robot_name(self) -> str:
@@ -664,6 +705,6 @@ class Dataset(Result):
         Raises
         ------
         DatasetError
-            If the dataset's joints are not these, or there was no metrology.
+            If the dataset's joints are not these.
         """
         return usable_readings(self, joint_names, check=check)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.dataset._layout import (
+    CONTACTS,
     INTEGERS,
     LINK_JOINT_POSITION,
     MADE_FROM,
@@ -19,6 +20,7 @@ from elastocal.dataset._layout import (
     VARIABLES,
     FloatArray,
     IntArray,
+    StatusArray,
 )
 from elastocal.dataset.readings import Presses, Readings
 from elastocal.errors import DatasetError, nearest
@@ -90,6 +92,7 @@ def merge(
         load_cases=cases,
         status=np.concatenate([_spread(each, each.status, cases, MISSING) for each in datasets]),
         sequence=_sequence(datasets, cases),
+        contacts=_contacts(datasets, cases),
         campaigns=_campaigns(datasets, campaigns),
         attributes={**stated, **_check(datasets), "provenance": provenance},
         **joined,
@@ -109,6 +112,18 @@ def _sequence(datasets: Sequence["Dataset"], cases: Sequence[str]) -> IntArray |
     if ordered and all(dataset.sequence is None for dataset in datasets):
         return None
     return np.concatenate([_spread(each, each.order, cases, -1) for each in datasets])
+
+
+def _contacts(datasets: Sequence["Dataset"], cases: Sequence[str]) -> StatusArray | None:
+    """Return the disks stacked at each press; None where none of the datasets states them."""
+    if all(dataset.contacts is None for dataset in datasets):
+        return None
+    parts = []
+    for dataset in datasets:
+        one = np.ones_like(dataset.status)
+        own = one if dataset.contacts is None else dataset.contacts
+        parts.append(_spread(dataset, own, cases, 1))
+    return np.concatenate(parts)
 
 
 def _campaigns(datasets: Sequence["Dataset"], named: Sequence[str] | None) -> tuple[str, ...]:
@@ -131,6 +146,8 @@ def _campaigns(datasets: Sequence["Dataset"], named: Sequence[str] | None) -> tu
 
 _DIMS = {variable.name: variable.dims for variable in (*VARIABLES, *INTEGERS)}
 _ZERO_BY_DEFAULT = "reference_force"
+_UNMEASURED = "marker_displacement"
+"""Variable without a number where no tracker measured."""
 _OF_ONE_CAMPAIGN = (MARKER_POSITION.name, STATIONS)
 """Fields left out when campaigns are combined."""
 
@@ -156,6 +173,8 @@ def _taken(dataset: "Dataset", rows: Sequence[int], columns: Sequence[int]) -> "
     variables: dict[str, np.ndarray] = dict(dataset.arrays)
     if dataset.sequence is not None or sorted(columns) != list(columns):
         variables[SEQUENCE.name] = dataset.order
+    if dataset.contacts is not None:
+        variables[CONTACTS.name] = dataset.contacts
     return replace(
         dataset,
         # Said again for the type checker: the arrays by name are none of these.
@@ -177,11 +196,6 @@ def usable_readings(
     dataset: "Dataset", joint_names: Sequence[str], *, check: bool = False
 ) -> Readings:
     """Return the usable readings of a dataset as flat arrays; see `Dataset.readings`."""
-    if dataset.marker_displacement is None:
-        raise DatasetError(
-            "dataset has no marker_displacement: to identify springs, metrology is needed"
-            " (a tracker that measures the marker)"
-        )
     wanted = list(joint_names)
     if sorted(wanted) != sorted(dataset.joint_names):
         raise DatasetError(
@@ -196,6 +210,7 @@ def usable_readings(
         if values is not None and variable not in (LINK_JOINT_POSITION, MARKER_POSITION):
             rows = values[pose, case] if "load_case" in variable.dims else values[pose]
             flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
+    flat |= _held_by_contact(dataset, pose, case)
     presses = _unusable_presses(dataset, order)
     if dataset.sequence is not None or presses is not None:
         flat["sequence"] = dataset.order[pose, case]
@@ -210,6 +225,26 @@ def usable_readings(
     )
     kept_out = np.isin(readings.load_case, dataset.check_cases)
     return readings.set_aside(~kept_out if check else kept_out)
+
+
+def _held_by_contact(
+    dataset: "Dataset", pose: np.ndarray, case: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return what differs of readings at poses that no tracker measured; nothing of none."""
+    held = np.isin(np.array(dataset.poses)[pose], dataset.poses_unmeasured)
+    if not held.any():
+        return {}
+    stacked = np.ones_like(dataset.status) if dataset.contacts is None else dataset.contacts
+    found = {"contacts": np.where(held, stacked[pose, case], 0)}
+    marker = np.zeros((len(pose), 3))
+    if dataset.marker_displacement is not None:
+        marker[~held] = dataset.marker_displacement[pose, case][~held]
+        if dataset.marker_sigma is not None:
+            # Nothing is weighed by it there; a row needs some number.
+            sigma = dataset.marker_sigma[pose, case].copy()
+            sigma[held] = np.median(sigma[~held], axis=0)
+            found["marker_sigma"] = sigma
+    return found | {"marker_displacement": marker}
 
 
 def _unusable_presses(dataset: "Dataset", order: Sequence[int]) -> Presses | None:
@@ -244,6 +279,8 @@ def _joined(datasets: Sequence["Dataset"], name: str, cases: Sequence[str]) -> F
     parts = []
     for dataset in datasets:
         values = dataset.arrays.get(name, np.zeros((len(dataset.poses), 3)))
+        if name == _UNMEASURED and dataset.marker_displacement is None:
+            values = np.full(dataset.force.shape, np.nan)
         if "joint" in _DIMS[name]:
             order = [dataset.joint_names.index(joint) for joint in datasets[0].joint_names]
             values = values[..., order]
@@ -282,7 +319,7 @@ def _check_compatible(first: "Dataset", other: "Dataset", index: int) -> None:
             f"datasets 0 and {index} have different histories: {_history(first)} and"
             f" {_history(other)}"
         )
-    allowed = {_ZERO_BY_DEFAULT, *_OF_ONE_CAMPAIGN}
+    allowed = {_ZERO_BY_DEFAULT, _UNMEASURED, *_OF_ONE_CAMPAIGN}
     for variable in sorted((set(first.arrays) ^ set(other.arrays)) - allowed):
         lacking = index if variable in first.arrays else 0
         raise DatasetError(

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from elastocal.dataset._layout import (
     FloatArray,
     IntArray,
+    StatusArray,
     StringArray,
     freeze,
 )
@@ -17,7 +18,9 @@ from elastocal.results import brief_repr
 
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
-_NO_NUMBERS = ("pose", "load_case", "sequence", "campaign", "conditioned", "also_pressed")
+_NO_NUMBERS = (
+    *("pose", "load_case", "sequence", "contacts", "campaign", "conditioned", "also_pressed"),
+)
 """Fields that are labels or say how all readings were taken."""
 
 
@@ -71,7 +74,8 @@ class Readings:
     controller_displacement: FloatArray
     """TCP displacement by the controller, in base (P^c), shape (reading, 3), in m."""
     marker_displacement: FloatArray
-    """Marker displacement by the tracker, in base (P^m), shape (reading, 3), in m."""
+    """Marker displacement by the tracker, in base (P^m), shape (reading, 3), in m; zero where none
+    measured: there the tooling holds the tool in its place (`contacts`)."""
     moment: FloatArray | None = None
     """Moment on the robot at the TCP in base, shape (reading, 3), in N·m; None: not measured."""
     force_sigma: FloatArray | None = None
@@ -88,6 +92,10 @@ class Readings:
     sequence: IntArray | None = None
     """Place of each reading in time among those of its pose, shape (reading,); None: their order
     here."""
+    contacts: StatusArray | None = None
+    """Disks or tips stacked between tool and tooling at each reading that no tracker measured,
+    shape (reading,); 0 where one did, None: it measured all. The displacement of a reading of
+    another stack than the pose's first counts from a light contact on its own stack."""
     conditioned: bool = False
     """Whether each pose's first reading is a press made before the zero was read; else the arm
     came to the zero by free moves."""
@@ -104,6 +112,8 @@ class Readings:
             self._own("sequence", np.array(self.sequence, dtype=np.int64), (len(self.pose),))
         elif self.also_pressed is not None:
             raise DatasetError("readings with other presses between them need their sequence")
+        if self.contacts is not None:
+            self._own("contacts", np.array(self.contacts, dtype=np.int8), (len(self.pose),))
         if self.campaign is not None:
             self._own("campaign", np.array(self.campaign, dtype=np.str_), (len(self.pose),))
         for name, value in self._numbers():
@@ -127,7 +137,8 @@ class Readings:
         """Real minus commanded TCP position, shape (reading, 3), in m (docs/conventions.md).
 
         ``deflection = marker_displacement - controller_displacement``: the paper's Eq. (10)
-        and (13) with both signs turned.
+        and (13) with both signs turned. Of a reading that no tracker measured it is the deflection
+        of the arm and of the contact together, since the tooling holds the tool.
         """
         deflection: FloatArray = self.marker_displacement - self.controller_displacement
         freeze(deflection)
@@ -154,6 +165,7 @@ class Readings:
             pose=self.pose[rows],
             load_case=self.load_case[rows],
             sequence=None if self.sequence is None else self.sequence[rows],
+            contacts=None if self.contacts is None else self.contacts[rows],
             campaign=None if self.campaign is None else self.campaign[rows],
             **numbers,
         )

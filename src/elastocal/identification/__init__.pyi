@@ -18,6 +18,11 @@ from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
 )
+from .contact import (
+    Contact as Contact,
+    at_tcp as at_tcp,
+    read_contact as read_contact,
+)
 from .conventions import (
     check_conventions as check_conventions,
     check_joints as check_joints,
@@ -46,7 +51,11 @@ from .frames import (
     FrameSummary as FrameSummary,
     frame_columns as frame_columns,
 )
-from .knowledge import DriveCompliances as DriveCompliances, with_knowledge as with_knowledge
+from .knowledge import (
+    DriveCompliances as DriveCompliances,
+    weigh_contact as weigh_contact,
+    with_knowledge as with_knowledge,
+)
 from .ladder import (
     Choice as Choice,
     Climbed as Climbed,
@@ -126,6 +135,7 @@ from .rungs import (
 )
 from .show import (
     show_budget as show_budget,
+    show_contact as show_contact,
     show_ladder as show_ladder,
     show_sums as show_sums,
     show_unseen as show_unseen,

@@ -17,6 +17,7 @@ from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.contact import ContactSummary, contact_summary
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.frames import FrameSummary, frame_summaries
@@ -34,7 +35,12 @@ from elastocal.identification.observability import (
     observability,
 )
 from elastocal.identification.options import FitOptions
-from elastocal.identification.problem import Problem, build, same_configuration
+from elastocal.identification.problem import (
+    Problem,
+    build,
+    contact_visibility,
+    same_configuration,
+)
 from elastocal.identification.rungs import low_loads
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
@@ -46,6 +52,7 @@ from elastocal.identification.uncertainty import (
     distrust_factor,
     doubt,
     doubt_factor,
+    interval,
     leave_poses_out,
     measured_coverage,
     widen_draws,
@@ -125,6 +132,8 @@ class Calibration:
     warnings: tuple[Finding, ...]
     frames: tuple[FrameSummary, ...] = ()
     """Frames that were estimated with the springs."""
+    contact: ContactSummary | None = None
+    """The contact that held the tool; None: a tracker measured every reading."""
 
     @property
     def residual_norm(self) -> FloatArray:
@@ -186,11 +195,11 @@ def calibrate(
     weighted = kept.reweighted(solution.reading_weight)
     held_out = leave_poses_out(weighted)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
-    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng, options.prior)
+    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng, weighted.prior_error)
     by = _widening(weighted, solution.compliance, draws, held_out, ladder, unexplained)
     widened = widen_draws(weighted, solution.compliance, draws, by)
-    springs, frames = weighted.springs, slice(weighted.springs.stop, None)
-    compliance, plain = solution.compliance[springs], weighted.without_frames()
+    springs, frames = weighted.springs, weighted.frame_columns
+    compliance, plain = solution.compliance[springs], weighted.of_springs()
     # A prior makes nothing observable: what was believed before is not measured.
     seen = observability(factor(plain.without_prior()), model.springs, plain, compliance)
     seen = find_faint(seen, plain, compliance, model.parameters)
@@ -225,7 +234,27 @@ def calibrate(
         solution=solution,
         warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
+        contact=_contact(model, weighted, readings.take(used), options, widened),
     )
+
+
+def _contact(
+    model: ElasticModel,
+    problem: Problem,
+    readings: Readings,
+    options: FitOptions,
+    draws: FloatArray,
+) -> ContactSummary | None:
+    """Return the contact as it was found; None where a tracker measured every reading."""
+    if options.contact is None or not problem.contact:
+        return None
+    own = problem.contact_columns
+    found = np.median(draws[:, own], axis=0)
+    # What the readings leave to the contact, they leave with the other sign to the arm.
+    left = problem.O[:, :, own] @ (draws[:, own] - found).T
+    zero = float(np.sqrt(np.mean(np.square(left))))
+    seen = contact_visibility(problem, model)
+    return contact_summary(options.contact, readings, seen, (found, *interval(draws[:, own])), zero)
 
 
 def _widening(
@@ -256,7 +285,7 @@ def _data_warnings(
     marker_offset: ArrayLike | None,
 ) -> list[Finding]:
     """Return a finding for each oddity of the data, or refuse them."""
-    seen = find_implausible(model.robot, readings, marker_offset)
+    seen = _implausible(model, readings, marker_offset)
     warnings = _stated(seen, options)
     warnings += list(check_joints(model.robot, readings)) + [
         SAME_CONFIGURATION(poses=group) for group in same_configuration(readings, problem.block)
@@ -265,7 +294,7 @@ def _data_warnings(
         warnings.append(WEIGHT_GAP(name=model.robot.name, gap=gap))
     warnings += _fitted_mistakes(model, readings, options, marker_offset, seen)
     try:
-        left = check_conventions(model, readings, marker_offset, options.free_frame)
+        left = check_conventions(model, readings, marker_offset, options)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
@@ -273,6 +302,18 @@ def _data_warnings(
     if left > POOR_FIT:
         warnings.append(POORLY_FITTED(left=left))
     return warnings
+
+
+def _implausible(
+    model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None
+) -> tuple[Finding, ...]:
+    """Return the mistakes that readings show; those by contact are of the tcp, not of a marker."""
+    if readings.contacts is None:
+        return find_implausible(model.robot, readings, marker_offset)
+    held = readings.contacts > 0
+    parts = ((readings.take(~held), marker_offset), (readings.take(held), None))
+    found = [find_implausible(model.robot, own, at) for own, at in parts if len(own)]
+    return tuple(dict.fromkeys(each for part in found for each in part))
 
 
 def _fitted_mistakes(
@@ -285,7 +326,8 @@ def _fitted_mistakes(
     """Return mistakes that fits show, beside those that readings show by themselves."""
     if options.free_frame != "none" or any(each.grade is Grade.REFUSAL for each in seen):
         return []
-    found = find_undone(model.robot, readings, marker_offset)
+    # Other readings of a marker's columns can be tried where there is a marker throughout.
+    found = () if options.contact else find_undone(model.robot, readings, marker_offset)
     if not (seen or found):
         found = tuple(find_wrong_units(model.robot, readings, marker_offset))
     return _stated(found, options)

@@ -23,7 +23,7 @@ from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.findings import Finding, Kind, as_number
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.mistakes import name_joint_mistake, still
-from elastocal.identification.options import FitOptions, FreeFrame
+from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import solve
 from elastocal.robot import JointReading, Robot, other_joint_readings
@@ -57,7 +57,7 @@ def check_conventions(
     model: ElasticModel,
     readings: Readings,
     marker_offset: ArrayLike | None = None,
-    free_frame: FreeFrame = "none",
+    options: FitOptions | None = None,
 ) -> float:
     """Return the part of the median deflection that a robust fit leaves unexplained.
 
@@ -69,8 +69,8 @@ def check_conventions(
         What was measured.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
-    free_frame : str
-        See `FitOptions.free_frame`.
+    options : FitOptions, optional
+        Their free frames and contact count here, nothing else.
 
     Raises
     ------
@@ -79,7 +79,9 @@ def check_conventions(
     IdentificationError
         If most deflections are zero.
     """
-    problem = build(model, readings, FitOptions(free_frame=free_frame), marker_offset)
+    stated_by = options or FitOptions()
+    plain = FitOptions(free_frame=stated_by.free_frame, contact=stated_by.contact)
+    problem = build(model, readings, plain, marker_offset)
     if not np.median(np.linalg.norm(problem.d, axis=1)) > 0.0:
         raise IdentificationError("most deflections are zero: there is nothing to identify")
     robust = solve(problem, "huber")

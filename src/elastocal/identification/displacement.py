@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, ModelPosture
+from elastocal.identification.contact import counts_from_other_stack
 from elastocal.robot import Robot
 
 _ROUNDS = 3
@@ -53,24 +54,42 @@ def displacement_blocks(
     loaded, reference = None, None
     if len(model.friction):
         loaded, reference = friction_states(model, readings, q, q_0)
-    rows = model.observation_blocks(q, readings.force, readings.moment, marker_offset, loaded)
-    rows = rows + model.sag_blocks(q, marker_offset) - model.sag_blocks(q_0, marker_offset)
-    if readings.reference_force is None and reference is None:
-        return rows
-    force = np.zeros_like(readings.force)
-    if readings.reference_force is not None:
-        force = readings.reference_force
-    return rows - model.observation_blocks(q_0, force, None, marker_offset, reference)
+
+    def of_point(offset: ArrayLike | None) -> FloatArray:
+        rows = model.observation_blocks(q, readings.force, readings.moment, offset, loaded)
+        rows = rows + model.sag_blocks(q, offset) - model.sag_blocks(q_0, offset)
+        if readings.reference_force is None and reference is None:
+            return rows
+        force = np.zeros_like(readings.force)
+        if readings.reference_force is not None:
+            force = readings.reference_force
+        return rows - model.observation_blocks(q_0, force, None, offset, reference)
+
+    if readings.contacts is None or marker_offset is None:
+        return of_point(marker_offset)
+    # What the tooling holds is the tcp, not the marker.
+    held = (readings.contacts > 0)[:, None, None]
+    return np.where(held, of_point(None), of_point(marker_offset))
 
 
 def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
     """Return the joints of the zero of both displacements, shape (reading, joint), in rad or m.
 
-    They are those recorded; otherwise those where the controller displacement began, with constant
-    orientation and external axes at rest.
+    They are those recorded; otherwise, and for presses on more disks than the pose began with,
+    those where the controller displacement began, with constant orientation and external axes at
+    rest.
     """
     if readings.reference_joint_position is not None:
-        return readings.reference_joint_position
+        q_0, anew = readings.reference_joint_position, counts_from_other_stack(readings)
+        if not anew.any():
+            return q_0
+        q_0 = q_0.copy()
+        q_0[anew] = _where_displacement_began(robot, readings)[anew]
+        return q_0
+    return _where_displacement_began(robot, readings)
+
+
+def _where_displacement_began(robot: Robot, readings: Readings) -> FloatArray:
     q = readings.joint_position.copy()
     here = robot.forward(q)
     goal = here[:, :3, 3] - readings.controller_displacement

@@ -14,6 +14,7 @@ from elastocal.findings import Finding
 from elastocal.identification.budget import ErrorBudget
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration
+from elastocal.identification.contact import ContactSummary
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.load_check import LoadCheck
@@ -195,6 +196,8 @@ class CalibrationSummary:
     """The simplest model first; empty in calibrations before the ladder."""
     frames: tuple[FrameSummary, ...] = ()
     """Frames that were estimated with the springs."""
+    contact: ContactSummary | None = None
+    """The contact that held the tool where no tracker measured; None: one measured throughout."""
     coverage: Coverage | None = None
     """Measured coverage of the intervals of a prediction; None in older calibrations."""
     production: ProductionCoverage | None = None
@@ -258,6 +261,7 @@ def summary(
         settings=settings,
         ladder=tuple(map(rung_summary, calibration.ladder)),
         frames=calibration.frames,
+        contact=calibration.contact,
         coverage=calibration.coverage,
         known=tuple(known),
     )

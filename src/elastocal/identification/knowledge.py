@@ -18,16 +18,29 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, KnownSpring, Parameter, actuated
-from elastocal.errors import IdentificationError
+from elastocal.elastic import ElasticModel, KnownSpring, Parameter, actuated, bearing
+from elastocal.errors import IdentificationError, present
+from elastocal.identification.contact import (
+    LATERAL,
+    NORMAL,
+    Contact,
+    guessed,
+    is_doubled,
+    with_doubled,
+)
 from elastocal.identification.observability import find_hidden, likely_sizes, observability
 from elastocal.identification.options import MEDIAN_NORM, FitOptions, Prior, bounds
 from elastocal.identification.problem import Problem, build
+from elastocal.identification.rungs import gears
 from elastocal.identification.solve import factor, solve
 from elastocal.identification.uncertainty import leave_poses_out
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
+_ROUNDS = 3
+"""Fits after which the noise of a row no longer changes."""
+_LEAST_NOISE = 1e-7
+"""Least noise of a row in m, of simulated readings without any."""
 _SURE = 2.0
 """Standard errors above zero from which the compliance of a drive is known."""
 
@@ -68,7 +81,7 @@ class DriveCompliances:
         folds = len(left)
         error = np.sqrt((folds - 1) / folds * np.sum(np.square(left - c), axis=0))
         scale = np.array([parameter.scale for parameter in model.parameters])
-        plain = problem.without_frames()
+        plain = problem.of_springs()
         usual = likely_sizes(plain, model.parameters)
         seen = observability(factor(plain), model.springs, plain, c)
         seen = find_hidden(seen, plain, c, model.parameters, usual)
@@ -139,7 +152,8 @@ def with_knowledge(
     if not np.isfinite(sigma).any():
         return bounded
     problem = build(model, readings, bounded, marker_offset)
-    residual = np.linalg.norm(problem.residuals(solve(problem, "huber").compliance), axis=1)
+    found = solve(problem, "huber").compliance
+    residual = np.linalg.norm(problem.own_errors(problem.residuals(found)), axis=1)
     # Readings without any noise reduce the weight of a prior, but not to zero.
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
     noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
@@ -177,6 +191,74 @@ def expected_sizes(
         return sizes, False
     sigma = np.asarray(prior.sigma, dtype=float)
     return (sigma, True) if np.isfinite(sigma).all() else (sizes, False)
+
+
+def weigh_contact(
+    robot: Robot,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None = None,
+) -> FitOptions:
+    """Return options whose contact is weighed against the noise of the readings.
+
+    First fits state the robust residual of a row, against which the prior and the errors that
+    readings share are weighed, and compliances of which the spread is a share. They are fits by
+    gears, or by bearing springs where gears imitate a compliance that is free.
+
+    Parameters
+    ----------
+    robot, readings, options, marker_offset
+        As for `elastocal.identification.choose_model`; options without a contact stay as they are.
+
+    Raises
+    ------
+    IdentificationError
+        If bearing springs too imitate a compliance of the contact that is free.
+    """
+    if options.contact is None:
+        return options
+    plain = replace(options, prior=None)
+    if is_doubled(readings):
+        # The arm's part in the differences needs a fit, of any springs that fit at all.
+        first = ElasticModel(robot, bearing(robot))
+        guess = replace(plain, contact=guessed(options.contact))
+        problem = build(first, readings, guess, marker_offset)
+        arm = _of_arm(problem, solve(problem, "huber").compliance)
+        plain = replace(plain, contact=with_doubled(options.contact, robot, readings, arm))
+    try:
+        model = ElasticModel(robot, gears(robot, readings))
+        contact = _weighed(model, readings, plain, marker_offset)
+    except IdentificationError:
+        model = ElasticModel(robot, bearing(robot))
+        contact = _weighed(model, readings, plain, marker_offset)
+    return replace(options, contact=contact)
+
+
+def _weighed(
+    model: ElasticModel,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None,
+) -> Contact:
+    """Return a contact with the noise of a row and the compliances of fits by a model."""
+    contact = present(options.contact, "contact")
+    for _ in range(_ROUNDS):
+        problem = build(model, readings, replace(options, contact=contact), marker_offset)
+        found = solve(problem, "huber").compliance
+        residual = np.linalg.norm(problem.own_errors(problem.residuals(found)), axis=1)
+        size = dict(zip(problem.contact, found[problem.contact_columns].tolist(), strict=True))
+        contact = replace(
+            contact,
+            noise=max(float(np.median(residual)) / MEDIAN_NORM, _LEAST_NOISE),
+            size=(size.get(NORMAL, 0.0), size.get(LATERAL, 0.0)),
+        )
+        contact = with_doubled(contact, model.robot, readings, _of_arm(problem, found))
+    return contact
+
+
+def _of_arm(problem: Problem, compliance: FloatArray) -> FloatArray:
+    """Return what the springs predict of each reading, shape (reading, 3), in m."""
+    return np.asarray(problem.O[:, :, problem.springs] @ compliance[problem.springs])
 
 
 def _columns_of(known: KnownSpring, model: ElasticModel) -> list[int]:

@@ -19,6 +19,7 @@ from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, KnownSpring, bearing
 from elastocal.errors import IdentificationError
+from elastocal.findings import Finding, Grade, Kind
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.knowledge import DriveCompliances, with_knowledge
 from elastocal.identification.observability import is_vague, likely_sizes
@@ -46,6 +47,12 @@ from elastocal.identification.uncertainty import HeldOut, leave_poses_out
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
+
+REFUSED = Kind(
+    "ladder.refused",
+    "springs {springs} were not tried: {reason}",
+    grade=Grade.NOTE,
+)
 
 
 @brief_repr
@@ -105,6 +112,8 @@ class Choice:
     model: ElasticModel
     ladder: tuple[Climbed, ...]
     """Every rung that the readings allow, the simplest first."""
+    refused: tuple[Finding, ...] = ()
+    """Rungs that the readings do not allow, with the reason."""
 
     @property
     def taken(self) -> str:
@@ -168,7 +177,7 @@ def choose_model(
         choice = climb(robot, readings, rungs, allowed, options, marker_offset)
         # A fit of springs by name is the paper's, but along a direction that readings hardly change
         # a spring would take any value, and draws of it values that no spring of an arm has.
-        problem = build(choice.model, readings, options, marker_offset).without_frames()
+        problem = build(choice.model, readings, options, marker_offset).of_springs()
         sizes = likely_sizes(problem, choice.model.parameters)
         if not is_vague(problem, solve(problem).compliance, sizes):
             return choice
@@ -252,6 +261,7 @@ def climb(
     rows = None if production is None else production.few()
     drives = DriveCompliances.of(robot, readings, options, marker_offset) if rows else None
     tried: list[Climbed] = []
+    refused: list[Finding] = []
     low, reason = low_loads(readings), NO_LEVELS
     # The frame of a load case that is left out is not known, so it cannot be judged.
     judged = low & (options.free_frame != "load_case")
@@ -269,9 +279,10 @@ def climb(
             tried.append(replace(found, counted=counted, known=known, forecast=forecast))
         except IdentificationError as error:
             reason = str(error)
+            refused.append(REFUSED(springs=rung.name, reason=reason))
     if not any(each.name in allowed for each in tried):
         raise IdentificationError(reason)
-    return take_best(tried, allowed)
+    return replace(take_best(tried, allowed), refused=tuple(refused))
 
 
 def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
@@ -349,7 +360,7 @@ def try_rung(name: str, model: ElasticModel, problem: Problem, low: BoolArray) -
         Readings that are also left out together.
     """
     held_out = leave_poses_out(problem)
-    error = held_out.error.copy()
+    error = np.linalg.norm(held_out.axis_error, axis=1)
     if np.any(low):
         error[low] = 0.5 * (error[low] + _left_out(problem, low))
     blocks, index = np.unique(problem.block, return_inverse=True)
@@ -370,4 +381,5 @@ def _left_out(problem: Problem, rows: BoolArray) -> FloatArray:
     """Return the errors of some readings under a refit to the others, shape (row,), in m."""
     rest = PoseGrams.of(problem.take(~rows))
     compliance = rest.refit(np.ones((1, len(rest))))[0]
-    return np.asarray(np.linalg.norm(problem.take(rows).residuals(compliance), axis=1))
+    left = problem.take(rows)
+    return np.asarray(np.linalg.norm(left.own_errors(left.residuals(compliance)), axis=1))

@@ -42,6 +42,7 @@ def check_loads(
     """Return the errors at readings that are kept out of every fit; None where there are none.
 
     There is no check with free frames either: the frame of a session is that of its own readings.
+    Nor is there one where the tooling holds the tool, whose contact is a part of what is shown.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def check_loads(
         Metrology marker in the tcp frame, in m.
     """
     readings = readings.take(np.isin(readings.pose, calibration.readings.pose))
-    if not len(readings) or calibration.frames:
+    if not len(readings) or calibration.frames or readings.contacts is not None:
         return None
     model, compliance = calibration.calibrated.model, calibration.calibrated.compliance
     shown = displacement_blocks(model, readings, marker_offset) @ compliance

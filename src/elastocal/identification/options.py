@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import IdentificationError, nearest
+from elastocal.identification.contact import Contact
 from elastocal.options import Exclude, Marker, Option
 from elastocal.plugins import Registry
 from elastocal.records import record
@@ -71,6 +72,9 @@ class FitOptions:
     free_frame: FreeFrame = "none"
     """Sessions whose frames of tracker and marker are estimated with the springs; see
     `elastocal.identification.frames`."""
+    contact: Contact | None = None
+    """What is known of the contact that holds the tool where no tracker measured; None: nothing,
+    and readings without metrology are refused. See `elastocal.identification.contact`."""
     draws: int = 200
     """Number of pose-block bootstrap draws."""
 
@@ -167,6 +171,8 @@ class FitSettings:
         Option(choices="free frame", help="Estimate a frame of tracker and marker for each."),
     ] = "none"
     """``load_case`` or ``campaign``: estimate a frame of tracker and marker for each."""
+    contact: Contact | None = None
+    """What is known of the contact that holds the tool where no tracker measured."""
     draws: Annotated[int, Option(most=100_000)] = 200
     """Bootstrap draws."""
     seed: Annotated[int, Option(least=0)] = 0
@@ -206,6 +212,7 @@ class FitSettings:
             set_blunders_aside=not self.keep_blunders,
             trust_conventions=self.trust_conventions,
             free_frame=self.free_frame,
+            contact=self.contact,
             draws=self.draws if draws is None else draws,
         )
 

@@ -19,6 +19,17 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import IdentificationError
 from elastocal.identification._least_squares import RANK_TOLERANCE
+from elastocal.identification.contact import (
+    ContactColumns,
+    ContactVisibility,
+    contact_columns,
+    is_doubled,
+    is_pressed_sideways,
+    require_metrology,
+    require_seen,
+    visibility,
+    whitened,
+)
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.frames import NUMBERS, FrameColumns, frame_columns
 from elastocal.identification.options import FitOptions, Prior, bounds
@@ -72,6 +83,15 @@ class Problem:
     frames: tuple[str, ...] = ()
     """Sessions whose frames are free; their columns follow those of the springs
     (`elastocal.identification.frames`)."""
+    contact: tuple[str, ...] = ()
+    """Compliances of the contact that holds the tool; their columns follow those of the frames
+    (`elastocal.identification.contact`)."""
+    shared: FloatArray | None = None
+    """Errors that readings of one block share, each of unit variance, over the noise of a typical
+    row, shape (reading, 3, error); None: there are none."""
+    prior_error: FloatArray | None = None
+    """Standard deviation of the right-hand side of each row of the prior over its repetitions,
+    shape (row,), in m; None: none is drawn."""
 
     def __len__(self) -> int:
         """Return the number of readings."""
@@ -79,13 +99,37 @@ class Problem:
 
     @property
     def columns(self) -> int:
-        """Number of columns: of the parameters of all springs, and of free frames."""
+        """Number of columns: of the parameters of all springs, of frames, and of the contact."""
         return int(self.O.shape[2])
 
     @property
     def springs(self) -> slice:
         """The columns of the springs."""
-        return slice(0, self.columns - NUMBERS * len(self.frames))
+        return slice(0, self.frame_columns.start)
+
+    @property
+    def frame_columns(self) -> slice:
+        """The columns of free frames."""
+        end = self.contact_columns.start
+        return slice(end - NUMBERS * len(self.frames), end)
+
+    @property
+    def contact_columns(self) -> slice:
+        """The columns of the contact."""
+        return slice(self.columns - len(self.contact), self.columns)
+
+    def weighted(self) -> FloatArray:
+        """Return the weighted rows ``[O d]``, whitened by what readings of a block share.
+
+        Shape (reading, 3, parameter + 1).
+        """
+        rows = np.concatenate([self.O, self.d[..., None]], axis=2) * self.weight[..., None]
+        return self._whitened(rows, self.weight)
+
+    def _whitened(self, rows: FloatArray, weight: FloatArray) -> FloatArray:
+        if self.shared is None:
+            return rows
+        return whitened(rows, self.shared * weight[..., None], self.block)
 
     def scaled(self) -> "ScaledRows":
         """Return the weighted observation blocks with columns of unit norm.
@@ -93,11 +137,25 @@ class Problem:
         The column of a spring that no force turns, e.g. of the last joint when the tcp is on its
         axis, is round-off that would pass for information; it becomes zero.
         """
-        return unit_columns(self.O * self.weight[..., None], self.size)
+        return unit_columns(self.weighted()[..., :-1], self.size)
 
     def residuals(self, compliance: FloatArray) -> FloatArray:
         """Return ``O c - d``, unweighted, shape (reading, 3), in m."""
         return np.asarray(self.O @ compliance - self.d)
+
+    def own_errors(self, error: FloatArray, weight: FloatArray | None = None) -> FloatArray:
+        """Return errors of the readings but for what those of a block share.
+
+        Parameters
+        ----------
+        error : ndarray, shape (reading, 3)
+            In m.
+        weight : ndarray, shape (reading, 3), optional
+            Weight of each component; 1 by default.
+        """
+        if weight is None:
+            weight = np.ones_like(self.weight)
+        return self._whitened((error * weight)[..., None], weight)[..., 0]
 
     def reweighted(self, factor: FloatArray) -> "Problem":
         """Return the problem with each reading's squared residual multiplied by a factor."""
@@ -109,20 +167,22 @@ class Problem:
         O = np.concatenate([blocks, behind], axis=2)  # noqa: E741 - the paper's name
         return replace(self, O=O, d=self.d if d is None else d)
 
-    def without_frames(self) -> "Problem":
-        """Return the problem of the springs in what no frame can explain.
+    def of_springs(self) -> "Problem":
+        """Return the problem of the springs in what neither a frame nor the contact can explain.
 
-        Weighted rows are projected on the complement of the frames' columns: what the springs'
-        fit and their observability rest on.
+        Weighted rows are projected on the complement of the frames' columns, and of those of a
+        contact of which nothing is known: what the springs' fit and their observability rest on. A
+        compliance of the contact that is stated takes from them what its prior leaves open.
         """
-        if not self.frames:
+        if not (self.frames or self.contact):
             return self
         n, size = self.springs.stop, np.broadcast_to(self.size, self.lower.shape)
-        rows = (self.O * self.weight[..., None]).reshape(-1, self.columns)
-        U, s, _ = np.linalg.svd(rows[:, n:], full_matrices=False)
-        Q = U[:, s > RANK_TOLERANCE * s[0]]
-        seen = np.column_stack([rows[:, :n], (self.d * self.weight).ravel()])
-        seen -= Q @ (Q.T @ seen)
+        rows = self.weighted().reshape(-1, self.columns + 1)
+        U, s, _ = np.linalg.svd(rows[:, self.frame_columns], full_matrices=False)
+        Q = U[:, s > RANK_TOLERANCE * s[0]] if s.size else U
+        rows = rows - Q @ (Q.T @ rows)
+        rows = _without_known(rows, self.contact_columns, self.prior_rows)
+        seen = rows[:, [*range(n), -1]]
         return Problem(
             O=seen[:, :n].reshape(-1, 3, n),
             d=seen[:, n].reshape(-1, 3),
@@ -136,7 +196,7 @@ class Problem:
 
     def without_prior(self) -> "Problem":
         """Return the problem of the data alone."""
-        return replace(self, prior_rows=self.prior_rows[:0])
+        return replace(self, prior_rows=self.prior_rows[:0], prior_error=None)
 
     def take(self, readings: ArrayLike) -> "Problem":
         """Return the problem of some of the readings (a mask or indices)."""
@@ -147,6 +207,7 @@ class Problem:
             d=self.d[index],
             weight=self.weight[index],
             block=self.block[index],
+            shared=None if self.shared is None else self.shared[index],
         )
 
     def with_columns(self, columns: IndexArray) -> "Problem":
@@ -159,6 +220,24 @@ class Problem:
             prior_rows=self.prior_rows[:, [*columns, -1]],
             size=np.broadcast_to(self.size, self.lower.shape)[columns],
         )
+
+
+def _without_known(rows: FloatArray, columns: slice, prior: FloatArray) -> FloatArray:
+    """Return rows without what columns explain whose values a prior knows in part.
+
+    A column ``b`` of variance ``v`` adds ``v b b'`` to the covariance of the rows, which are
+    whitened by it; without a prior ``v`` is infinite.
+    """
+    own, rows = range(rows.shape[1])[columns], rows.copy()
+    # What is known of one is used first: what is then left of a free one is projected away.
+    for column in sorted(own, key=lambda each: not np.any(prior[:, each])):
+        b = rows[:, column].copy()
+        if not (size := float(np.linalg.norm(b))) > 0.0:
+            continue
+        gain = float(np.linalg.norm(prior[:, column]))
+        less = 1.0 - (gain / float(np.hypot(gain, size)))
+        rows -= less * np.outer(b / size, b @ rows / size)
+    return rows
 
 
 def unit_columns(rows: FloatArray, size: FloatArray | float = 1.0) -> ScaledRows:
@@ -223,10 +302,13 @@ def build(
     Raises
     ------
     IdentificationError
-        If there are too few poses, impossible bounds, weights without sigmas, or campaigns with
-        free frames that the readings do not name.
+        If there are too few poses, impossible bounds, weights without sigmas, campaigns with free
+        frames that the readings do not name, readings that no tracker measured and nothing known
+        of the contact, or a contact that the springs imitate.
     """
     options = options or FitOptions()
+    if options.contact is None:
+        require_metrology(readings)
     natural = [parameter.lower for parameter in model.parameters]
     lower, upper = bounds(options, len(natural), natural)
     problem = Problem(
@@ -238,31 +320,70 @@ def build(
         upper=upper,
         prior_rows=_prior_rows(options.prior, len(model.parameters)),
         size=relative_sizes(model.parameters),
+        prior_error=None if options.prior is None else _prior_error(options.prior),
     )
+    scale = model.parameters[0].scale
     frames = frame_columns(model.robot, readings, options.free_frame, marker_offset)
-    if not frames.names:
+    if frames.names:
+        problem = _with_frames(problem, frames, scale)
+    if options.contact is None or readings.contacts is None:
         return problem
-    return _with_frames(problem, frames, model.parameters[0].scale)
+    contact = contact_columns(model.robot, readings, problem.block, options.contact)
+    problem = _with_contact(problem, contact, scale)
+    sideways = is_pressed_sideways(model.robot, readings)
+    seen = contact_visibility(problem, model)
+    require_seen(options.contact, seen, sideways, is_doubled(readings))
+    return problem
+
+
+def contact_visibility(problem: Problem, model: ElasticModel) -> tuple[ContactVisibility, ...]:
+    """Return how far the springs of a model imitate each compliance of the contact."""
+    rows = problem.weighted().reshape(-1, problem.columns + 1)
+    others, own = rows[:, : problem.contact_columns.start], rows[:, problem.contact_columns]
+    return visibility(problem.contact, own, model.parameter_names, others)
 
 
 def _with_frames(problem: Problem, frames: FrameColumns, scale: float) -> Problem:
     """Return a problem of springs with the columns of free frames behind them."""
-    count, free = len(frames), np.full(len(frames), np.inf)
-    before = problem.prior_rows
-    prior = np.zeros((len(before) + count, problem.columns + count + 1))
-    prior[: len(before), : problem.columns], prior[: len(before), -1] = (
-        before[:, :-1],
-        before[:, -1],
+    free = np.full(len(frames), np.inf)
+    prior = np.column_stack([frames.prior, np.zeros(len(frames))])
+    wider = _with_columns_behind(problem, frames.columns, (-free, free), frames.size / scale, prior)
+    return replace(wider, frames=frames.names)
+
+
+def _with_contact(problem: Problem, contact: ContactColumns, scale: float) -> Problem:
+    """Return a problem with the columns of the contact last, and the errors that rows share."""
+    count = len(contact.names)
+    limits = np.zeros(count), np.full(count, np.inf)
+    wider = _with_columns_behind(
+        problem, contact.columns, limits, contact.size / scale, contact.prior
     )
-    prior[len(before) :, problem.columns : -1] = frames.prior
+    error = np.zeros(len(wider.prior_rows))
+    if problem.prior_error is not None:
+        error[: len(problem.prior_error)] = problem.prior_error
+    error[len(problem.prior_rows) :] = contact.prior_error
+    return replace(wider, contact=contact.names, shared=contact.shared, prior_error=error)
+
+
+def _with_columns_behind(
+    problem: Problem,
+    columns: FloatArray,
+    limits: tuple[FloatArray, FloatArray],
+    size: FloatArray,
+    prior: FloatArray,
+) -> Problem:
+    """Return a problem with further columns behind its own, and the rows of their prior."""
+    before, n = problem.prior_rows, problem.columns
+    rows = np.zeros((len(before) + len(prior), n + columns.shape[2] + 1))
+    rows[: len(before), :n], rows[: len(before), -1] = before[:, :-1], before[:, -1]
+    rows[len(before) :, n:] = prior
     return replace(
         problem,
-        O=np.concatenate([problem.O, frames.columns], axis=2),
-        lower=np.concatenate([problem.lower, -free]),
-        upper=np.concatenate([problem.upper, free]),
-        prior_rows=prior,
-        size=np.concatenate([np.atleast_1d(problem.size), frames.size / scale]),
-        frames=frames.names,
+        O=np.concatenate([problem.O, columns], axis=2),
+        lower=np.concatenate([problem.lower, limits[0]]),
+        upper=np.concatenate([problem.upper, limits[1]]),
+        prior_rows=rows,
+        size=np.concatenate([np.atleast_1d(problem.size), size]),
     )
 
 
@@ -288,6 +409,11 @@ def _prior_rows(prior: Prior | None, springs: int) -> FloatArray:
         raise IdentificationError("prior needs finite means, and sigmas and noise above 0")
     gain = prior.noise / sigma
     return np.column_stack([gain[:, None] * rows, gain * mean])
+
+
+def _prior_error(prior: Prior) -> FloatArray:
+    """Return the standard deviation of the right-hand side of each row of a prior, in m."""
+    return np.full(np.size(prior.mean), prior.noise)
 
 
 def pose_blocks(readings: Readings) -> IndexArray:

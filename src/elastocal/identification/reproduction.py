@@ -14,6 +14,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Dataset, without
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration, calibrate
+from elastocal.identification.contact import at_tcp
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.knowledge import with_knowledge
 from elastocal.identification.options import MINIMUM_DRAWS, FitSettings
@@ -124,6 +125,7 @@ def reproduce_calibration(
     readings = dataset.readings(found.model.robot.joint_names)
     readings = without(readings, settings.exclude)
     marker = settings.marker or dataset.marker
+    readings = at_tcp(found.model.robot, readings, marker)
     options, known = settings.options(MINIMUM_DRAWS), figures.known if figures else ()
     calibration = calibrate(
         found.model,

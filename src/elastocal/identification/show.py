@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from elastocal.blocks import Block, Bullets, Cell, Grade, Graded, Heading, Paragraph, Row, Table
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification.budget import ErrorBudget
+from elastocal.identification.contact import LATERAL, NORMAL, ContactFigure, ContactSummary
 from elastocal.identification.figures import (
     CalibrationSummary,
     RungSummary,
@@ -27,6 +28,7 @@ from elastocal.wording import (
     mm,
     phrase,
     phrases,
+    sentences,
     springs_and_parameters,
     um,
 )
@@ -36,6 +38,7 @@ _USUAL_UNIT = unit_of("rad/(N*m)")
 _MOST_SAID = 10.0
 """Half an interval by its value, from which on its size says nothing more."""
 _MOST_SUSPICIOUS = 10
+_DIRECTIONS = {NORMAL: phrase("along the normal"), LATERAL: phrase("sideways")}
 _WELL, _FAIRLY = 0.2, 0.5
 """Half an interval by its value, up to which a spring is known well, or fairly well."""
 
@@ -78,6 +81,7 @@ def show_calibration(figures: CalibrationSummary) -> Iterator[Block]:
     )
     yield from show_sums(figures.sums)
     yield from _frames(figures.frames)
+    yield from show_contact(figures.contact)
     yield from show_budget(figures.budget)
     yield from _suspicious(figures.suspicious)
 
@@ -366,6 +370,56 @@ def _frames(frames: Sequence[FrameSummary]) -> Iterator[Block]:
             rows.append((name, what, *(f"{1e6 * x:.0f} ±{1e6 * h:.0f}" for x, h in numbers)))
     heads = (phrase("Frame of"), phrase("Against its references"), *"xyz")
     yield Table(phrase("Frames that were estimated"), heads, tuple(rows), texts=2)
+
+
+def show_contact(contact: ContactSummary | None) -> Iterator[Block]:
+    """Yield where the zero of a calibration without a tracker comes from; nothing of one with."""
+    if contact is None:
+        return
+    yield Heading(phrase("The contact that held the tool"))
+    yield Paragraph(contact.sentence())
+    heads = phrases(
+        "Direction",
+        "Stiffness, N/µm",
+        "95 % interval",
+        "Stated",
+        "By doubled presses",
+        "Distinct from the springs?",
+    )
+    rows = tuple(
+        (
+            _DIRECTIONS[each.name],
+            _newton_per_um(each.compliance),
+            f"{_newton_per_um(each.high)} … {_newton_per_um(each.low)}",
+            phrase("free") if each.stated is None else _newton_per_um(each.stated),
+            "" if each.doubled is None else _newton_per_um(each.doubled),
+            _distinct(each),
+        )
+        for each in contact.figures
+    )
+    yield Table(phrase("Stiffness of one disk or tip on the tooling"), heads, rows)
+    if contact.fixed:
+        names = sentences([_DIRECTIONS[each] for each in contact.fixed], ", ")
+        text = phrase("Not fitted, since no press loads it: {names}.", names=names)
+        yield Paragraph(text)
+    if not all(each.is_seen for each in contact.figures):
+        yield Paragraph(
+            phrase(
+                "What springs imitate is as good as the contact file says, and no better: press at"
+                " some places on one and on two disks, sideways too, turn the tool by ±1 rad about"
+                " the normal, or use a second tip."
+            )
+        )
+
+
+def _newton_per_um(compliance: float) -> str:
+    return phrase("rigid") if compliance <= 0.0 else f"{1e-6 / compliance:.3g}"
+
+
+def _distinct(figure: ContactFigure) -> Cell:
+    if figure.is_seen:
+        return phrase("yes, {part} of its column", part=f"{figure.outside:.0%}")
+    return Graded(phrase("no: {springs} imitate it", springs=", ".join(figure.imitators)), "fair")
 
 
 def show_budget(budget: ErrorBudget | None) -> Iterator[Block]:

@@ -19,7 +19,7 @@ import numpy as np
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.identification._least_squares import minimise, minimise_certified
 from elastocal.identification.options import LOSSES, MEDIAN_NORM
-from elastocal.identification.problem import Problem, column_scaling
+from elastocal.identification.problem import Problem, column_scaling, unit_columns
 from elastocal.results import brief_repr
 
 _BLOCKS = 500
@@ -62,9 +62,9 @@ class Solution:
 
 def factor(problem: Problem) -> Factored:
     """Reduce the weighted rows to a triangle and decompose it."""
-    n, scaled = problem.columns, problem.scaled()
-    deflection = (problem.d * problem.weight).ravel()
-    system = np.column_stack([scaled.rows.reshape(-1, n), deflection])
+    n, weighted = problem.columns, problem.weighted()
+    scaled = unit_columns(weighted[..., :n], problem.size)
+    system = np.column_stack([scaled.rows.reshape(-1, n), weighted[..., n].ravel()])
     system = np.vstack([system, problem.prior_rows / np.append(scaled.scale, 1.0)])
     # With fewer rows than columns the triangle would not be square.
     if len(system) < n + 1:
@@ -118,7 +118,8 @@ def normalised_residuals(
     shrinkage : ndarray, shape (reading,), or float
         By how much the fit has shrunk each residual, at most 1; divided out.
     """
-    norms = np.linalg.norm(problem.residuals(compliance) * problem.weight, axis=1) / shrinkage
+    error = problem.own_errors(problem.residuals(compliance), problem.weight)
+    norms = np.linalg.norm(error, axis=1) / shrinkage
     sigma = np.median(norms) / MEDIAN_NORM
     # Exact data have a median residual of zero.
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
@@ -154,11 +155,11 @@ class PoseGrams:
     @classmethod
     def of(cls, problem: Problem) -> "PoseGrams":
         """Return the Gram blocks of a problem, in the order of its sorted block numbers."""
-        scaled = problem.scaled()
-        deflection = (problem.d * problem.weight)[..., None]
+        weighted = problem.weighted()
+        scaled = unit_columns(weighted[..., :-1], problem.size)
         order = np.argsort(problem.block, kind="stable")
         _, start = np.unique(problem.block[order], return_index=True)
-        rows = np.concatenate([scaled.rows, deflection], axis=2)[order]
+        rows = np.concatenate([scaled.rows, weighted[..., -1:]], axis=2)[order]
         prior = problem.prior_rows / np.append(scaled.scale, 1.0)
         return cls(rows, start, prior, scaled.scale, problem.lower, problem.upper)
 
@@ -240,8 +241,7 @@ class PoseTriangles:
             Block numbers, in the order in which choices count them. One that has no reading
             has a triangle of zeros.
         """
-        system = np.concatenate([problem.O, problem.d[..., None]], axis=2)
-        system *= problem.weight[..., None]
+        system = problem.weighted()
         width = system.shape[2]
         found = [
             np.linalg.qr(system[problem.block == block].reshape(-1, width), mode="r")

@@ -24,7 +24,6 @@ from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.identification._least_squares import minimise
-from elastocal.identification.options import Prior
 from elastocal.identification.problem import Problem
 from elastocal.identification.solve import PoseGrams, factor
 from elastocal.records import record
@@ -135,7 +134,8 @@ class HeldOut:
     compliance: FloatArray
     """Compliances of each refit, and free frames behind them, shape (fold, column)."""
     axis_error: FloatArray
-    """Size of the prediction error along each axis, shape (reading, 3), in m."""
+    """Size of the prediction error along each axis but for what readings of a pose share when a
+    contact holds the tool (`Problem.own_errors`), shape (reading, 3), in m."""
     size: FloatArray
     """Norm of the predicted deflection, shape (reading,), in m."""
 
@@ -216,7 +216,7 @@ def measured_coverage(
         interval(np.moveaxis(problem.O[i : i + _READINGS] @ deviations.T, -1, 0)) for i in pieces
     ]
     low, high = (np.concatenate(end) for end in zip(*ends, strict=True))
-    off = problem.d - predicted
+    off = problem.own_errors(problem.d - predicted)
     inside = (off >= -np.hypot(np.minimum(low, 0.0), error)) & (
         off <= np.hypot(np.maximum(high, 0.0), error)
     )
@@ -251,11 +251,12 @@ def leave_poses_out(problem: Problem) -> HeldOut:
     error, n = predicted - problem.d, problem.springs
     deflection = np.einsum("rin,rn->ri", problem.O[:, :, n], compliance[fold][:, n])
     size = np.linalg.norm(deflection, axis=1)
-    return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, np.abs(error), size)
+    own = np.abs(problem.own_errors(error))
+    return HeldOut(np.linalg.norm(error, axis=1), fold, compliance, own, size)
 
 
 def bootstrap(
-    grams: PoseGrams, draws: int, rng: Generator, prior: Prior | None = None
+    grams: PoseGrams, draws: int, rng: Generator, prior_error: FloatArray | None = None
 ) -> FloatArray:
     """Return the compliances refitted to resampled poses.
 
@@ -272,8 +273,8 @@ def bootstrap(
         Number of resamples.
     rng : Generator
         Source of randomness.
-    prior : Prior, optional
-        That of the problem.
+    prior_error : ndarray, shape (row,), optional
+        `Problem.prior_error`.
 
     Returns
     -------
@@ -282,9 +283,11 @@ def bootstrap(
     blocks = len(grams)
     chosen = rng.integers(blocks, size=(draws, blocks))
     multiplicity = np.stack([np.bincount(draw, minlength=blocks) for draw in chosen])
-    if prior is None:
+    if prior_error is None:
         return grams.refit(multiplicity.astype(float))
-    error = prior.noise * rng.standard_normal((draws, np.size(prior.mean)))
+    drawn = np.flatnonzero(prior_error)
+    error = np.zeros((draws, len(prior_error)))
+    error[:, drawn] = prior_error[drawn] * rng.standard_normal((draws, len(drawn)))
     return grams.refit(multiplicity.astype(float), error)
 
 

@@ -26,6 +26,7 @@ from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.errors import IdentificationError
 from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.contact import require_metrology
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -164,6 +165,7 @@ def update_springs(
         )
     model, c = calibrated.model, calibrated.compliance
     course = np.array([courses.index(name) for name in names.tolist()], dtype=np.intp)
+    require_metrology(readings)
     blocks = _centred(displacement_blocks(model, readings, marker_offset), course)
     L = draws_factor(calibrated.draws)
     rows = _Rows(blocks @ L, _centred(readings.deflection, course) - blocks @ c, course)

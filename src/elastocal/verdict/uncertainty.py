@@ -8,6 +8,7 @@ distribution. It applies to the deflection along any one axis, at poses and unde
 of the run.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,7 +93,7 @@ def state_uncertainty(evidence: Evidence) -> UncertaintyStatement | None:
                 poses=counted(unseen.poses, "pose"),
             ),
         ),
-        _tracker(evidence),
+        *_zero(evidence),
         _sensor(evidence),
     ]
     return UncertaintyStatement(tuple(sources), unseen.poses - 1)
@@ -103,6 +104,23 @@ def why_not_stated(evidence: Evidence) -> Phrase:
     if evidence.figures is None:
         return phrase("Not stated: no error at poses left out of the fit is known.")
     return phrase("Not stated: the errors that the model file states could not be confirmed.")
+
+
+def _zero(evidence: Evidence) -> Iterator[UncertaintySource]:
+    """Yield the contributions of what measured the zero: the tracker, the contact, or both."""
+    contact = None if evidence.figures is None else evidence.figures.contact
+    if contact is not None:
+        yield UncertaintySource(
+            phrase("Compliance of the contact that held the tool, without a tracker"),
+            "A",
+            contact.zero,
+            phrase(
+                "spread over fits to resampled poses; what was stated of the contact is drawn with"
+                " them"
+            ),
+        )
+    if contact is None or contact.tracked:
+        yield _tracker(evidence)
 
 
 def _tracker(evidence: Evidence) -> UncertaintySource:

@@ -19,15 +19,19 @@ from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
     Climbed,
+    Contact,
     FitSettings,
     PredictionDoubt,
     ProductionCoverage,
     ProductionRows,
+    at_tcp,
     check_loads,
     choose_model,
     error_budget,
+    read_contact,
     summary,
     update_springs,
+    weigh_contact,
     with_knowledge,
 )
 from elastocal.options import Option, ToolFrame
@@ -86,6 +90,13 @@ class CalibrateSettings(FitSettings):
     process: Path | None = None
     """Path of production, ``.csv``: ``auto`` chooses for it, and how much of it the readings cover
     is stated. None: that which the cell file of the data's own run names, where there is one."""
+    # Wider than what a model file keeps of it; see `fit`.
+    contact: Annotated[
+        Path | Contact | None,
+        Option(metavar="CONTACT.yaml", help="What is known of the contact, without a tracker."),
+    ] = field(default=None, kw_only=True)  # type: ignore[assignment]
+    """What is known of the contact that holds the tool where no tracker measured: a contact file.
+    In Python also a `Contact`."""
     force: bool = False
     """Replace a file that is no former output of this command."""
 
@@ -155,7 +166,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     """
     if settings.update is not None:
         return _updated(settings, settings.update)
-    options = settings.options()
+    settings = _with_contact_file(settings)
     found = settings.read()
     made_from = {str(path): content_sha256(each) for path, each in found}
     measured, source = merge_files(found)
@@ -167,6 +178,9 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         source = f"{source}, on the arm as built of {settings.geometry}"
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
+    readings = at_tcp(arm, readings, marker)
+    options = weigh_contact(arm, readings, settings.options(), marker)
+    settings = replace(settings, contact=options.contact)
     path, unknown = _production(settings, arm)
     rows = None if path is None else _rows(path)
     chosen = _chosen(settings, arm, readings, marker, rows)
@@ -192,12 +206,28 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         figures = replace(figures, production=coverage, doubt=doubt, warnings=warnings)
     by_name = settings.springs not in (AUTO, "gears")
     held = (HELD(),) if chosen.by_drives and by_name else ()
-    figures = replace(figures, warnings=(*figures.warnings, *held, *unknown, *unbuilt))
+    further = (*chosen.refused, *held, *unknown, *unbuilt)
+    figures = replace(figures, warnings=(*figures.warnings, *further))
     found_model = replace(calibration.calibrated, on_production=figures.doubt)
     result = replace(CalibrateResult.of(found_model, figures), made_from=made_from)
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+def _with_contact_file(settings: CalibrateSettings) -> CalibrateSettings:
+    """Return settings with what the contact file knows; refuse options about a tracker with it."""
+    if settings.contact is None:
+        return settings
+    for name in ("budget", "free_frame", "geometry"):
+        if getattr(settings, name) != CalibrateSettings.__dataclass_fields__[name].default:
+            raise IdentificationError(
+                f"--{name.replace('_', '-')} is about what a tracker measures: it does not go with"
+                " --contact"
+            )
+    if isinstance(settings.contact, Contact):
+        return settings
+    return replace(settings, contact=read_contact(Path(settings.contact)))
 
 
 _WITH_UPDATE = frozenset(
@@ -279,6 +309,8 @@ class _Chosen(NamedTuple):
     known: tuple[KnownSpring, ...] = ()
     by_drives: bool = False
     """Whether the drives say it, and no spring file."""
+    refused: tuple[Finding, ...] = ()
+    """Models that the readings do not allow."""
 
 
 def _chosen(
@@ -294,7 +326,11 @@ def _chosen(
     choice = choose_model(arm, readings, name, options, marker, production=rows)
     stated = known_springs(arm, name)
     return _Chosen(
-        choice.model, choice.ladder, stated or choice.known, bool(choice.known) and not stated
+        choice.model,
+        choice.ladder,
+        stated or choice.known,
+        bool(choice.known) and not stated,
+        choice.refused,
     )
 
 

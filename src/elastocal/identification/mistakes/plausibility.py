@@ -242,6 +242,8 @@ def _zero_loads(readings: Readings) -> Iterator[Finding]:
 
 def _dead_markers(readings: Readings) -> Iterator[Finding]:
     """Yield axes along which the tracker sees next to nothing of what the controller moves."""
+    if readings.contacts is not None and np.all(readings.contacts > 0):
+        return
     told = np.median(np.abs(readings.controller_displacement), axis=0)
     seen = np.median(np.abs(readings.marker_displacement), axis=0)
     moves = told > _MOVED * np.linalg.norm(told)

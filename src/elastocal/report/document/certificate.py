@@ -159,6 +159,7 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
     sensor = None if cell is None else cell.file.sensor
     named = None if sensor is None else sensor.name
     mass = _tool_mass(evidence)
+    contact = None if evidence.figures is None else evidence.figures.contact
     things = (
         (phrase("Robot"), entry.robot, evidence.robot, ()),
         (phrase("Controller"), entry.controller, None, ()),
@@ -167,7 +168,9 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
         (phrase("Tracker"), entry.tracker, None, ()),
     )
     rows, missing = list[_Row](), list[Phrase]()
-    for name, thing, own, more in things:
+    # Without a tracker there is none to name.
+    shown = things if contact is None or contact.tracked else things[:-1]
+    for name, thing, own, more in shown:
         parts, lacking = _equipment(thing, own)
         rows += [(name, (*parts, *more))] if parts or more else []
         names = sentences(lacking, ", ")
@@ -181,6 +184,7 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
     )
     others: tuple[tuple[Phrase, str | Stamp | None], ...] = (
         (phrase("Tested with"), _tested_with(evidence)),
+        *(((phrase("Zero"), contact.sentence()),) if contact is not None else ()),
         (day, began or entry.date),
         (phrase("Place"), entry.place),
         (phrase("Temperature"), entry.temperature),

@@ -7,6 +7,7 @@ from elastocal import blocks
 from elastocal.identification import (
     CalibrationSummary,
     show_budget,
+    show_contact,
     show_ladder,
     show_sums,
     show_unseen,
@@ -51,6 +52,7 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
     ranks = seen.rank, attainable, seen.parameters
     yield from show_unseen(rows, (seen.unobservable, seen.hidden), ranks, seen.condition)
     yield from show_sums(sum_summaries(found.model))
+    yield from show_contact(found.figures.contact if found.figures else None)
     yield from show_budget(found.figures.budget if found.figures else None)
 
 

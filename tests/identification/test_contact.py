@@ -1,0 +1,164 @@
+"""Calibration without a tracker: the tooling holds the tool, and gives way by itself."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import elastocal as ec
+from elastocal.dataset import Readings, write
+from elastocal.elastic import ElasticModel, actuated
+from elastocal.errors import ElastocalError, IdentificationError, SchemaError
+from elastocal.identification import (
+    Contact,
+    FitOptions,
+    build,
+    choose_model,
+    read_contact,
+    solve,
+    weigh_contact,
+)
+from elastocal.identification.contact import whitened
+from support.cli import elastocal
+from support.held import STIFFNESS, Held, held_by_contact, robot
+
+SOFT = Held()
+STATED = Contact(normal=SOFT.normal, lateral=SOFT.lateral)
+
+
+@cache
+def readings(how: Held = SOFT) -> Readings:
+    return held_by_contact(how).readings(robot().joint_names)
+
+
+@cache
+def arm():
+    return replace(robot(), gravity=(0.0, 0.0, 0.0))
+
+
+def solved(contact: Contact, how: Held = SOFT):
+    model = ElasticModel(arm(), actuated(arm()))
+    problem = build(model, readings(how), FitOptions(contact=contact))
+    return problem, solve(problem).compliance
+
+
+@pytest.mark.parametrize("how", [SOFT, Held(tracked=4), Held(doubled=5)])
+def test_a_free_contact_and_the_springs_are_found_to_a_percent(how):
+    problem, found = solved(Contact(), how)
+    np.testing.assert_allclose(1.0 / found[problem.springs], STIFFNESS, rtol=0.01)
+    wanted = (how.normal, how.lateral)
+    np.testing.assert_allclose(1.0 / found[problem.contact_columns], wanted, rtol=0.02)
+
+
+def test_a_contact_that_is_taken_as_rigid_passes_for_softer_springs():
+    rigid = Contact(normal=1e11, lateral=1e11, uncertainty=0.01)
+    problem, found = solved(rigid)
+    assert np.max(1.0 / found[problem.springs] / STIFFNESS) < 0.99
+
+
+def test_readings_that_no_tracker_measured_are_refused_where_nothing_is_said_of_the_contact():
+    model = ElasticModel(arm(), actuated(arm()))
+    with pytest.raises(IdentificationError, match=r"no marker_displacement: .*--contact"):
+        build(model, readings())
+    with pytest.raises(IdentificationError, match=r"no number at pose 4 \(11 such poses\)"):
+        build(model, readings(Held(tracked=4)))
+
+
+def test_gears_are_refused_by_name_where_the_normal_compliance_is_free():
+    options = weigh_contact(arm(), readings(), FitOptions(contact=Contact()))
+    with pytest.raises(IdentificationError, match=r"contact\.normal is free.*most: joint_a"):
+        choose_model(arm(), readings(), "gears", options)
+
+
+def test_presses_on_one_and_on_two_disks_leave_it_free_with_gears():
+    how = Held(doubled=8, noise=5e-6)
+    options = weigh_contact(arm(), readings(how), FitOptions(contact=Contact(spread=0.02)))
+    choice = choose_model(arm(), readings(how), "gears", options)
+    problem = build(choice.model, readings(how), options)
+    found = solve(problem).compliance[problem.contact_columns]
+    np.testing.assert_allclose(1.0 / found, (how.normal, how.lateral), rtol=0.05)
+
+
+def test_presses_along_the_normal_alone_need_a_stated_normal_compliance_and_no_lateral_one():
+    how = Held(sideways=False)
+    with pytest.raises(IdentificationError, match="every press is along the normal on one disk"):
+        solved(Contact(), how)
+    problem, _ = solved(STATED, how)
+    assert problem.contact == ("normal",)
+
+
+def test_rows_are_whitened_by_what_a_block_shares():
+    rng = np.random.default_rng(0)
+    shared, block = rng.normal(size=(7, 3, 4)), np.array([0, 1, 0, 1, 1, 0, 0])
+    for each in (0, 1):
+        own = np.flatnonzero(block == each)
+        G = shared[own].reshape(-1, 4)
+        root = np.linalg.cholesky(np.eye(len(G)) + G @ G.T)
+        rows = np.zeros((7, 3, len(G)))
+        rows[own] = root.reshape(len(own), 3, -1)
+        white = whitened(rows, shared, block)[own].reshape(len(G), -1)
+        np.testing.assert_allclose(white @ white.T, np.eye(len(G)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('contact: {normal: "50 N"}', "unit 'N' is not a translational stiffness"),
+        ("contact: {normal: 50}", "is not a translational stiffness with its unit"),
+        ('contact: {normal: "-5 N/um"}', "must be above 0"),
+        ('contact: {normal: "nan N/um"}', "is not a translational stiffness with its unit"),
+        ('contact: {uncertainty: "0 %"}', "must be a percentage above 0 %"),
+        ("contact: {uncertainty: 0.3}", "must be a percentage above 0 %"),
+        ('contact: {stop: "1 m"}', "up to 1 mm"),
+        ('contact: {norml: "5 N/um"}', "normal"),
+        ("contact: 5", "contact"),
+        ("{}", "contact"),
+        ("[]", "contact.yaml"),
+        ('schema: "elastocal.contact/9"\ncontact: {}', "elastocal.contact/9"),
+    ],
+)
+def test_a_contact_file_that_does_not_fit_is_refused_in_a_line(tmp_path, text, message):
+    path = tmp_path / "contact.yaml"
+    path.write_text(text)
+    with pytest.raises(SchemaError, match=message) as found:
+        read_contact(path)
+    assert "\n" not in str(found.value)
+
+
+def test_a_contact_file_of_one_line_states_what_is_known(tmp_path):
+    path = tmp_path / "contact.yaml"
+    path.write_text('contact: {normal: "50 N/um", uncertainty: "40 %"}\n')
+    assert read_contact(path) == Contact(normal=50e6, uncertainty=0.4)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("held")
+    write(held_by_contact(Held(noise=5e-6, tracked=3)), folder / "data.nc")
+    (folder / "contact.yaml").write_text('contact: {normal: "6 N/um", lateral: "3 N/um"}\n')
+    return folder
+
+
+def test_calibrate_states_where_its_zero_comes_from(files):
+    model, springs = files / "model.json", ("--springs", "actuated", "--draws", "80")
+    data, contact = files / "data.nc", ("--contact", files / "contact.yaml")
+    said = elastocal("calibrate", data, *contact, "--out", model, *springs)
+    assert said.code == 0, said.err
+    figures = json.loads(model.read_text())["calibration"]["contact"]
+    assert (figures["poses"], figures["tracked"], figures["doubled"]) == (12, 3, 0)
+    normal, lateral = figures["figures"]
+    assert normal["low"] < 1.0 / SOFT.normal < normal["high"]
+    assert lateral["low"] < 1.0 / SOFT.lateral < lateral["high"]
+    assert normal["stated"] == pytest.approx(1.0 / 6e6)
+    assert 0.0 < figures["zero"] < 50e-6
+    assert "The contact that held the tool" in said.err
+
+
+def test_without_a_contact_file_it_refuses_in_a_line(files):
+    said = elastocal("calibrate", files / "data.nc", "--out", files / "none.json")
+    assert said.code == 1
+    assert "marker_displacement has no number at pose 3 (12 such poses)" in said.reason
+    with pytest.raises(ElastocalError, match="--budget"):
+        ec.calibrate(files / "data.nc", contact=files / "contact.yaml", budget=True)
