@@ -53,7 +53,7 @@ def test_a_free_contact_and_the_springs_are_found_to_a_percent(how):
 
 
 def test_a_contact_that_is_taken_as_rigid_passes_for_softer_springs():
-    rigid = Contact(normal=1e11, lateral=1e11, uncertainty=0.01)
+    rigid = Contact(normal=1e10, lateral=1e10, uncertainty=0.01)
     problem, found = solved(rigid)
     assert np.max(1.0 / found[problem.springs] / STIFFNESS) < 0.99
 
@@ -107,7 +107,7 @@ def test_rows_are_whitened_by_what_a_block_shares():
     [
         ('contact: {normal: "50 N"}', "unit 'N' is not a translational stiffness"),
         ("contact: {normal: 50}", "is not a translational stiffness with its unit"),
-        ('contact: {normal: "-5 N/um"}', "must be above 0"),
+        ('contact: {normal: "-5 N/um"}', "must lie between"),
         ('contact: {normal: "nan N/um"}', "is not a translational stiffness with its unit"),
         ('contact: {uncertainty: "0 %"}', "must be a percentage above 0 %"),
         ("contact: {uncertainty: 0.3}", "must be a percentage above 0 %"),
@@ -125,6 +125,15 @@ def test_a_contact_file_that_does_not_fit_is_refused_in_a_line(tmp_path, text, m
     with pytest.raises(SchemaError, match=message) as found:
         read_contact(path)
     assert "\n" not in str(found.value)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"normal": np.nan}, {"lateral": -1.0}, {"spread": 0.0}, {"stop": 1.0}, {"slip": np.inf}],
+)
+def test_a_contact_that_is_none_is_refused(wrong):
+    with pytest.raises(IdentificationError, match=rf"contact\.{next(iter(wrong))} is"):
+        Contact(**wrong)
 
 
 def test_a_contact_file_of_one_line_states_what_is_known(tmp_path):

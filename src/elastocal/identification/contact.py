@@ -49,6 +49,8 @@ _SIDEWAYS = 0.05
 """Part of a force below which it has no lateral load: noise, and a normal that is a little off."""
 LEAST_OUTSIDE = 0.05
 """Part of the column of a free compliance that must lie outside those of the springs."""
+_SOFTEST, _STIFFEST = 1e3, 1e10
+"""Stiffnesses of contacts in N/m: softer than any foam, and stiffer than a machine's bed."""
 _ASIDE, _ASIDE_SPREAD = 2.0, 1.0
 """Lateral compliance of a contact over its normal one, and its standard deviation."""
 _CUT = 0.1
@@ -77,8 +79,8 @@ def _parse_share(text: object) -> float:
 
 def _parse_stiffness(text: object) -> float:
     value = parse_quantity(text, "translational stiffness")
-    if not value > 0.0:
-        raise ValueError(f"{text!r} must be above 0")
+    if not _SOFTEST <= value <= _STIFFEST:
+        raise ValueError(f"{text!r} must lie between 1 N/mm and 10000 N/um, as that of any contact")
     return value
 
 
@@ -136,6 +138,28 @@ class Contact:
     size: tuple[float, float] | None = None
     """Normal and lateral compliance of a first fit, in m/N, of which ``spread`` is a share; None:
     the inverses of the stiffnesses that are stated."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that no contact has.
+
+        Raises
+        ------
+        IdentificationError
+            If a stiffness, a share or a length is not above 0, or beyond that of any contact.
+        """
+        for name in (NORMAL, LATERAL):
+            value = getattr(self, name)
+            if value is not None and not _SOFTEST <= value <= _STIFFEST:
+                raise IdentificationError(
+                    f"contact.{name} is {value:g} N/m: it must lie between {_SOFTEST:g} and"
+                    f" {_STIFFEST:g}"
+                )
+        for name, most in (("uncertainty", 1.0), ("spread", 1.0), ("stop", 1e-3), ("slip", 1e-3)):
+            value = getattr(self, name)
+            if not 0.0 < value <= most:
+                raise IdentificationError(
+                    f"contact.{name} is {value:g}: it must be above 0 and up to {most:g}"
+                )
 
     @property
     def row_noise(self) -> float:
