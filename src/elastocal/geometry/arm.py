@@ -15,12 +15,13 @@ needs no case for parallel axes, as Denavit and Hartenberg's parameters do; numb
 positions do not determine are found from the derivatives themselves.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
@@ -209,11 +210,13 @@ def series(q: FloatArray, terms: FloatArray, first: int = 1) -> FloatArray:
     return np.asarray((total * turn**first).real)
 
 
-def screws(robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray) -> FloatArray:
-    """Return the motion of the tool by each error: velocity at the base's origin, and rotation.
+def point_motions(
+    robot: Robot, at: ArmFrames, terms: FloatArray, points: FloatArray, row: IndexArray
+) -> Iterator[FloatArray]:
+    """Yield, joint by joint, the motion of points on the tool by each of its errors.
 
-    A point ``p`` on the tool moves by ``v + w x p``; ``(v, w)`` is the error's instantaneous screw
-    (K. M. Lynch, F. C. Park, "Modern Robotics", 2017, section 3.3).
+    A point at a lever ``l`` from an axis ``a`` moves by ``a x l`` when it turns, by ``a`` when it
+    slides (K. M. Lynch, F. C. Park, "Modern Robotics", 2017, section 5.1).
 
     Parameters
     ----------
@@ -221,20 +224,28 @@ def screws(robot: Robot, at: ArmFrames, q: FloatArray, torque: FloatArray) -> Fl
         The nominal arm.
     at : ArmFrames
         Frames of the arm with its errors.
-    q, torque : ndarray, shape (pose, joint)
-        As for `frames`.
+    terms : ndarray, shape (pose, joint, 7)
+        By `motion_terms`.
+    points : ndarray, shape (point, 3)
+        In base, in m.
+    row : ndarray, shape (point,)
+        Pose of each.
 
-    Returns
-    -------
-    ndarray, shape (pose, 6, joint, 13)
-        By shifts and turns of the joints' places (`KINDS`), then errors of their motion (`MOTION`).
+    Yields
+    ------
+    ndarray, shape (point, 3, 13)
+        By shifts and turns of the joint's place (`KINDS`), then errors of its motion (`MOTION`).
     """
-    origin = at.origin[..., None]
-    turns = np.concatenate([np.cross(origin, at.turns, axis=2), at.turns], axis=2)
-    shifts = np.concatenate([at.shifts, np.zeros_like(at.shifts)], axis=2)
-    revolute = np.array([joint.revolute for joint in robot.chain.joints])[:, None, None]
-    turned = np.concatenate([np.cross(at.origin, at.axis), at.axis], axis=2)
-    pushed = np.concatenate([at.axis, np.zeros_like(at.axis)], axis=2)
-    own = np.where(revolute, turned, pushed)
-    motion = own[..., None] * motion_terms(q, torque).swapaxes(0, 1)[:, :, None]
-    return np.concatenate([shifts, turns, motion], axis=3).transpose(1, 2, 0, 3)
+    shifts, turns = len(KINDS) // 2, len(KINDS)
+    for number, joint in enumerate(robot.chain.joints):
+        lever = points - at.origin[number][row]
+        axis, axes = at.axis[number][row], at.turns[number][row]
+        x, y, z = lever.T[..., None]
+        found = np.empty((len(points), 3, turns + len(MOTION)))
+        found[:, :, :shifts] = at.shifts[number][row]
+        found[:, 0, shifts:turns] = axes[:, 1] * z - axes[:, 2] * y
+        found[:, 1, shifts:turns] = axes[:, 2] * x - axes[:, 0] * z
+        found[:, 2, shifts:turns] = axes[:, 0] * y - axes[:, 1] * x
+        own = np.cross(axis, lever) if joint.revolute else axis
+        found[:, :, turns:] = own[:, :, None] * terms[row, number][:, None]
+        yield found

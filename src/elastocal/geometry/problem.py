@@ -17,7 +17,8 @@ from elastocal.geometry.arm import (
     ArmFrames,
     frames,
     motion_names,
-    screws,
+    motion_terms,
+    point_motions,
 )
 from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.positions import Positions, joint_torques
@@ -100,6 +101,7 @@ class GeometryProblem:
     def __init__(self, robot: Robot, data: Positions) -> None:
         self.robot, self.data = robot, data
         self.torque = joint_torques(robot, data)
+        self._terms = motion_terms(data.q, self.torque)
         self.row, self.marker = np.nonzero(data.seen)
         index = {name: n for n, name in enumerate(data.stations)}
         self.station = np.array([index[name] for name in data.station.tolist()])[self.row]
@@ -116,7 +118,7 @@ class GeometryProblem:
         # Joint and kind of each error of pose and of motion, in the order of their columns.
         self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)
         low = np.array(_moving(joints), dtype=np.intp).T
-        # The same of both, counted as `screws` does.
+        # The same of both, counted as `point_motions` does.
         self._errors = np.concatenate([self._placed, (low[0], low[1] + len(KINDS))], axis=1)
         self._waved = np.flatnonzero([joint.revolute for joint in joints])
         names = motion_names(ORDERS)
@@ -153,7 +155,11 @@ class GeometryProblem:
             J[each, :, 6 * self.station + axis] = unit
             J[each, :, 6 * self.station + 3 + axis] = np.cross(unit, points)
             J[each, :, 6 * stations + 3 * self.marker + axis] = tool[:, :3, axis]
-        J[:, :, start:] = self._arm_columns(arm, points)
+        joint, kind = self._errors
+        motions = point_motions(self.robot, arm, self._terms, points, self.row)
+        for number, motion in enumerate(motions):
+            own = np.flatnonzero(joint == number)
+            J[:, :, start + own] = motion[:, :, kind[own]]
         return residual, Derivatives(J, self._turned, self.data.q[:, self._waved], self.row)
 
     def _expected(self, at: State) -> tuple[FloatArray, ArmFrames, FloatArray, FloatArray]:
@@ -163,18 +169,6 @@ class GeometryProblem:
         points = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], at.markers[self.marker])
         R, t = at.T_station_base[self.station, :3, :3], at.T_station_base[self.station, :3, 3]
         return np.einsum("nji,nj->ni", R, self.measured - t) - points, arm, points, R
-
-    def _arm_columns(self, arm: ArmFrames, points: FloatArray) -> FloatArray:
-        """Return the motion of the points by errors of the arm, shape (point, 3, error)."""
-        joint, kind = self._errors
-        twist = screws(self.robot, arm, self.data.q, self.torque)[:, :, joint, kind]
-        x, y, z = points.T
-        moves = np.zeros((len(points), 3, 6))
-        moves[:, [0, 1, 2], [0, 1, 2]] = 1.0
-        moves[:, 0, 4], moves[:, 0, 5] = z, -y
-        moves[:, 1, 3], moves[:, 1, 5] = -z, x
-        moves[:, 2, 3], moves[:, 2, 4] = y, -x
-        return np.asarray(moves @ twist[self.row])
 
     def moved(self, at: State, step: FloatArray) -> State:
         """Return the state after a step of all unknowns, shape (unknown,)."""
