@@ -152,6 +152,14 @@ def test_the_file_keeps_them_and_older_files_are_read(model, tmp_path):
         read_geometry(path)
 
 
+def test_a_whole_turn_of_a_joint_changes_nothing(model, measured):
+    """A scale would: measured over one turn it is what sines leave of a straight line."""
+    data = measured.data.rows(np.arange(5))
+    turned = replace(data, q=data.q + 2.0 * np.pi * np.array([1, 0, -1, 0, 2, -2]))
+    assert np.allclose(model.predict(turned), model.predict(data), rtol=0.0, atol=1e-12)
+    assert not [each.name for each in model.parameters if each.name.endswith("scale")]
+
+
 def test_a_urdf_does_without_them(model):
     assert model.chain.rung in ("offsets", "geometry")
     assert model.chain.held_out.mean < model.held_out.registration.mean

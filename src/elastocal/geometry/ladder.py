@@ -6,7 +6,8 @@ that a fold is a sum of some of them.
 
 The last rung, functions of the joints, is rich enough to learn from the neighbours of a pose
 whatever is wrong there. It is tried where the residuals show such functions, and taken where it
-also predicts regions of joint space that it has not seen: only functions of single joints do.
+also predicts regions of joint space that it has not seen: only functions of single joints do. It
+has no scales of joints that turn: what is measured over one turn must hold a turn further on.
 """
 
 from collections.abc import Sequence
@@ -199,6 +200,7 @@ def _up_to(
     names = {each.name for each in problem.unknowns if each.rung in kept}
     chosen = [index for index in free.tolist() if problem.unknowns[index].name in names]
     if rung == _FUNCTIONS:
+        chosen = [index for index in chosen if index not in problem.turn_scales]
         chosen += range(problem.dense, len(problem.unknowns))
     return np.array(chosen), [each for each in fixed if each.name in names]
 

@@ -26,7 +26,8 @@ from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, ChainJoint, Robot
 
 RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics", "joint-functions")
-"""Rungs from the frames alone to functions of each joint; each includes all before."""
+"""Rungs from the frames alone to functions of each joint; each includes all before, but the last no
+scales of joints that turn."""
 CHAIN_RUNGS = RUNGS[:3]
 """Rungs with only poses and zeros of joints: what a URDF can express."""
 _SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3}
@@ -128,6 +129,9 @@ class GeometryProblem:
         self._moving = np.concatenate([low[0], joint]), np.concatenate([kinds, kind])
         turned = self.dense - len(low[0]) + np.flatnonzero(low[1] == MOTION.index("offset"))
         self._turned = turned[self._waved]
+        scaled = self.dense - len(low[0]) + np.flatnonzero(low[1] == MOTION.index("scale"))
+        self.turn_scales = frozenset(scaled[self._waved].tolist())
+        """Unknown scales of joints that turn: no function of an angle that comes back."""
 
     def __len__(self) -> int:
         """Return the number of seen markers."""
