@@ -20,6 +20,7 @@ from elastocal.geometry.ladder import climb, joint_regions
 from elastocal.geometry.solve import register
 from elastocal.progress import silent
 from elastocal.records import write_json
+from elastocal.robot import Robot
 from support.measured_arms import (
     Measured,
     kuka,
@@ -146,10 +147,10 @@ def test_the_file_keeps_them_and_older_files_are_read(model, tmp_path):
     data["schema"] = "elastocal.geometry/3"
     path.write_text(json.dumps(data), encoding="utf-8")
     assert read_geometry(path).motion.shape == (6, 7)
-    data["motion"] = [row[:6] for row in data["motion"]]
-    path.write_text(json.dumps(data), encoding="utf-8")
-    with pytest.raises(SchemaError, match=r"motion has shape \(6, 6\), not \(6, 7\)"):
-        read_geometry(path)
+    for bad, shape in (([row[:6] for row in data["motion"]], r"\(6, 6\)"), ([1.0, 2.0], r"\(2,\)")):
+        path.write_text(json.dumps(data | {"motion": bad}), encoding="utf-8")
+        with pytest.raises(SchemaError, match=rf"motion has shape {shape}, not \(6, 7\)"):
+            read_geometry(path)
 
 
 def test_a_whole_turn_of_a_joint_changes_nothing(model, measured):
@@ -178,6 +179,20 @@ def test_what_only_neighbours_show_is_no_function_of_a_joint():
     bump = 5e-4 * np.sin(3.0 * q[:, 0]) * np.sin(4.0 * q[:, 1]) * np.cos(3.0 * q[:, 2])
     data = replace(measured.data, markers=measured.data.markers + bump[:, None, None])
     assert rung(fitted(replace(measured, data=data))) != "joint-functions"
+
+
+def test_an_arm_of_linear_axes_has_none():
+    links = "".join(f'<link name="l{n}"/>' for n in range(4))
+    axes = "".join(
+        f'<joint name="j{n}" type="prismatic"><parent link="l{n}"/><child link="l{n + 1}"/>'
+        f'<origin xyz="0.1 0 0.2"/><axis xyz="{axis}"/>'
+        '<limit lower="-1" upper="1" effort="0" velocity="0"/></joint>'
+        for n, axis in enumerate(("1 0 0", "0 1 0", "0 0 1"))
+    )
+    gantry = Robot.from_urdf(f'<robot name="gantry">{links}{axes}</robot>', "l3")
+    model = fitted(measure(gantry, 40, noise=NOISE, error=3e-4))
+    assert rung(model) != "joint-functions"
+    assert model.motion.shape == (3, 7)
 
 
 def test_regions_are_whole_poses_and_far_apart():

@@ -221,7 +221,8 @@ def _shows_functions(
     Rao, Proceedings of the Cambridge Philosophical Society 44, 1948; R. Davidson, E. Flachaire,
     Journal of Econometrics 146, 2008): far cheaper than the fit of the rung.
     """
-    if len(np.unique(problem.data.pose)) < _BLOCKS_THAT_TELL:
+    joints = fitted.derivatives.joints
+    if not joints or len(np.unique(problem.data.pose)) < _BLOCKS_THAT_TELL:
         return False
     size = np.array([each.size for each in problem.unknowns])[problem.dense :]
     # A stream of its own, so that the draws are those of before.
@@ -229,7 +230,7 @@ def _shows_functions(
     signs[0] = 1.0
     left = np.where(fitted.used[:, None], residual, 0.0)
     scores = fitted.derivatives.series_scores(left, signs)
-    energy = ((scores * size) ** 2).reshape(_SIGNS, fitted.derivatives.joints, -1).sum(axis=2)
+    energy = ((scores * size) ** 2).reshape(_SIGNS, joints, -1).sum(axis=2)
     chance = energy[1:]
     return bool((energy[0] > chance.mean(axis=0) + _STRANGE * chance.std(axis=0)).any())
 

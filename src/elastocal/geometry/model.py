@@ -364,7 +364,11 @@ def read_geometry(path: Path) -> GeometryModel:
     wanted = {
         **of_chain,
         "place": (found.place, (joints, len(KINDS))),
-        "motion": (found.motion, (joints, max(len(MOTION), found.motion.shape[-1] // 2 * 2 + 1))),
+        # Sine and cosine of each order beside three other errors.
+        "motion": (
+            found.motion,
+            (joints, max(len(MOTION), sum(found.motion.shape[1:2]) // 2 * 2 + 1)),
+        ),
         "markers": (found.markers, (*found.markers.shape[:1], 3)),
         **{f"stations.{name}": (T, (4, 4)) for name, T in found.stations.items()},
     }

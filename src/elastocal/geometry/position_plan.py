@@ -322,6 +322,8 @@ class _Knowledge:
     def functions(self, chosen: IndexArray) -> Iterator[FunctionsShown]:
         """Yield what some poses show of the functions of each joint, and how many it takes."""
         joints = [joint for joint in self.problem.robot.chain.joints if joint.revolute]
+        if not joints:
+            return
         counts = range(_STEP, len(self.marker) + 1, _STEP)
         drawn = np.array([self._unknown(np.arange(n)) for n in counts])
         for j, (joint, here) in enumerate(zip(joints, self._unknown(chosen), strict=True)):
