@@ -13,11 +13,12 @@ the jackknife over poses. Noise that no reading states, such as where the arm st
 the error is overstated by it rather than understated.
 
 The interval is that of the mean of ``m`` over poses, on a logarithmic scale, with Student's
-distribution. A campaign that looks after each pose and stops at the first good news looks at chance
-as often. So the level of one look is the nominal level of repeated significance tests, at which
-the probability that any of the looks is wrong is the stated risk (P. Armitage, C. K. McPherson,
-B. C. Rowe, "Repeated significance tests on accumulating data", J. Royal Statistical Society A 132,
-1969; C. Jennison and B. W. Turnbull, "Interim analyses: the repeated confidence interval approach",
+distribution; its lower end is of ``fit`` alone, as unstated noise may be all the rest. A campaign
+that looks after each pose and stops at the first good news looks at chance as often. So the level
+of one look is the nominal level of repeated significance tests, at which the probability that any
+of the looks is wrong is the stated risk (P. Armitage, C. K. McPherson, B. C. Rowe, "Repeated
+significance tests on accumulating data", J. Royal Statistical Society A 132, 1969; C. Jennison and
+B. W. Turnbull, "Interim analyses: the repeated confidence interval approach",
 J. Royal Statistical Society B 51, 1989).
 """
 
@@ -68,7 +69,8 @@ class ProductionError:
     error: float
     """The error, in m."""
     low: float
-    """Lower end of its interval, in m."""
+    """Lower end of its interval, in m: of the part due to the poses, since unstated noise may be
+    all the rest."""
     high: float
     """Upper end, in m."""
     model: float
@@ -87,8 +89,7 @@ class ProductionError:
         """Return the error of both parts, with its interval."""
         error = float(np.hypot(model, fit))
         factor = float(np.exp(0.5 * stdtrit(poses - 1, level) * spread))
-        low, high = error / factor, error * factor
-        return cls(poses, springs, error, low, high, model, fit, spread, level)
+        return cls(poses, springs, error, fit / factor, error * factor, model, fit, spread, level)
 
     def after(self, poses: int, share: float) -> "ProductionError":
         """Return the error to expect with more poses.

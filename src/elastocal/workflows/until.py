@@ -83,8 +83,8 @@ class ReachedAccuracy:
                 f" {mm(last.high)}"
             )
         left = f"springs and noise of a reading leave {mm(last.model)}, which poses do not remove"
-        if last.model * last.low > self.wanted * last.error:
-            return f"no number of poses reaches {wanted}: {left}"
+        if last.model * last.error > self.wanted * last.high:
+            return f"no number of poses shows {wanted}: {left}"
         enough = [each for each in self.further if each.high <= self.wanted]
         if not enough:
             return f"{wanted} not reached, nor expected soon: {left}"
