@@ -240,9 +240,10 @@ class TestCourses:
     MOVED = np.array([1e-4, -5e-5, 8e-5])
 
     @pytest.fixture
-    def landed(self, tmp_path, files, monkeypatch):
+    def landed(self, request, tmp_path, files, monkeypatch):
         """Return what makes a live compensation of a tool that lands, and the cell's arm."""
-        cell = live_bench.write_cell(tmp_path / "cell.yaml", metrology="live_bench")
+        tracker = getattr(request, "param", "live_bench")
+        cell = live_bench.write_cell(tmp_path / "cell.yaml", metrology=tracker)
         described = load_cell(cell)
         T = described.robot.forward(described.home)
         station = described.file.trackers[0].name
@@ -302,3 +303,11 @@ class TestCourses:
         assert silent.problem is None
         assert (silent.loop.courses, silent.loop.offsets_refused) == (0, 0)
         assert any("kept the offset before them: the tracker gave 0" in n for n in silent.notes)
+
+    @pytest.mark.parametrize("landed", ["simulated"], indirect=True)
+    def test_a_simulated_tracker_beside_another_arm_is_refused_before_it_moves(self, landed):
+        correct, _ = landed
+        DRIVER.arm = None
+        with pytest.raises(DeviceError, match="'simulated' is simulated: it does not see this arm"):
+            correct()
+        assert DRIVER.arm is None

@@ -238,13 +238,14 @@ class ReservedRig:
         DeviceError
             If it cannot be used.
         """
-        name = self.rig.cell.file.devices.metrology.driver
-        found = self.rig.drivers[name].connect(
-            self.rig.cell, {"metrology": self.rig.wanted[name]["metrology"]}, context
-        )
+        cell, name = self.rig.cell, self.rig.cell.file.devices.metrology.driver
+        driver, place = self.rig.drivers[name], f"{cell.path}: devices.metrology: driver {name!r}"
+        if self.rig.real and not driver.real:
+            raise DeviceError(f"{place} is simulated: it does not see this arm")
+        found = driver.connect(cell, {"metrology": self.rig.wanted[name]["metrology"]}, context)
         if found.metrology is None:
             found.close()
-            raise DeviceError(f"{self.rig.cell.path}: devices.metrology: driver {name!r} made none")
+            raise DeviceError(f"{place} made none")
         return found
 
     def _only(self, kind: str, made: Sequence[DeviceSet]) -> Any:
