@@ -103,8 +103,8 @@ def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone
     assert kind != "afp" or "typical" in offset
     for truth, row in offset.items():
         alone, with_it = (float(cell.partition("%")[0]) for cell in row[5:7])
-        # On `kind` there is next to nothing to learn, and nothing may be spoilt.
-        assert with_it > alone - 0.5 if truth == "kind" else with_it > alone + 2.0
+        # On `kind` there is next to nothing to learn, and a hundredth at most may be spoilt.
+        assert with_it > alone - 1.0 if truth == "kind" else with_it > alone + 2.0
 
 
 @pytest.mark.slow
