@@ -1,17 +1,21 @@
 """List in the reference what the face of a package exports, so that neither can get ahead.
 
 A comment ``<!-- face: elastocal.codec -->`` in a page of the reference is replaced by an entry for
-each name that the package exports from its own modules and no page shows yet.
+each name that the package exports from its own modules and no page shows yet. A package whose face
+would be a very long page is shown in parts: ``<!-- face: elastocal.workflows of plan -->`` has
+the names of these modules, and the comment without modules the rest.
 """
 
 import ast
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 from mkdocs.structure.pages import Page
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 MARK = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
+PART = re.compile(r"<!-- face: (elastocal[\w.]*) of ([\w ]+) -->")
 PAGES = Path(__file__).resolve().parents[1] / "reference" / "api"
 _BLOCK = re.compile(r"^::: (elastocal[\w.]*)\n((?:[ ].*\n|\n)*)", flags=re.MULTILINE)
 _ENTRY = re.compile(r"^::: elastocal[\w.]*\.(\w+)$", flags=re.MULTILINE)
@@ -61,19 +65,30 @@ def shown_elsewhere(page: str) -> set[str]:
     }
 
 
+def parted(package: str) -> set[str]:
+    """Return the modules of a package that pages of their own show."""
+    return {
+        module
+        for path in PAGES.glob("*.md")
+        for whole, modules in PART.findall(path.read_text(encoding="utf-8"))
+        if whole == package
+        for module in modules.split()
+    }
+
+
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     """Return the page with an entry for every exported name."""
     if not page.file.src_uri.startswith("reference/api/"):
         return markdown
     known, elsewhere = shown(markdown), shown_elsewhere(Path(page.file.src_uri).name)
 
-    def entries(match: re.Match[str]) -> str:
-        package = match[1]
+    def entries(package: str, wanted: Callable[[str], bool]) -> str:
         # What comes from another package's face has its entry there.
         rest = {
             name: home
             for name, home in exported(package).items()
-            if name not in known
+            if wanted(home)
+            and name not in known
             and f"{package}.{name}" not in elsewhere
             and name in defined(package, home)
         }
@@ -84,4 +99,7 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
         )
         return "\n\n".join(f"::: {path}" for path in paths)
 
-    return MARK.sub(entries, markdown)
+    markdown = PART.sub(lambda part: entries(part[1], part[2].split().__contains__), markdown)
+    return MARK.sub(
+        lambda mark: entries(mark[1], lambda home: home not in parted(mark[1])), markdown
+    )

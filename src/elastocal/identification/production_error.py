@@ -183,6 +183,8 @@ def level_of_a_look(first: int, last: int, risk: float = RISK) -> float:
     risk : float
         Probability that any of the looks is wrong.
 
+    Examples
+    --------
     >>> round(level_of_a_look(8, 8), 4)
     0.95
     >>> round(level_of_a_look(8, 31), 3)
