@@ -40,7 +40,8 @@ export function say(text, good = false, beside = origin) {
   message.hidden = !text;
   message.textContent = onPage(text);
   message.classList.toggle("good", good);
-  if (text) message.scrollIntoView({ block: "nearest" });
+  // The button first: what sticks to an edge is in sight already, and would hide it.
+  if (text) (row || message).scrollIntoView({ block: "nearest" });
 }
 
 // The button that was used last.
