@@ -143,14 +143,36 @@ def test_what_is_missing_is_named(tmp_path, dome):
 
 def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
     cell = tmp_path / "cell.yaml"
-    answers = ["UR 2", "UR20", "none.stl", str(dome), *[""] * 6, "80 kg", "80 N", "none", *[""] * 3]
+    rail = ["sideways, 1 m, 2 m", "y, 1 m, -1 m", "y, -1 m, 1 m"]
+    answers = [
+        "UR 2",
+        "UR20",
+        *rail,
+        "none.stl",
+        str(dome),
+        *[""] * 6,
+        "80 kg",
+        "80 N",
+        "none",
+        *[""] * 3,
+    ]
     with mock.patch.object(sys, "stdin", io.StringIO("\n".join([*answers, ""]))):
         begun = elastocal("new", "-o", cell, "--ask")
     assert begun.code == 0, begun.err
-    for complaint in ("no robot 'UR 2'", "none.stl", "unit 'kg' is not a force"):
+    for complaint in (
+        "no robot 'UR 2'",
+        "none.stl",
+        "unit 'kg' is not a force",
+        "must be x, y or z of base",
+        "the first end of the travel must be the smaller",
+    ):
         assert complaint in begun.err
-    file = load_cell(cell).file
+    found = load_cell(cell)
+    file = found.file
     assert (file.robot.model, file.load_cases.fz, file.sensor) == ("UR20", 80.0, None)
+    assert (file.robot.rail.axis, file.robot.rail.travel) == ((0.0, 1.0, 0.0), (-1.0, 1.0))
+    assert found.robot.joint_names[0] == "rail"
+    assert found.home[0] == 0.0
 
 
 def test_questions_that_nobody_answers_end_in_a_refusal(tmp_path):

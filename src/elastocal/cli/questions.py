@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 _QUESTIONS = {
     "robot": "Robot: name of the catalogue, or a URDF file",
     "flange": "Link that carries the tool, its z axis out of the arm",
+    "rail": "Rail that carries the robot: direction in base, both ends (y, -1.5 m, 1.5 m), or none",
     "mesh": "Surface that the tool presses on (.stl, .obj, .ply)",
     "unit": "Unit of its numbers (mm, m, in)",
     "place": "Its frame in the robot's base: x, y, z, a, b, c",

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -108,7 +109,8 @@ def _tries(settings: NewSettings, known: NewSettings) -> list[tuple[str, bool]]:
 def _begun(temporary: Path, out: Path, settings: NewSettings, flip: bool) -> Cell:
     """Return the cell with HOME amid the limits of the joints."""
     limits = settings.arm.limits
-    text = _text(out, settings, 0.5 * (limits.lower + limits.upper), flip)
+    middle = 0.5 * (limits.lower + limits.upper)
+    text = _text(out, settings, np.array([*settings.rail_home, *middle]), flip)
     temporary.write_text(text, encoding="utf-8")
     return load_cell(temporary)
 
@@ -133,7 +135,7 @@ def _unbearable(cell: Cell, surface: Surface) -> tuple[str, ...]:
     if check is None or not cell.robot.has_masses:
         return ()
     T = _places(surface, 0.0)
-    q = inverse_for(cell.robot).solve_many(T.reshape(-1, 4, 4)).q
+    q = inverse_for(cell.robot).solve_many(T.reshape(-1, 4, 4), _on_the_rail(cell)).q
     point, turn, branch = np.nonzero(np.isfinite(q.reshape(*T.shape[:2], -1, q.shape[-1])).all(-1))
     q = q.reshape(*T.shape[:2], -1, q.shape[-1])[point, turn, branch]
     at = T[point, turn]
@@ -151,17 +153,24 @@ def _unbearable(cell: Cell, surface: Surface) -> tuple[str, ...]:
 def _home(cell: Cell, surface: Surface, mover: Mover) -> FloatArray:
     """Return a posture before the surface that is far from its limits and free of collisions."""
     places = np.concatenate([_places(surface, retreat) for retreat in _RETREATS])
-    found = inverse_for(cell.robot).solve_many(places.reshape(-1, 4, 4)).q
+    external = _on_the_rail(cell)
+    found = inverse_for(cell.robot).solve_many(places.reshape(-1, 4, 4), external).q
     q = in_unit(found[np.isfinite(found).all(axis=-1)], "deg")
     q = np.radians(np.round(q, 1))
+    q[:, : len(external)] = external
     if not len(q):
         raise PlanningError("the arm comes to no point before the surface: move it by --place")
     lower, upper = cell.robot.limits.lower, cell.robot.limits.upper
-    room = np.minimum(q - lower, upper - q).min(axis=1)
+    room = np.minimum(q - lower, upper - q)[:, len(external) :].min(axis=1)
     for posture in q[np.argsort(-room)][:_MOST_POSTURES]:
         if mover.sweep.free(posture[None], posture[None])[0]:
             return np.asarray(posture)
     raise PlanningError("no posture before the surface is free of collisions and within the limits")
+
+
+def _on_the_rail(cell: Cell) -> FloatArray:
+    """Return where the robot stands on its rail while HOME is looked for, shape (0,) or (1,)."""
+    return cell.home[: cell.robot.external_axes]
 
 
 def _places(surface: Surface, retreat: float) -> FloatArray:
@@ -187,8 +196,6 @@ def _before(point: FloatArray, normal: FloatArray, retreat: float, turn: float) 
 def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str:
     """Return the text of the cell file; paths in it are relative to the file."""
     robot = settings.arm
-    shown = zip(robot.joint_names, home, strict=True)
-    slow = not np.isfinite(robot.limits.velocity).all()
     effort = np.where(np.isfinite(robot.limits.effort), robot.limits.effort, 100.0)
     torques = zip(robot.joint_names, effort, strict=True)
     low, high = settings.bounds
@@ -222,13 +229,42 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         disk=_quoted(f"{settings.disk_radius:g} mm"),
         payload=_quoted(f"{2.0 * parse_quantity(settings.tool_mass, 'mass'):g} kg"),
         torques=", ".join(f'{_quoted(name)}: "{value:g} N*m"' for name, value in torques),
-        home=", ".join(f'{_quoted(name)}: "{quantity(q, "deg", ".1f")}"' for name, q in shown),
-        speed=", ".join(f'{_quoted(n)}: "90 deg/s"' for n in robot.joint_names) if slow else "",
+        home=_home_entry(settings, home),
+        speed=_speed_entry(settings),
+        rail=_rail(settings.travel),
         poses=settings.poses,
         process="" if process == NONE else _quoted(_relative(process, out)),
         tolerance="" if tolerance == NONE else _quoted(tolerance),
     )  # fmt: skip
     return _REMARK.sub(lambda found: f"{found[1]:<{_COLUMN - 3}}   {found[2]}", text)
+
+
+def _home_entry(settings: NewSettings, home: FloatArray) -> str:
+    """Return the joints of HOME, a rail first."""
+    rails, names = len(settings.rail_home), settings.arm.joint_names
+    shown = [("rail", quantity(q, "mm", ".0f")) for q in home[:rails]]
+    arm = zip(names, home[rails:], strict=True)
+    return _named(shown + [(name, quantity(q, "deg", ".1f")) for name, q in arm])
+
+
+def _speed_entry(settings: NewSettings) -> str:
+    """Return assumed speeds of the rail, and of joints of which none are known."""
+    robot = settings.arm
+    known = bool(np.isfinite(robot.limits.velocity).all())
+    arm = [] if known else [(name, "90 deg/s") for name in robot.joint_names]
+    return _named([("rail", "0.5 m/s") for _ in settings.rail_home] + arm)
+
+
+def _named(texts: Sequence[tuple[str, str]]) -> str:
+    return ", ".join(f'{_quoted(name)}: "{text}"' for name, text in texts)
+
+
+def _rail(travel: tuple[str, str, str] | None) -> str:
+    """Return the entry of a rail; empty without one."""
+    if travel is None:
+        return ""
+    axis, low, high = travel
+    return f"{{axis: {[int(each == axis) for each in 'xyz']}, travel: {_listed(f'{low}, {high}')}}}"
 
 
 def _masses(robot: Robot) -> str:

@@ -32,6 +32,7 @@ _SIZES = ((1.4, 100.0, 3.0, 15.0), (2.2, 300.0, 10.0, 15.0), (math.inf, 1000.0, 
 """Press in N, mass of the tool in kg and radius of the contact in mm of arms up to a reach in m."""
 _ROUND = (1.0, 2.0, 3.0, 5.0, 8.0)
 """First digits of a press that is guessed."""
+_AXES = "xyz"
 _GRAVITY = 9.81
 _ABOVE_PROCESS, _ASIDE = 1.05, 3.0
 """A press by what that of the process is, and by the part of it that is pressed aside."""
@@ -52,6 +53,9 @@ class NewSettings:
     """Surface that the tool presses on: STL, OBJ or PLY."""
     flange: str | None = None
     """Link that carries the tool, its z axis out of the arm."""
+    rail: str | None = None
+    """Linear axis that carries the robot, its direction in base and both ends of its travel,
+    ``"y, -1.5 m, 1.5 m"``, or ``none``."""
     unit: str | None = None
     """Unit of the mesh's numbers."""
     place: str | None = None
@@ -141,6 +145,7 @@ class NewSettings:
             tcp=self.tcp or "0 mm, 0 mm, 200 mm, 0 deg, 0 deg, 0 deg",
             tool_mass=self.tool_mass or f"{arm._size[2]:g} kg",
             marker_place=self.marker_place or "70 mm, 0 mm, -110 mm",
+            rail=self.rail or NONE,
             process=self.process or NONE,
             accepted=self.accepted or NONE,
         )
@@ -172,6 +177,8 @@ class NewSettings:
         """Return the value guessed for a field of settings with robot and mesh."""
         if name == "flange":
             return self.flange or self._tool_link()
+        if name == "rail":  # asked for before there is a mesh
+            return NONE
         return str(getattr(self.filled(), name))
 
     def require_answer(self, name: str, text: str) -> None:
@@ -182,12 +189,14 @@ class NewSettings:
         ElastocalError
             Which says what is allowed.
         """
-        if text == NONE and name in ("force_range", "tracker", "process", "accepted"):
+        if text == NONE and name in ("force_range", "tracker", "process", "accepted", "rail"):
             return
         if name in ("robot", "flange"):
             _ = replace(self, **{name: text}).arm  # type: ignore[arg-type]
         elif name in ("mesh", "process"):
             load_triangles(Path(text)) if name == "mesh" else _require_file(Path(text))
+        elif name == "rail":
+            _ = replace(self, rail=text).travel
         elif name in ("place", "tcp"):
             parse_frame(text)
         elif name in ("tool_centre", "marker_place", "tracker"):
@@ -212,6 +221,38 @@ class NewSettings:
             return catalogue.load(str(self.robot), flange)
         with refusals_naming(Path(str(self.robot))):
             return Robot.from_urdf(read_urdf(Path(str(self.robot))), flange)
+
+    @property
+    def travel(self) -> tuple[str, str, str] | None:
+        """Direction of the rail, and the ends of its travel as they were given; None without one.
+
+        Raises
+        ------
+        UnitError
+            If it is no direction with two lengths, the first the smaller.
+        """
+        if self.rail in (None, NONE):
+            return None
+        parts = [part.strip() for part in str(self.rail).split(",")]
+        if len(parts) != 3 or parts[0].lower() not in _AXES:
+            raise UnitError(
+                f"--rail {self.rail!r}: must be x, y or z of base and both ends of the travel, e.g."
+                " 'y, -1.5 m, 1.5 m', or none"
+            )
+        low, high = (parse_quantity(part, "length") for part in parts[1:])
+        if not low < high:
+            raise UnitError(
+                f"--rail {self.rail!r}: the first end of the travel must be the smaller"
+            )
+        return parts[0].lower(), parts[1], parts[2]
+
+    @property
+    def rail_home(self) -> tuple[float, ...]:
+        """Place of the robot on its rail from which the cell begins, in m; empty without a rail."""
+        if self.travel is None:
+            return ()
+        low, high = (parse_quantity(end, "length") for end in self.travel[1:])
+        return (min(max(0.0, low), high),)
 
     @cached_property
     def reach(self) -> float:
