@@ -58,9 +58,17 @@ def test_three_sessions_in_one_table_are_named_with_their_rows(frame, marker, ki
     assert [(each.kind, each.values["row"]) for each in found] == [(kind, 30), (kind, 60)]
 
 
-@pytest.mark.parametrize(("frame", "marker"), [(2e-3, 0.0), (0.0, 2e-3), (1e-3, 1e-3)])
-def test_sessions_that_leave_no_arm_are_refused_by_name(frame, marker):
+@pytest.mark.parametrize(("frame", "marker"), [(2e-3, 0.0), (0.0, 2e-3), (2e-2, 2e-2)])
+def test_large_changes_are_undone_whether_one_place_fits_or_not(frame, marker):
     data = changed(measure(ARM, 90, markers=1, stations=1), [30, 60], frame, marker)
+    rows, undone = undo_changes(GeometryProblem(ARM, data))
+    assert rows == [30, 60]
+    assert len(undone.stations) == (3 if frame else 1)
+    assert undone.markers.shape[1] == (3 if marker else 1)
+
+
+def test_sessions_that_leave_no_arm_are_refused_by_name():
+    data = changed(measure(ARM, 90, markers=1, stations=1), [30, 60], 1e-3, 1e-3)
     with pytest.raises(GeometryError) as refused:
         plausible_ladder(GeometryProblem(ARM, data), 40, np.random.default_rng(0))
     text = str(refused.value)

@@ -107,6 +107,7 @@ def test_a_rail_a_turned_sense_and_hayatis_turn_are_those_of_the_row(tmp_path):
         ("180.7", "1e9", "1000000"),
         ("standard,0,180.7,0,90", "standard,0,180.7,0", "row 2 has 4 cells"),
         ("alpha[deg]", "a[deg]", "'a' stands twice"),
+        ("theta[deg]", "lower[deg],theta[deg]", "row 2 has 5 cells"),
     ],
 )
 def test_what_is_no_such_table_is_refused_by_name(old, new, message, tmp_path):
@@ -114,6 +115,12 @@ def test_what_is_no_such_table_is_refused_by_name(old, new, message, tmp_path):
     if old == "convention,":
         text = text.replace("standard,", "")
     with pytest.raises(RobotError, match=message):
+        robot(tmp_path, text)
+
+
+def test_a_limit_without_the_other_is_refused(tmp_path):
+    text = UR10E.replace("theta", "lower[deg],theta").replace("standard,", "standard,-90,")
+    with pytest.raises(RobotError, match="columns lower and upper go together"):
         robot(tmp_path, text)
 
 

@@ -201,6 +201,8 @@ def _joint(
 def _limit(joint: ElementTree.Element, table: _Table, row: int, kind: str) -> None:
     """Make a joint a sliding one, or one with limits, as its row says."""
     limited = [each in table.found for each in _LIMITS]
+    if any(limited) != all(limited):
+        raise RobotError(f"columns {' and '.join(_LIMITS)} go together")
     if kind == "prismatic" and not all(limited):
         raise RobotError(
             f"row {table.rows.lines[row]}: a prismatic joint needs limits, in columns lower and"
