@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel
-from elastocal.errors import ConventionError, IdentificationError
+from elastocal.elastic import ElasticModel, Parameter
+from elastocal.errors import ConventionError, IdentificationError, present
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.contact import ContactSummary, contact_summary
@@ -60,6 +60,7 @@ from elastocal.identification.uncertainty import (
 )
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
+from elastocal.units import dimension_of_unit, largest
 
 _PART_OF_DATA = 1e-2
 """Least part of the measured deflection that must change when springs go to their bounds."""
@@ -196,6 +197,7 @@ def calibrate(
     held_out = leave_poses_out(weighted)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng, weighted.prior_error)
+    draws[:, weighted.springs] = _as_of_arms(draws[:, weighted.springs], model.parameters)
     by = _widening(weighted, solution.compliance, draws, held_out, ladder, unexplained)
     widened = widen_draws(weighted, solution.compliance, draws, by)
     springs, frames = weighted.springs, weighted.frame_columns
@@ -208,7 +210,7 @@ def calibrate(
     calibrated = CalibratedModel(
         model,
         compliance,
-        widened[:, springs],
+        _as_of_arms(widened[:, springs], model.parameters),
         seen,
         provenance,
         held_out.misfit,
@@ -255,6 +257,16 @@ def _contact(
     zero = float(np.sqrt(np.mean(np.square(left))))
     seen = contact_visibility(problem, model)
     return contact_summary(options.contact, readings, seen, (found, *interval(draws[:, own])), zero)
+
+
+def _as_of_arms(draws: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:
+    """Return draws no larger than compliances of any arm are.
+
+    A spring that some choice of the poses does not turn takes any value in it.
+    """
+    dimensions = (present(dimension_of_unit(each.unit.si), "dimension") for each in parameters)
+    most = np.array([largest(each)[0] for each in dimensions])
+    return np.clip(draws, -most, most)
 
 
 def _widening(

@@ -302,6 +302,10 @@ def spring_summaries(
             group, reach = seen.group_of(parts), seen.faint_reach(parts)
             value = float(calibrated.compliance[own] @ weights)
             low, high = map(float, interval(calibrated.draws[:, own] @ weights))
+            # Noise may mix the parts of a gear and leave what they come to.
+            whole = np.count_nonzero(weights) > 1 and 0.5 * (high - low) <= abs(value)
+            if whole and group is not None and group > len(seen.unobservable):
+                group = None
             if reach is not None:
                 # Draws at a bound agree with one another, so the noise decides whether the value
                 # means anything.

@@ -22,7 +22,6 @@ from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.knowledge import DriveCompliances, with_knowledge
-from elastocal.identification.observability import is_vague, likely_sizes
 from elastocal.identification.options import FitOptions
 from elastocal.identification.paired import Judgement, Overlap, judge_models
 from elastocal.identification.prediction_doubt import (
@@ -41,7 +40,7 @@ from elastocal.identification.rungs import (
     low_loads,
     rung_of,
 )
-from elastocal.identification.solve import PoseGrams, solve
+from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import HeldOut, leave_poses_out
 from elastocal.parallel import one_blas_thread
@@ -174,14 +173,7 @@ def choose_model(
     options = replace(options, prior=None)
     readings = usable_for_choice(robot, readings, options, marker_offset)
     if len(allowed) == 1:
-        choice = climb(robot, readings, rungs, allowed, options, marker_offset)
-        # A fit of springs by name is the paper's, but along a direction that readings hardly change
-        # a spring would take any value, and draws of it values that no spring of an arm has.
-        problem = build(choice.model, readings, options, marker_offset).of_springs()
-        sizes = likely_sizes(problem, choice.model.parameters)
-        if not is_vague(problem, solve(problem).compliance, sizes):
-            return choice
-        return _told(choice, robot, readings, options, marker_offset)
+        return climb(robot, readings, rungs, allowed, options, marker_offset)
     choice = climb(robot, readings, rungs, allowed, options, marker_offset, production)
     return choice if choice.known else _told(choice, robot, readings, options, marker_offset)
 

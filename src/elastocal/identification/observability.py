@@ -58,9 +58,8 @@ _MUCH_OPEN = 0.5
 _TOLD = 0.5
 """Standard deviation of a spring over its likely size, or over its value, up to which the readings
 tell it."""
-_VAGUE = 1e-6
-"""Information over that of the likely size below which values are no springs of any arm: a
-standard deviation of a thousand likely sizes."""
+_WIDE = 10.0
+"""Likely sizes up to which a spring may be in a fit without a prior, if none is larger."""
 _LINKED = 0.1
 """Correlation above which springs are hidden together."""
 _SMALL_PART = 0.02
@@ -189,7 +188,8 @@ class Observability:
             for vector in basis:
                 members = np.flatnonzero(np.abs(vector) > _NOTICEABLE).tolist()
                 if len(members) <= MOST_TERMS:
-                    found.append(tuple(Term(names[own[m]], float(vector[m])) for m in members))
+                    terms = ((names[own[m]], _three_digits(float(vector[m]))) for m in members)
+                    found.append(tuple(Term(*term) for term in terms))
         return tuple(found)
 
     @property
@@ -342,9 +342,11 @@ def find_hidden(
         Whether a prior of these sizes is part of the fit.
     """
     Vt, information = _information(problem, compliance, sizes)
-    spread = 1.0 / (information + float(held))
-    variance = np.square(Vt.T) @ spread
     known, usual = np.array(seen.observable), np.maximum(1.0, np.abs(compliance) / sizes)
+    # Without a prior a spring may be what no arm's is, and those beside it what is then left.
+    width = 1.0 if held else max(_WIDE, float(usual.max()))
+    spread = 1.0 / (information + 1.0 / width**2)
+    variance = np.square(Vt.T) @ spread
     unsure = known & (variance > np.square(_TOLD * usual))
     seen = replace(seen, reach=tuple((_TWICE * sizes * np.sqrt(variance)).tolist()))
     members = np.flatnonzero(unsure)
@@ -362,25 +364,13 @@ def find_hidden(
             weights = np.array([part * sizes[i] for i, part in parts])
             weights /= weights[np.abs(weights).argmax()]
             names = [parameters[i].name for i, _ in parts]
-            hidden.append(tuple(map(Term, names, weights.tolist())))
+            hidden.append(tuple(map(Term, names, map(_three_digits, weights.tolist()))))
     return replace(
         seen,
         observable=tuple((known & ~unsure).tolist()),
         faint=(*seen.faint, *faint),
         hidden=tuple(hidden),
     )
-
-
-def is_vague(problem: Problem, compliance: FloatArray, sizes: FloatArray) -> bool:
-    """Return whether readings leave a combination open by a thousand likely sizes of springs.
-
-    Parameters
-    ----------
-    problem, compliance, sizes
-        As for `find_hidden`.
-    """
-    _, information = _information(problem, compliance, sizes)
-    return bool(np.any(information < _VAGUE))
 
 
 def _information(
@@ -419,6 +409,11 @@ def _combinations(left: FloatArray) -> FloatArray:
     U, s, _ = np.linalg.svd(left, full_matrices=False)
     basis = U[:, s > _TOLD] if np.any(s > _TOLD) else U[:, :1]
     return np.array(list(eliminated(basis)))
+
+
+def _three_digits(weight: float) -> float:
+    """Return a weight of what is estimated itself."""
+    return float(f"{weight:.3g}")
 
 
 def _faint(

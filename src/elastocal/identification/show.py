@@ -23,6 +23,7 @@ from elastocal.identification.rungs import AUTO
 from elastocal.identification.spring_sums import Term, describe_briefly, sum_text
 from elastocal.identification.uncertainty import Coverage
 from elastocal.wording import (
+    Phrase,
     counted,
     lengths_with_interval,
     mm,
@@ -39,6 +40,8 @@ _MOST_SAID = 10.0
 """Half an interval by its value, from which on its size says nothing more."""
 _MOST_SUSPICIOUS = 10
 _DIRECTIONS = {NORMAL: phrase("along the normal"), LATERAL: phrase("sideways")}
+_FEW_TERMS = 3
+"""Most springs of a hidden combination that is written out; larger ones are counted."""
 _WELL, _FAIRLY = 0.2, 0.5
 """Half an interval by its value, up to which a spring is known well, or fairly well."""
 
@@ -243,6 +246,13 @@ def _at_bound(value: float, low: float, high: float) -> str:
     return phrase("above {bound}", bound=f"{low:.3f}") if low < value else phrase("at bound")
 
 
+def _hidden_note() -> Phrase:
+    return phrase(
+        "Noise hides some springs: the readings tell them less well than the size that is likely of"
+        " such an arm does."
+    )
+
+
 def show_unseen(
     springs: Sequence[SpringSummary],
     open_: tuple[Sequence[Sequence[Term]], Sequence[Sequence[Term]]],
@@ -270,19 +280,10 @@ def show_unseen(
         condition=f"{float(f'{condition:.3g}'):.0f}",
     )
     yield Paragraph(phrase("{rank} {meaning}", rank=text, meaning=_meaning(springs, open_, ranks)))
+    if hidden and (groups or rank < total):
+        yield Paragraph(_hidden_note())
     if groups or hidden:
-        yield Bullets(
-            tuple(
-                phrase(
-                    "group {number}, not by itself: {springs}"
-                    if number <= len(groups)
-                    else "group {number}, hidden by noise: {springs}",
-                    number=number,
-                    springs=describe_briefly(each),
-                )
-                for number, each in enumerate((*groups, *hidden), start=1)
-            )
-        )
+        yield Bullets(tuple(_groups(groups, hidden)))
         yield Paragraph(
             phrase(
                 "Do not use single values: what they predict together was tested, and nothing else."
@@ -297,6 +298,21 @@ def show_unseen(
                 springs=counted(weak, "spring"),
             )
         )
+
+
+def _groups(groups: Sequence[Sequence[Term]], hidden: Sequence[Sequence[Term]]) -> Iterator[Phrase]:
+    """Yield the combinations that readings or noise leave open; large hidden ones are counted."""
+    for number, each in enumerate((*groups, *hidden), start=1):
+        springs = describe_briefly(each)
+        if number <= len(groups):
+            yield phrase("group {number}, not by itself: {springs}", number=number, springs=springs)
+        elif len(each) <= _FEW_TERMS:
+            yield phrase(
+                "group {number}, hidden by noise: {springs}", number=number, springs=springs
+            )
+    large = sum(len(each) > _FEW_TERMS for each in hidden)
+    if large:
+        yield phrase("groups of more springs, hidden by noise: {count}", count=large)
 
 
 def show_sums(sums: Sequence[SumSummary]) -> Iterator[Block]:
@@ -325,14 +341,11 @@ def _meaning(
     ranks: tuple[int, int, int],
 ) -> str:
     (rank, attainable, total), (groups, hidden) = ranks, open_
-    if hidden and not groups:
-        return phrase(
-            "Noise hides some springs: the readings tell them less well than the size that is"
-            " likely of such an arm does."
-        )
     if not groups:
         if rank < total:
             return phrase("What the readings leave open, the bounds of the springs settle.")
+        if hidden:
+            return _hidden_note()
         bound = [each.name for each in springs if each.at_bound]
         if bound:
             return phrase(

@@ -15,7 +15,6 @@ from elastocal.elastic import ElasticModel, KnownSpring, Spring, known_springs
 from elastocal.errors import ElastocalError, IdentificationError, present
 from elastocal.findings import Finding, Kind
 from elastocal.identification import (
-    AUTO,
     CalibratedModel,
     CalibrateResult,
     Climbed,
@@ -204,9 +203,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         coverage, doubt = _on_production(path, calibration.calibrated)
         warnings = (*figures.warnings, *(doubt.warnings if doubt else ()))
         figures = replace(figures, production=coverage, doubt=doubt, warnings=warnings)
-    by_name = settings.springs not in (AUTO, "gears")
-    held = (HELD(),) if chosen.by_drives and by_name else ()
-    further = (*chosen.refused, *held, *unknown, *unbuilt)
+    further = (*chosen.refused, *unknown, *unbuilt)
     figures = replace(figures, warnings=(*figures.warnings, *further))
     found_model = replace(calibration.calibrated, on_production=figures.doubt)
     result = replace(CalibrateResult.of(found_model, figures), made_from=made_from)
@@ -307,8 +304,6 @@ class _Chosen(NamedTuple):
     model: ElasticModel
     ladder: tuple[Climbed, ...] = ()
     known: tuple[KnownSpring, ...] = ()
-    by_drives: bool = False
-    """Whether the drives say it, and no spring file."""
     refused: tuple[Finding, ...] = ()
     """Models that the readings do not allow."""
 
@@ -324,14 +319,8 @@ def _chosen(
         return _Chosen(ElasticModel(arm, settings.given))
     name, options = str(settings.springs), settings.options()
     choice = choose_model(arm, readings, name, options, marker, production=rows)
-    stated = known_springs(arm, name)
-    return _Chosen(
-        choice.model,
-        choice.ladder,
-        stated or choice.known,
-        bool(choice.known) and not stated,
-        choice.refused,
-    )
+    known = known_springs(arm, name) or choice.known
+    return _Chosen(choice.model, choice.ladder, known, choice.refused)
 
 
 def _as_built(
@@ -367,11 +356,6 @@ def _rebuilt(
     return measured, tuple(dict.fromkeys(note for each in rebuilt for note in each.findings))
 
 
-HELD = Kind(
-    "calibration.held-by-likely-size",
-    "the readings leave combinations of springs open by more than a thousand times the likely size"
-    " of a spring: here the size of the drives holds them",
-)
 PRODUCTION_UNKNOWN = Kind(
     "calibration.production-unknown",
     "production is not known, though the cell of {folder} may name it: {error};"
