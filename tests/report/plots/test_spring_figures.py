@@ -43,12 +43,13 @@ def words(figure) -> str:
 def test_every_spring_is_drawn_with_both_intervals(found):
     values, tested, rows = drawn(found).axes
     names = [label.get_text() for label in values.get_yticklabels()]
-    assert len(names) == len(found.springs) == 14
+    # The readings determine 14 sums; joint_2.x moves the marker by less than their noise.
+    assert len(names) == len(found.springs) == 13
     ends = [line.get_xdata() for line in values.lines if len(line.get_xdata()) == 2]
     for change in found.springs:
         for estimate in (change.old, change.new):
             assert any(np.allclose(x, [1e6 * estimate.low, 1e6 * estimate.high]) for x in ends)
-    assert len(tested.lines) >= 2 * 14
+    assert len(tested.lines) >= 2 * 13
     np.testing.assert_allclose(rows.lines[0].get_ydata(), 1e3 * np.array(found.deflection.size))
 
 
