@@ -61,7 +61,7 @@ def test_every_spring_is_observable_stands_in_a_group_or_is_too_weak_to_see():
     for poses in (3, 4, 6, 10):
         readings = few(poses).readings(robot().joint_names)
         seen = calibrate(model(), readings, np.random.default_rng(0)).calibrated.observability
-        grouped = {term.spring for group in seen.unobservable for term in group}
+        grouped = {term.spring for group in (*seen.unobservable, *seen.hidden) for term in group}
         weak = {each.name for each in seen.faint}
         for name, observable in zip(model().spring_names, seen.observable, strict=True):
             assert observable != (name in grouped | weak)

@@ -272,7 +272,7 @@ class TestCourses:
                 cell,
                 model=files[1],
                 arm=True,
-                course_offset=(tmp_path / "taught",),
+                taught=(tmp_path / "taught",),
                 interrupted=lands,
             )
 

@@ -12,7 +12,10 @@ import pytest
 from elastocal.report.document import SECTIONS, Section
 from elastocal.verdict import Evidence
 
-_KEPT = {"made", "name", "limits", "files", "missing", "doubts", "stated", "logs"}
+_KEPT = {
+    *("made", "name", "limits", "files", "missing", "doubts", "stated", "logs"),
+    *("campaigns", "merged"),
+}
 PARTS: dict[str, Any] = {
     each.name: each.default for each in fields(Evidence) if each.name not in _KEPT
 }

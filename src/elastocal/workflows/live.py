@@ -66,7 +66,7 @@ class LiveSettings(NewTool, TouchedArm):
     tool: Path | None = None
     """Tool file of `tool`; none: the tool of the cell file, and the bias that the sensor has at
     the beginning, when the tool must be free."""
-    course_offset: Annotated[tuple[Path, ...], Option("--course-offset", metavar="RUN")] = ()
+    taught: Annotated[tuple[Path, ...], Option("--taught", metavar="RUN")] = ()
     """Runs that say how the tracker stands; cold touches (`run --touch cold`) also teach where
     courses begin. The tracker is read in light contact at the start of each course, after a press,
     and what it shows beyond what was taught there and is predicted is corrected over it."""
@@ -250,13 +250,13 @@ def _prepare(settings: LiveSettings) -> Prepared:
 
 def _taught(settings: LiveSettings, cell: Cell) -> TaughtCourses | None:
     """Return what was read where courses begin; None: their offsets are not read."""
-    if not settings.course_offset:
+    if not settings.taught:
         return None
-    found = read_taught_markers(settings.course_offset)
-    require_same_robot(found.robot, cell.robot, (str(settings.course_offset[0]), cell.name))
+    found = read_taught_markers(settings.taught)
+    require_same_robot(found.robot, cell.robot, (str(settings.taught[0]), cell.name))
     if found.station not in (names := [each.name for each in cell.file.trackers]):
         raise CompensationError(
-            f"{settings.course_offset[0]}: measured by station {found.station}; {cell.path} has"
+            f"{settings.taught[0]}: measured by station {found.station}; {cell.path} has"
             f" {', '.join(names) or 'none'}"
         )
     return TaughtCourses(
