@@ -182,3 +182,9 @@ def test_a_pose_farther_than_any_hall_is_refused_before_it_is_solved(tmp_path):
     (tmp_path / "p.csv").write_text("\n".join(lines) + "\n")
     with pytest.raises(PathError, match=r"row 3, column 'x\[mm\]': 1e\+160 mm is not within"):
         compensate_path(geared(), tmp_path / "p.csv", tmp_path / "o.csv", CorrectionSettings())
+
+
+@pytest.mark.parametrize("rows", [[1, 2, 3], None, b"x", 3.0])
+def test_rows_that_are_no_columns_are_refused_in_a_line(rows):
+    with pytest.raises(PathError, match="they must be a file, a dataset, or columns"):
+        PathTable.of(rows, lambda _: None)

@@ -20,7 +20,7 @@ from elastocal.identification import (
     solve,
     weigh_contact,
 )
-from elastocal.identification.contact import whitened
+from elastocal.identification.contact import ContactFigure, whitened
 from support.cli import elastocal
 from support.held import STIFFNESS, Held, held_by_contact, robot
 
@@ -171,3 +171,21 @@ def test_without_a_contact_file_it_refuses_in_a_line(files):
     assert "marker_displacement has no number at pose 3 (12 such poses)" in said.reason
     with pytest.raises(ElastocalError, match="--budget"):
         ec.calibrate(files / "data.nc", contact=files / "contact.yaml", budget=True)
+
+
+def test_statements_that_contradict_the_presses_are_not_blended_with_them_and_named():
+    apart = Contact(normal=50e6, doubled=((2.6e-7, 1.8e-8), None)).known("normal")
+    assert (apart.mean, apart.sigma) == (2.6e-7, 1.8e-8)
+    near = Contact(normal=4e6, doubled=((2.6e-7, 1.8e-8), None)).known("normal")
+    assert 2.5e-7 < near.mean < 2.6e-7
+    found = ContactFigure("normal", 2.0e-7, 1.8e-7, 2.2e-7, stated=2e-8, doubled=None, outside=1.0)
+    assert found.contradicts(0.3)
+    assert not replace(found, stated=1.7e-7).contradicts(0.3)
+    assert not replace(found, stated=None).contradicts(0.3)
+
+
+def test_a_contact_file_of_another_tip_is_warned_of(files):
+    path = files / "other.yaml"
+    path.write_text('contact: {normal: "300 N/um", lateral: "3 N/um"}\n')
+    found = ec.calibrate(files / "data.nc", contact=path, springs="actuated", draws=40)
+    assert "does it describe this tip or disk?" in " ".join(found.calibration.warnings)

@@ -302,7 +302,7 @@ class TestCourses:
         assert silent.ended == "interrupted"
         assert silent.problem is None
         assert (silent.loop.courses, silent.loop.offsets_refused) == (0, 0)
-        assert any("kept the offset before them: the tracker gave 0" in n for n in silent.notes)
+        assert any("gave no offset of their own: the tracker gave 0" in n for n in silent.notes)
 
     @pytest.mark.parametrize("landed", ["simulated"], indirect=True)
     def test_a_simulated_tracker_beside_another_arm_is_refused_before_it_moves(self, landed):

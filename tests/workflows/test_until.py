@@ -53,7 +53,15 @@ def test_it_stops_at_the_first_pose_with_which_the_upper_end_is_low_enough(watch
         "0.135 mm reached with 11 poses: the error on production is below 0.135 mm"
     )
     assert [each.poses for each in made.looks] == [8, 10, 11]
-    assert "after pose 8 no error can be expected: nothing fits" in lines
+    assert "after 9 poses no error can be stated: nothing fits" in lines
+
+
+def test_a_resumed_run_looks_once_at_the_poses_that_it_has(watch):
+    made, _, _ = watch
+    for pose in range(11):
+        made.add(SimpleNamespace(pose=pose))
+    assert made.look().startswith("0.135 mm reached with 11 poses")
+    assert made.reason == made.look()
 
 
 def test_it_goes_on_while_the_poses_do_not_cover_production(watch):

@@ -14,6 +14,8 @@ from elastocal.results import brief_repr
 
 _SAMPLES = 4
 """Angles of a band for each wave of the highest order."""
+_LEAST_SPAN = np.pi / 3.0
+"""Smallest range of a joint, in rad, over which more than low orders can be told."""
 
 
 @brief_repr
@@ -62,7 +64,7 @@ def joint_functions(problem: GeometryProblem, found: GeometryLadder) -> tuple[Jo
 def _functions(problem: GeometryProblem, found: GeometryLadder) -> Iterator[JointFunction]:
     start, whole = problem.dense, found.whole
     count = 2 * len(wave_sizes())
-    guess = float(np.linalg.norm(wave_sizes()))
+    sizes = np.repeat(wave_sizes(), 2)
     for number, joint in enumerate(problem.robot.chain.joints):
         if not joint.revolute:
             continue
@@ -74,8 +76,10 @@ def _functions(problem: GeometryProblem, found: GeometryLadder) -> Iterator[Join
         angle = low + np.linspace(0.0, span, samples)
         wave = beyond_low_orders(angle, waves(angle[:, None], LOW_ORDERS + 1, ORDERS)[:, 0])
         below, above = interval(whole.draws[:, own] @ wave.T)
-        sizes = np.linalg.norm(whole.values[own].reshape(-1, 2), axis=1)
-        strongest = int(sizes.argmax())
+        amplitudes = np.linalg.norm(whole.values[own].reshape(-1, 2), axis=1)
+        strongest = int(amplitudes.argmax())
+        # Of what low orders cannot stand in for: next to nothing over a small part of a turn.
+        guess = float(np.linalg.norm(wave * sizes, axis=1).mean())
         yield JointFunction(
             joint=joint.name,
             angle=angle,
@@ -83,8 +87,8 @@ def _functions(problem: GeometryProblem, found: GeometryLadder) -> Iterator[Join
             low=below,
             high=above,
             order=LOW_ORDERS + 1 + strongest,
-            amplitude=float(sizes[strongest]),
-            known=bool((above - below).mean() <= 2.0 * guess),
+            amplitude=float(amplitudes[strongest]),
+            known=bool(span >= _LEAST_SPAN and (above - below).mean() <= 2.0 * guess),
         )
 
 

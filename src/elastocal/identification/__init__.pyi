@@ -117,6 +117,7 @@ from .production import (
 )
 from .production_error import (
     FEWEST as FEWEST,
+    RISK as RISK,
     ProductionError as ProductionError,
     level_of_a_look as level_of_a_look,
     production_error as production_error,

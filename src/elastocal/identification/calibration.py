@@ -29,6 +29,7 @@ from elastocal.identification.mistakes import (
     find_wrong_units,
 )
 from elastocal.identification.observability import (
+    Observability,
     attainable_rank,
     find_faint,
     find_hidden,
@@ -66,6 +67,10 @@ _PART_OF_DATA = 1e-2
 """Least part of the measured deflection that must change when springs go to their bounds."""
 
 
+def _nm_per_newton(value: float) -> str:
+    return f"{1e9 * value:.3g}"
+
+
 SAME_CONFIGURATION = Kind(
     "calibration.same-configuration",
     "poses {poses} are one configuration: resampled and left out together",
@@ -96,6 +101,12 @@ WORSE_THAN_NONE = replace(
     UNFIT,
     name="calibration.worse-than-none",
     template=f"{UNFIT.template}; it predicts no better than none at all",
+)
+OTHER_CONTACT = Kind(
+    "calibration.other-contact",
+    "the readings have the {name} compliance of the contact at {found} nm/N, where the contact"
+    " file states {stated} nm/N: does it describe this tip or disk?",
+    shown={"found": _nm_per_newton, "stated": _nm_per_newton},
 )
 NOT_SETTLED = Kind(
     "calibration.loss-not-settled",
@@ -202,16 +213,11 @@ def calibrate(
     widened = widen_draws(weighted, solution.compliance, draws, by)
     springs, frames = weighted.springs, weighted.frame_columns
     compliance, plain = solution.compliance[springs], weighted.of_springs()
-    # A prior makes nothing observable: what was believed before is not measured.
-    seen = observability(factor(plain.without_prior()), model.springs, plain, compliance)
-    seen = find_faint(seen, plain, compliance, model.parameters)
-    sizes, held = expected_sizes(options.prior, plain, model.parameters)
-    seen = find_hidden(seen, plain, compliance, model.parameters, sizes, held)
     calibrated = CalibratedModel(
         model,
         compliance,
         _as_of_arms(widened[:, springs], model.parameters),
-        seen,
+        _seen(model, plain, compliance, options),
         provenance,
         held_out.misfit,
         unexplained=unexplained,
@@ -219,6 +225,8 @@ def calibrate(
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
+    contact = _contact(model, weighted, readings.take(used), options, widened)
+    warnings += _contact_warnings(contact, options)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
@@ -236,8 +244,19 @@ def calibrate(
         solution=solution,
         warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
-        contact=_contact(model, weighted, readings.take(used), options, widened),
+        contact=contact,
     )
+
+
+def _seen(
+    model: ElasticModel, problem: Problem, compliance: FloatArray, options: FitOptions
+) -> Observability:
+    """Return what the readings tell of each spring."""
+    # A prior makes nothing observable: what was believed before is not measured.
+    seen = observability(factor(problem.without_prior()), model.springs, problem, compliance)
+    seen = find_faint(seen, problem, compliance, model.parameters)
+    sizes, held = expected_sizes(options.prior, problem, model.parameters)
+    return find_hidden(seen, problem, compliance, model.parameters, sizes, held)
 
 
 def _contact(
@@ -257,6 +276,16 @@ def _contact(
     zero = float(np.sqrt(np.mean(np.square(left))))
     seen = contact_visibility(problem, model)
     return contact_summary(options.contact, readings, seen, (found, *interval(draws[:, own])), zero)
+
+
+def _contact_warnings(found: ContactSummary | None, options: FitOptions) -> list[Finding]:
+    if found is None or options.contact is None:
+        return []
+    return [
+        OTHER_CONTACT(name=each.name, found=each.compliance, stated=each.stated)
+        for each in found.figures
+        if each.contradicts(options.contact.uncertainty)
+    ]
 
 
 def _as_of_arms(draws: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:

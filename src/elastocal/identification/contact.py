@@ -96,6 +96,10 @@ _Stiffness = Annotated[float, BeforeValidator(_parse_stiffness)]
 _Length = Annotated[float, BeforeValidator(_parse_length)]
 
 
+_APART = 3.0
+"""Standard deviations from which on two statements of a compliance contradict each other."""
+
+
 class ContactEntry(StrictModel):
     """The key ``contact`` of a contact file; see `Contact`."""
 
@@ -182,6 +186,9 @@ class Contact:
         stated = self.stated(name)
         found = self.doubled[(NORMAL, LATERAL).index(name)]
         if stated is not None and found is not None:
+            if abs(found[0] - stated) > _APART * np.hypot(self.uncertainty * stated, found[1]):
+                # They contradict each other: what was measured counts.
+                return KnownCompliance(*found, True)
             weights = 1.0 / np.square([self.uncertainty * stated, found[1]])
             mean = float(weights @ np.array([stated, found[0]]) / weights.sum())
             return KnownCompliance(mean, float(weights.sum() ** -0.5), True)
@@ -575,6 +582,13 @@ class ContactFigure:
     """Part of its column outside those of the springs: 0 where springs imitate it."""
     imitators: tuple[str, ...] = ()
     """Parameters of springs that imitate it most."""
+
+    def contradicts(self, uncertainty: float) -> bool:
+        """Return whether it is not what was stated, with a standard deviation as a share."""
+        if self.stated is None:
+            return False
+        apart = abs(self.compliance - self.stated) > _APART * uncertainty * self.stated
+        return apart and not self.low <= self.stated <= self.high
 
     @property
     def is_seen(self) -> bool:

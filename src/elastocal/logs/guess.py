@@ -504,7 +504,9 @@ def _unit(table: LogTable, columns: Sequence[str], kind: str) -> tuple[str, str]
     largest = _largest(table, columns)
     why = f"up to {largest:.4g}"
     if kind == "angle":
-        return ("deg" if largest > _SURELY_DEGREES else "rad" if largest <= 3.5 else UNKNOWN), why
+        return (
+            "deg" if largest > _SURELY_DEGREES else "rad" if 0.0 < largest <= 3.5 else UNKNOWN
+        ), why
     if kind == "length":
         return ("mm" if largest > _SURELY_MM else "m" if largest > _SURELY_PLACED else UNKNOWN), why
     if largest > _LARGEST_FORCE:

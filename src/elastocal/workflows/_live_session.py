@@ -395,7 +395,8 @@ class LiveSession:
             points = None
         deviation = courses.see(cycle, points)
         if deviation is not None:
-            loop.begin_course(deviation)
+            (x, y, z), (dx, dy, dz) = deviation, cycle.deflection
+            loop.begin_course((x - dx, y - dy, z - dz))
         elif courses.refusal:
             self._missed_courses.append(courses.refusal)
             courses.refusal = ""
@@ -411,7 +412,7 @@ class LiveSession:
             yield f"the log ends early: {self._log.failure}"
         if self._missed_courses:
             yield (
-                f"{len(self._missed_courses)} courses kept the offset before them:"
+                f"{len(self._missed_courses)} courses gave no offset of their own:"
                 f" {self._missed_courses[-1]}"
             )
         robot, rows = self._ready.calibrated.model.robot, self._rows

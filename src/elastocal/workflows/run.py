@@ -29,7 +29,7 @@ from elastocal.cell import (
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.files import read_text
 from elastocal.findings import group_alike
-from elastocal.identification import FEWEST
+from elastocal.identification import FEWEST, RISK
 from elastocal.options import CHOICES, Option, Statements
 from elastocal.planning import PLAN, POOL, PlanResult, read_plan, read_pool
 from elastocal.planning.export import pose_lines
@@ -115,7 +115,7 @@ class RunSettings:
     """Stop as soon as the expected error on production is surely below this, e.g. '0.05 mm'. It is
     stated after each pose, with its interval; the poses are visited in rounds, those first that
     the search chose first."""
-    risk: Annotated[float, Option(metavar="P")] = 0.05
+    risk: Annotated[float, Option(metavar="P")] = RISK
     """Risk that the error is larger than that although the run stopped for it."""
 
 
@@ -321,6 +321,7 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
             if not entries:
                 procedure.fill_folder(job.folder, job.cell, job.plan_folder)
             known = procedure.last_known(entries) if entries else None
+            watch = _accuracy_watch(job, entries, settings)
             devices = rig.connect(job.record.seed, known.entry.time if known else 0.0)
             with contextlib.closing(devices):
                 _confirm(job, known, devices, settings)
@@ -330,7 +331,6 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
                     journal.write(devices.clock.now(), Event.START, run=record)
                 else:
                     journal.write(devices.clock.now(), Event.RESUME)
-                watch = _accuracy_watch(job, entries, settings)
                 result = _carry_out(session, devices, journal, settings.operator, progress, watch)
     if job.key is not None:
         vouched = verdict.sign(job.key, verdict.OF_RUN, procedure.file_sha256(journal_file), _now())
@@ -384,6 +384,8 @@ def _prepare(settings: RunSettings) -> _Job:
     touches, place = settings.touch is not None, RunFolder(Path(settings.out))
     carried_out = procedure.run_settings(loaded, read, touches=touches)
     procedure.rehearse_derivation(loaded, read, place, stated)
+    if settings.until is None and settings.risk != RISK:
+        raise ProcedureError(f"--risk {settings.risk} goes with --until only")
     if settings.until is not None:
         if touches:
             raise ProcedureError("--until is for load cases, not for --touch")
@@ -461,6 +463,7 @@ def _accuracy_watch(
     watch = AccuracyWatch(job.cell, job.plan, job.folder, settings.until, settings.risk, tell)
     for log in {each.pose: each for each in procedure.commits(entries)}.values():
         watch.add(log)
+    watch.look()
     return watch
 
 
@@ -470,9 +473,12 @@ def _reached(
     """Return the error to expect on production, and what further poses would bring."""
     if watch is None:
         return None
-    pool = job.folder.plan / POOL
-    found = read_pool(pool) if pool.is_file() else None
-    return watch.result(result.enough, found)
+    pool, reached = job.folder.plan / POOL, result.enough or bool(watch.reason)
+    try:
+        return watch.result(reached, read_pool(pool) if pool.is_file() else None)
+    except ElastocalError:
+        # What more poses would bring is no part of the run, which is done.
+        return watch.result(reached, None)
 
 
 def _derived(job: _Job, result: procedure.SessionResult, watch: AccuracyWatch | None) -> RunResult:

@@ -165,6 +165,8 @@ class AccuracyWatch:
     tell: Callable[[Sequence[str]], None]
     """Shows lines to the operator; may wait."""
     looks: list[ProductionError] = field(default_factory=list)
+    reason: str = ""
+    """Why the poses so far are enough; empty: they are not."""
     _poses: dict[int, PoseReadings] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -206,13 +208,22 @@ class AccuracyWatch:
         """Return why the run has enough poses, or nothing."""
         try:
             self.add(log)
-            if len(self._poses) < FEWEST:
-                return ""
+        except ElastocalError as error:
+            self._say(f"pose {log.pose} cannot be judged: {error}")
+            return ""
+        return self.look()
+
+    def look(self) -> str:
+        """Return why the poses so far are enough, or nothing."""
+        self.reason = ""
+        if len(self._poses) < FEWEST:
+            return ""
+        try:
             found = cell_error(self.cell, self._dataset(), self.level)
             covered = present(plan_coverage(self.cell, self._measured()), "coverage")
         except ElastocalError as error:
             # What cannot be judged yet is no fault of the run, which goes on.
-            self._say(f"after pose {log.pose} no error can be expected: {error}")
+            self._say(f"after {len(self._poses)} poses no error can be stated: {error}")
             return ""
         self.looks.append(found)
         self._say(found.sentence())
@@ -221,7 +232,8 @@ class AccuracyWatch:
         if not covered.is_enough:
             self._say(covered.sentence())
             return ""
-        return ReachedAccuracy(self.wanted, self.risk, True, (found,)).sentence()
+        self.reason = ReachedAccuracy(self.wanted, self.risk, True, (found,)).sentence()
+        return self.reason
 
     def result(self, reached: bool, pool: PoolData | None) -> ReachedAccuracy:
         """Return the looks, and what further poses from the plan's pool would bring."""

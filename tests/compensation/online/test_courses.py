@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from elastocal.cell import BeamState, PointBlock
-from elastocal.compensation.online import CourseWatch, LightContact, LiveCycle, TaughtCourses
+from elastocal.compensation.online import (
+    CourseWatch,
+    LightContact,
+    LiveCycle,
+    Status,
+    TaughtCourses,
+)
 from elastocal.robot import Robot
 from support.virtual_chain import ARMS
 
@@ -94,9 +100,20 @@ def test_a_tool_that_moves_or_readings_that_fail_begin_the_wait_anew():
         assert cell.look(1.2, 60.0) == []
         cell.q = cell.q + 1e-3
     assert cell.look(1.4, 60.0) == []
-    assert cell.look(0.1, 60.0, status=1) == []
+    assert cell.look(0.1, 60.0, status=2) == []
     # The press is forgotten with them: the tool may have left meanwhile.
     assert cell.look(3.0, 60.0) == []
+
+
+def test_cycles_between_two_readings_of_a_slower_sensor_take_nothing_away():
+    cell = Cell()
+    found = []
+    for force in (0.0, 900.0, 60.0):
+        for _ in range(round(2.0 / (2 * LOOK))):
+            found += cell.look(LOOK, force) + cell.look(LOOK, force, status=Status.HELD.value)
+    assert len(found) == 1
+    cell.look(1.0, 0.0, status=Status.HELD.value)
+    assert cell.free
 
 
 @pytest.mark.parametrize(

@@ -282,7 +282,7 @@ def test_the_offset_of_a_course_comes_and_goes_at_the_rate():
     bench = started()
     before = np.array(bench.run(0.1)[-1])
     shown = np.array([2e-4, 0.0, -1e-4])
-    bench.loop.begin_course(tuple(np.array(bench.cycles[-1].deflection) + shown))
+    bench.loop.begin_course(tuple(shown))
     begun = bench.run(0.5)
     np.testing.assert_allclose(begun[-1] - before, -1e3 * shown, atol=1e-6)
     largest = 1e3 * bench.settings.limits.rate * CYCLE * (1.0 + 1e-9)
@@ -306,7 +306,7 @@ def test_an_offset_that_is_none_or_comes_without_a_wrench_is_refused_and_counted
     bench.streams = False
     bench.run(0.02)
     bench.loop.begin_course((1e-4, 0.0, 0.0))
-    bench.run(0.02)
+    bench.run(0.5)  # held first, which keeps it, and then faded
     assert bench.loop.counts().offsets_refused == 3
     assert bench.loop.counts().courses == 0
 
@@ -314,7 +314,7 @@ def test_an_offset_that_is_none_or_comes_without_a_wrench_is_refused_and_counted
 def test_a_program_that_begins_anew_has_no_offset():
     bench = started()
     shown = np.array([2e-4, 0.0, 0.0])
-    bench.loop.begin_course(tuple(np.array(bench.cycles[-1].deflection) + shown))
+    bench.loop.begin_course(tuple(shown))
     bench.run(0.5)
     bench.loop.begin_course((1e-4, 0.0, 0.0))
     bench.step(begins=True)

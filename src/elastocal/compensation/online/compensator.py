@@ -357,8 +357,10 @@ class Compensator:
         share = _faded_share(state.correction, self._fade) if faded else 1.0
         x, y, z = state.correction
         correction = (share * x, share * y, share * z)
-        remembered = state[4:7]
+        remembered, offset = state[4:7], state.offset
         if faded:
+            # Where the arm is when readings come again is not known: its course may be over.
+            offset = _ORIGIN
             remembered = (
                 tuple([_scaled(values, share) for values in state.window]),
                 tuple([([*_scaled(a, share)], [*_scaled(b, share)]) for a, b in state.memory]),
@@ -378,7 +380,8 @@ class Compensator:
             correction,
             *state[8:11],
             unloaded,
-            *state[12:],
+            offset,
+            state.refused,
         ), answer
 
 

@@ -31,7 +31,9 @@ _NEAR = 0.03
 """Distance from a taught place that is still that place, in m."""
 _LEAST = 5
 """Fewer samples of the marker make no reading."""
-_UNKNOWN = (Status.HELD | Status.FADED).value
+_UNKNOWN = Status.FADED.value
+"""A cycle that is held between two readings of a slower sensor tells nothing new, and takes nothing
+away."""
 
 
 @brief_repr

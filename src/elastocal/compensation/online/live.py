@@ -239,9 +239,16 @@ class LiveLoop:
         """Fade out from now on; from any thread, any number of times."""
         self._ending = True
 
-    def begin_course(self, deviation: Triple) -> None:
-        """Take an offset in the next cycle, from any thread; see `Compensator.begin_course`."""
-        self._begins = deviation
+    def begin_course(self, beyond: Triple) -> None:
+        """Take the offset of a course in the next cycle with a reading, from any thread.
+
+        Parameters
+        ----------
+        beyond : tuple of float
+            What marker and controller showed beyond the deflection that was predicted then, in
+            base, in m; see `Compensator.begin_course`.
+        """
+        self._begins = beyond
 
     def end_course(self) -> None:
         """Let the offset of a course go from the next cycle on, from any thread."""
@@ -302,7 +309,7 @@ class LiveLoop:
         before = here if self.last is None or cycle.begins else self.last.correction
         self._state, answer = self._compensator.correct(self._state, cycle.q)
         if self._ends or self._begins is not None:
-            self._take_course(cycle.q)
+            self._take_course(cycle.q, bool(answer.status & Status.HELD.value))
         correction, status = here if cycle.holds else answer.correction, answer.status
         self._statuses[status] = self._statuses.get(status, 0) + 1
         self._farthest = max(self._farthest, math.dist(before, correction))
@@ -322,14 +329,18 @@ class LiveLoop:
             self._log(self.last)
         return correction
 
-    def _take_course(self, q: Sequence[float]) -> None:
+    def _take_course(self, q: Sequence[float], holds: bool) -> None:
         """Begin or end a course, as another thread has asked."""
-        begins, ends, self._begins, self._ends = self._begins, self._ends, None, False
-        if ends:
+        if self._ends:
+            self._ends = False
             self._state = self._compensator.end_course(self._state)
-        if begins is None:
+        if self._begins is None or holds:
+            # Between two readings of the sensor the present load is not known.
             return
-        self._state = self._compensator.begin_course(self._state, q, begins)
+        # The load may have changed since the tracker was read.
+        (x, y, z), (dx, dy, dz) = self._begins, self._state.deflection
+        self._begins = None
+        self._state = self._compensator.begin_course(self._state, q, (x + dx, y + dy, z + dz))
         self._courses += not self._state.refused
         self._not_taken += bool(self._state.refused)
         self._largest_offset = max(self._largest_offset, math.hypot(*self._state.offset))

@@ -250,7 +250,7 @@ def commits(entries: tuple[Entry, ...]) -> tuple[PoseLog, ...]:
 
 def why_enough(entries: tuple[Entry, ...]) -> str:
     """Return why a run has enough poses; empty: it has not, or has gone on since."""
-    last = (e for e in reversed(entries) if e.event in (Event.ENOUGH, Event.RESUME, Event.COMMIT))
+    last = (e for e in reversed(entries) if e.event in (Event.ENOUGH, Event.COMMIT))
     found = next(last, None)
     return found.text if found is not None and found.event is Event.ENOUGH else ""
 

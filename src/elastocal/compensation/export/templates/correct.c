@@ -174,6 +174,10 @@ static unsigned int go_without(elastocal_state *state)
     }
     if (state->missed > HOLD_CYCLES) {
         fade(state);
+        /* Where the arm is when readings come again is not known: its course may be over. */
+        state->offset[0] = 0.0;
+        state->offset[1] = 0.0;
+        state->offset[2] = 0.0;
 @FRICTION@        /* What acted meanwhile is not known: friction is as unknown as at the start. */
 @FRICTION@        state->unloaded = FREE_CYCLES;
         status = ELASTOCAL_FADED;
