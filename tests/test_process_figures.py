@@ -47,8 +47,9 @@ def test_a_table_tells_its_seeds_and_stands_beside_the_paper(tables, kind):
     cells = [row.strip("| ").split(" | ") for row in rows]
     assert kind != "afp" or "typical" in {row[0] for row in cells}
     for row in cells:
-        # An interval over several seeds; none of a single one.
-        assert (" to " in row[5]) == (int(row[-1]) > 1)
+        # An interval over several seeds; two values of two; none of a single one.
+        assert (" to " in row[5]) == (int(row[-1]) > 2)
+        assert (" and " in row[5]) == (int(row[-1]) == 2)
 
 
 def test_short_campaigns_on_typical_are_no_worse_than_the_papers_way_and_take_8_minutes(tables):

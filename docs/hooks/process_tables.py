@@ -92,7 +92,7 @@ def table(kind: str) -> str:
 
 _INTERVALS = (
     "Means over the seeds that the last column counts, in brackets their 95 % interval (Student's"
-    " t); of one seed there is none."
+    " t); of one seed there is none, and of two both are given."
 )
 
 
@@ -323,8 +323,13 @@ def _reduction(pair: list[float]) -> float:
 
 
 def _mean(values: list[float], form: str) -> str:
-    """Return a mean with its interval, both in a format."""
+    """Return a mean with its interval, both in a format; two values in place of an interval.
+
+    Student's interval of two values is twelve times as wide as they are apart, and tells nothing.
+    """
     found = SeedMean.of(values)
+    if len(values) == 2:
+        return f"{found.mean:{form}} ({min(values):{form}} and {max(values):{form}})"
     if found.low is None or found.high is None:
         return f"{found.mean:{form}}"
     return f"{found.mean:{form}} ({found.low:{form}} to {found.high:{form}})"
