@@ -131,6 +131,9 @@ def _three_digits(value: float) -> str:
     """Return at least three significant digits, without an exponent for everyday sizes."""
     if value == 0.0:
         return "0"
+    if not math.isfinite(value):
+        # A number near the largest is beyond it in a smaller unit.
+        return str(value)
     digits = 2 - math.floor(math.log10(abs(value)))
     if digits > 6:
         return f"{value:.2e}"
