@@ -159,6 +159,29 @@ def parse_quantity(text: object, dimension: str) -> float:
     return value
 
 
+def parse_share(text: object, most: float) -> float:
+    """Return a share above 0 from a percentage; a bare number is refused.
+
+    >>> parse_share("30 %", most=1.0)
+    0.3
+
+    Raises
+    ------
+    UnitError
+        If ``text`` is no percentage, or its share is not above 0 and up to ``most``.
+    """
+    number, sign, rest = str(text).partition("%")
+    try:
+        share = float(number) / 100.0
+    except ValueError:
+        share = math.nan
+    if not (isinstance(text, str) and sign and not rest.strip() and 0.0 < share <= most):
+        raise UnitError(
+            f"{text!r} must be a percentage above 0 % and up to {100.0 * most:.0f} %, e.g. '20 %'"
+        )
+    return share
+
+
 def parse_number(text: str) -> float:
     """Return the number in a text, as people and controllers write it; it may be NaN or inf.
 

@@ -53,6 +53,17 @@ static int arm_errors(void)
 }
 #endif
 
+static elastocal_reading reading_of(const double row[])
+{
+    elastocal_reading reading;
+    reading.time = row[0];
+    (void)memcpy(reading.q, &row[1], sizeof reading.q);
+    (void)memcpy(reading.force, &row[N + 1], sizeof reading.force);
+    (void)memcpy(reading.moment, &row[N + 4], sizeof reading.moment);
+    reading.ok = (row[N + 7] != 0.0) ? 1 : 0;
+    return reading;
+}
+
 static int steps(void)
 {
     double row[N + 8];
@@ -60,13 +71,8 @@ static int steps(void)
     elastocal_state state;
     elastocal_start(&state);
     while (fread(row, sizeof(double), N + 8, stdin) == N + 8) {
-        elastocal_reading reading;
+        const elastocal_reading reading = reading_of(row);
         elastocal_correction told;
-        reading.time = row[0];
-        (void)memcpy(reading.q, &row[1], sizeof reading.q);
-        (void)memcpy(reading.force, &row[N + 1], sizeof reading.force);
-        (void)memcpy(reading.moment, &row[N + 4], sizeof reading.moment);
-        reading.ok = (row[N + 7] != 0.0) ? 1 : 0;
         elastocal_step(&state, &reading, &told);
         (void)memcpy(out, told.correction, sizeof told.correction);
         (void)memcpy(&out[3], told.deflection, sizeof told.deflection);
@@ -85,13 +91,8 @@ static int courses(void)
     elastocal_state state;
     elastocal_start(&state);
     while (fread(row, sizeof(double), N + 12, stdin) == N + 12) {
-        elastocal_reading reading;
+        const elastocal_reading reading = reading_of(row);
         elastocal_correction told;
-        reading.time = row[0];
-        (void)memcpy(reading.q, &row[1], sizeof reading.q);
-        (void)memcpy(reading.force, &row[N + 1], sizeof reading.force);
-        (void)memcpy(reading.moment, &row[N + 4], sizeof reading.moment);
-        reading.ok = (row[N + 7] != 0.0) ? 1 : 0;
         out[4] = 0.0;
         if (row[N + 8] == 1.0) {
             out[4] = (double)elastocal_begin_course(&state, reading.q, &row[N + 9]);

@@ -7,6 +7,7 @@ parameters.
 """
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from elastocal.elastic.springs import OneAxisSpring, Spring, SpringLoad
 from elastocal.errors import SpringError
 from elastocal.records import StrictModel, record
 from elastocal.results import brief_repr
-from elastocal.units import dimension_of, impossible, parse_quantity
+from elastocal.units import dimension_of, impossible, parse_quantity, parse_share
 
 _DIMENSIONS = {
     "rotational stiffness": (True, True),
@@ -74,18 +75,6 @@ def _parse_compliance(text: object) -> _Compliance:
     return _Compliance(compliance, revolute)
 
 
-def _parse_share(text: object) -> float:
-    """Return a share from ``"20 %"``."""
-    number, sign, rest = str(text).partition("%")
-    try:
-        share = float(number) / 100.0
-    except ValueError:
-        share = float("nan")
-    if not (sign and not rest.strip() and 0.0 < share <= 10.0):
-        raise ValueError(f"{text!r} must be a percentage above 0 %, e.g. '20 %'")
-    return share
-
-
 def _parse_torque(text: object) -> float:
     """Return a torque above 0 in N·m."""
     value = parse_quantity(text, "moment")
@@ -105,7 +94,7 @@ class Knowledge(StrictModel):
     """Two stiffnesses or two compliances; in any order."""
     stiffness: _Written | None = None
     """Expected, of a data sheet."""
-    uncertainty: Annotated[float, BeforeValidator(_parse_share)] | None = None
+    uncertainty: Annotated[float, BeforeValidator(partial(parse_share, most=10.0))] | None = None
     """Standard deviation of that, or of each of the next three, as a percentage."""
     K1: _Written | None = None
     """Stiffness of a gear up to ``T1``; without torque where that is not given."""

@@ -38,6 +38,8 @@ _MOST_CHANGES = 8
 """More changes are a drift."""
 _TOGETHER = 3
 """Rows within which a station and markers changed at once."""
+_FROM = " from row "
+"""Stands between the name of a station and the row from which it is elsewhere."""
 
 MOVED = Kind(
     "geometry.station-moved",
@@ -121,14 +123,16 @@ def session_findings(problem: GeometryProblem, found: GeometryFit) -> Iterator[F
             if not any(abs(s.row - each.row) <= _TOGETHER for s in changes if s.station):
                 yield MARKERS_MOVED(row=each.row, shift=each.shift)
         elif with_it:
-            name = each.station.partition(_FROM)[0]
-            yield NEW_SESSION(row=each.row, name=name, shift=each.shift, by=with_it[0].shift)
+            yield NEW_SESSION(
+                row=each.row, name=_as_named(each.station), shift=each.shift, by=with_it[0].shift
+            )
         else:
-            name = each.station.partition(_FROM)[0]
-            yield MOVED(name=name, shift=each.shift, row=each.row)
+            yield MOVED(name=_as_named(each.station), shift=each.shift, row=each.row)
 
 
-_FROM = " from row "
+def _as_named(station: str) -> str:
+    """Return the name that the table has for a station."""
+    return station.partition(_FROM)[0]
 
 
 def find_changes(problem: GeometryProblem, found: GeometryFit) -> list[Change]:
@@ -209,8 +213,7 @@ def _changed(data: Positions, change: Change) -> Positions:
     later = np.arange(len(data)) >= change.row
     if change.station is not None:
         own = later & (data.station == change.station)
-        name = change.station.partition(_FROM)[0]
-        new = f"{name}{_FROM}{change.row}"
+        new = f"{_as_named(change.station)}{_FROM}{change.row}"
         return replace(data, station=np.where(own, new, data.station.astype(object)).astype(str))
     return replace(data, markers=_own_markers(data.markers, later.astype(np.intp)))
 

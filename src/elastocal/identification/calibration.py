@@ -67,10 +67,6 @@ _PART_OF_DATA = 1e-2
 """Least part of the measured deflection that must change when springs go to their bounds."""
 
 
-def _nm_per_newton(value: float) -> str:
-    return f"{1e9 * value:.3g}"
-
-
 SAME_CONFIGURATION = Kind(
     "calibration.same-configuration",
     "poses {poses} are one configuration: resampled and left out together",
@@ -106,7 +102,7 @@ OTHER_CONTACT = Kind(
     "calibration.other-contact",
     "the readings have the {name} compliance of the contact at {found} nm/N, where the contact"
     " file states {stated} nm/N: does it describe this tip or disk?",
-    shown={"found": _nm_per_newton, "stated": _nm_per_newton},
+    shown={"found": as_number(".3g", 1e9), "stated": as_number(".3g", 1e9)},
 )
 NOT_SETTLED = Kind(
     "calibration.loss-not-settled",

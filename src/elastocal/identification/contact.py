@@ -24,6 +24,7 @@ under a selection model", Biometrics 31, 1975).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -38,7 +39,7 @@ from elastocal.identification._least_squares import RANK_TOLERANCE
 from elastocal.records import StrictModel, from_data, read_yaml_data, record
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.units import parse_quantity
+from elastocal.units import parse_quantity, parse_share
 from elastocal.wording import Phrase, counted, phrase, um
 
 NORMAL, LATERAL = "normal", "lateral"
@@ -65,18 +66,6 @@ _IMITATORS = 3
 """Springs that are named as those that imitate a compliance of the contact."""
 
 
-def _parse_share(text: object) -> float:
-    """Return a share from ``"30 %"``."""
-    number, sign, rest = str(text).partition("%")
-    try:
-        share = float(number) / 100.0
-    except ValueError:
-        share = float("nan")
-    if not (isinstance(text, str) and sign and not rest.strip() and 0.0 < share <= 1.0):
-        raise ValueError(f"{text!r} must be a percentage above 0 % and up to 100 %, e.g. '30 %'")
-    return share
-
-
 def _parse_stiffness(text: object) -> float:
     value = parse_quantity(text, "translational stiffness")
     if not _SOFTEST <= value <= _STIFFEST:
@@ -91,7 +80,7 @@ def _parse_length(text: object) -> float:
     return value
 
 
-_Share = Annotated[float, BeforeValidator(_parse_share)]
+_Share = Annotated[float, BeforeValidator(partial(parse_share, most=1.0))]
 _Stiffness = Annotated[float, BeforeValidator(_parse_stiffness)]
 _Length = Annotated[float, BeforeValidator(_parse_length)]
 

@@ -29,8 +29,8 @@ _AXIS = re.compile(
 )
 """Numbered: KUKA A1; FANUC, Staubli, Denso, Nachi J1; Kawasaki JT1; ABB rax_1; UR actual_q_0."""
 _LETTERED = {
-    "Yaskawa": ("S", "L", "U", "R", "B", "T"),
-    "Hyundai or Nachi": ("S", "H", "V", "R2", "B", "R1"),
+    "Yaskawa": ("s", "l", "u", "r", "b", "t"),
+    "Hyundai or Nachi": ("s", "h", "v", "r2", "b", "r1"),
 }
 """Axes that makers name by letters, from the base on."""
 _LETTER = re.compile(r"(?i)((?:.*[._ ])?)(r[12]|[slurbthv])(?:[-_ ]?(?:axis|ax))?")
@@ -332,17 +332,12 @@ def _rail(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
 
 def _by_letters(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
     """Return the columns of joints whose maker names them by letters, from the base on."""
-    groups: dict[str, dict[str, str]] = {}
-    for name, bare in names.items():
-        if match := _LETTER.fullmatch(bare):
-            groups.setdefault(match[1].lower(), {})[match[2].upper()] = name
-    for maker, letters in _LETTERED.items():
-        for own in groups.values():
-            if all(letter in own for letter in letters):
-                arm = tuple(own[letter] for letter in letters)
-                unit, why = _unit(table, arm, "angle")
-                return [GuessedColumns("joints", arm, unit, f"axes of {maker}, {why}")]
-    return []
+    found = _of_makers(names, _LETTER, _LETTERED)
+    if found is None:
+        return []
+    maker, arm = found
+    unit, why = _unit(table, arm, "angle")
+    return [GuessedColumns("joints", arm, unit, f"axes of {maker}, {why}")]
 
 
 def _force(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
@@ -383,7 +378,7 @@ def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[Gu
     found = [GuessedColumns("pose.position", places[0], *_unit(table, places[0], "length"))]
     if angles := _triples(_ANGLE, names):
         found.append(GuessedColumns("pose.angles", angles[0], *_unit(table, angles[0], "angle")))
-    elif turned := _turns_of_makers(names):
+    elif turned := _of_makers(names, _TURN, _TURNS_OF):
         maker, columns = turned
         unit, why = _unit(table, columns, "angle")
         found.append(GuessedColumns("pose.angles", columns, unit, f"{why}; angles of {maker}"))
@@ -392,16 +387,21 @@ def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[Gu
     return found
 
 
-def _turns_of_makers(names: dict[str, str]) -> tuple[str, tuple[str, ...]] | None:
-    """Return the maker whose angles about fixed x, y and z these are, and the columns a, b, c."""
+def _of_makers(
+    names: dict[str, str], pattern: re.Pattern[str], wanted: Mapping[str, tuple[str, ...]]
+) -> tuple[str, tuple[str, ...]] | None:
+    """Return the maker whose letters name columns with one prefix, and these in its order.
+
+    The first group of the pattern is the prefix, the second the letter in any case.
+    """
     groups: dict[str, dict[str, str]] = {}
     for name, bare in names.items():
-        if match := _TURN.fullmatch(bare):
+        if match := pattern.fullmatch(bare):
             groups.setdefault(match[1].lower(), {})[match[2].lower()] = name
-    for maker, axes in _TURNS_OF.items():
+    for maker, letters in wanted.items():
         for own in groups.values():
-            if all(axis in own for axis in axes):
-                return maker, tuple(own[axis] for axis in axes)
+            if all(letter in own for letter in letters):
+                return maker, tuple(own[letter] for letter in letters)
     return None
 
 
