@@ -97,7 +97,7 @@ class PosesNeeded:
 
 @record()
 class FunctionsShown:
-    """What poses show of the function of a joint: errors of gear and encoder by its angle."""
+    """How well poses determine the function of a joint: errors of its gear and encoder."""
 
     joint: str
     orders: int
@@ -133,7 +133,7 @@ class PositionPlan:
     """Expected accuracy with a quarter, half and all of the poses, in the order of the search."""
     findings: tuple[Finding, ...]
     functions: tuple[FunctionsShown, ...] = ()
-    """What they show of functions of the joints; empty in older files."""
+    """How well they determine the function of each joint; empty in older files."""
 
     def show(self) -> Iterator[Block]:
         """Yield the poses to measure, and the expected accuracy."""

@@ -378,7 +378,7 @@ class _LoadCase(NamedTuple):
 
 
 class _Course(Enum):
-    """What happens to the offset of the course before a reading; the C has the same numbers."""
+    """Event of a course before a reading; the C has the same numbers."""
 
     GOES_ON = 0
     BEGINS = 1

@@ -31,7 +31,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 _PREFIX = "arm_"
-"""Of its constants: those of the arm that the springs were fitted on may be others."""
+"""Begins the names of its constants: the springs may have been fitted on another arm."""
 
 
 @brief_repr

@@ -39,7 +39,7 @@ away."""
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class TaughtCourses:
-    """What marker and controller showed where courses begin, when the path was taught."""
+    """Readings of marker and controller at the places where courses begin, from teaching."""
 
     place: FloatArray
     """Tool centre points by the controller, in base, shape (place, 3), in m; none: (0, 3)."""

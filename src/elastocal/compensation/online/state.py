@@ -81,7 +81,7 @@ class State(NamedTuple):
     unloaded: int = 0
     """Corrections in a row without a load, at most as many as wear the memory off."""
     offset: Triple = (0.0, 0.0, 0.0)
-    """Of the course: how far the tool is off beyond deflection and growth, in base, in m."""
+    """Offset of the course, in base, in m: the tool's error beyond deflection and growth."""
     refused: int = 0
     """`Status.OFFSET` where the last reading of a course was not taken, else 0."""
 
