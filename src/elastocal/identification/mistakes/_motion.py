@@ -101,9 +101,7 @@ def _likeliest(
     """Return the rest after undoing the likeliest mistake, and the name of that mistake."""
     mistakes = [
         ReadingMistake(each.message, partial(_read, each.read))
-        for each in joint_mistakes(
-            robot, lambda read: _relative(robot, _read(read, readings), offset)
-        )
+        for each in joint_mistakes(robot, partial(_left_by_zero, robot, readings, offset))
     ]
     tried = [
         (_relative(robot, each.undo(readings), offset), each.message)
@@ -119,11 +117,16 @@ def _moved(robot: Robot, readings: Readings, offset: FloatArray) -> FloatArray |
 
     It is relative to the reference; without one, to the mean of the readings at the pose.
     """
+    if readings.reference_joint_position is None and len(np.unique(readings.pose)) == len(readings):
+        return None
+    return _motion(robot, readings, offset)
+
+
+def _motion(robot: Robot, readings: Readings, offset: FloatArray) -> FloatArray:
+    """Return the motion of `_moved`, which the joints determine; it is linear in the places."""
     here = _marker(robot, readings.joint_position, offset)
     if readings.reference_joint_position is not None:
         return here - _marker(robot, readings.reference_joint_position, offset)
-    if len(np.unique(readings.pose)) == len(readings):
-        return None
     return _counted(here, readings)
 
 
@@ -153,6 +156,36 @@ def _relative(robot: Robot, readings: Readings, offset: FloatArray) -> float:
     """Return the same over what the controller says."""
     controller = median_norm(_counted(readings.controller_displacement, readings))
     return _apart(robot, readings, offset) / controller if controller > 0.0 else np.inf
+
+
+def _left_by_zero(
+    robot: Robot, readings: Readings, offset: FloatArray, joint: int
+) -> Callable[[float], float]:
+    """Return the rest of `_relative` as a function of an angle that is added to a joint.
+
+    A point turned by an angle about an axis is ``centre + a cos + b sin``, moved along one it is
+    linear; so few angles determine the motion at all others.
+    """
+    controller = _counted(readings.controller_displacement, readings)
+    size = median_norm(controller)
+
+    def at(angle: float) -> FloatArray:
+        return _motion(robot, _read(partial(_turned, robot, joint, angle), readings), offset)
+
+    start = at(0.0)
+    if robot.revolute[joint]:
+        quarter, centre = at(0.5 * np.pi), 0.5 * (start + at(np.pi))
+    else:
+        quarter, centre = at(1.0), start
+
+    def left(angle: float) -> float:
+        if not size > 0.0:
+            return np.inf
+        cos, sin = (np.cos(angle), np.sin(angle)) if robot.revolute[joint] else (1.0, angle)
+        moved = centre + (start - centre) * cos + (quarter - centre) * sin
+        return median_norm(moved - controller) / size
+
+    return left
 
 
 JointRead = Callable[[FloatArray], FloatArray]
@@ -237,19 +270,21 @@ def _in_base(robot: Robot, readings: Readings, own: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("rij,rj->ri", R, own))
 
 
-def joint_mistakes(robot: Robot, left: Callable[[JointRead], float]) -> Iterator[JointMistake]:
+def joint_mistakes(
+    robot: Robot, left_by_zero: Callable[[int], Callable[[float], float]]
+) -> Iterator[JointMistake]:
     """Yield every mistake in joints that is known, the likeliest first.
 
     Parameters
     ----------
-    left : callable
-        What stays unexplained with the joints read otherwise; by it the zero of each joint is
-        estimated.
+    left_by_zero : callable
+        Function from the number of a joint to what stays unexplained as a function of an angle, in
+        rad, that is added to that joint; by it its zero is estimated.
     """
     for message, read in _other_joints(robot):
         yield JointMistake(message, read)
     for joint in range(robot.external_axes, len(robot.joint_names)):
-        angle = _zero(robot, joint, left)
+        angle = _zero(left_by_zero(joint))
         if abs(angle) > np.radians(_LEAST_ZERO):
             base = ", or all else is of another base" if joint == robot.external_axes else ""
             yield JointMistake(
@@ -259,12 +294,12 @@ def joint_mistakes(robot: Robot, left: Callable[[JointRead], float]) -> Iterator
             )
 
 
-def _zero(robot: Robot, joint: int, left: Callable[[JointRead], float]) -> float:
-    """Return the angle in rad that, added to a joint, leaves least."""
+def _zero(left: Callable[[float], float]) -> float:
+    """Return the angle in rad at which a function of it is least."""
     step, best = np.radians(15.0), 0.0
     tried = step * np.arange(-11, 13)
     while step > np.radians(0.05):
-        best = min(tried, key=lambda angle: left(partial(_turned, robot, joint, angle)))
+        best = min(tried, key=left)
         step /= 4.0
         tried = best + step * np.arange(-3, 4)
     return float(best)
@@ -290,7 +325,11 @@ def name_joint_mistake(robot: Robot, left: Callable[[JointRead], float], enough:
     enough : float
         What may stay.
     """
-    found = [(left(each.read), each.message) for each in joint_mistakes(robot, left)]
+
+    def by_zero(joint: int) -> Callable[[float], float]:
+        return lambda angle: left(partial(_turned, robot, joint, angle))
+
+    found = [(left(each.read), each.message) for each in joint_mistakes(robot, by_zero)]
     least, message = min(found, key=itemgetter(0))
     return message if least < enough else ""
 
