@@ -28,6 +28,7 @@ from elastocal.procedure import (
 )
 from elastocal.procedure.record import read_commits
 from support import drivers
+from support.by_day import some_by_day
 from support.cli import elastocal
 from support.run_cells import PlannedCell, planned_cell
 
@@ -106,7 +107,7 @@ def test_killed_for_real_it_goes_on_to_the_same_dataset(planned, whole, tmp_path
         np.testing.assert_allclose(ours[name], theirs[name], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", some_by_day([signal.SIGINT, signal.SIGTERM]))
 def test_a_signal_leaves_the_surface_and_can_be_resumed(planned, tmp_path, number):
     out = tmp_path / "run"
     journal = RunFolder(out).journal

@@ -37,6 +37,7 @@ def test_six_and_eighteen_springs_cross_between_four_and_fifteen_poses(tmp_path)
     assert found["settings"]["poses"] == 43
 
 
+@pytest.mark.slow
 @needs_shared
 def test_calibrate_and_codec_say_the_same_of_one_file_and_the_page_quotes_them(tmp_path):
     """On the FANUC readings: the ladder, the pairs of layouts, and the words."""

@@ -21,10 +21,7 @@ from support.fault_matrix import (
 
 DOCS = Path(__file__).parents[2] / "docs"
 WALKED = DOCS / "hooks" / "gallery" / "fault_matrix.json"
-FIRST = [
-    ("PC: killed", "lateral load"),
-    ("force: bad status", "press"),
-]
+FIRST = [("PC: killed", "lateral load")]
 """Those that run in `make test`, some 10 s of processor each; every night all of them."""
 
 

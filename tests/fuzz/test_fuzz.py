@@ -17,7 +17,7 @@ from support.kept import kept
 
 CORPUS = json.loads((Path(__file__).parent / "corpus.json").read_text(encoding="utf-8"))
 REPORTS = ("report ", '["report"')
-PARTS = 10
+PARTS = 20
 """Tests that share the cases: the first runs by day, the others at night."""
 CASES = 2_000
 NIGHTLY = 100_000

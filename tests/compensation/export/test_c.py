@@ -25,6 +25,7 @@ from elastocal.identification import RobotRecord
 from elastocal.records import record
 from elastocal.robot import Robot
 from support import compensated, exported
+from support.by_day import some_by_day
 from support.exported import SANITIZED, build, needs_gcc, written
 from support.filters import EXAMPLES, filter_settings
 from support.geared import geared
@@ -200,7 +201,7 @@ def grown_arm(robot):
     )
 
 
-@pytest.mark.parametrize("name", ["hinges", "gears"])
+@pytest.mark.parametrize("name", some_by_day(["gears", "hinges"]))
 def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
     model = geared() if name == "gears" else compensated.arm("on a rail")
     state = grown_arm(model.model.robot)
@@ -221,7 +222,7 @@ def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
 
 
-@pytest.mark.parametrize(("orders", "payload"), [(40, 30.0), (2, 0.0)])
+@pytest.mark.parametrize(("orders", "payload"), some_by_day([(40, 30.0), (2, 0.0)]))
 def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, payload):
     """Places, zeros, functions of the joints, weight and payload, a tool of its own."""
     model = compensated.arm("on a rail")
@@ -259,7 +260,7 @@ def beginnings(rng, deflection, limit):
     return rows
 
 
-@pytest.mark.parametrize("name", ["hinges", "gears, grown"])
+@pytest.mark.parametrize("name", some_by_day(["gears, grown", "hinges"]))
 def test_offsets_of_courses_are_those_of_python(tmp_path, name):
     model = compensated.arm("on a rail") if name == "hinges" else geared()
     state = None if name == "hinges" else grown_arm(model.model.robot)
@@ -498,7 +499,7 @@ def test_sine_and_cosine_are_good_to_two_ulp_over_many_turns(folder, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not on this machine")
-@pytest.mark.parametrize("springs", ["hinges", "gears"])
+@pytest.mark.parametrize("springs", some_by_day(["gears", "hinges"]))
 def test_instructions_do_not_depend_on_the_input(tmp_path, springs):
     calibrated = geared() if springs == "gears" else compensated.arm()
     numbers = design(calibrated, compensated.settings(), compensated.load())
