@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from elastocal.compensation import process
 from elastocal.compensation.process import read_process
 from elastocal.files import sha256
 from elastocal.identification import write_model
 from elastocal.planning import cell_surface
 from support.cli import elastocal
+from support.compiled import CompiledCorrector
+from support.exported import needs_gcc
 from support.paths import made_up
 from support.simulated import example_cell
 
@@ -70,6 +73,25 @@ def test_the_offset_of_a_course_is_read_and_its_time_said(folder):
     assert read["lines"][0]["before"] == pytest.approx(bare["lines"][0]["before"])
     # A model that is made up is wrong by more than the cell: its offset is worth much.
     assert read["spatial"][0]["after"]["mean"] < bare["spatial"][0]["after"]["mean"]
+
+
+@needs_gcc
+def test_the_c_of_the_target_gives_the_same_figures(folder, tmp_path, monkeypatch):
+    given = "--seed", 2, "--course-offset", "--json"
+    by_python = json.loads(run(folder, "python", *given).out)
+    made = []
+
+    def compiled(compensator):
+        made.append(CompiledCorrector(compensator, tmp_path / f"c{len(made)}"))
+        return made[-1]
+
+    monkeypatch.setattr(process, "ModelCorrector", compiled)
+    by_c = json.loads(run(folder, "c", *given).out)
+    assert made
+    for key in ("lines", "spatial"):
+        for one, other in zip(by_python[key], by_c[key], strict=True):
+            for when in ("before", "after"):
+                assert other[when] == pytest.approx(one[when], rel=0, abs=1e-12)
 
 
 def test_check_knows_the_table_and_the_folder(folder):
