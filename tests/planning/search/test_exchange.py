@@ -155,7 +155,7 @@ def test_e_and_o3_choose_alike():
     np.testing.assert_array_equal(*orders)
 
 
-@pytest.mark.parametrize("name", ["d", "i"])
+@pytest.mark.parametrize("name", ["d", "i", "a", "e"])
 def test_a_search_of_many_poses_looks_closely_at_few_and_chooses_as_if_at_all(name, monkeypatch):
     pool = dome(400)
     looked: list[int] = []

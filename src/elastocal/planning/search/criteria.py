@@ -16,6 +16,7 @@ stacked with the poses last, so that each elimination step is one whole-array op
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
@@ -27,6 +28,9 @@ from elastocal.planning.search.information import Information
 from elastocal.plugins import Registry
 from elastocal.results import brief_repr
 
+_NOTHING = np.finfo(float).tiny
+_WEAKEST = 2
+"""Directions in which the smallest eigenvalue is looked for first."""
 _CHUNK = 4096
 """Matrices decomposed at once, so that temporaries stay small for large pools."""
 
@@ -87,15 +91,19 @@ class Criterion(ABC):
         self,
         matrix: FloatArray,  # noqa: ARG002 - most know none
         information: Information,  # noqa: ARG002
+        sign: float = 1.0,  # noqa: ARG002
     ) -> FloatArray | None:
-        """Return a bound that `after_adding` stays below, for next to nothing; None: none known.
+        """Return a bound that ``value(S + sign O_p^T O_p)`` stays below; None: none known.
 
-        A search looks closer only at the poses whose bound reaches the best value.
+        It costs next to nothing. A search looks closer only at the poses whose bound reaches the
+        best value.
 
         Parameters
         ----------
         matrix, information : ndarray, Information
             As for `after_adding`.
+        sign : float
+            1 where poses are added, -1 where poses that ``S`` holds are dropped.
 
         Returns
         -------
@@ -209,7 +217,9 @@ class DOptimal(Criterion):
         whole = _log_determinant(matrix) + gain
         return np.asarray(np.exp(whole / (2 * information.rank)))
 
-    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray | None:
+    def ceiling(
+        self, matrix: FloatArray, information: Information, sign: float = 1.0
+    ) -> FloatArray | None:
         """Return the bound of Jensen: ``log det(I + K) <= m log(1 + tr K / m)`` for m rows.
 
         None in pools as small as those whose whole matrices cost less.
@@ -217,8 +227,9 @@ class DOptimal(Criterion):
         if not information.updates_pay:
             return None
         rows, inverse = len(information.rows), np.asarray(np.linalg.inv(matrix), dtype=float)
-        trace = information.products(inverse)
-        whole = _log_determinant(matrix) + rows * np.log1p(trace / rows)
+        trace = sign * information.products(inverse)
+        # Of poses that the matrix holds, what round-off leaves below nothing.
+        whole = _log_determinant(matrix) + rows * np.log(np.maximum(1.0 + trace / rows, _NOTHING))
         return np.asarray(np.exp(whole / (2 * information.rank)))
 
 
@@ -312,8 +323,57 @@ class EOptimal(Criterion):
         """Return the smallest eigenvalue."""
         return np.asarray(np.square(singular_values(matrix)[..., 0]))
 
+    def ceiling(
+        self, matrix: FloatArray, information: Information, sign: float = 1.0
+    ) -> FloatArray | None:
+        """Return the smallest eigenvalue within the two weakest directions of ``S``.
 
-class AOptimal(Criterion):
+        No vector of a subspace has a smaller Rayleigh quotient than the smallest eigenvalue (G. H.
+        Golub, C. F. Van Loan, *Matrix Computations*, 2013, section 8.1.1).
+        """
+        if information.rank < _WEAKEST:
+            return None
+        values, vectors = np.linalg.eigh(matrix)
+        one, other = vectors[:, 0], vectors[:, 1]
+        mixed = 0.5 * (np.outer(one, other) + np.outer(other, one))
+        weights = np.array([np.outer(one, one), mixed, np.outer(other, other)])
+        a, b, c = sign * information.products(weights).T
+        a, c = a + values[0], c + values[1]
+        return np.asarray(0.5 * (a + c) - np.hypot(0.5 * (a - c), b))
+
+
+class _Trace(Criterion):
+    """Minus the trace of a weight times the inverse, a concave function of the matrix."""
+
+    @abstractmethod
+    def _weight(self, rank: int) -> tuple[FloatArray, FloatArray]:
+        """Return the weight, shape (r, r), and a root of it, shape (r, q)."""
+
+    def value(self, matrix: FloatArray) -> FloatArray:
+        """Return minus the trace."""
+        weight, _ = self._weight(matrix.shape[-1])
+        return np.asarray(-np.einsum("...ij,ij->...", np.linalg.inv(matrix), weight))
+
+    def after_adding(self, matrix: FloatArray, information: Information) -> FloatArray:
+        """Return the values by Woodbury's identity."""
+        if not information.updates_pay:
+            return super().after_adding(matrix, information)
+        _, root = self._weight(information.rank)
+        return self.value(matrix) + inverse_trace_loss(matrix, information.rows, root)
+
+    def ceiling(
+        self, matrix: FloatArray, information: Information, sign: float = 1.0
+    ) -> FloatArray | None:
+        """Return the tangent at ``S``, which a concave function stays below."""
+        weight, _ = self._weight(information.rank)
+        inverse = np.asarray(np.linalg.inv(matrix), dtype=float)
+        weighed = inverse @ weight
+        slope = weighed @ inverse
+        here = -float(np.trace(weighed))
+        return here + sign * information.products(0.5 * (slope + slope.T))
+
+
+class AOptimal(_Trace):
     """``-(1/s1^2 + … + 1/sr^2)``: minus the summed variance of the scaled compliances.
 
     Y. Sun, J. M. Hollerbach, "Observability index selection for robot calibration", ICRA 2008
@@ -322,19 +382,13 @@ class AOptimal(Criterion):
 
     name: ClassVar[str] = "a"
 
-    def value(self, matrix: FloatArray) -> FloatArray:
-        """Return minus the trace of the inverse."""
-        return np.asarray(-np.trace(np.linalg.inv(matrix), axis1=-2, axis2=-1))
-
-    def after_adding(self, matrix: FloatArray, information: Information) -> FloatArray:
-        """Return the values by Woodbury's identity."""
-        loss = inverse_trace_loss(matrix, information.rows, np.eye(information.rank))
-        return self.value(matrix) + loss
+    def _weight(self, rank: int) -> tuple[FloatArray, FloatArray]:
+        return np.eye(rank), np.eye(rank)
 
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class IOptimal(Criterion):
+class IOptimal(_Trace):
     """``-mean over process rows of z^T S^-1 z``: minus the mean variance of the predictions.
 
     In units of the variance of one measured coordinate, of each coordinate of the deflection at
@@ -363,23 +417,13 @@ class IOptimal(Criterion):
             raise PlanningError("the pool has no process rows, which I-optimality needs")
         return cls(information.process)
 
-    def value(self, matrix: FloatArray) -> FloatArray:
-        """Return minus the mean variance."""
-        product = np.linalg.solve(matrix, np.broadcast_to(self.process, matrix.shape))
-        return np.asarray(-np.trace(product, axis1=-2, axis2=-1))
+    def _weight(self, rank: int) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        return self.process, self._root
 
-    def after_adding(self, matrix: FloatArray, information: Information) -> FloatArray:
-        """Return the values by Woodbury's identity."""
-        if not information.updates_pay:
-            return super().after_adding(matrix, information)
+    @cached_property
+    def _root(self) -> FloatArray:
         eigenvalues, vectors = np.linalg.eigh(self.process)
-        root = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-        return self.value(matrix) + inverse_trace_loss(matrix, information.rows, root)
-
-    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray:
-        """Return the tangent at ``S``, which a concave function stays below."""
-        weighed = np.linalg.solve(matrix, self.process)
-        return self.value(matrix) + information.products(np.linalg.solve(matrix, weighed.T))
+        return np.asarray(vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
 
 
 _CLASSES: tuple[type[Criterion], ...] = (DOptimal, AOptimal, EOptimal, O2, O3, O4, O5, IOptimal)

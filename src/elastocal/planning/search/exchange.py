@@ -6,6 +6,7 @@ robot calibration with the local convergence method and Tabu search", IJRR 24, 2
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -229,16 +230,36 @@ def best_addition(information: Information, criterion: Criterion, chosen: IndexA
     matrix = information.matrix(chosen)
     left = np.delete(np.arange(len(information)), chosen)
     values = np.full(len(information), -np.inf)
-    ceiling = criterion.ceiling(matrix, information)
-    if ceiling is not None:
-        order = left[np.argsort(-ceiling[left])]
-        first, others = np.split(order, [1 + math.isqrt(len(order))])
-        values[first] = criterion.after_adding(matrix, information.take(first))
-        best = values.max()
-        left = others[ceiling[others] >= best - _SLACK * abs(best)]
-    if len(left):
-        values[left] = criterion.after_adding(matrix, information.take(left))
+    for some in _promising(left, values, criterion.ceiling(matrix, information)):
+        values[some] = criterion.after_adding(matrix, information.take(some))
     return int(_best(values, criterion)[0])
+
+
+def _promising(
+    poses: IndexArray, values: FloatArray, ceiling: FloatArray | None
+) -> Iterator[IndexArray]:
+    """Yield poses whose value may be the best, those with the highest bound first.
+
+    Parameters
+    ----------
+    poses : ndarray of int, shape (n,)
+        Poses to choose from.
+    values : ndarray, shape (pose,)
+        Values of all poses; the caller fills in those of the poses that it is given.
+    ceiling : ndarray, shape (pose,), optional
+        Bound of each value; None: none is known.
+    """
+    if ceiling is None:
+        yield poses
+        return
+    order = poses[np.argsort(-ceiling[poses])]
+    size = 1 + math.isqrt(len(order)) // 2
+    while len(order):
+        yield order[:size]
+        best = values.max()
+        order = order[size:]
+        order = order[ceiling[order] >= best - _SLACK * abs(best)]
+        size *= 2
 
 
 def _greedy_order(
@@ -267,11 +288,15 @@ def _worst(
 ) -> int:
     """Return the pose whose loss costs least, the newest if it is among these; none of ``kept``."""
     members = np.append(chosen, newest)
+    matrix, gram = information.matrix(members), information.gram[members]
+    values = np.full(len(members), -np.inf)
+    free = np.flatnonzero(~np.isin(members, np.asarray(kept, dtype=np.intp)))
     # Few matrices of full size: subtracting is exact enough where a low-rank downdate of an
     # ill-conditioned inverse would not be.
-    remaining = information.matrix(members) - information.gram[members]
-    values = np.array(criterion.value(remaining))
-    values[np.isin(members, np.asarray(kept, dtype=np.intp))] = -np.inf
+    for some in _promising(
+        free, values, criterion.ceiling(matrix, information.take(members), -1.0)
+    ):
+        values[some] = criterion.value(matrix - gram[some])
     tied = _best(values, criterion)
     return newest if len(chosen) in tied else int(members[tied[0]])
 

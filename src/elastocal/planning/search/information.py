@@ -5,6 +5,7 @@ pose scaled by column and projected on the directions that the pool observes.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,8 +81,28 @@ class Information:
         return total + EPSILON * np.eye(self.rank)
 
     def products(self, weight: FloatArray) -> FloatArray:
-        """Return ``tr(weight gram[p])`` of each pose for a symmetric weight, shape (pose,)."""
-        return self.gram.reshape(len(self), -1) @ weight.ravel()
+        """Return ``tr(weight gram[p])`` of each pose.
+
+        Parameters
+        ----------
+        weight : ndarray, shape (..., r, r)
+            Symmetric weights.
+
+        Returns
+        -------
+        ndarray, shape (pose, ...)
+        """
+        upper = weight[(..., *np.triu_indices(self.rank))]
+        return np.asarray(self._upper @ upper.T)
+
+    @cached_property
+    def _upper(self) -> FloatArray:
+        """Upper triangles of `gram`, what is off the diagonal twice, shape (pose, r (r + 1) / 2).
+
+        Products with all poses take as long as the numbers need to arrive from memory.
+        """
+        row, column = np.triu_indices(self.rank)
+        return np.asarray(self.gram[:, row, column] * np.where(row == column, 1.0, 2.0))
 
     def take(self, index: ArrayLike) -> "Information":
         """Return the information of some of the poses, about the directions of the whole pool."""
