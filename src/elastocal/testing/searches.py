@@ -153,17 +153,6 @@ class CriterionSuite:
             values = criterion.after_adding(matrix, information)
             assert np.all(values <= ceiling + 1e-6 * np.abs(values))
 
-    @pytest.mark.parametrize("count", [1, 3, 10, 30])
-    def test_no_value_after_dropping_is_above_its_ceiling(
-        self, criterion: Criterion, information: Information, count: int
-    ) -> None:
-        held = np.arange(count)
-        matrix = information.matrix(held)
-        ceiling = criterion.ceiling(matrix, information.take(held), -1.0)
-        if ceiling is not None:
-            values = criterion.value(matrix - information.gram[held])
-            assert np.all(values <= ceiling + 1e-6 * np.abs(values))
-
     def test_many_matrices_have_the_values_of_each(
         self, criterion: Criterion, information: Information
     ) -> None:

@@ -16,7 +16,7 @@ from elastocal.planning.search import (
     technique,
 )
 from elastocal.planning.search.criteria import Criterion, DOptimal
-from elastocal.planning.search.exchange import _exchange_poses, _greedy_order
+from elastocal.planning.search.exchange import _exchange_poses, _greedy_orders, _Run
 from elastocal.planning.search.information import EPSILON
 from support.pools import dome
 
@@ -192,7 +192,7 @@ def test_each_pose_of_the_order_raises_the_criterion_most():
 def test_equal_poses_go_to_the_lowest_number():
     pool = dome(20).take(np.repeat(np.arange(20), 2))
     information = build_information(pool)
-    order, _ = _greedy_order(information, _criterion("d", information), np.arange(40))
+    ((order, _),) = _greedy_orders(information, _criterion("d", information), [np.arange(40)])
     first = {}
     for place, pose in enumerate(order.tolist()):
         first.setdefault(pose // 2, (place, pose))
@@ -232,7 +232,9 @@ class Undefined(Fickle):
 @pytest.mark.parametrize("seed", range(10))
 def test_a_criterion_without_rhyme_or_reason_still_ends(seed):
     information = build_information(dome(12))
-    run = _exchange_poses(information, Fickle(np.random.default_rng(seed)), np.arange(6), 50)
+    (run,) = _exchange_poses(
+        information, Fickle(np.random.default_rng(seed)), [_Run.of(np.arange(6))], 50
+    )
     assert run.ended in ("cycle", "cap", "converged")
     assert len(run.added) <= 50
     assert len(run.chosen) == 6
@@ -242,17 +244,18 @@ def test_a_choice_that_comes_back_ends_the_run():
     """Of three poses choose one, with values that make each lose to the next."""
 
     class Circle(Fickle):
-        turn = 0
+        asked = 0
 
         def value(self, matrix):
-            return np.asarray(0.0) if matrix.ndim == 2 else np.array([1.0, 0.0])  # drops the old
+            if matrix.ndim == 2:
+                return np.asarray(0.0)
+            assert len(matrix) == 2  # those that are not chosen; the old and the new
+            self.asked += 1
+            adds, turn = self.asked % 2, (self.asked + 1) // 2
+            # Of these the next of the circle; then the old one is dropped.
+            return np.eye(2)[int(turn % 2 == 0)] if adds else np.array([1.0, 0.0])
 
-        def after_adding(self, matrix, information):  # noqa: ARG002
-            assert len(information) == 2  # those that are not chosen
-            self.turn += 1
-            return np.eye(2)[int(self.turn % 2 == 0)]  # of these the next of the circle
-
-    run = _exchange_poses(build_information(dome(3)), Circle(None), [0], 50)
+    (run,) = _exchange_poses(build_information(dome(3)), Circle(None), [_Run.of([0])], 50)
     assert run.ended == "cycle"
     assert run.added.tolist() == [1, 2, 0]
     assert run.dropped.tolist()[:2] == [0, 1]
@@ -261,7 +264,7 @@ def test_a_choice_that_comes_back_ends_the_run():
 def test_a_criterion_that_gives_nan_is_refused():
     information = build_information(dome(12))
     with pytest.raises(PlanningError, match="criterion 'undefined' gives NaN"):
-        _exchange_poses(information, Undefined(None), np.arange(4), 10)
+        _exchange_poses(information, Undefined(None), [_Run.of(np.arange(4))], 10)
 
 
 @pytest.mark.parametrize(("option", "value"), [("starts", 0), ("cap", 0), ("starts", -3)])

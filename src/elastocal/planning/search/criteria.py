@@ -28,7 +28,6 @@ from elastocal.planning.search.information import Information
 from elastocal.plugins import Registry
 from elastocal.results import brief_repr
 
-_NOTHING = np.finfo(float).tiny
 _WEAKEST = 2
 """Directions in which the smallest eigenvalue is looked for first."""
 _CHUNK = 4096
@@ -91,19 +90,15 @@ class Criterion(ABC):
         self,
         matrix: FloatArray,  # noqa: ARG002 - most know none
         information: Information,  # noqa: ARG002
-        sign: float = 1.0,  # noqa: ARG002
     ) -> FloatArray | None:
-        """Return a bound that ``value(S + sign O_p^T O_p)`` stays below; None: none known.
+        """Return a bound that `after_adding` stays below, for next to nothing; None: none known.
 
-        It costs next to nothing. A search looks closer only at the poses whose bound reaches the
-        best value.
+        A search looks closer only at the poses whose bound reaches the best value.
 
         Parameters
         ----------
         matrix, information : ndarray, Information
             As for `after_adding`.
-        sign : float
-            1 where poses are added, -1 where poses that ``S`` holds are dropped.
 
         Returns
         -------
@@ -217,9 +212,7 @@ class DOptimal(Criterion):
         whole = _log_determinant(matrix) + gain
         return np.asarray(np.exp(whole / (2 * information.rank)))
 
-    def ceiling(
-        self, matrix: FloatArray, information: Information, sign: float = 1.0
-    ) -> FloatArray | None:
+    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray | None:
         """Return the bound of Jensen: ``log det(I + K) <= m log(1 + tr K / m)`` for m rows.
 
         None in pools as small as those whose whole matrices cost less.
@@ -227,9 +220,8 @@ class DOptimal(Criterion):
         if not information.updates_pay:
             return None
         rows, inverse = len(information.rows), np.asarray(np.linalg.inv(matrix), dtype=float)
-        trace = sign * information.products(inverse)
-        # Of poses that the matrix holds, what round-off leaves below nothing.
-        whole = _log_determinant(matrix) + rows * np.log(np.maximum(1.0 + trace / rows, _NOTHING))
+        trace = information.products(inverse)
+        whole = _log_determinant(matrix) + rows * np.log1p(trace / rows)
         return np.asarray(np.exp(whole / (2 * information.rank)))
 
 
@@ -323,9 +315,7 @@ class EOptimal(Criterion):
         """Return the smallest eigenvalue."""
         return np.asarray(np.square(singular_values(matrix)[..., 0]))
 
-    def ceiling(
-        self, matrix: FloatArray, information: Information, sign: float = 1.0
-    ) -> FloatArray | None:
+    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray | None:
         """Return the smallest eigenvalue within the two weakest directions of ``S``.
 
         No vector of a subspace has a smaller Rayleigh quotient than the smallest eigenvalue (G. H.
@@ -337,7 +327,7 @@ class EOptimal(Criterion):
         one, other = vectors[:, 0], vectors[:, 1]
         mixed = 0.5 * (np.outer(one, other) + np.outer(other, one))
         weights = np.array([np.outer(one, one), mixed, np.outer(other, other)])
-        a, b, c = sign * information.products(weights).T
+        a, b, c = information.products(weights).T
         a, c = a + values[0], c + values[1]
         return np.asarray(0.5 * (a + c) - np.hypot(0.5 * (a - c), b))
 
@@ -361,16 +351,14 @@ class _Trace(Criterion):
         _, root = self._weight(information.rank)
         return self.value(matrix) + inverse_trace_loss(matrix, information.rows, root)
 
-    def ceiling(
-        self, matrix: FloatArray, information: Information, sign: float = 1.0
-    ) -> FloatArray | None:
+    def ceiling(self, matrix: FloatArray, information: Information) -> FloatArray | None:
         """Return the tangent at ``S``, which a concave function stays below."""
         weight, _ = self._weight(information.rank)
         inverse = np.asarray(np.linalg.inv(matrix), dtype=float)
         weighed = inverse @ weight
         slope = weighed @ inverse
         here = -float(np.trace(weighed))
-        return here + sign * information.products(0.5 * (slope + slope.T))
+        return here + information.products(0.5 * (slope + slope.T))
 
 
 class AOptimal(_Trace):

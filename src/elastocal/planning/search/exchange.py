@@ -6,14 +6,14 @@ robot calibration with the local convergence method and Tabu search", IJRR 24, 2
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
 from elastocal.planning.search.criteria import CRITERIA, Criterion
 from elastocal.planning.search.information import Information, build_information
@@ -22,6 +22,8 @@ from elastocal.results import brief_repr
 
 _TIE = 1e-9
 """Values closer than this part of the best are equal but for round-off."""
+_CHUNK = 4096
+"""Matrices that are judged at once, so that temporaries stay small."""
 _SLACK = 1e-6
 """Part of the best value by which round-off may lower a bound of another."""
 
@@ -144,20 +146,36 @@ class ExchangeSearch:
         PlanningError
             If the pool lacks the rows that the criterion needs.
         """
-        rng = np.random.default_rng(0) if rng is None else rng
+        return self.choose_each(information, [count], [rng])[0]
+
+    def choose_each(
+        self,
+        information: Information,
+        counts: Sequence[int],
+        rngs: Sequence[np.random.Generator | None],
+    ) -> list[ExchangeSelection]:
+        """Return a choice of each of several numbers of poses; see `choose`.
+
+        All searches take their steps together, which in a small pool costs little more than one.
+        """
         criterion = CRITERIA.named(self.criterion).of(information)
-        kept = _indices(list(self.kept[:count]))
-        starts = [
-            _with_kept(kept, rng.permutation(len(information)), count) for _ in range(self.starts)
+        runs: list[_Run] = []
+        for count, given in zip(counts, rngs, strict=True):
+            rng = np.random.default_rng(0) if given is None else given
+            kept = _indices(list(self.kept[:count]))
+            orders = [rng.permutation(len(information)) for _ in range(self.starts)]
+            runs += [_Run.of(_with_kept(kept, order, count), kept) for order in orders]
+        found = _exchange_poses(information, criterion, runs, self.cap)
+        tries = [tuple(found[n : n + self.starts]) for n in range(0, len(found), self.starts)]
+        best = [int(np.argmax([run.value for run in each])) for each in tries]
+        chosen = [each[number].chosen for each, number in zip(tries, best, strict=True)]
+        grown = _greedy_orders(information, criterion, chosen)
+        return [
+            ExchangeSelection(
+                order, self.name, {"value": values}, each, number, information.process_unseen
+            )
+            for each, number, (order, values) in zip(tries, best, grown, strict=True)
         ]
-        runs = tuple(
-            _exchange_poses(information, criterion, start, self.cap, kept) for start in starts
-        )
-        best = int(np.argmax([run.value for run in runs]))
-        order, values = _greedy_order(information, criterion, runs[best].chosen)
-        return ExchangeSelection(
-            order, self.name, {"value": values}, runs, best, information.process_unseen
-        )
 
 
 def _with_kept(kept: IndexArray, order: IndexArray, count: int) -> IndexArray:
@@ -165,14 +183,44 @@ def _with_kept(kept: IndexArray, order: IndexArray, count: int) -> IndexArray:
     return np.concatenate([kept, order[~np.isin(order, kept)]])[:count]
 
 
+@dataclass
+class _Run:
+    """A run of exchanges on its way."""
+
+    start: IndexArray
+    kept: IndexArray
+    """Poses of the start that are never dropped."""
+    chosen: IndexArray
+    added: list[int] = field(default_factory=list)
+    dropped: list[int] = field(default_factory=list)
+    seen: set[bytes] = field(default_factory=set)
+    """Choices that it has had."""
+    ended: str = ""
+    """Why it ended; empty while it goes on."""
+
+    @classmethod
+    def of(cls, start: ArrayLike, kept: ArrayLike = ()) -> "_Run":
+        """Return the run from a start, poses of which none stands twice."""
+        poses = np.sort(np.asarray(start, dtype=np.intp))
+        return cls(poses, np.asarray(kept, dtype=np.intp), poses, seen={poses.tobytes()})
+
+    def exchange(self, best: int, worst: int) -> None:
+        """Add a pose and drop another; the run ends where they are the same."""
+        self.added.append(best)
+        self.dropped.append(worst)
+        if best == worst:
+            self.ended = "converged"
+            return
+        self.chosen = np.sort(np.append(self.chosen[self.chosen != worst], best))
+        if self.chosen.tobytes() in self.seen:
+            self.ended = "cycle"
+        self.seen.add(self.chosen.tobytes())
+
+
 def _exchange_poses(
-    information: Information,
-    criterion: Criterion,
-    start: ArrayLike,
-    cap: int,
-    kept: ArrayLike = (),
-) -> Exchange:
-    """Return a choice that no single exchange of its worst pose improves.
+    information: Information, criterion: Criterion, runs: Sequence[_Run], cap: int
+) -> list[Exchange]:
+    """Return choices that no single exchange of their worst pose improves.
 
     Ties, to round-off, go to the lowest number; a pose just added that is among the worst is
     the one to drop, which ends the run. A converged run cannot have gone in circles, since each
@@ -185,38 +233,100 @@ def _exchange_poses(
         Information of the pool.
     criterion : Criterion
         What to raise.
-    start : array_like of int, shape (n,)
-        Poses to begin with, none twice.
+    runs : sequence of _Run
+        Runs at their start. They know nothing of one another.
     cap : int
         Most steps to take.
-    kept : array_like of int, shape (n,)
-        Poses of the start that are never dropped.
 
     Raises
     ------
     PlanningError
         If the criterion gives NaN.
     """
-    start = np.sort(np.asarray(start, dtype=np.intp))
-    chosen = start
-    added: list[int] = []
-    dropped: list[int] = []
-    seen = {chosen.tobytes()}
-    ended = "whole pool" if len(chosen) == len(information) else "cap"
-    while ended == "cap" and len(added) < cap:
-        best = best_addition(information, criterion, chosen)
-        worst = _worst(information, criterion, chosen, best, kept)
-        added.append(best)
-        dropped.append(worst)
-        if best == worst:
-            ended = "converged"
+    for run in runs:
+        if len(run.chosen) == len(information):
+            run.ended = "whole pool"
+    for _ in range(cap):
+        active = [run for run in runs if not run.ended]
+        if not active:
             break
-        chosen = np.sort(np.append(chosen[chosen != worst], best))
-        if chosen.tobytes() in seen:
-            ended = "cycle"
-        seen.add(chosen.tobytes())
-    value = float(criterion.value(information.matrix(chosen)))
-    return Exchange(start, chosen, _indices(added), _indices(dropped), value, ended)
+        best = _best_additions(information, criterion, [run.chosen for run in active])
+        worst = _worst_of_each(information, criterion, active, best)
+        for run, *exchanged in zip(active, best, worst, strict=True):
+            run.exchange(*exchanged)
+    matrices = [information.matrix(run.chosen) for run in runs]
+    return [
+        Exchange(
+            run.start,
+            run.chosen,
+            _indices(run.added),
+            _indices(run.dropped),
+            float(criterion.value(matrix)),
+            run.ended or "cap",
+        )
+        for run, matrix in zip(runs, matrices, strict=True)
+    ]
+
+
+def _best_additions(
+    information: Information, criterion: Criterion, choices: Sequence[IndexArray]
+) -> list[int]:
+    """Return what `best_addition` returns of each of several choices."""
+    if information.updates_pay:
+        return [best_addition(information, criterion, each) for each in choices]
+    matrices = np.array([information.matrix(each) for each in choices])
+    outside = np.ones((len(choices), len(information)), dtype=bool)
+    for row, each in zip(outside, choices, strict=True):
+        row[each] = False
+    owner, pose = np.nonzero(outside)
+    values = np.full(outside.shape, -np.inf)
+    values[owner, pose] = _values(criterion, matrices, owner, information.gram[pose])
+    return [int(row.argmax()) for row in _ties(values, criterion)]
+
+
+def _worst_of_each(
+    information: Information, criterion: Criterion, runs: Sequence[_Run], newest: Sequence[int]
+) -> list[int]:
+    """Return the pose of each choice, with its newest, whose loss costs least; none of ``kept``.
+
+    The newest if it is among these.
+    """
+    members = [np.append(run.chosen, pose) for run, pose in zip(runs, newest, strict=True)]
+    matrices = np.array([information.matrix(each) for each in members])
+    free = [np.isin(each, run.kept, invert=True) for each, run in zip(members, runs, strict=True)]
+    owner = np.repeat(np.arange(len(runs)), [len(each) for each in members])
+    place = np.concatenate([np.arange(len(each)) for each in members])
+    may = np.concatenate(free)
+    owner, place, pose = owner[may], place[may], np.concatenate(members)[may]
+    values = np.full((len(runs), max(map(len, members))), -np.inf)
+    # Few matrices of full size: subtracting is exact enough where a low-rank downdate of an
+    # ill-conditioned inverse would not be.
+    values[owner, place] = _values(criterion, matrices, owner, -information.gram[pose])
+    tied = _ties(values, criterion)
+    return [
+        int(each[-1] if row[len(each) - 1] else each[row.argmax()])
+        for each, row in zip(members, tied, strict=True)
+    ]
+
+
+def _values(
+    criterion: Criterion, matrices: FloatArray, owner: IndexArray, gram: FloatArray
+) -> FloatArray:
+    """Return the criterion of matrices with the information of a pose more, or less, each.
+
+    Parameters
+    ----------
+    criterion : Criterion
+        What is asked.
+    matrices : ndarray, shape (choice, r, r)
+        Information of each choice.
+    owner : ndarray of int, shape (n,)
+        Choice of each pose.
+    gram : ndarray, shape (n, r, r)
+        Information of each pose.
+    """
+    parts = [slice(begin, begin + _CHUNK) for begin in range(0, len(owner), _CHUNK)]
+    return np.concatenate([criterion.value(matrices[owner[part]] + gram[part]) for part in parts])
 
 
 def best_addition(information: Information, criterion: Criterion, chosen: IndexArray) -> int:
@@ -232,7 +342,7 @@ def best_addition(information: Information, criterion: Criterion, chosen: IndexA
     values = np.full(len(information), -np.inf)
     for some in _promising(left, values, criterion.ceiling(matrix, information)):
         values[some] = criterion.after_adding(matrix, information.take(some))
-    return int(_best(values, criterion)[0])
+    return int(_ties(values, criterion).argmax())
 
 
 def _promising(
@@ -262,50 +372,38 @@ def _promising(
         size *= 2
 
 
-def _greedy_order(
-    information: Information, criterion: Criterion, chosen: IndexArray
-) -> tuple[IndexArray, FloatArray]:
-    """Return a choice in an order of growth, and the criterion's value of each prefix.
+def _greedy_orders(
+    information: Information, criterion: Criterion, choices: Sequence[IndexArray]
+) -> list[tuple[IndexArray, FloatArray]]:
+    """Return choices in an order of growth, and the criterion's value of each prefix.
 
     Each next pose is the one of the choice that raises the criterion most, so that the first
-    visited poses already carry much information; shapes (n,) and (n,).
+    visited poses already carry much information; shapes (n,) and (n,) of each.
     """
-    inner = information.take(chosen)
-    order: list[int] = []
-    values = []
-    for _ in range(len(chosen)):
-        order.append(best_addition(inner, criterion, _indices(order)))
-        values.append(float(criterion.value(inner.matrix(order))))
-    return chosen[_indices(order)], np.array(values)
+    orders: list[list[int]] = [[] for _ in choices]
+    values: list[list[float]] = [[] for _ in choices]
+    for step in range(max(map(len, choices))):
+        growing = [number for number, each in enumerate(choices) if len(each) > step]
+        matrices = np.array([information.matrix(orders[number]) for number in growing])
+        left = [np.setdiff1d(choices[number], orders[number]) for number in growing]
+        owner = np.repeat(np.arange(len(growing)), [len(each) for each in left])
+        place = np.concatenate([np.arange(len(each)) for each in left])
+        gains = np.full((len(growing), max(map(len, left))), -np.inf)
+        added = information.gram[np.concatenate(left)]
+        gains[owner, place] = _values(criterion, matrices, owner, added)
+        picks = _ties(gains, criterion).argmax(axis=1).tolist()
+        for number, poses, pick, row in zip(growing, left, picks, gains, strict=True):
+            orders[number].append(int(poses[pick]))
+            values[number].append(float(row[pick]))
+    return [(_indices(order), np.array(value)) for order, value in zip(orders, values, strict=True)]
 
 
-def _worst(
-    information: Information,
-    criterion: Criterion,
-    chosen: IndexArray,
-    newest: int,
-    kept: ArrayLike = (),
-) -> int:
-    """Return the pose whose loss costs least, the newest if it is among these; none of ``kept``."""
-    members = np.append(chosen, newest)
-    matrix, gram = information.matrix(members), information.gram[members]
-    values = np.full(len(members), -np.inf)
-    free = np.flatnonzero(~np.isin(members, np.asarray(kept, dtype=np.intp)))
-    # Few matrices of full size: subtracting is exact enough where a low-rank downdate of an
-    # ill-conditioned inverse would not be.
-    for some in _promising(
-        free, values, criterion.ceiling(matrix, information.take(members), -1.0)
-    ):
-        values[some] = criterion.value(matrix - gram[some])
-    tied = _best(values, criterion)
-    return newest if len(chosen) in tied else int(members[tied[0]])
-
-
-def _best(values: FloatArray, criterion: Criterion) -> IndexArray:
-    best = values.max()
-    if np.isnan(best):
+def _ties(values: FloatArray, criterion: Criterion) -> BoolArray:
+    """Return which values are the best of their row but for round-off."""
+    best = values.max(axis=-1, keepdims=True)
+    if np.isnan(best).any():
         raise PlanningError(f"criterion {criterion.name!r} gives NaN: it cannot rank poses")
-    return np.flatnonzero(values >= best - _TIE * abs(best))
+    return np.asarray(values >= best - _TIE * np.abs(best))
 
 
 def _indices(values: list[int]) -> IndexArray:

@@ -80,5 +80,6 @@ def growing_choices(
     counts = range(1, most + 1)
     if isinstance(wanted, ExchangeSearch):
         information = build_information(candidates)
-        return [wanted.choose(information, count, rng_of(count)).order for count in counts]
+        rngs = [rng_of(count) for count in counts]
+        return [each.order for each in wanted.choose_each(information, counts, rngs)]
     return [wanted.search(candidates, count, rng_of(count)).order for count in counts]
