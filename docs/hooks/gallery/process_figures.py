@@ -8,9 +8,9 @@ A case is an example cell with a preset and a seed. The procedure is run, calibr
 layout of springs, the tool is weighed, and the process simulated at the programmed, half and turned
 load, as `elastocal simulate-process` does. On `typical` the same is done, at the programmed load,
 with shorter campaigns and with that of the paper; on every truth with the growth of the arm that is
-touched before production, and with a press before every reference: alone, and with the offset of
-each course. Of `ur20`, an example without a process, the deflection at left-out poses
-is measured, and what its prediction leaves of it.
+touched before production, with a press before every reference, alone and with the offset of each
+course, and with all of these. Of `ur20`, an example without a process, the deflection at left-out
+poses is measured, and what its prediction leaves of it.
 """
 
 import argparse
@@ -77,6 +77,7 @@ SHORTER = (
 TOUCHED = Campaign("touched", {}, ("auto",), points=12)
 CONDITIONED = Campaign("conditioned", {}, ("auto",), conditioned=True)
 OFFSET = Campaign("course offset", {}, ("auto",), conditioned=True, offset=True)
+ALL = Campaign("touched and offset", {}, ("auto",), points=12, conditioned=True, offset=True)
 
 
 @record()
@@ -140,7 +141,7 @@ def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
     for seed in SEEDS[1:]:
         for kind in process.PROCESSES:
             yield Case(kind, TYPICAL, seed), SHORTER
-    for campaigns in ((TOUCHED,), (CONDITIONED, OFFSET)):
+    for campaigns in ((TOUCHED,), (CONDITIONED, OFFSET), (ALL,)):
         for preset in (TYPICAL, *OTHERS):
             for seed in SEEDS:
                 for kind in process.PROCESSES:
