@@ -22,8 +22,8 @@ from elastocal.results import brief_repr
 
 _TIE = 1e-9
 """Values closer than this part of the best are equal but for round-off."""
-_CHUNK = 4096
-"""Matrices that are judged at once, so that temporaries stay small."""
+_CHUNK = 256
+"""Matrices that are judged at once: few enough that they stay in a cache of the processor."""
 _SLACK = 1e-6
 """Part of the best value by which round-off may lower a bound of another."""
 
@@ -254,17 +254,17 @@ def _exchange_poses(
         worst = _worst_of_each(information, criterion, active, best)
         for run, *exchanged in zip(active, best, worst, strict=True):
             run.exchange(*exchanged)
-    matrices = [information.matrix(run.chosen) for run in runs]
+    values = criterion.value(information.matrices([run.chosen for run in runs]))
     return [
         Exchange(
             run.start,
             run.chosen,
             _indices(run.added),
             _indices(run.dropped),
-            float(criterion.value(matrix)),
+            float(value),
             run.ended or "cap",
         )
-        for run, matrix in zip(runs, matrices, strict=True)
+        for run, value in zip(runs, values, strict=True)
     ]
 
 
@@ -274,7 +274,7 @@ def _best_additions(
     """Return what `best_addition` returns of each of several choices."""
     if information.updates_pay:
         return [best_addition(information, criterion, each) for each in choices]
-    matrices = np.array([information.matrix(each) for each in choices])
+    matrices = information.matrices(choices)
     outside = np.ones((len(choices), len(information)), dtype=bool)
     for row, each in zip(outside, choices, strict=True):
         row[each] = False
@@ -292,12 +292,15 @@ def _worst_of_each(
     The newest if it is among these.
     """
     members = [np.append(run.chosen, pose) for run, pose in zip(runs, newest, strict=True)]
-    matrices = np.array([information.matrix(each) for each in members])
-    free = [np.isin(each, run.kept, invert=True) for each, run in zip(members, runs, strict=True)]
+    matrices = information.matrices(members)
     owner = np.repeat(np.arange(len(runs)), [len(each) for each in members])
     place = np.concatenate([np.arange(len(each)) for each in members])
-    may = np.concatenate(free)
-    owner, place, pose = owner[may], place[may], np.concatenate(members)[may]
+    pose = np.concatenate(members)
+    kept = np.zeros((len(runs), len(information)), dtype=bool)
+    for row, run in zip(kept, runs, strict=True):
+        row[run.kept] = True
+    may = ~kept[owner, pose]
+    owner, place, pose = owner[may], place[may], pose[may]
     values = np.full((len(runs), max(map(len, members))), -np.inf)
     # Few matrices of full size: subtracting is exact enough where a low-rank downdate of an
     # ill-conditioned inverse would not be.
@@ -382,10 +385,10 @@ def _greedy_orders(
     """
     orders: list[list[int]] = [[] for _ in choices]
     values: list[list[float]] = [[] for _ in choices]
-    for step in range(max(map(len, choices))):
-        growing = [number for number, each in enumerate(choices) if len(each) > step]
-        matrices = np.array([information.matrix(orders[number]) for number in growing])
-        left = [np.setdiff1d(choices[number], orders[number]) for number in growing]
+    ungrown = [np.sort(each) for each in choices]
+    while growing := [number for number, each in enumerate(ungrown) if len(each)]:
+        matrices = information.matrices([_indices(orders[number]) for number in growing])
+        left = [ungrown[number] for number in growing]
         owner = np.repeat(np.arange(len(growing)), [len(each) for each in left])
         place = np.concatenate([np.arange(len(each)) for each in left])
         gains = np.full((len(growing), max(map(len, left))), -np.inf)
@@ -394,6 +397,7 @@ def _greedy_orders(
         picks = _ties(gains, criterion).argmax(axis=1).tolist()
         for number, poses, pick, row in zip(growing, left, picks, gains, strict=True):
             orders[number].append(int(poses[pick]))
+            ungrown[number] = np.delete(poses, pick)
             values[number].append(float(row[pick]))
     return [(_indices(order), np.array(value)) for order, value in zip(orders, values, strict=True)]
 

@@ -4,13 +4,14 @@ The information matrix of a choice of poses is ``S = eps I + sum O_p^T O_p``, wi
 pose scaled by column and projected on the directions that the pool observes.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import BoolArray, FloatArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PlanningError
 from elastocal.identification import RANK_TOLERANCE, rank
 from elastocal.planning.search.protocol import Candidates
@@ -77,7 +78,15 @@ class Information:
 
     def matrix(self, chosen: ArrayLike) -> FloatArray:
         """Return ``S = eps I + sum of gram`` over chosen poses, shape (r, r)."""
-        total: FloatArray = self.gram[np.asarray(chosen, dtype=np.intp)].sum(axis=0)
+        return np.asarray(self.matrices([np.asarray(chosen, dtype=np.intp)])[0])
+
+    def matrices(self, choices: Sequence[IndexArray]) -> FloatArray:
+        """Return what `matrix` returns of each of several choices, shape (choice, r, r)."""
+        total: FloatArray = np.zeros((len(choices), self.rank, self.rank))
+        size = np.array([len(each) for each in choices])
+        begin = (np.cumsum(size) - size)[size > 0]
+        if len(begin):
+            total[size > 0] = np.add.reduceat(self.gram[np.concatenate(choices)], begin, axis=0)
         return total + EPSILON * np.eye(self.rank)
 
     def products(self, weight: FloatArray) -> FloatArray:
