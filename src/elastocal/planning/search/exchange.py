@@ -22,8 +22,10 @@ from elastocal.results import brief_repr
 
 _TIE = 1e-9
 """Values closer than this part of the best are equal but for round-off."""
-_CHUNK = 256
-"""Matrices that are judged at once: few enough that they stay in a cache of the processor."""
+_NUMBERS = 2**17
+"""Numbers in the matrices that are judged at once: few enough for a cache of the processor."""
+_MANY = 100
+"""Poses from which on each of several choices is looked at alone, where updates pay."""
 _SLACK = 1e-6
 """Part of the best value by which round-off may lower a bound of another."""
 
@@ -246,12 +248,17 @@ def _exchange_poses(
     for run in runs:
         if len(run.chosen) == len(information):
             run.ended = "whole pool"
+    matrices = information.matrices([run.chosen for run in runs])
     for _ in range(cap):
-        active = [run for run in runs if not run.ended]
-        if not active:
+        going = [number for number, run in enumerate(runs) if not run.ended]
+        if not going:
             break
-        best = _best_additions(information, criterion, [run.chosen for run in active])
-        worst = _worst_of_each(information, criterion, active, best)
+        active = [runs[number] for number in going]
+        grown = matrices[going]
+        best = _best_additions(information, criterion, [run.chosen for run in active], grown)
+        grown += information.gram[best]
+        worst = _worst_of_each(information, criterion, active, best, grown)
+        matrices[going] = grown - information.gram[worst]
         for run, *exchanged in zip(active, best, worst, strict=True):
             run.exchange(*exchanged)
     values = criterion.value(information.matrices([run.chosen for run in runs]))
@@ -269,67 +276,76 @@ def _exchange_poses(
 
 
 def _best_additions(
-    information: Information, criterion: Criterion, choices: Sequence[IndexArray]
+    information: Information,
+    criterion: Criterion,
+    choices: Sequence[IndexArray],
+    matrices: FloatArray,
 ) -> list[int]:
-    """Return what `best_addition` returns of each of several choices."""
-    if information.updates_pay:
+    """Return what `best_addition` returns of each of several choices with their information."""
+    if information.updates_pay and len(information) > _MANY:
         return [best_addition(information, criterion, each) for each in choices]
-    matrices = information.matrices(choices)
-    outside = np.ones((len(choices), len(information)), dtype=bool)
-    for row, each in zip(outside, choices, strict=True):
-        row[each] = False
-    owner, pose = np.nonzero(outside)
-    values = np.full(outside.shape, -np.inf)
-    values[owner, pose] = _values(criterion, matrices, owner, information.gram[pose])
+    outside = ~_members(information, choices)
+    values = _values(information, criterion, matrices, outside)
     return [int(row.argmax()) for row in _ties(values, criterion)]
 
 
 def _worst_of_each(
-    information: Information, criterion: Criterion, runs: Sequence[_Run], newest: Sequence[int]
+    information: Information,
+    criterion: Criterion,
+    runs: Sequence[_Run],
+    newest: Sequence[int],
+    matrices: FloatArray,
 ) -> list[int]:
     """Return the pose of each choice, with its newest, whose loss costs least; none of ``kept``.
 
-    The newest if it is among these.
+    The newest if it is among these; the information is that with the newest.
     """
-    members = [np.append(run.chosen, pose) for run, pose in zip(runs, newest, strict=True)]
-    matrices = information.matrices(members)
-    owner = np.repeat(np.arange(len(runs)), [len(each) for each in members])
-    place = np.concatenate([np.arange(len(each)) for each in members])
-    pose = np.concatenate(members)
-    kept = np.zeros((len(runs), len(information)), dtype=bool)
-    for row, run in zip(kept, runs, strict=True):
-        row[run.kept] = True
-    may = ~kept[owner, pose]
-    owner, place, pose = owner[may], place[may], pose[may]
-    values = np.full((len(runs), max(map(len, members))), -np.inf)
-    # Few matrices of full size: subtracting is exact enough where a low-rank downdate of an
-    # ill-conditioned inverse would not be.
-    values[owner, place] = _values(criterion, matrices, owner, -information.gram[pose])
-    tied = _ties(values, criterion)
-    return [
-        int(each[-1] if row[len(each) - 1] else each[row.argmax()])
-        for each, row in zip(members, tied, strict=True)
-    ]
+    free = _members(information, [run.chosen for run in runs])
+    free[np.arange(len(runs)), newest] = True
+    free &= ~_members(information, [run.kept for run in runs])
+    tied = _ties(_values(information, criterion, matrices, free, -1), criterion)
+    return [int(new if row[new] else row.argmax()) for row, new in zip(tied, newest, strict=True)]
 
 
 def _values(
-    criterion: Criterion, matrices: FloatArray, owner: IndexArray, gram: FloatArray
+    information: Information,
+    criterion: Criterion,
+    matrices: FloatArray,
+    asked: BoolArray,
+    sign: int = 1,
 ) -> FloatArray:
-    """Return the criterion of matrices with the information of a pose more, or less, each.
+    """Return the criterion of several choices with a pose more, or less.
 
     Parameters
     ----------
+    information : Information
+        Information of the pool.
     criterion : Criterion
         What is asked.
     matrices : ndarray, shape (choice, r, r)
         Information of each choice.
-    owner : ndarray of int, shape (n,)
-        Choice of each pose.
-    gram : ndarray, shape (n, r, r)
-        Information of each pose.
+    asked : ndarray of bool, shape (choice, pose)
+        What is wanted; the other values are minus infinity.
+    sign : int
+        1 adds each pose, -1 drops it.
     """
-    parts = [slice(begin, begin + _CHUNK) for begin in range(0, len(owner), _CHUNK)]
-    return np.concatenate([criterion.value(matrices[owner[part]] + gram[part]) for part in parts])
+    choice, pose = np.nonzero(asked)
+    values = np.full(asked.shape, -np.inf)
+    size = max(1, _NUMBERS // information.rank**2)
+    for begin in range(0, len(choice), size):
+        some = choice[begin : begin + size], pose[begin : begin + size]
+        # Whole matrices: where a pose is dropped, a low-rank downdate of an ill-conditioned inverse
+        # would not be exact enough.
+        values[some] = criterion.value(matrices[some[0]] + sign * information.gram[some[1]])
+    return values
+
+
+def _members(information: Information, choices: Sequence[IndexArray]) -> BoolArray:
+    """Return whether each choice has each pose, shape (choice, pose)."""
+    members = np.zeros((len(choices), len(information)), dtype=bool)
+    for row, each in zip(members, choices, strict=True):
+        row[each] = True
+    return members
 
 
 def best_addition(information: Information, criterion: Criterion, chosen: IndexArray) -> int:
@@ -385,19 +401,15 @@ def _greedy_orders(
     """
     orders: list[list[int]] = [[] for _ in choices]
     values: list[list[float]] = [[] for _ in choices]
-    ungrown = [np.sort(each) for each in choices]
-    while growing := [number for number, each in enumerate(ungrown) if len(each)]:
-        matrices = information.matrices([_indices(orders[number]) for number in growing])
-        left = [ungrown[number] for number in growing]
-        owner = np.repeat(np.arange(len(growing)), [len(each) for each in left])
-        place = np.concatenate([np.arange(len(each)) for each in left])
-        gains = np.full((len(growing), max(map(len, left))), -np.inf)
-        added = information.gram[np.concatenate(left)]
-        gains[owner, place] = _values(criterion, matrices, owner, added)
-        picks = _ties(gains, criterion).argmax(axis=1).tolist()
-        for number, poses, pick, row in zip(growing, left, picks, gains, strict=True):
-            orders[number].append(int(poses[pick]))
-            ungrown[number] = np.delete(poses, pick)
+    left = _members(information, choices)
+    matrices = information.matrices([_indices([]) for _ in choices])
+    while len(growing := np.flatnonzero(left.any(axis=1))):
+        gains = _values(information, criterion, matrices[growing], left[growing])
+        picks = _ties(gains, criterion).argmax(axis=1)
+        left[growing, picks] = False
+        matrices[growing] += information.gram[picks]
+        for number, pick, row in zip(growing.tolist(), picks.tolist(), gains, strict=True):
+            orders[number].append(pick)
             values[number].append(float(row[pick]))
     return [(_indices(order), np.array(value)) for order, value in zip(orders, values, strict=True)]
 
