@@ -12,6 +12,7 @@ from matplotlib.text import Text
 from elastocal.codec import AXES
 from elastocal.errors import CodecError
 from elastocal.report.plots import (
+    analysis_charts,
     codec_chart,
     compliance_chart,
     index_chart,
@@ -160,6 +161,24 @@ def test_every_spring_has_a_panel_with_a_readable_unit(known):
     assert {axes.get_ylabel() for axes in figure.axes} == {"µrad/(N·m)"}
     first = names[:3]
     assert {name.partition(".")[0] for name in first} == {"joint_1"}
+
+
+def test_of_many_springs_those_without_a_finding_have_no_panel(known, monkeypatch):
+    monkeypatch.setattr(analysis_charts, "_MOST_SPRINGS", 10)
+    found = {
+        name
+        for each, labels in zip(known.insight.seen, known.data.springs, strict=True)
+        for name, share in zip(labels.names, each.share[-1], strict=True)
+        if share >= 0.5
+    }
+    springs = set().union(*(labels.names for labels in known.data.springs))
+    assert found
+    assert found < springs
+    figure = compliance_chart(known.data, known.insight.seen)
+    assert {axes.get_title("left") for axes in figure.axes} == found
+    left = f"Not drawn: {len(springs) - len(found)} of {len(springs)} springs"
+    assert left in texts_of(figure)
+    assert not overlapping(figure)
 
 
 def test_springs_that_are_not_told_apart_say_so(known):

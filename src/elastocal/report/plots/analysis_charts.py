@@ -41,6 +41,8 @@ _HEAD, _FOOT, _LINE = 0.62, 0.75, 0.155
 _SETTLED = 0.25
 """Part of the largest training set from which on boxes set the scale; those of fewer poses may
 be cut, which is marked."""
+_MOST_SPRINGS = 18
+"""Panels up to which a page has one for every spring."""
 _SHORT = 26
 """Characters of variants' names that fit beside the name of a spring."""
 _ROOMY = 1.8
@@ -98,6 +100,8 @@ class SpringBoxes:
 def compliance_chart(data: CodecData, seen: Sequence[SpringObservability]) -> Figure:
     """Return one page with a panel for each spring.
 
+    Where there are very many, springs that the largest training sets do not tell apart have none.
+
     Parameters
     ----------
     data : CodecData
@@ -110,7 +114,8 @@ def compliance_chart(data: CodecData, seen: Sequence[SpringObservability]) -> Fi
     CodecError
         If a variant has no compliance to draw.
     """
-    springs = spring_boxes(data, seen)
+    every = spring_boxes(data, seen)
+    springs = _worth_a_panel(every)
     styles = variant_styles([each.name for each in data.variants])
     last = int(data.n_train[-1])
     across = max(2.75, last * (0.03 + 0.035 * len(styles)))
@@ -139,8 +144,21 @@ def compliance_chart(data: CodecData, seen: Sequence[SpringObservability]) -> Fi
         " sets do not tell the spring apart from others; its value is no finding. Arrow: beyond"
         " the scale."
     )
+    if len(springs) < len(every):
+        notes.append(
+            f"Not drawn: {len(every) - len(springs)} of {counted(len(every), 'spring')}, which the"
+            " largest training sets of no variant tell apart."
+        )
     figure.add_caption("\n".join(notes), _LEFT, 7.5, 1.3)
     return figure
+
+
+def _worth_a_panel(springs: list[SpringBoxes]) -> list[SpringBoxes]:
+    """Return all of a few springs; of many those whose last box of some variant is a finding."""
+    if len(springs) <= _MOST_SPRINGS:
+        return springs
+    found = [each for each in springs if not all(b.hollow[-1] for b in each.boxes.values())]
+    return found or springs
 
 
 def spring_boxes(data: CodecData, seen: Sequence[SpringObservability]) -> list[SpringBoxes]:
