@@ -59,11 +59,12 @@ def test_the_table_names_its_columns_after_joints_and_axes(tmp_path):
         for line in (tmp_path / "data.csv").read_text().splitlines()
         if not line.startswith("#")
     )
-    assert header.split(",")[:12] == [
+    assert header.split(",")[:14] == [
         *("pose", "load_case", "status", "sequence", "contacts", "campaign"),
         *("joint_1[rad]", "joint_2[rad]"),
         *("reference_joint_1[rad]", "reference_joint_2[rad]"),
         *("link_joint_1[rad]", "link_joint_2[rad]"),
+        *("reference_link_joint_1[rad]", "reference_link_joint_2[rad]"),
     ]
     assert header.endswith("reference_force_x[N],reference_force_y[N],reference_force_z[N]")
 
@@ -250,6 +251,14 @@ def test_another_history_is_a_remark():
             "link_joint_position joint_1 of pose 4, load case 'normal' is -113.736 rad, beyond",
         ),
         (
+            {"link_joint_position": None},
+            "reference_link_joint_position needs link_joint_position: there are no links under",
+        ),
+        (
+            {"reference_link_joint_position": [[0.3, np.nan]] * 3},
+            "reference_link_joint_position and link_joint_position have different encoders: only",
+        ),
+        (
             {"reference_joint_position": keywords()["joint_position"][:, 1] + 0.2},
             "reference_joint_position is a median of 0.2",
         ),
@@ -266,7 +275,9 @@ def test_what_breaks_the_contract_is_refused_by_name(changes, message):
 def test_a_joint_without_secondary_encoder_has_no_link_position():
     links = second_keywords()["link_joint_position"]
     links[..., 1] = np.nan
-    assert np.isnan(second(link_joint_position=links).link_joint_position[..., 1]).all()
+    data = second(link_joint_position=links, reference_link_joint_position=None)
+    assert np.isnan(data.link_joint_position[..., 1]).all()
+    assert data.readings(data.joint_names).encoders == (0,)
 
 
 def test_a_joint_named_like_a_column_of_another_is_refused():

@@ -70,6 +70,7 @@ def second_keywords(**changes: Any) -> dict[str, Any]:
         "reference_joint_position": joints[:, 1] + 1e-3,
         "reference_force": [[0.0, 0.0, -5.0], [1.0, 0.0, -6.0], [0.0, 0.0, 0.0]],
         "link_joint_position": joints + 1e-4,
+        "reference_link_joint_position": joints[:, 1] + 1.1e-3,
         "campaigns": ("monday", "monday", "in the winter"),
         "gravity": (0.0, 9.8, -0.5),
         "conditioned": True,

@@ -149,11 +149,27 @@ LINK_JOINT_POSITION = Variable(
     schema=SCHEMA_2,
 )
 
-JOINT_VARIABLES = (JOINT_POSITION, REFERENCE_JOINT_POSITION, LINK_JOINT_POSITION)
+REFERENCE_LINK_JOINT_POSITION = Variable(
+    "reference_link_joint_position",
+    ("pose", "joint"),
+    "angle",
+    "rad",
+    "positions of the links by secondary encoders when the zero of both displacements was read",
+    schema=SCHEMA_2,
+)
+
+ENCODER_VARIABLES = (LINK_JOINT_POSITION, REFERENCE_LINK_JOINT_POSITION)
+"""The variables that are NaN throughout at a joint without a secondary encoder."""
+
+JOINT_VARIABLES = (JOINT_POSITION, REFERENCE_JOINT_POSITION, *ENCODER_VARIABLES)
 """The variables that have a value for each joint."""
 
-JOINT_PREFIXES = {"reference_": REFERENCE_JOINT_POSITION, "link_": LINK_JOINT_POSITION}
-"""Prefix of a joint's name in the CSV column of a variable."""
+JOINT_PREFIXES = {
+    "reference_link_": REFERENCE_LINK_JOINT_POSITION,
+    "reference_": REFERENCE_JOINT_POSITION,
+    "link_": LINK_JOINT_POSITION,
+}
+"""Prefix of a joint's name in the CSV column of a variable, the longest first."""
 
 MARKER_POSITION = Variable(
     "marker_position",

@@ -22,7 +22,6 @@ from elastocal.dataset._layout import (
     CF_ATTRIBUTES,
     COLUMN_NAMES,
     CONTACTS,
-    JOINT_POSITION,
     JOINT_PREFIXES,
     JOINT_UNITS,
     MADE_FROM,
@@ -467,7 +466,7 @@ def write_table(data: Dataset, path: Path) -> None:
     if data.campaigns:
         columns["campaign"] = [name for name in data.campaigns for _ in data.load_cases]
     prefixes = {variable: prefix for prefix, variable in JOINT_PREFIXES.items()}
-    for variable in (JOINT_POSITION, *prefixes, *VECTORS):
+    for variable in VARIABLES:
         values = data.arrays.get(variable.name)
         if values is None:
             continue

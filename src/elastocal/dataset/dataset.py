@@ -33,14 +33,15 @@ from elastocal.dataset._layout import (
     AXES,
     CONDITIONED,
     CONTACTS,
+    ENCODER_VARIABLES,
     INTEGERS,
     JOINT_POSITION,
     JOINT_VARIABLES,
-    LINK_JOINT_POSITION,
     MARKER_POSITION,
     MISSING,
     OK,
     REFERENCE_JOINT_POSITION,
+    REFERENCE_LINK_JOINT_POSITION,
     SCHEMA,
     SCHEMA_2,
     SEQUENCE,
@@ -122,8 +123,8 @@ def check_numbers(labels: Labels, arrays: Arrays) -> None:
         if variable.name in arrays:
             values = arrays[variable.name]
             needed = ok if "load_case" in variable.dims else ok.any(axis=1)
-            if variable == LINK_JOINT_POSITION:
-                values = _without_absent_encoders(values)
+            if variable in ENCODER_VARIABLES:
+                values = _without_absent_encoders(variable, values)
             if variable.name in _OF_METROLOGY:
                 seen = ~unmeasured_poses(arrays)
                 needed = needed & (seen[:, np.newaxis] if needed.ndim > 1 else seen)
@@ -137,6 +138,7 @@ def check_numbers(labels: Labels, arrays: Arrays) -> None:
                     raise DatasetError(
                         f"{place} is {value}: a standard deviation must be greater than 0"
                     )
+    _check_encoders(labels, arrays)
     if SEQUENCE.name in arrays:
         _check_sequence(labels, arrays[SEQUENCE.name], arrays["status"])
 
@@ -160,7 +162,7 @@ def check_plausible(labels: Labels, arrays: Arrays, joint_units: Sequence[str]) 
         if variable.name in arrays:
             needed = ok if "load_case" in variable.dims else ok.any(axis=1)
             _check_joints(labels, variable, arrays[variable.name], joint_units, needed)
-    for variable in (REFERENCE_JOINT_POSITION, LINK_JOINT_POSITION):
+    for variable in (REFERENCE_JOINT_POSITION, *ENCODER_VARIABLES):
         if variable.name in arrays:
             _check_near(variable, arrays, joint_units, ok)
     if "tcp_position" in arrays:
@@ -230,14 +232,34 @@ def _norms(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(vectors, axis=-1))
 
 
-def _without_absent_encoders(values: FloatArray) -> FloatArray:
+def _without_absent_encoders(variable: Variable, values: FloatArray) -> FloatArray:
     """Return link positions with zeros at the joints that have no secondary encoder."""
-    absent = np.isnan(values).all(axis=(0, 1))
+    absent = _absent_encoders(values)
     if absent.all():
         raise DatasetError(
-            f"{LINK_JOINT_POSITION.name} has no number: leave it out without secondary encoders"
+            f"{variable.name} has no number: leave it out without secondary encoders"
         )
     return np.where(absent, 0.0, values)
+
+
+def _absent_encoders(values: FloatArray) -> BoolArray:
+    """Return which joints have no secondary encoder, shape (joint,)."""
+    return np.asarray(np.isnan(values).all(axis=tuple(range(values.ndim - 1))))
+
+
+def _check_encoders(labels: Labels, arrays: Arrays) -> None:
+    """Refuse links at the reference without those under load, or of other joints."""
+    link, reference = (each.name for each in ENCODER_VARIABLES)
+    if reference not in arrays:
+        return
+    if link not in arrays:
+        raise DatasetError(f"{reference} needs {link}: there are no links under load")
+    differ = _absent_encoders(arrays[link]) != _absent_encoders(arrays[reference])
+    for joint in np.flatnonzero(differ)[:1].tolist():
+        raise DatasetError(
+            f"{reference} and {link} have different encoders: only one of them has numbers at"
+            f" joint {labels['joint'][joint]!r}"
+        )
 
 
 def _check_sequence(labels: Labels, sequence: NDArray[np.int64], status: StatusArray) -> None:
@@ -383,6 +405,9 @@ class Dataset(Result):
     """Force on the robot at the TCP in base then, shape (pose, 3), in N; None: none."""
     link_joint_position: FloatArray | None = None
     """Positions of the links by secondary encoders, shape (pose, load_case, joint)."""
+    reference_link_joint_position: FloatArray | None = None
+    """The same when the zero of both displacements was read, shape (pose, joint); None: each pose
+    has a zero of its own that is not known."""
     campaigns: tuple[str, ...] = ()
     """Campaign of each pose; empty where there are none."""
     attributes: Mapping[str, str] = field(default_factory=lambda: {"schema": SCHEMA})
@@ -435,6 +460,7 @@ class Dataset(Result):
         reference_joint_position: ArrayLike | None = None,
         reference_force: ArrayLike | None = None,
         link_joint_position: ArrayLike | None = None,
+        reference_link_joint_position: ArrayLike | None = None,
         campaigns: Sequence[str] | None = None,
         joint_units: Sequence[str] | None = None,
         robot_name: str = "",
@@ -455,7 +481,8 @@ class Dataset(Result):
             As the fields of these names. Displacements are those of the TCP, or both of the marker
             where ``marker`` is given; the tracker's is left out where there was no metrology.
         moment, tcp_position, marker_position, sequence, contacts : array_like, optional
-        reference_joint_position, reference_force, link_joint_position : array_like, optional
+        reference_joint_position, reference_force : array_like, optional
+        link_joint_position, reference_link_joint_position : array_like, optional
             As the fields of these names.
         joint_names, load_cases : sequence of str
             Labels of the joints and the load cases.
@@ -503,6 +530,7 @@ class Dataset(Result):
             "reference_joint_position": reference_joint_position,
             "reference_force": reference_force,
             "link_joint_position": link_joint_position,
+            REFERENCE_LINK_JOINT_POSITION.name: reference_link_joint_position,
         }
         attributes = {
             "schema": SCHEMA_2,

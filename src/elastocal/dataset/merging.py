@@ -11,7 +11,6 @@ import numpy as np
 from elastocal.dataset._layout import (
     CONTACTS,
     INTEGERS,
-    LINK_JOINT_POSITION,
     MADE_FROM,
     MARKER_POSITION,
     MISSING,
@@ -207,7 +206,7 @@ def usable_readings(
     flat: dict[str, np.ndarray] = {}
     for variable in VARIABLES:
         values = dataset.arrays.get(variable.name)
-        if values is not None and variable not in (LINK_JOINT_POSITION, MARKER_POSITION):
+        if values is not None and variable != MARKER_POSITION:
             rows = values[pose, case] if "load_case" in variable.dims else values[pose]
             flat[variable.name] = rows[:, order] if "joint" in variable.dims else rows
     flat |= _held_by_contact(dataset, pose, case)

@@ -87,6 +87,12 @@ class Readings:
     reference_joint_position: FloatArray | None = None
     """Joint positions when the zero of both displacements was read, shape (reading, joint), in rad
     or m; None: where the controller displacement at constant orientation began."""
+    link_joint_position: FloatArray | None = None
+    """Positions of the links by secondary encoders, shape (reading, joint), in rad or m; NaN
+    throughout at a joint that has none."""
+    reference_link_joint_position: FloatArray | None = None
+    """The same when the zero of both displacements was read; None: each pose has a zero of its own
+    that is not known."""
     reference_force: FloatArray | None = None
     """Force on the robot at the TCP in base then, shape (reading, 3), in N; None: none."""
     sequence: IntArray | None = None
@@ -121,6 +127,8 @@ class Readings:
             width = array.shape[-1] if name.endswith("joint_position") and array.ndim else 3
             self._own(name, array, (len(self.pose), width))
             usable = np.abs(array) < _LARGEST
+            if "link" in name:
+                usable |= np.isnan(array).all(axis=0)
             if not np.all(usable):
                 row = int(np.argwhere(~usable)[0, 0])
                 raise DatasetError(
@@ -131,6 +139,14 @@ class Readings:
 
     def __len__(self) -> int:
         return len(self.pose)
+
+    @property
+    def encoders(self) -> tuple[int, ...]:
+        """Numbers of the joints that have a secondary encoder."""
+        if self.link_joint_position is None:
+            return ()
+        there = ~np.isnan(self.link_joint_position).all(axis=0)
+        return tuple(np.flatnonzero(there).tolist())
 
     @property
     def deflection(self) -> FloatArray:

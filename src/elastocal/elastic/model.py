@@ -415,11 +415,47 @@ class ElasticModel:
             If an argument has another shape or is not finite.
         """
         posture = self.at(q)
+        observed = posture.observed(marker_offset)
+        return self._loaded_blocks(posture, observed, force, moment, friction)
+
+    def joint_blocks(
+        self,
+        q: "ArrayLike | ModelPosture",
+        force: ArrayLike,
+        moment: ArrayLike | None = None,
+        friction: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return the rows that times ``c`` are what each joint yields about its own axis.
+
+        What a secondary encoder behind the gear sees: springs about or along the joint's own axis.
+
+        Parameters
+        ----------
+        q, force, moment, friction
+            As for `observation_blocks`.
+
+        Returns
+        -------
+        ndarray, shape (..., joint, parameter)
+            In rad, or m, per unit of each parameter.
+        """
+        posture = self.at(q)
+        return self._loaded_blocks(posture, posture.own_axes, force, moment, friction)
+
+    def _loaded_blocks(
+        self,
+        posture: "ModelPosture",
+        observed: FloatArray,
+        force: ArrayLike,
+        moment: ArrayLike | None,
+        friction: FloatArray | None,
+    ) -> FloatArray:
+        """Return the columns of all springs under a load; see `observation_blocks`."""
         torque = spring_torques(posture.jacobian, force, moment)
         weight = posture.weight if self.bears_weight else None
         if friction is None and len(self.friction):
             friction = self.friction.press(torque)
-        return self._blocks(posture.observed(marker_offset), torque, weight, friction)
+        return self._blocks(observed, torque, weight, friction)
 
     def sag_blocks(
         self, q: "ArrayLike | ModelPosture", marker_offset: ArrayLike | None = None
@@ -439,6 +475,11 @@ class ElasticModel:
         posture = self.at(q)
         return self._blocks(posture.observed(marker_offset), posture.weight)
 
+    def joint_sag_blocks(self, q: "ArrayLike | ModelPosture") -> FloatArray:
+        """Return the rows of what the arm's own weight turns each joint by; see `joint_blocks`."""
+        posture = self.at(q)
+        return self._blocks(posture.own_axes, posture.weight)
+
     def _blocks(
         self,
         observed: FloatArray,
@@ -446,7 +487,7 @@ class ElasticModel:
         weight: FloatArray | None = None,
         friction: FloatArray | None = None,
     ) -> FloatArray:
-        """Return the columns of all springs, shape (..., 3, parameter)."""
+        """Return the columns of all springs, shape (..., row, parameter)."""
         places: list[Columns] = []
         columns: list[FloatArray] = []
         for group in self._groups:
@@ -613,6 +654,17 @@ class ModelPosture:
     def weight(self) -> FloatArray:
         """Torque of the arm's own weight about each axis, see `ElasticModel.weight_torques`."""
         return self.model.weight_torques(self.q)
+
+    @cached_property
+    def own_axes(self) -> FloatArray:
+        """1 where an axis of a spring is a joint's own, shape (..., joint, axis)."""
+        joints = self.model.robot.chain.joints
+        axes = [axis for spring in self.model.springs for axis in spring.axes]
+        own = [
+            [axis.joint == each.name and axis.is_axis_of(each) for axis in axes] for each in joints
+        ]
+        shape = self.jacobian.translation.shape[:-2]
+        return np.broadcast_to(np.array(own, dtype=float), (*shape, len(joints), len(axes)))
 
     def observed(self, marker_offset: ArrayLike | None = None) -> FloatArray:
         """Return the translational Jacobian of a marker, shape (..., 3, axis), or of the tcp."""

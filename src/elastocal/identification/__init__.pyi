@@ -137,6 +137,7 @@ from .rungs import (
 from .show import (
     show_budget as show_budget,
     show_contact as show_contact,
+    show_encoders as show_encoders,
     show_ladder as show_ladder,
     show_sums as show_sums,
     show_unseen as show_unseen,

@@ -186,10 +186,10 @@ def error_budget(
 
 
 def _for_any_model(options: FitOptions) -> FitOptions:
-    """Return the options without those for single parameters."""
+    """Return the options without those for single parameters; terms are of the tracker's rows."""
     lower = 0.0 if np.ndim(options.lower) else options.lower
     upper = np.inf if np.ndim(options.upper) else options.upper
-    return replace(options, prior=None, lower=lower, upper=upper)
+    return replace(options, prior=None, lower=lower, upper=upper, encoders=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.contact import ContactSummary, contact_summary
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.encoders import EncoderSummary
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.knowledge import expected_sizes
 from elastocal.identification.ladder import Climbed
@@ -142,6 +143,8 @@ class Calibration:
     """Frames that were estimated with the springs."""
     contact: ContactSummary | None = None
     """The contact that held the tool; None: a tracker measured every reading."""
+    encoders: EncoderSummary | None = None
+    """What secondary encoders brought; None: there are none."""
 
     @property
     def residual_norm(self) -> FloatArray:
@@ -241,6 +244,7 @@ def calibrate(
         warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
         contact=contact,
+        encoders=_encoders(weighted, solution, held_out),
     )
 
 
@@ -253,6 +257,14 @@ def _seen(
     seen = find_faint(seen, problem, compliance, model.parameters)
     sizes, held = expected_sizes(options.prior, problem, model.parameters)
     return find_hidden(seen, problem, compliance, model.parameters, sizes, held)
+
+
+def _encoders(problem: Problem, solution: Solution, held_out: HeldOut) -> EncoderSummary | None:
+    """Return what secondary encoders brought; None where there are none."""
+    if problem.encoders is None:
+        return None
+    folds = held_out.compliance[held_out.fold]
+    return problem.encoders.summary(problem.O, problem.d, solution.compliance, folds)
 
 
 def _contact(

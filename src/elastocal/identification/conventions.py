@@ -80,7 +80,7 @@ def check_conventions(
         If most deflections are zero.
     """
     stated_by = options or FitOptions()
-    plain = FitOptions(free_frame=stated_by.free_frame, contact=stated_by.contact)
+    plain = FitOptions(free_frame=stated_by.free_frame, contact=stated_by.contact, encoders=False)
     problem = build(model, readings, plain, marker_offset)
     if not np.median(np.linalg.norm(problem.d, axis=1)) > 0.0:
         raise IdentificationError("most deflections are zero: there is nothing to identify")

@@ -11,7 +11,8 @@ loaded. Friction has a memory: its elements are evaluated over the loads at the 
 starting from the state that a free motion leaves.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,28 +49,64 @@ def displacement_blocks(
     ndarray, shape (reading, 3, parameter)
         In m per unit of each parameter.
     """
-    # A posture is evaluated once for loads, sag and friction.
-    q = model.at(readings.joint_position)
-    q_0 = model.at(reference_joints(model.robot, readings))
-    loaded, reference = None, None
-    if len(model.friction):
-        loaded, reference = friction_states(model, readings, q, q_0)
+    between = Between.of(model, readings)
+    if readings.contacts is None or marker_offset is None:
+        return between.of_point(marker_offset)
+    # What the tooling holds is the tcp, not the marker.
+    held = (readings.contacts > 0)[:, None, None]
+    return np.where(held, between.of_point(None), between.of_point(marker_offset))
 
-    def of_point(offset: ArrayLike | None) -> FloatArray:
-        rows = model.observation_blocks(q, readings.force, readings.moment, offset, loaded)
-        rows = rows + model.sag_blocks(q, offset) - model.sag_blocks(q_0, offset)
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """A model at the loaded and at the reference joints of readings; each is evaluated once."""
+
+    readings: Readings
+    loaded: ModelPosture
+    reference: ModelPosture
+    friction: tuple[FloatArray, FloatArray] | None
+    """See `friction_states`; None without friction."""
+
+    @classmethod
+    def of(cls, model: ElasticModel, readings: Readings) -> "Between":
+        """Return the model at the joints of readings, in the robot's order."""
+        q = model.at(readings.joint_position)
+        q_0 = model.at(reference_joints(model.robot, readings))
+        friction = friction_states(model, readings, q, q_0) if len(model.friction) else None
+        return cls(readings, q, q_0, friction)
+
+    def of_point(self, offset: ArrayLike | None) -> FloatArray:
+        """Return the rows of the displacement of a point in the tcp frame."""
+        model = self.loaded.model
+
+        def blocks(
+            at: ModelPosture, force: FloatArray, moment: FloatArray | None, f: FloatArray | None
+        ) -> FloatArray:
+            return model.observation_blocks(at, force, moment, offset, f)
+
+        return self._difference(blocks, lambda at: model.sag_blocks(at, offset))
+
+    def of_joints(self) -> FloatArray:
+        """Return the rows of what joints yield, shape (reading, joint, parameter)."""
+        model = self.loaded.model
+        return self._difference(model.joint_blocks, model.joint_sag_blocks)
+
+    def _difference(
+        self,
+        blocks: Callable[
+            [ModelPosture, FloatArray, FloatArray | None, FloatArray | None], FloatArray
+        ],
+        sag: Callable[[ModelPosture], FloatArray],
+    ) -> FloatArray:
+        readings, (loaded, reference) = self.readings, self.friction or (None, None)
+        rows = blocks(self.loaded, readings.force, readings.moment, loaded)
+        rows = rows + sag(self.loaded) - sag(self.reference)
         if readings.reference_force is None and reference is None:
             return rows
         force = np.zeros_like(readings.force)
         if readings.reference_force is not None:
             force = readings.reference_force
-        return rows - model.observation_blocks(q_0, force, None, offset, reference)
-
-    if readings.contacts is None or marker_offset is None:
-        return of_point(marker_offset)
-    # What the tooling holds is the tcp, not the marker.
-    held = (readings.contacts > 0)[:, None, None]
-    return np.where(held, of_point(None), of_point(marker_offset))
+        return rows - blocks(self.reference, force, None, reference)
 
 
 def reference_joints(robot: Robot, readings: Readings) -> FloatArray:

@@ -15,6 +15,7 @@ from elastocal.identification.budget import ErrorBudget
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.calibration import Calibration
 from elastocal.identification.contact import ContactSummary
+from elastocal.identification.encoders import EncoderSummary
 from elastocal.identification.frames import FrameSummary
 from elastocal.identification.ladder import Climbed
 from elastocal.identification.load_check import LoadCheck
@@ -198,6 +199,8 @@ class CalibrationSummary:
     """Frames that were estimated with the springs."""
     contact: ContactSummary | None = None
     """The contact that held the tool where no tracker measured; None: one measured throughout."""
+    encoders: EncoderSummary | None = None
+    """What secondary encoders brought; None: there are none, or they were left out."""
     coverage: Coverage | None = None
     """Measured coverage of the intervals of a prediction; None in older calibrations."""
     production: ProductionCoverage | None = None
@@ -262,6 +265,7 @@ def summary(
         ladder=tuple(map(rung_summary, calibration.ladder)),
         frames=calibration.frames,
         contact=calibration.contact,
+        encoders=calibration.encoders,
         coverage=calibration.coverage,
         known=tuple(known),
     )

@@ -75,6 +75,9 @@ class FitOptions:
     contact: Contact | None = None
     """What is known of the contact that holds the tool where no tracker measured; None: nothing,
     and readings without metrology are refused. See `elastocal.identification.contact`."""
+    encoders: bool = True
+    """Whether positions of the links by secondary encoders are rows of the fit; see
+    `elastocal.identification.encoders`."""
     draws: int = 200
     """Number of pose-block bootstrap draws."""
 
@@ -173,6 +176,8 @@ class FitSettings:
     """``load_case`` or ``campaign``: estimate a frame of tracker and marker for each."""
     contact: Contact | None = None
     """What is known of the contact that holds the tool where no tracker measured."""
+    ignore_encoders: bool = False
+    """Leave positions of the links by secondary encoders out of the fit."""
     draws: Annotated[int, Option(most=100_000)] = 200
     """Bootstrap draws."""
     seed: Annotated[int, Option(least=0)] = 0
@@ -213,6 +218,7 @@ class FitSettings:
             trust_conventions=self.trust_conventions,
             free_frame=self.free_frame,
             contact=self.contact,
+            encoders=not self.ignore_encoders,
             draws=self.draws if draws is None else draws,
         )
 

@@ -31,6 +31,7 @@ from elastocal.identification.contact import (
     whitened,
 )
 from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.encoders import EncoderRows, encoder_rows
 from elastocal.identification.frames import NUMBERS, FrameColumns, frame_columns
 from elastocal.identification.options import FitOptions, Prior, bounds
 from elastocal.results import brief_repr
@@ -92,6 +93,8 @@ class Problem:
     prior_error: FloatArray | None = None
     """Standard deviation of the right-hand side of each row of the prior over its repetitions,
     shape (row,), in m; None: none is drawn."""
+    encoders: EncoderRows | None = None
+    """What secondary encoders see; None: there are none."""
 
     def __len__(self) -> int:
         """Return the number of readings."""
@@ -121,10 +124,14 @@ class Problem:
     def weighted(self) -> FloatArray:
         """Return the weighted rows ``[O d]``, whitened by what readings of a block share.
 
-        Shape (reading, 3, parameter + 1).
+        Shape (reading, 3, parameter + 1). With secondary encoders the tracker's rows are those of
+        what these do not see, and their own follow, shape (reading, 3 + encoder, parameter + 1).
         """
-        rows = np.concatenate([self.O, self.d[..., None]], axis=2) * self.weight[..., None]
-        return self._whitened(rows, self.weight)
+        rows = np.concatenate([self.O, self.d[..., None]], axis=2)
+        if self.encoders is None:
+            return self._whitened(rows * self.weight[..., None], self.weight)
+        rest = self._whitened((rows - self.encoders.seen) * self.weight[..., None], self.weight)
+        return np.concatenate([rest, self.encoders.weighted()], axis=1)
 
     def _whitened(self, rows: FloatArray, weight: FloatArray) -> FloatArray:
         if self.shared is None:
@@ -159,13 +166,14 @@ class Problem:
 
     def reweighted(self, factor: FloatArray) -> "Problem":
         """Return the problem with each reading's squared residual multiplied by a factor."""
-        return replace(self, weight=self.weight * np.sqrt(factor)[:, None])
+        encoders = None if self.encoders is None else self.encoders.reweighted(factor)
+        return replace(self, weight=self.weight * np.sqrt(factor)[:, None], encoders=encoders)
 
     def with_springs(self, blocks: FloatArray, d: FloatArray | None = None) -> "Problem":
-        """Return the problem with other columns of the springs; frames stay as they are."""
+        """Return the tracker's problem with other columns of the springs; frames stay."""
         behind = self.O[:, :, self.springs.stop :]
         O = np.concatenate([blocks, behind], axis=2)  # noqa: E741 - the paper's name
-        return replace(self, O=O, d=self.d if d is None else d)
+        return replace(self, O=O, d=self.d if d is None else d, encoders=None)
 
     def of_springs(self) -> "Problem":
         """Return the problem of the springs in what neither a frame nor the contact can explain.
@@ -182,16 +190,17 @@ class Problem:
         Q = U[:, s > RANK_TOLERANCE * s[0]] if s.size else U
         rows = rows - Q @ (Q.T @ rows)
         rows = _without_known(rows, self.contact_columns, self.prior_rows)
-        seen = rows[:, [*range(n), -1]]
+        seen = rows[:, [*range(n), -1]].reshape(len(self), -1, n + 1)
         return Problem(
-            O=seen[:, :n].reshape(-1, 3, n),
-            d=seen[:, n].reshape(-1, 3),
+            O=seen[:, :3, :n],
+            d=seen[:, :3, n],
             weight=np.ones_like(self.weight),
             block=self.block,
             lower=self.lower[:n],
             upper=self.upper[:n],
             prior_rows=self.prior_rows[:, [*range(n), -1]],
             size=size[:n],
+            encoders=None if self.encoders is None else self.encoders.alone(seen[:, 3:]),
         )
 
     def without_prior(self) -> "Problem":
@@ -208,6 +217,7 @@ class Problem:
             weight=self.weight[index],
             block=self.block[index],
             shared=None if self.shared is None else self.shared[index],
+            encoders=None if self.encoders is None else self.encoders.take(index),
         )
 
     def with_columns(self, columns: IndexArray) -> "Problem":
@@ -219,6 +229,7 @@ class Problem:
             upper=self.upper[columns],
             prior_rows=self.prior_rows[:, [*columns, -1]],
             size=np.broadcast_to(self.size, self.lower.shape)[columns],
+            encoders=None if self.encoders is None else self.encoders.with_columns(columns),
         )
 
 
@@ -321,6 +332,7 @@ def build(
         prior_rows=_prior_rows(options.prior, len(model.parameters)),
         size=relative_sizes(model.parameters),
         prior_error=None if options.prior is None else _prior_error(options.prior),
+        encoders=encoder_rows(model, readings, marker_offset) if options.encoders else None,
     )
     scale = model.parameters[0].scale
     frames = frame_columns(model.robot, readings, options.free_frame, marker_offset)
@@ -384,6 +396,7 @@ def _with_columns_behind(
         upper=np.concatenate([problem.upper, limits[1]]),
         prior_rows=rows,
         size=np.concatenate([np.atleast_1d(problem.size), size]),
+        encoders=None if problem.encoders is None else problem.encoders.widened(columns.shape[2]),
     )
 
 

@@ -10,6 +10,7 @@ from elastocal.blocks import Block, Bullets, Cell, Grade, Graded, Heading, Parag
 from elastocal.elastic import Unit, unit_of
 from elastocal.identification.budget import ErrorBudget
 from elastocal.identification.contact import LATERAL, NORMAL, ContactFigure, ContactSummary
+from elastocal.identification.encoders import EncoderSummary
 from elastocal.identification.figures import (
     CalibrationSummary,
     RungSummary,
@@ -85,6 +86,7 @@ def show_calibration(figures: CalibrationSummary) -> Iterator[Block]:
     yield from show_sums(figures.sums)
     yield from _frames(figures.frames)
     yield from show_contact(figures.contact)
+    yield from show_encoders(figures.encoders, figures.held_out.mean)
     yield from show_budget(figures.budget)
     yield from _suspicious(figures.suspicious)
 
@@ -423,6 +425,42 @@ def show_contact(contact: ContactSummary | None) -> Iterator[Block]:
                 " the normal, or use a second tip."
             )
         )
+
+
+def show_encoders(encoders: EncoderSummary | None, alone: float) -> Iterator[Block]:
+    """Yield what secondary encoders brought; nothing without any.
+
+    Parameters
+    ----------
+    encoders : EncoderSummary, optional
+        What they brought.
+    alone : float
+        Mean error at left-out poses of the model alone, in m.
+    """
+    if encoders is None:
+        return
+    yield Heading(phrase("Secondary encoders"))
+    if encoders.held_out is None:
+        yield Paragraph(
+            phrase(
+                "The links were not read at the reference, so the zero of each pose is unknown:"
+                " encoders show how each joint yields, and the tracker the whole."
+            )
+        )
+    else:
+        yield Paragraph(
+            phrase(
+                "At left-out poses the mean error is {alone} by the model alone, and {both} where"
+                " the encoders are read in production, too: they see the gears, and the model"
+                " predicts the rest.",
+                alone=mm(alone),
+                both=mm(encoders.held_out),
+            )
+        )
+    heads = phrases("Joint", "What the model leaves of what its encoder sees, rms")
+    figures = zip(encoders.joints, encoders.units, encoders.unexplained, strict=True)
+    rows = tuple((joint, f"{1e6 * left:.3g} µ{unit}") for joint, unit, left in figures)
+    yield Table(phrase("Joints with a secondary encoder"), heads, rows, texts=1)
 
 
 def _newton_per_um(compliance: float) -> str:

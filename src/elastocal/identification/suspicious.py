@@ -83,5 +83,5 @@ def leverage(problem: Problem, solution: Solution) -> FloatArray:
     system = solution.factored
     seen = rank(system.s)
     basis = system.Vt[:seen] / system.s[:seen, None]
-    rows = problem.scaled().rows @ basis.T
+    rows = problem.scaled().rows[:, :3] @ basis.T
     return np.asarray(np.minimum(np.square(rows).sum(axis=2).mean(axis=1), _MOST_LEVERAGE))

@@ -32,12 +32,15 @@ from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.conventions import FORCE_MISTAKES
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.mistakes._motion import AXES, median_norm
+from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import leave_poses_out
 from elastocal.robot import Robot
 
+_TRACKER = FitOptions(encoders=False)
+"""What a force or a frame read otherwise changes is the tracker's: encoders would hide it."""
 _PARALLEL = 0.02
 """Largest element by which axes of parallel frames differ."""
 
@@ -86,7 +89,7 @@ class Rows:
         model = ElasticModel(robot, bearing(robot))
         zero = reference_joints(robot, readings)
         readings = replace(readings, reference_joint_position=zero)
-        problem = build(model, readings, None, marker_offset)
+        problem = build(model, readings, _TRACKER, marker_offset)
         at, before = model.at(readings.joint_position), model.at(zero)
 
         def unit(posture: ModelPosture) -> FloatArray:
@@ -103,7 +106,7 @@ class Rows:
         reference = unit(before) if light is not None else np.zeros(0)
         kept = ~screen(problem).blunder
         place = np.zeros(3) if marker_offset is None else np.asarray(marker_offset, dtype=float)
-        moved = [build(model, readings, None, place + e).O - problem.O for e in np.eye(3)]
+        moved = [build(model, readings, _TRACKER, place + e).O - problem.O for e in np.eye(3)]
         lever = np.stack(moved, axis=2)
         bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), lever, kept)
         return replace(bare, rest=problem.O - bare.blocks(readings.force, light))

@@ -21,6 +21,7 @@ from elastocal.sim.arm.springs import (
     Linear,
     SpringChain,
     TruthSpring,
+    as_triple,
     axial_spring,
     build_spring_chain,
     joint_index,
@@ -93,6 +94,18 @@ class ElasticArm:
         chain = build_spring_chain(self.linkage, self.springs)
         object.__setattr__(self, "_chain", chain)
         object.__setattr__(self, "springs", chain.springs)
+
+    @property
+    def axial_joints(self) -> tuple[int | None, ...]:
+        """Joint about or along whose own axis each spring yields; None: of a tilt or a link."""
+        linkage = self.linkage
+
+        def joint_of(spring: TruthSpring) -> int | None:
+            joint = linkage.joint_names.index(spring.joint)
+            own = as_triple(linkage.axis[joint]) == tuple(spring.axis) and not any(spring.at)
+            return joint if own and spring.revolute == linkage.revolute[joint] else None
+
+        return tuple(map(joint_of, self.springs))
 
     def equilibrium(self, q: ArrayLike, force: ArrayLike) -> Equilibrium:
         """Return the stable rest position under a load that keeps its direction in base.

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
-from elastocal.errors import DatasetError, UnreachableError
+from elastocal.errors import DatasetError, UnreachableError, present
 from elastocal.sim.arm.elastic_arm import GRAVITY, ElasticArm
 from elastocal.sim.arm.linkage import Linkage, solve_inverse
 
@@ -43,6 +43,8 @@ class Noise:
     """Laser tracker, one position, in m. A displacement is the difference of two."""
     controller: float = 0.0
     """Stops of the arm that its own encoders do not see (repeatability), in m."""
+    encoder: float | None = None
+    """Secondary encoders, one position, in rad or m; None: there are none."""
 
 
 SHOP_FLOOR = Noise(force=5.0, marker=20e-6, controller=20e-6)
@@ -131,10 +133,17 @@ def measure(
     unloaded = T_base_touch[:, :3, 3] - contact.gap * T_base_touch[:, :3, 2]
     slip = contact.micro_slip * rng.standard_normal((*force.shape[:2], 2))
     travel = _marker_travel(T_base_touch, force, contact, slip)
-    reference = _reference_joints(arm, q, T_base_touch, unloaded)
+    reference = None
+    if any(arm.gravity) or noise.encoder is not None:
+        reference = _reference_joints(arm, q, T_base_touch, unloaded)
     joints, shown = _press(arm, q, T_base_touch, unloaded, travel, force, reference)
     seen = _difference_of_readings(noise.marker, force.shape, rng)
     stops = _difference_of_readings(noise.controller, force.shape, rng)
+    link, link_reference = None, None
+    if noise.encoder is not None:
+        still = present(reference, "reference")
+        link = _links(arm, joints, force, noise.encoder, rng)
+        link_reference = _links(arm, still, np.zeros((len(q), 3)), noise.encoder, rng)
     return Dataset.from_arrays(
         joint_position=joints,
         force=force + noise.force * rng.standard_normal(force.shape),
@@ -147,6 +156,8 @@ def measure(
         marker_sigma=float(np.hypot(noise.marker, noise.controller) * np.sqrt(2.0)) or None,
         tcp_position=unloaded,
         reference_joint_position=reference,
+        link_joint_position=link,
+        reference_link_joint_position=link_reference,
         gravity=None if reference is None or arm.gravity == GRAVITY else arm.gravity,
         robot_name=arm.linkage.name,
         robot_urdf=arm.linkage.urdf,
@@ -172,12 +183,22 @@ def _marker_travel(
     return travel
 
 
+def _links(
+    arm: ElasticArm, q: FloatArray, force: FloatArray, sigma: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return positions of the links as encoders behind the gears read them, shape (..., joint)."""
+    theta = arm.equilibrium(q, force).theta
+    links = q + sigma * rng.standard_normal(q.shape)
+    for number, joint in enumerate(arm.axial_joints):
+        if joint is not None:
+            links[..., joint] += theta[..., number]
+    return links
+
+
 def _reference_joints(
     arm: ElasticArm, q: FloatArray, T_base_touch: FloatArray, unloaded: FloatArray
-) -> FloatArray | None:
-    """Return commanded joints of the unloaded reading; None where no gravity makes it matter."""
-    if not any(arm.gravity):
-        return None
+) -> FloatArray:
+    """Return commanded joints of the unloaded reading."""
     goals = T_base_touch.copy()
     goals[:, :3, 3] = unloaded
     found = solve_inverse(arm.linkage, goals, q)

@@ -8,6 +8,7 @@ from elastocal.identification import (
     CalibrationSummary,
     show_budget,
     show_contact,
+    show_encoders,
     show_ladder,
     show_sums,
     show_unseen,
@@ -52,7 +53,9 @@ def _compliances(evidence: Evidence) -> Iterator[blocks.Block]:
     ranks = seen.rank, attainable, seen.parameters
     yield from show_unseen(rows, (seen.unobservable, seen.hidden), ranks, seen.condition)
     yield from show_sums(sum_summaries(found.model))
-    yield from show_contact(found.figures.contact if found.figures else None)
+    if found.figures:
+        yield from show_contact(found.figures.contact)
+        yield from show_encoders(found.figures.encoders, found.figures.held_out.mean)
     yield from show_budget(found.figures.budget if found.figures else None)
 
 
