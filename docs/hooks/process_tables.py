@@ -40,7 +40,7 @@ MORE = {
     TOUCHED: "touches, cold and warm",
     "conditioned": "press before every reference",
     "course offset": "press before every reference, and the offset of each course",
-    "touched and offset": "all of these",
+    "touched and offset": "touches, press, and the offset of each course",
 }
 """Procedures beside the springs, by the name of their campaign."""
 _README = Path(__file__).parents[2] / "README.md"

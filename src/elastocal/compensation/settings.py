@@ -18,6 +18,7 @@ Example::
     friction: {free_below: 0.5, free_after: "200 ms"}
 """
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -93,6 +94,16 @@ class FrictionReset(StrictModel):
     """Time for which it must, in s: a load that passes through zero is no free motion."""
 
 
+class EncoderSettings(StrictModel):
+    """Secondary encoders that are read in production."""
+
+    joints: tuple[str, ...] = ()
+    """Joints that have one."""
+    average: Annotated[Duration, Field(le=_LONGEST_HOLD)] = 0.02
+    """Time constant with which noise of the encoders is smoothed, in s: what they add to the model
+    is friction and slow errors."""
+
+
 class FixedFrame(StrictModel):
     """A frame of fixed rotation in base, such as a controller's ``$BASE``."""
 
@@ -123,6 +134,7 @@ class CompensatorSettings(StrictModel):
     uncertain_above: PositiveLength = 2e-4
     """Half the 95 % interval of the predicted deflection beyond which it warns, in m."""
     friction: FrictionReset = FrictionReset()
+    encoders: EncoderSettings = EncoderSettings()
 
     @model_validator(mode="after")
     def _can_correct(self) -> "CompensatorSettings":
@@ -153,6 +165,11 @@ class CompensatorSettings(StrictModel):
     def free_cycles(self) -> int:
         """Corrections without load after which friction is taken to bear nothing."""
         return max(1, round(self.friction.free_after / self.cycle))
+
+    @property
+    def encoder_share(self) -> float:
+        """Share of a new reading of the encoders in their smoothed one, every cycle."""
+        return 1.0 - math.exp(-self.cycle / self.encoders.average)
 
     @property
     def R_base_frame(self) -> FloatArray | None:

@@ -666,6 +666,16 @@ class ModelPosture:
         shape = self.jacobian.translation.shape[:-2]
         return np.broadcast_to(np.array(own, dtype=float), (*shape, len(joints), len(axes)))
 
+    @cached_property
+    def joint_weight(self) -> FloatArray:
+        """Torque of the arm's own weight about each joint that has an axial spring, (..., joint).
+
+        In N·m, or N; zero about the others.
+        """
+        own = self.own_axes
+        count = np.maximum(own.sum(axis=-1, keepdims=True), 1.0)
+        return np.asarray((own / count @ self.weight[..., None])[..., 0])
+
     def observed(self, marker_offset: ArrayLike | None = None) -> FloatArray:
         """Return the translational Jacobian of a marker, shape (..., 3, axis), or of the tcp."""
         if marker_offset is None or not np.any(marker_offset):

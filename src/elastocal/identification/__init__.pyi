@@ -36,6 +36,7 @@ from .domain import (
     CalibrationDomain as CalibrationDomain,
     force_in_tcp as force_in_tcp,
 )
+from .encoders import EncoderZero as EncoderZero
 from .figures import (
     CalibrationSummary as CalibrationSummary,
     DeflectionSummary as DeflectionSummary,

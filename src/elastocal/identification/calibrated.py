@@ -16,6 +16,7 @@ from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel, ModelPosture, check_vectors
 from elastocal.errors import RobotError, SpringError
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
+from elastocal.identification.encoders import EncoderZero
 from elastocal.identification.extrapolation import CalibratedTorques
 from elastocal.identification.observability import Observability
 from elastocal.identification.prediction_doubt import PredictionDoubt, ProductionRows
@@ -207,6 +208,8 @@ class CalibratedModel:
     on_production: PredictionDoubt | None = None
     """Uncertainty on the production that it was calibrated for; None: no production was named, or
     it belonged to another tool."""
+    encoders: tuple[EncoderZero, ...] = ()
+    """What secondary encoders read in the air; empty: the calibration had none."""
 
     def __post_init__(self) -> None:
         for name in ("compliance", "draws"):

@@ -20,7 +20,7 @@ from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.contact import ContactSummary, contact_summary
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
-from elastocal.identification.encoders import EncoderSummary
+from elastocal.identification.encoders import EncoderSummary, EncoderZero, encoder_zeros
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.knowledge import expected_sizes
 from elastocal.identification.ladder import Climbed
@@ -221,6 +221,7 @@ def calibrate(
         held_out.misfit,
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
+        encoders=encoder_zeros(model, readings.take(used), compliance) if options.encoders else (),
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
@@ -244,7 +245,7 @@ def calibrate(
         warnings=tuple(warnings),
         frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
         contact=contact,
-        encoders=_encoders(weighted, solution, held_out),
+        encoders=_encoders(weighted, solution, held_out, calibrated.encoders),
     )
 
 
@@ -259,12 +260,15 @@ def _seen(
     return find_hidden(seen, problem, compliance, model.parameters, sizes, held)
 
 
-def _encoders(problem: Problem, solution: Solution, held_out: HeldOut) -> EncoderSummary | None:
+def _encoders(
+    problem: Problem, solution: Solution, held_out: HeldOut, zeros: tuple[EncoderZero, ...]
+) -> EncoderSummary | None:
     """Return what secondary encoders brought; None where there are none."""
     if problem.encoders is None:
         return None
     folds = held_out.compliance[held_out.fold]
-    return problem.encoders.summary(problem.O, problem.d, solution.compliance, folds)
+    found = problem.encoders.summary(problem.O, problem.d, solution.compliance, folds)
+    return replace(found, zeros=zeros)
 
 
 def _contact(

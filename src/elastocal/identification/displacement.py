@@ -91,6 +91,15 @@ class Between:
         model = self.loaded.model
         return self._difference(model.joint_blocks, model.joint_sag_blocks)
 
+    def of_joints_at_reference(self) -> FloatArray:
+        """Return the rows of what the load at the reference yields, (reading, joint, parameter)."""
+        reference = None if self.friction is None else self.friction[1]
+        return self.loaded.model.joint_blocks(self.reference, self._light(), None, reference)
+
+    def _light(self) -> FloatArray:
+        light = self.readings.reference_force
+        return np.zeros_like(self.readings.force) if light is None else light
+
     def _difference(
         self,
         blocks: Callable[
@@ -103,10 +112,7 @@ class Between:
         rows = rows + sag(self.loaded) - sag(self.reference)
         if readings.reference_force is None and reference is None:
             return rows
-        force = np.zeros_like(readings.force)
-        if readings.reference_force is not None:
-            force = readings.reference_force
-        return rows - blocks(self.reference, force, None, reference)
+        return rows - blocks(self.reference, self._light(), None, reference)
 
 
 def reference_joints(robot: Robot, readings: Readings) -> FloatArray:

@@ -29,7 +29,14 @@ from elastocal.errors import present
 from elastocal.identification.displacement import Between
 from elastocal.records import record
 from elastocal.results import brief_repr
+from elastocal.robot import Robot
 
+_SCATTER = 3e-5
+"""Friction that a free move leaves in a gear, in rad: what the zeros of encoders scatter by."""
+_WAVE = 3e-4
+"""Size of an error once a turn, and of a balancer's effect on its gear, in rad."""
+_STIFF = 1e-9
+"""Smallest softness of a gear that its sag is expected by, in rad/(N·m) or m/N."""
 _LEAST_LEVER = 0.1
 """Lever of a joint whose axis passes through the tool, in m: its encoder sees it all the same."""
 
@@ -121,7 +128,28 @@ class EncoderRows:
             predicted = np.einsum("rin,rn->ri", O - self.seen[..., :-1], folds)
             error = predicted - (d - self.seen[..., -1])
             held_out = float(np.linalg.norm(error, axis=1).mean())
-        return EncoderSummary(self.joints, self.units, tuple(left.tolist()), held_out)
+        return EncoderSummary(self.joints, self.units, tuple(left.tolist()), (), held_out)
+
+
+@record()
+class EncoderZero:
+    """What an encoder reads of a joint in the air: mounting, sag of the arm, an error once a turn.
+
+    ``link - motor = offset + weight tau_w + sine sin q + cosine cos q``, with the torque ``tau_w``
+    of the arm's own weight about the joint. A balancer, which no mass of the URDF describes, is a
+    sine of its joint as well.
+    """
+
+    joint: str
+    offset: float
+    """In rad or m."""
+    weight: float
+    """In rad/(N·m) or m/N."""
+    sine: float
+    """In rad; 0 of a prismatic joint."""
+    cosine: float
+    left: float
+    """Root mean square of what it leaves at the poses that it is from, in rad or m: friction."""
 
 
 @brief_repr
@@ -135,6 +163,8 @@ class EncoderSummary:
     """``rad`` or ``m``, of each."""
     unexplained: tuple[float, ...]
     """Root mean square of what the model leaves of what each sees, in rad or m."""
+    zeros: tuple[EncoderZero, ...]
+    """What each reads in the air; empty: the links were not read at the reference."""
     held_out: float | None
     """Mean error at left-out poses where the encoders are read in production, too, in m; None:
     the links were not read at the reference."""
@@ -176,6 +206,55 @@ def encoder_rows(
     joints = tuple(model.robot.joint_names[joint] for joint in own)
     units = tuple("rad" if turns else "m" for turns in revolute)
     return EncoderRows(joints, rows * lever[:, None], seen, lever, units, np.ones(len(readings)))
+
+
+def encoder_zeros(
+    model: ElasticModel, readings: Readings, compliance: FloatArray
+) -> tuple[EncoderZero, ...]:
+    """Return what the encoders read in the air, from the references of the poses.
+
+    Regularised, since few poses do not tell the four numbers of a joint apart.
+
+    Parameters
+    ----------
+    model, readings
+        As for `encoder_rows`.
+    compliance : ndarray, shape (parameter,)
+        Of the springs.
+    """
+    own, zeroed = list(readings.encoders), readings.reference_link_joint_position
+    if not own or zeroed is None:
+        return ()
+    between = Between.of(model, readings)
+    _, first = np.unique(readings.pose, return_index=True)
+    q = np.broadcast_to(between.reference.q, zeroed.shape)[first]
+    air = zeroed[first] - q - (between.of_joints_at_reference() @ compliance)[first]
+    weight = between.reference.joint_weight[first]
+    sag = (model.joint_sag_blocks(between.reference) @ compliance)[first]
+    squares = np.maximum(np.square(weight).sum(axis=0), np.finfo(float).tiny)
+    softness = (sag * weight).sum(axis=0) / squares
+    return tuple(
+        _zero_of(model.robot, j, air[:, j], q[:, j], weight[:, j], softness[j]) for j in own
+    )
+
+
+def _zero_of(
+    robot: Robot, joint: int, air: FloatArray, q: FloatArray, weight: FloatArray, softness: float
+) -> EncoderZero:
+    """Return the numbers of a joint, near what its gear alone would do."""
+    turns = robot.revolute[joint]
+    columns = [np.ones_like(q), weight, *((np.sin(q), np.cos(q)) if turns else ())]
+    rows = np.stack(columns, axis=1)
+    expected = np.array([0.0, softness, 0.0, 0.0][: len(columns)])
+    prior = np.array([0.0, _SCATTER / max(softness, _STIFF), *[_SCATTER / _WAVE] * 2])
+    prior = np.diag(prior[: len(columns)])
+    system = np.vstack([rows, prior])
+    right = np.concatenate([air, prior @ expected])
+    found = np.linalg.lstsq(system, right, rcond=None)[0]
+    left = float(np.sqrt(np.mean(np.square(rows @ found - air))))
+    offset, slope, *waves = found.tolist()
+    sine, cosine = waves or (0.0, 0.0)
+    return EncoderZero(robot.joint_names[joint], offset, slope, sine, cosine, left)
 
 
 def marker_jacobian(

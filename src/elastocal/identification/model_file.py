@@ -16,6 +16,7 @@ from elastocal.files import sha256
 from elastocal.findings import group_alike
 from elastocal.identification.calibrated import CalibratedModel, ToolChange
 from elastocal.identification.domain import CalibrationDomain
+from elastocal.identification.encoders import EncoderZero
 from elastocal.identification.figures import CalibrationSummary
 from elastocal.identification.observability import Observability
 from elastocal.identification.options import MINIMUM_DRAWS
@@ -193,7 +194,13 @@ class CalibrateResult(Result):
             self.domain,
             float("nan") if self.calibration is None else self.calibration.unexplained,
             None if self.calibration is None or self.tool is not None else self.calibration.doubt,
+            self._encoders,
         )
+
+    @property
+    def _encoders(self) -> tuple[EncoderZero, ...]:
+        found = None if self.calibration is None else self.calibration.encoders
+        return () if found is None else found.zeros
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""

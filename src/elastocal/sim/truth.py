@@ -452,6 +452,16 @@ class TrackerTruth(StrictModel):
     """Standard deviation of the station's true place about that of the cell file, in m."""
 
 
+class EncoderTruth(StrictModel):
+    """Secondary encoders behind the gears of the arm's joints, which see their links."""
+
+    noise: AngleUpToPi | None = None
+    """Standard deviation of a sample, in rad; None: the arm has no such encoders."""
+    eccentricity: AngleUpToPi = 2e-5
+    """Amplitude of an error once a turn, in rad: a ring that is not centred."""
+    rate: SampleRate = 250.0
+
+
 class Geometry(StrictModel):
     """Errors of the robot's geometry against its description."""
 
@@ -494,6 +504,7 @@ class Simulation(StrictModel):
     controller: ControllerTruth = ControllerTruth()
     sensor: SensorTruth = SensorTruth()
     tracker: TrackerTruth = TrackerTruth()
+    encoders: EncoderTruth = EncoderTruth()
 
     @model_validator(mode="before")
     @classmethod

@@ -37,12 +37,12 @@ from elastocal.progress import Progress
 from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.sim import truth_of
-from elastocal.sim.workcell import ProcessCell
+from elastocal.sim.workcell import LinkEncoders, ProcessCell
 from elastocal.wording import phrase
 from elastocal.workflows._inputs import NewTool, parse_posture, require_same_robot
 from elastocal.workflows._workflow import workflow
 
-__all__ = ["ProcessTrial", "TrialRuns", "run_budget", "run_loads"]
+__all__ = ["ProcessTrial", "TrialRuns", "run_budget", "run_loads", "with_encoders"]
 _ZEROING = 250
 """Readings in the air that a sensor is zeroed by when no tool file says its bias."""
 _ALIKE = 0.5
@@ -385,6 +385,9 @@ class SimulateProcessSettings(NewTool):
     course_offset: bool = False
     """Land, press and read marker and controller in light contact where each course begins: what
     they show beyond the prediction is corrected over the course."""
+    encoders: bool = False
+    """Read the secondary encoders of the simulated arm: what they see takes the place of the model
+    about the axes of its joints."""
     posture: Annotated[str, Option(choices="posture", default="programmed")] = PROGRAMMED
     """``programmed``, or ``stiffest``: the tool turned about its axis as the first model says."""
     seeds: Annotated[tuple[int, ...], Option("--seed", least=0)] = (0,)
@@ -724,6 +727,24 @@ def _compensator_settings(settings: SimulateProcessSettings) -> CompensatorSetti
     return found
 
 
+def with_encoders(settings: CompensatorSettings, cell: Cell) -> CompensatorSettings:
+    """Return settings that read the secondary encoders of a simulated cell.
+
+    Raises
+    ------
+    CompensationError
+        If its arm has none.
+    """
+    found = LinkEncoders.of(cell)
+    if found is None:
+        raise CompensationError(
+            f"--encoders: the arm of cell {cell.name} has no secondary encoders"
+            " (key simulation.encoders.noise)"
+        )
+    encoders = settings.encoders.model_copy(update={"joints": found.joints})
+    return settings.model_copy(update={"encoders": encoders})
+
+
 def _trial(
     cell: Cell, compensator: CompensatorSettings, run: ProcessRun, settings: SimulateProcessSettings
 ) -> ProcessTrial:
@@ -733,6 +754,8 @@ def _trial(
     load = read_sensor_load(Path(run.tool) if run.tool else None, robot)
     state = None if run.arm_state is None else read_arm_growth(Path(run.arm_state), robot)
     landing = process.Landing.of(cell) if settings.course_offset else None
+    if settings.encoders:
+        compensator = with_encoders(compensator, cell)
     return ProcessTrial(
         *(cell, calibrated, load, compensator, run.seed, state, landing), jobs=settings.jobs
     )

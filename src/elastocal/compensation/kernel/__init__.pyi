@@ -5,6 +5,7 @@ from ._arm_error import (
 from ._statics import (
     deflection as deflection,
     growth as growth,
+    joint_deflections as joint_deflections,
     observation_block as observation_block,
     orientation as orientation,
     rest as rest,

@@ -3,16 +3,34 @@
 The laws of the springs as statements: from torques about their axes to angles.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, count
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.kernel.program import ONE, ZERO, Matrix, Program, Routine, Value, Vector
+from elastocal.compensation.kernel.program import (
+    ONE,
+    ZERO,
+    Matrix,
+    Product,
+    Program,
+    Routine,
+    Value,
+    Vector,
+)
 from elastocal.elastic import ElasticModel, SpringAxis, SpringLoad
-from elastocal.elastic.springs import Expression, Function, Input, Number, Product, Sum
+from elastocal.elastic.springs import (
+    Expression,
+    Function,
+    Input,
+    Number,
+    Product as ProductOf,
+    Sum,
+)
+from elastocal.errors import SpringError
+from elastocal.identification import EncoderZero
 from elastocal.robot import ChainJoint, Robot, SerialChain
 
 Angles = list[tuple[int, Value]]
@@ -62,8 +80,12 @@ class Memory:
 class Laws:
     """The laws of a model's springs, with the loads that they were given."""
 
-    def __init__(self, program: Program, model: ElasticModel) -> None:
+    def __init__(
+        self, program: Program, model: ElasticModel, sagging: Collection[int] = ()
+    ) -> None:
+        """Take the springs of a model; ``sagging`` are axes whose weight is asked for, too."""
         self.memory = Memory(model)
+        self._sagging = frozenset(sagging)
         self._program = program
         self._heavy = model.robot.has_masses
         self._springs = model.springs
@@ -80,7 +102,8 @@ class Laws:
     def weighs(self, axis: int) -> bool:
         """Return whether a law asks for the torque of the arm's own weight about an axis."""
         spring = self._springs[self._spring_of[axis]]
-        return self._heavy and (spring.bears_weight or bool(spring.friction_limits))
+        asks = spring.bears_weight or bool(spring.friction_limits) or axis in self._sagging
+        return self._heavy and asks
 
     def angles(self, axis: LoadedAxis) -> Iterator[tuple[int, Angles]]:
         """Yield, once all torques of a spring are known, the angles of each of its axes.
@@ -214,7 +237,7 @@ def written(
 def reads(x: Expression) -> bool:
     """Return whether a formula has an input."""
     match x:
-        case Sum(parts) | Product(parts) | Function(_, parts):
+        case Sum(parts) | ProductOf(parts) | Function(_, parts):
             return any(map(reads, parts))
     return isinstance(x, Input)
 
@@ -236,7 +259,7 @@ def _statement(
             # Unlike lengths of a URDF, numbers of a law may be tiny and still count.
             plain = number in (0.0, 1.0, -1.0)
             return Value(int(number)) if plain else program.quantity(next(names), number)
-        case Product(factors):
+        case ProductOf(factors):
             return program.total(next(names), [tuple(map(value, factors))])
         case Sum(terms):
             return program.total(next(names), [(value(term),) for term in terms])
@@ -518,6 +541,60 @@ def observation_block(model: ElasticModel, compliance: Sequence[float] = ()) -> 
     if len(model.friction) and len(compliance):
         outputs += [*_unknown(program, laws, jacobian, compliance), *laws.remembered()]
     return routine(program, outputs, laws.memory.names)
+
+
+def joint_deflections(
+    model: ElasticModel, compliance: Sequence[float], zeros: Sequence[EncoderZero]
+) -> Routine:
+    """Return the program of what secondary encoders see, and of the Jacobian of their joints.
+
+    The outputs are how far each link is from its motor, under the load and by what its encoder
+    reads in the air; then the displacement of the tool centre point for a unit of each, x, y, z.
+
+    Raises
+    ------
+    SpringError
+        If a joint has no spring about its own axis: the model does not know what it yields.
+    """
+    axes = [axis for spring in model.springs for axis in spring.axes]
+    links = {each.name: each for each in model.robot.chain.joints}
+    own = {n: axis.joint for n, axis in enumerate(axes) if axis.is_axis_of(links[axis.joint])}
+    for zero in zeros:
+        if zero.joint not in own.values():
+            raise SpringError(f"joint {zero.joint!r} has no spring about its own axis")
+    joints = [zero.joint for zero in zeros]
+    asked = {number: joint for number, joint in own.items() if joint in joints}
+    program = Program()
+    laws = Laws(program, model, asked)
+    terms: dict[str, list[Product]] = {zero.joint: [] for zero in zeros}
+    jacobian: dict[str, Vector] = {}
+    weight: dict[str, Value] = {}
+    for place in _places(program, model, laws):
+        for axis in place.loaded():
+            joint = asked.get(axis.number)
+            if joint is not None and joint not in jacobian:
+                weight[joint] = axis.weight
+                turned = program.cross(f"j{axis.number + 1}", axis.direction, place.lever)
+                jacobian[joint] = turned if axis.revolute else axis.direction
+            for number, angles in laws.angles(axis):
+                if number in asked:
+                    terms[asked[number]] += [
+                        (program.quantity(f"compliance{p + 1}", float(compliance[p])), angle)
+                        for p, angle in angles
+                    ]
+    yielded = []
+    for k, zero in enumerate(zeros, start=1):
+        label = str(model.robot.joint_names.index(zero.joint) + 1)
+        numbers = {"at": zero.offset, "sag": zero.weight, "sin": zero.sine, "cos": zero.cosine}
+        at, sag, *waves = (
+            program.quantity(f"zero{k}_{name}", number) for name, number in numbers.items()
+        )
+        pairs = zip(waves, (Value(1, f"s{label}"), Value(1, f"c{label}")), strict=True)
+        turning = [*pairs] if links[zero.joint].revolute else []
+        in_air = [(at,), (sag, weight[zero.joint]), *turning]
+        yielded.append(program.total(f"yield{k}", [*in_air, *terms[zero.joint]]))
+    moved = [value for joint in joints for value in jacobian[joint]]
+    return routine(program, [*yielded, *moved], laws.memory.names)
 
 
 def rest(model: ElasticModel) -> Routine:

@@ -48,6 +48,9 @@ class ModelFunctions:
     the load."""
     growth: Function | None = None
     """``(q)``: how far a warm arm has grown, in base, in m; None: nothing is known of it."""
+    links: Function | None = None
+    """``(q, force, moment, memory)``: what joints with a secondary encoder yield, then the
+    displacement of the tool centre point for a unit of each; None: there are none."""
 
 
 def compiled(routine: Routine, joints: int, loaded: bool = True) -> Function:

@@ -167,6 +167,13 @@ class Compensator:
         self._gain, self._uncertain = numbers.settings.gain, numbers.settings.uncertain_above
         self._light, self._free = numbers.light_loads, numbers.settings.free_cycles
         self._farthest = limits.offset
+        self._links, self._share = functions.links, numbers.settings.encoder_share
+        names = numbers.calibrated.model.robot.joint_names
+        self._encoders = [names.index(joint) for joint in numbers.settings.encoders.joints]
+        self._sees_friction = numbers.encoders_see_friction
+        rest = numbers.rest_spread
+        self._rest_spread = self._spread if rest is None else np.ascontiguousarray(rest)
+        self._rest_weighted = np.ascontiguousarray(np.column_stack([compliance, self._rest_spread]))
 
     @classmethod
     def of(
@@ -201,14 +208,19 @@ class Compensator:
 
     def step(self, state: State, reading: Reading) -> tuple[State, Correction]:
         """Take a reading and return the correction: `condition`, then `correct`."""
-        return self.correct(self._conditioner.step(state, reading), reading.q)
+        return self.correct(self._conditioner.step(state, reading), reading.q, reading.links)
 
     def condition(self, state: State, reading: Reading) -> State:
         """Take a reading only: for a sensor that is quicker than the controller's cycle."""
         return self._conditioner.step(state, reading)
 
-    def correct(self, state: State, q: Sequence[float]) -> tuple[State, Correction]:
+    def correct(
+        self, state: State, q: Sequence[float], links: Sequence[float] | None = None
+    ) -> tuple[State, Correction]:
         """Return the correction of a cycle.
+
+        Secondary encoders, once zeroed (`zero_encoders`), take the place of the model about the
+        axes of their joints: what they see beyond it moves the tool by ``J (delta - theta)``.
 
         Parameters
         ----------
@@ -216,6 +228,8 @@ class Compensator:
             After the readings of the cycle.
         q : sequence of float
             Joint positions, in rad or m.
+        links : sequence of float, optional
+            Positions of the links by secondary encoders, in the order of the settings, in rad or m.
         """
         # Both early returns precede the model: it must not be evaluated at invalid joints, nor with
         # a wrench that no reading of this cycle supports.
@@ -225,12 +239,17 @@ class Compensator:
             return self._without_reading(state, state.problem)
         rotation = self._orientation(q)
         load = _in_base(rotation, state.wrench)
+        beyond, shift, unread = self._seen(state, q, load, links)
+        spread = self._rest_spread if state.zero else self._spread
         if self._light:
-            deflection, half_width, friction, unloaded = self._remembering(q, load, state)
+            deflection, half_width, friction, unloaded = self._remembering(q, load, state, spread)
         else:
-            (deflection, half_width), friction, unloaded = self._predicted(q, load), (), self._free
+            deflection, half_width = self._predicted(q, load, spread)
+            friction, unloaded = (), self._free
+        deflection = _sum(deflection, shift)
         off = self._off(deflection, state.offset, q)
         target, status = self._target(off, rotation)
+        status |= unread
         if half_width > self._uncertain:
             status |= Status.UNCERTAIN.value
         # The rate limit is last, from the correction before: whatever the model, the deadband or
@@ -249,8 +268,58 @@ class Compensator:
             half_width,
             friction,
             unloaded,
-            *state[12:],
+            state.offset,
+            state.refused,
+            beyond,
+            state.zero,
         ), answer
+
+    def zero_encoders(self, state: State) -> State:
+        """Return the state with the secondary encoders zeroed: the arm is in the air, or touches.
+
+        What they see beyond the model there, the errors of their mounting among it, is what they
+        count from. The sag of the arm on its way is the model's. Without a reading of theirs, or
+        of the force, nothing changes.
+
+        Parameters
+        ----------
+        state : State
+            After a correction with positions of the links.
+        """
+        known = not state.missed and not state.problem
+        return state._replace(zero=state.beyond) if known else state
+
+    def _seen(
+        self, state: State, q: Sequence[float], load: _Load, links: Sequence[float] | None
+    ) -> tuple[tuple[float, ...], Triple, int]:
+        """Return what encoders see beyond the model, how that moves the tool, and a flag."""
+        if self._links is None:
+            return (), _ORIGIN, 0
+        own, arguments = self._encoders, (q, *load)
+        if self._light:
+            free = state.unloaded >= self._free
+            out = self._links(*arguments, self._rest(q) if free else state.friction)
+        else:
+            out = self._links(*arguments)
+        beyond, unread = state.beyond, 0
+        if links is not None and len(links) == len(own) and _are_joints(links):
+            seen = tuple(
+                [x - q[n] - y for x, n, y in zip(links, own, out[: len(own)], strict=True)]
+            )
+            before, share = beyond or seen, self._share
+            pairs = zip(before, seen, strict=True)
+            beyond = tuple([b + share * (s - b) for b, s in pairs])
+        else:
+            unread = Status.ENCODER.value
+        x, y, z = _ORIGIN
+        place = len(own)
+        for b, zero in zip(beyond, state.zero, strict=False):
+            change = b - zero
+            x += change * out[place]
+            y += change * out[place + 1]
+            z += change * out[place + 2]
+            place += 3
+        return beyond, (x, y, z), unread
 
     def begin_course(self, state: State, q: Sequence[float], deviation: Sequence[float]) -> State:
         """Take what marker and controller show in light contact at the start of a course.
@@ -293,16 +362,18 @@ class Compensator:
         known = _sum(deflection, offset)
         return known if self._growth is None else _sum(known, self._growth(q))
 
-    def _predicted(self, q: Sequence[float], load: _Load) -> tuple[Triple, float]:
+    def _predicted(
+        self, q: Sequence[float], load: _Load, spread: FloatArray
+    ) -> tuple[Triple, float]:
         """Return the deflection in base, and half its 95 % interval where that is widest."""
         dx, dy, dz = self._deflection(q, *load)
         # O L has the interval's half widths as lengths of its rows: products of a fixed number, in
         # every cycle the same time, where percentiles of the draws would need a sort.
-        rows = np.array(self._block(q, *load)).reshape(self._shape) @ self._spread
+        rows = np.array(self._block(q, *load)).reshape(self._shape) @ spread
         return (dx, dy, dz), math.sqrt(max(_squares(rows)))
 
     def _remembering(
-        self, q: Sequence[float], load: _Load, state: State
+        self, q: Sequence[float], load: _Load, state: State, spread: FloatArray
     ) -> tuple[Triple, float, tuple[float, ...], int]:
         """Return the same of a model with friction, its memory, and how long nothing has loaded it.
 
@@ -313,9 +384,13 @@ class Compensator:
         block = self._block(q, *load, self._rest(q) if free else state.friction)
         # The deflection is the block times the compliances: the model need not be asked twice.
         size = self._shape[0] * self._shape[1]
-        rows = np.array(block[:size]).reshape(self._shape) @ self._weighted
+        weighted = self._weighted if spread is self._spread else self._rest_weighted
+        rows = np.array(block[:size]).reshape(self._shape) @ weighted
         dx, dy, dz = rows[:, 0].tolist()
-        pairs = zip(_squares(rows[:, 1:]), block[size : size + 3], strict=True)
+        earlier = block[size : size + 3]
+        if weighted is not self._weighted and self._sees_friction:
+            earlier = (0.0, 0.0, 0.0)
+        pairs = zip(_squares(rows[:, 1:]), earlier, strict=True)
         half_width = max([math.sqrt(variance) + unknown for variance, unknown in pairs])
         friction = block[size + 3 :]
         unloaded = 0
@@ -382,6 +457,8 @@ class Compensator:
             unloaded,
             offset,
             state.refused,
+            state.beyond,
+            state.zero,
         ), answer
 
 

@@ -1,5 +1,6 @@
 """The numbers of a compensator, worked out once: the Python and the C step both read them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +18,14 @@ from elastocal.compensation.kernel import (
     compiled,
     deflection,
     growth,
+    joint_deflections,
     observation_block,
     orientation,
     rest,
 )
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.elastic import require_possible
-from elastocal.errors import CompensationError, SpringError
+from elastocal.errors import CompensationError, SpringError, nearest
 from elastocal.identification import CalibratedModel, draws_factor
 from elastocal.results import brief_repr
 
@@ -68,6 +70,10 @@ class Design:
     """Growth of the arm; None: unknown, or there is nothing to correct."""
     growth: Routine | None = None
     """Program of the growth; None if it is unknown."""
+    links: Routine | None = None
+    """Program of what joints with a secondary encoder yield; None: there are none."""
+    rest_spread: FloatArray | None = None
+    """`spread` without what encoders see, of the same shape; None: there are none."""
     arm_error: Routine | None = None
     """Program of the error of the unloaded tool; None where the geometry of the arm is unknown."""
 
@@ -86,6 +92,7 @@ class Design:
             growth=None
             if self.growth is None
             else compiled(self.growth, self.joints, loaded=False),
+            links=None if self.links is None else compiled(self.links, self.joints),
         )
 
     @property
@@ -100,6 +107,13 @@ class Design:
             share * float(friction.limit[friction.axis == axis].min())
             for axis in dict.fromkeys(friction.axis.tolist())
         )
+
+    @property
+    def encoders_see_friction(self) -> bool:
+        """Whether secondary encoders sit at every joint whose friction the model remembers."""
+        model, seen = self.calibrated.model, self.settings.encoders.joints
+        axes = [axis for spring in model.springs for axis in spring.axes]
+        return all(axes[n].joint in seen for n in set(model.friction.axis.tolist()))
 
     @property
     def weighs(self) -> bool:
@@ -169,6 +183,8 @@ def design(
     frame = settings.R_base_frame
     model = calibrated.model
     grown = state is not None and state.corrects
+    spread = _Z * draws_factor(calibrated.draws)
+    links, rest_spread = _of_encoders(calibrated, settings.encoders.joints, spread)
     return Design(
         calibrated=calibrated,
         settings=settings,
@@ -178,7 +194,9 @@ def design(
         orientation=orientation(model),
         rest=rest(model),
         filters=filters,
-        spread=_Z * draws_factor(calibrated.draws),
+        spread=spread,
+        links=links,
+        rest_spread=rest_spread,
         sensor_matrix=load.matrix_tcp,
         weight_response=load.response_tcp,
         gravity=load.gravity,
@@ -188,6 +206,34 @@ def design(
         growth=growth(model.robot, state.share, state.offset) if state and grown else None,
         arm_error=None if built is None else arm_error(built),
     )
+
+
+def _of_encoders(
+    calibrated: CalibratedModel, joints: Sequence[str], spread: FloatArray
+) -> tuple[Routine | None, FloatArray | None]:
+    """Return the program of joints with encoders, and the spread of what these do not see."""
+    if not joints:
+        return None, None
+    model, known = calibrated.model, {each.joint: each for each in calibrated.encoders}
+    for joint in joints:
+        if joint not in known:
+            those = ", ".join(known) or "none"
+            raise CompensationError(
+                f"encoders.joints: joint {joint!r} had no secondary encoder in the calibration"
+                f"{nearest(joint, known)} (that had: {those})"
+            )
+    try:
+        zeros = [known[joint] for joint in joints]
+        links = joint_deflections(model, calibrated.compliance.tolist(), zeros)
+    except SpringError as error:
+        raise CompensationError(f"encoders.joints: {error}") from error
+    chain = {each.name: each for each in model.robot.chain.joints}
+    seen = [
+        all(axis.joint in joints and axis.is_axis_of(chain[axis.joint]) for axis in spring.axes)
+        for spring in model.springs
+        for _ in spring.parameters
+    ]
+    return links, np.where(np.array(seen)[:, None], 0.0, spread)
 
 
 def _require_same_sensor(calibrated: CalibratedModel, load: SensorLoad) -> None:

@@ -36,6 +36,8 @@ class Status(IntFlag):
     """The sensor called the last reading bad."""
     OFFSET = 1024
     """The reading at the start of the course was not taken: its offset stays what it was."""
+    ENCODER = 2048
+    """A position of a link was missing or no joint's: what the encoders saw last counts."""
 
 
 class Reading(NamedTuple):
@@ -51,6 +53,9 @@ class Reading(NamedTuple):
     """Raw, in the sensor's frame, about its origin, in N·m."""
     ok: bool = True
     """Whether the sensor calls it good."""
+    links: Sequence[float] | None = None
+    """Positions of the links by secondary encoders, in the order of the settings, in rad or m;
+    None: none were read."""
 
 
 class State(NamedTuple):
@@ -84,6 +89,11 @@ class State(NamedTuple):
     """Offset of the course, in base, in m: the tool's error beyond deflection and growth."""
     refused: int = 0
     """`Status.OFFSET` where the last reading of a course was not taken, else 0."""
+    beyond: tuple[float, ...] = ()
+    """What the secondary encoders see beyond the model, smoothed, in rad or m; empty: nothing yet,
+    or there are none."""
+    zero: tuple[float, ...] = ()
+    """The same when they were zeroed; empty: they were not, and the model alone corrects."""
 
 
 class Correction(NamedTuple):

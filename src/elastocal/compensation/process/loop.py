@@ -40,6 +40,8 @@ class CycleInput:
     """Readings of the sensor, shape (reading, 6), in N and N·m."""
     deflection: FloatArray
     """True deflection, shape (3,), in m, for a corrector that may know it."""
+    links: FloatArray | None = None
+    """Positions of the links by secondary encoders, shape (encoder,), in rad; None: not read."""
 
 
 class Corrector(Protocol):
@@ -50,6 +52,9 @@ class Corrector(Protocol):
 
     def correct(self, cycle: CycleInput) -> FloatArray:
         """Return the correction in base, shape (3,), in m."""
+
+    def zero_encoders(self) -> None:
+        """Zero the secondary encoders: the tool is in the air."""
 
     def begin_course(self, q: FloatArray, deviation: FloatArray) -> None:
         """Take what marker and controller show in light contact, in base, shape (3,), in m."""
@@ -81,8 +86,13 @@ class ModelCorrector:
         state, joints = self._state, cycle.q.tolist()
         for t, values in zip(cycle.time.tolist(), cycle.raw.tolist(), strict=True):
             state = self._compensator.condition(state, Reading(t, joints, values[:3], values[3:]))
-        self._state, answer = self._compensator.correct(state, joints)
+        links = None if cycle.links is None else cycle.links.tolist()
+        self._state, answer = self._compensator.correct(state, joints, links)
         return np.array(answer.correction)
+
+    def zero_encoders(self) -> None:
+        """Take what the encoders show beyond the model as their zero."""
+        self._state = self._compensator.zero_encoders(self._state)
 
     def begin_course(self, q: FloatArray, deviation: FloatArray) -> None:
         """Take the offset of the course."""
@@ -109,6 +119,9 @@ class PerfectCorrector:
         self._last = late
         return late + self._lead * (late - before)
 
+    def zero_encoders(self) -> None:
+        """Learn nothing: the deflection is known."""
+
     def begin_course(self, q: FloatArray, deviation: FloatArray) -> None:
         """Learn nothing: the deflection is known."""
 
@@ -127,6 +140,10 @@ class LoadedRobot(Protocol):
     @property
     def felt(self) -> FloatArray:
         """The part of it that the process makes, shape (..., 6)."""
+
+    @property
+    def gears(self) -> FloatArray:
+        """How far links are from where their motors have them, shape (..., joint), in rad."""
 
 
 class TrueCell(Protocol):
@@ -152,6 +169,9 @@ class TrueCell(Protocol):
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return the sensor's readings of true wrenches, shape (..., sample, 6)."""
+
+    def read_links(self, q: FloatArray, gears: FloatArray) -> FloatArray | None:
+        """Return what secondary encoders read, shape (run, encoder); None: there are none."""
 
     def taught(self, q: FloatArray, time: float, visits: int) -> FloatArray:
         """Return marker less controller as read in the air when the path was taught, (..., 3).
@@ -227,6 +247,10 @@ class Passage:
     """See `air_shifts`, shape (row, 3), in m."""
     corrector: Corrector | None = None
     """Without one the path is run as programmed."""
+
+
+_ZEROING = 100
+"""Cycles in the air that secondary encoders are zeroed over."""
 
 
 class _Drives:
@@ -348,7 +372,20 @@ class _Ride:
         for each in passages:
             if each.corrector is not None:
                 each.corrector.start()
+        self._zero_encoders()
         self._before = cell.press(rows.q[0], rows.force[0], rows.path[0], rows.outward[0])
+
+    def _zero_encoders(self) -> None:
+        """Let corrected courses zero their encoders in the air above their beginning."""
+        rows, cell, runs = self.rows, self._cell, len(self._passages)
+        if cell.read_links(rows.q[0], np.zeros_like(rows.q[0])) is None:
+            return
+        self._before = cell.press(rows.q[0], np.zeros((runs, 3)))
+        for cycle in range(-_ZEROING, 0, self._parts.size):
+            self._cycles_to(0, 0, self._before, cycle * self._controller.cycle)
+        for each in self._passages:
+            if each.corrector is not None:
+                each.corrector.zero_encoders()
 
     def go_on(self, row: int) -> FloatArray:
         """Run to a row, and return the shifts in the cycles up to it, shape (cycle, run, 3)."""
@@ -388,24 +425,27 @@ class _Ride:
         raw = raw.reshape(runs, len(parts), -1, 6)
         deflection = _between(before.shift - rows.air[last], now.shift - rows.air[row], parts)
         joints = _between(rows.q[last], rows.q[row], parts)
+        gears = _between(before.gears, now.gears, parts)
         shifts = np.empty((len(parts), runs, 3))
         for n, times in enumerate(time.reshape(len(parts), -1)):
             # The correction of this cycle acts from the next on, later by the dead cycles.
             q = rows.joints(row, joints[n], self._drives.done)
-            self._drives.command(_corrections(rows, row, times, q, raw[:, n], deflection[n]))
+            links = self._cell.read_links(q, gears[n])
+            cycles = [
+                CycleInput(times, q[run], raw[run, n], deflection[n, run], own)
+                for run, own in enumerate([None] * runs if links is None else links)
+            ]
+            self._drives.command(_corrections(rows, row, cycles))
             shifts[n] = deflection[n] + self._drives.done
         self._before = now
         return shifts
 
 
-def _corrections(
-    rows: _Rows, row: int, time: FloatArray, q: FloatArray, raw: FloatArray, deflection: FloatArray
-) -> FloatArray:
+def _corrections(rows: _Rows, row: int, cycles: Sequence[CycleInput]) -> FloatArray:
     """Return the correction of each run in a cycle, shape (run, 3), in m; none past its end."""
-    corrections = np.zeros((len(q), 3))
-    for run, passage in enumerate(rows.passages):
+    corrections = np.zeros((len(cycles), 3))
+    for run, (passage, cycle) in enumerate(zip(rows.passages, cycles, strict=True)):
         if passage.corrector is not None and row <= rows.last[run]:
-            cycle = CycleInput(time, q[run], raw[run], deflection[run])
             corrections[run] = passage.corrector.correct(cycle)
     return corrections
 

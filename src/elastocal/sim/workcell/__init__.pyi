@@ -1,3 +1,4 @@
+from ._instruments import LinkEncoders as LinkEncoders
 from ._timeline import SimClock as SimClock
 from .campaign import (
     CampaignSimulator as CampaignSimulator,

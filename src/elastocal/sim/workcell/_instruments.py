@@ -16,6 +16,7 @@ process of `_AIR_TIME`.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
@@ -81,6 +82,53 @@ class SampleBuffer:
         times, values = np.concatenate(self._times), np.concatenate(self._values)
         self._times, self._values = [], []
         return times[-NEWEST:] / MICROSECONDS, values[-NEWEST:]
+
+
+@dataclass(frozen=True, eq=False)
+class LinkEncoders:
+    """Secondary encoders behind the gears of the arm, with errors of their own."""
+
+    joints: tuple[str, ...]
+    """Joints of the arm, each of which has one."""
+    noise: float
+    """Standard deviation of a sample, in rad."""
+    rate: float
+    """Samples a second."""
+    eccentricity: float
+    """Amplitude of the error once a turn, in rad."""
+    phase: FloatArray
+    """Where that is zero, shape (arm joint,), in rad."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "LinkEncoders | None":
+        """Return the encoders of a simulated cell; None: its arm has none."""
+        entry, names = truth_of(cell).encoders, cell.robot.joint_names
+        if entry.noise is None:
+            return None
+        joints = names[cell.robot.external_axes :]
+        rng = generator(truth_of(cell).seed, "encoders")
+        phase = rng.uniform(-np.pi, np.pi, len(joints))
+        return cls(joints, entry.noise, entry.rate, entry.eccentricity, phase)
+
+    def scatter(self, time: float) -> float:
+        """Return the standard deviation of a mean over a time in s, in rad."""
+        return self.noise / math.sqrt(max(time * self.rate, 1.0))
+
+    def read(self, q: FloatArray, gears: FloatArray, noise: FloatArray) -> FloatArray:
+        """Return the positions of links as read, shape (..., joint); NaN at external axes.
+
+        Parameters
+        ----------
+        q, gears : ndarray, shape (..., joint)
+            Positions of the motors, and of the links from there, in rad or m.
+        noise : ndarray, shape (..., arm joint)
+            In rad.
+        """
+        links = np.full_like(q, np.nan)
+        own = slice(links.shape[-1] - len(self.joints), None)
+        wobble = self.eccentricity * np.sin(q[..., own] + self.phase)
+        links[..., own] = q[..., own] + gears[..., own] + wobble + noise
+        return links
 
 
 class NoiseStream:

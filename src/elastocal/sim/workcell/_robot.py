@@ -107,6 +107,20 @@ class TrueRobot:
         init=False, repr=False, default_factory=dict
     )
 
+    def gear_angles(self, theta: FloatArray) -> FloatArray:
+        """Return how far each link is from where its motor has it, shape (..., joint), in rad.
+
+        Zero at external axes, whose drives have no gears here.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (..., spring)
+            Spring positions in rad or m.
+        """
+        angles = np.zeros((*theta.shape[:-1], len(self.linkage.joint_names)))
+        angles[..., self.external :] = theta[..., self.springs.gears.which]
+        return angles
+
     def __post_init__(self) -> None:
         linkage, ends = self.built, self.chain.ends
         T = linkage.T_base_tip

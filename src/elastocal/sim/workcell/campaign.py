@@ -69,6 +69,11 @@ class TrueReadings:
     or m: near contact, or in light contact."""
     reference_felt: FloatArray
     """As `felt`, near contact, shape (place, 3), in N."""
+    gears: FloatArray
+    """How far the links are from where their motors have them, shape (place, load, joint), in
+    rad."""
+    reference_gears: FloatArray
+    """The same where the displacements count from, shape (place, joint)."""
 
     def __repr__(self) -> str:
         return "TrueReadings({} places, {} loads)".format(*self.force.shape)
@@ -266,10 +271,11 @@ class CampaignSimulator:
         self, near: RobotState, touch: RobotState, states: list[RobotState], reference: int | None
     ) -> TrueReadings:
         weight, statics = self.statics.weight, self.statics
-        q, twist, force = (
+        q, twist, force, theta = (
             np.stack([getattr(state, name) for state in states], axis=1)
-            for name in ("q", "twist", "force")
+            for name in ("q", "twist", "force", "theta")
         )
+        gears, zero_gears = map(statics.robot.gear_angles, (theta, near.theta))
         unloaded, loaded = self._markers(near.q, near.twist), self._markers(q, twist)
         tare = weight @ statics.R_base_sensor(near.q, near.twist)
         carried = np.einsum("plji,plj->pli", statics.R_base_sensor(q, twist), force + weight)
@@ -284,7 +290,7 @@ class CampaignSimulator:
         if reference is not None:
             kept = np.arange(len(states)) != reference
             zero, zero_q = (loaded[0][:, reference], loaded[1][:, reference]), q[:, reference]
-            zero_felt = felt[:, reference]
+            zero_felt, zero_gears = felt[:, reference], gears[:, reference]
         return TrueReadings(
             q=q[:, kept],
             force=force[:, kept],
@@ -296,4 +302,6 @@ class CampaignSimulator:
             R_base_sensor=R,
             reference_q=zero_q,
             reference_felt=zero_felt,
+            gears=gears[:, kept],
+            reference_gears=zero_gears,
         )

@@ -18,7 +18,13 @@ from elastocal.dataset import Readings
 from elastocal.errors import present
 from elastocal.results import brief_repr
 from elastocal.sim.truth import truth_of
-from elastocal.sim.workcell._instruments import COVERAGE, averaged_noise, sensor_range
+from elastocal.sim.workcell._instruments import (
+    COVERAGE,
+    LinkEncoders,
+    averaged_noise,
+    sensor_range,
+)
+from elastocal.sim.workcell._robot import ARM_JOINTS
 from elastocal.sim.workcell.campaign import TrueReadings
 
 
@@ -43,6 +49,8 @@ class ErrorDraws:
     """Shape (place, 3)."""
     cross_talk: FloatArray
     """Shape (6, 6)."""
+    encoder: FloatArray
+    """Shape (place, 1 + load, arm joint); the first is the unloaded reading."""
 
     def __repr__(self) -> str:
         places, readings, _ = self.marker.shape
@@ -52,16 +60,16 @@ class ErrorDraws:
     def of(cls, places: int, loads: int, rng: np.random.Generator) -> "ErrorDraws":
         """Draw for some places under some load cases."""
         marker, sensor, stop = rng.standard_normal((3, places, 1 + loads, 3))
-        return cls(
-            marker, sensor, stop, rng.standard_normal((places, 3)), rng.standard_normal((6, 6))
-        )
+        drift, cross_talk = rng.standard_normal((places, 3)), rng.standard_normal((6, 6))
+        encoder = rng.standard_normal((places, 1 + loads, ARM_JOINTS))
+        return cls(marker, sensor, stop, drift, cross_talk, encoder)
 
     def take(self, places: IndexArray, loads: IndexArray) -> "ErrorDraws":
         """Return the draws of some places and load cases."""
         rows = np.ix_(places, np.concatenate([[0], 1 + loads]))
         return ErrorDraws(
             self.marker[rows], self.sensor[rows], self.stop[rows], self.drift[places],
-            self.cross_talk,
+            self.cross_talk, self.encoder[rows],
         )  # fmt: skip
 
 
@@ -85,6 +93,10 @@ class CampaignErrors:
     """Change of the gain per unit of cross-talk, shape (3, 3, 6, 6)."""
     repeatability: float
     """Error of a stop, in m."""
+    encoders: LinkEncoders | None
+    """Secondary encoders; None: the arm has none."""
+    times: tuple[float, float]
+    """Times that an unloaded and a loaded reading are averaged over, in s."""
 
     @classmethod
     def of(cls, cell: Cell) -> "CampaignErrors":
@@ -109,6 +121,8 @@ class CampaignErrors:
             drift=sensor.drift / 60.0 * load_case_time(cell) * ranges[:3] / ranges[0],
             gain=sensor.cross_talk * _gain(cell, ranges),
             repeatability=entry.controller.repeatability,
+            encoders=LinkEncoders.of(cell),
+            times=times,
         )
 
     def readings(
@@ -147,6 +161,7 @@ class CampaignErrors:
         # The encoders do not see where the arm truly stops; the tracker does.
         marker += self.repeatability * (draws.stop[:, 1:] - draws.stop[:, :1])
         rows = (places * loads, -1)
+        link, zero = self._links(settled, draws)
         return Readings(
             pose=np.repeat(np.arange(places), loads),
             load_case=np.tile(load_cases, places),
@@ -157,7 +172,23 @@ class CampaignErrors:
             reference_joint_position=np.repeat(settled.reference_q, loads, axis=0),
             reference_force=np.repeat(self._reference(settled, draws, scales.force), loads, axis=0),
             conditioned=conditioned,
+            link_joint_position=link,
+            reference_link_joint_position=zero,
         )
+
+    def _links(
+        self, settled: TrueReadings, draws: ErrorDraws
+    ) -> tuple[FloatArray | None, FloatArray | None]:
+        """Return the links under load and at the reference, (reading, joint); no encoders: None."""
+        if self.encoders is None:
+            return None, None
+        unloaded, loaded = (self.encoders.scatter(time) for time in self.times)
+        loads = settled.q.shape[1]
+        link = self.encoders.read(settled.q, settled.gears, loaded * draws.encoder[:, 1:])
+        zero = self.encoders.read(
+            settled.reference_q, settled.reference_gears, unloaded * draws.encoder[:, 0]
+        )
+        return link.reshape(-1, link.shape[-1]), np.repeat(zero, loads, axis=0)
 
     def _force(self, settled: TrueReadings, draws: ErrorDraws, scale: float) -> FloatArray:
         """Return the force in base as the sensor shows it, shape (place, load, 3), in N."""

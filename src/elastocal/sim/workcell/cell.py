@@ -39,6 +39,7 @@ from elastocal.sim.truth import Fault, truth_of
 from elastocal.sim.workcell._contact import Contact
 from elastocal.sim.workcell._imperfections import SensorHysteresis, VisitChance
 from elastocal.sim.workcell._instruments import (
+    LinkEncoders,
     SimulatedForceSensor,
     SimulatedTracker,
     force_gain,
@@ -326,6 +327,8 @@ class ProcessState:
     in N and N·m."""
     felt: FloatArray
     """The part of the wrench that the process force makes, shape (..., 6)."""
+    gears: FloatArray
+    """How far the links are from where their motors have them, shape (..., joint), in rad."""
 
 
 class _SpringTrail:
@@ -372,9 +375,10 @@ class ProcessCell:
         self._state: RobotState | None = None
         self._pressed = _SpringTrail()
         self._stop = np.zeros(3)
-        self._noise = _Noise(seed, "")
+        self._noise = self._wobble = _Noise(seed, "")
         self._slope = np.zeros(6)
         self._tracker = run.tracker
+        self._encoders = LinkEncoders.of(cell)
 
     def lift(self, course: str | Sequence[str], q: FloatArray) -> None:
         """Begin a course in the air: strains, noise, drift and stop error of its own.
@@ -387,6 +391,7 @@ class ProcessCell:
             In rad or m.
         """
         self._noise = _Noise(self._seed, course)
+        self._wobble = self._noise.of("encoders")
         self._stop = self._repeatability * self._noise.each(lambda rng: rng.standard_normal(3))
         self._slope = self._noise.each(self._sensor.slope)
         self._chance = self._noise.chance()
@@ -457,7 +462,8 @@ class ProcessCell:
         felt = strained - self._seen(replace(state, force=nothing, moment=nothing))
         if self._hysteresis is not None:
             strained = strained + self._hysteresis.lag(strained[None])[0]
-        return ProcessState(state.twist[..., :3], strained, felt)
+        gears = statics.robot.gear_angles(state.theta)
+        return ProcessState(state.twist[..., :3], strained, felt, gears)
 
     def _reacting(
         self,
@@ -540,6 +546,25 @@ class ProcessCell:
         columns = [np.atleast_2d(x) for x in (state.q, state.twist, state.force, state.moment)]
         seen = statics.knots(np.zeros(len(columns[0])), *columns).seen
         return seen.reshape(*state.force.shape[:-1], seen.shape[-1])
+
+    def free_gears(self, q: FloatArray) -> FloatArray:
+        """Return how far links are from their motors in the air, (..., joint); see `free_shift`."""
+        state = self._statics.free(q, np.zeros(3), None)
+        return self._statics.robot.gear_angles(state.theta)
+
+    def read_links(self, q: FloatArray, gears: FloatArray) -> FloatArray | None:
+        """Return what the secondary encoders of the arm read, (..., arm joint); None: none.
+
+        Parameters
+        ----------
+        q, gears : ndarray, shape (run, joint)
+            Positions of the motors, and of the links from there, in rad or m.
+        """
+        if self._encoders is None:
+            return None
+        own = len(self._encoders.joints)
+        noise = self._encoders.noise * self._wobble.each(lambda rng: rng.standard_normal(own))
+        return self._encoders.read(q, gears, noise)[..., -own:]
 
     def read(self, since: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return the sensor's samples: cross-talk, zero, drift, noise, end of its range.
