@@ -72,6 +72,9 @@ class ArmState:
     wrong."""
     source: str
     """Device that says so."""
+    link: FloatArray | None = None
+    """Positions of the links by secondary encoders, shape (joint,), in rad or m; NaN at a joint
+    that has none. None: the arm has none at all."""
 
 
 class RobotArm(Protocol):

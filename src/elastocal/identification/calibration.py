@@ -201,7 +201,7 @@ def calibrate(
     warnings = _data_warnings(model, readings, problem, options, marker_offset)
     screening = screen(problem)
     used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
-    kept = problem.take(used)
+    kept, fitted = problem.take(used), readings.take(used)
     solution = solve(kept, options.loss)
     weighted = kept.reweighted(solution.reading_weight)
     held_out = leave_poses_out(weighted)
@@ -220,12 +220,12 @@ def calibrate(
         provenance,
         held_out.misfit,
         unexplained=unexplained,
-        domain=CalibrationDomain.of(model.robot, readings.take(used), kept.block),
-        encoders=encoder_zeros(model, readings.take(used), compliance) if options.encoders else (),
+        domain=CalibrationDomain.of(model.robot, fitted, kept.block),
+        encoders=encoder_zeros(model, fitted, compliance) if options.encoders else (),
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
-    contact = _contact(model, weighted, readings.take(used), options, widened)
+    contact = _contact(model, weighted, fitted, options, widened)
     warnings += _contact_warnings(contact, options)
     return Calibration(
         calibrated=calibrated,
@@ -237,7 +237,7 @@ def calibrate(
         held_out=held_out,
         ladder=tuple(ladder),
         coverage=measured_coverage(
-            weighted, held_out, widened - solution.compliance, low_loads(readings.take(used))
+            weighted, held_out, widened - solution.compliance, low_loads(fitted)
         ),
         widening=by,
         screening=screening,

@@ -208,7 +208,8 @@ def joined_streams(streams: Sequence[Stream]) -> Stream:
 
 def stream_rows(stream: Stream, rows: slice | IndexArray | BoolArray) -> Stream:
     """Return some samples of a stream."""
-    return replace(stream, **{name: values[rows] for name, values in vars(stream).items()})
+    there = {name: values for name, values in vars(stream).items() if values is not None}
+    return replace(stream, **{name: values[rows] for name, values in there.items()})
 
 
 def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> ArmStream:

@@ -28,6 +28,7 @@ class Pressed:
     shift: np.ndarray
     wrench: np.ndarray
     felt: np.ndarray
+    gears: np.ndarray
 
 
 class Spring:
@@ -46,7 +47,11 @@ class Spring:
         self.joints.append(q[0])
         self.pressed = force
         felt = np.concatenate([force, np.zeros_like(force)], axis=-1)
-        return Pressed(self.free_shift(q) + COMPLIANCE * force, felt + 5.0, felt)
+        gears = 1e-6 * force[..., :1] * np.ones_like(q)
+        return Pressed(self.free_shift(q) + COMPLIANCE * force, felt + 5.0, felt, gears)
+
+    def read_links(self, q, gears):  # noqa: ARG002
+        return None
 
     def read(self, since, wrench):  # noqa: ARG002
         return wrench
@@ -73,16 +78,27 @@ class Landed(PerfectCorrector):
         self.offset = deviation
 
 
+class Seeing(Spring):
+    """The same arm with secondary encoders at its last joints."""
+
+    def read_links(self, q, gears):
+        return (q + gears)[..., -2:]
+
+
 class Listener(PerfectCorrector):
     """Corrects nothing, and keeps the readings."""
 
     def __init__(self) -> None:
         super().__init__(0)
-        self.time, self.raw = [], []
+        self.time, self.raw, self.links, self.zeroed = [], [], [], None
+
+    def zero_encoders(self):
+        self.zeroed = len(self.links)
 
     def correct(self, cycle):
         self.time.append(cycle.time)
         self.raw.append(cycle.raw)
+        self.links.append(None if cycle.links is None else cycle.links - cycle.q[-2:])
         return np.zeros(3)
 
 
@@ -197,6 +213,16 @@ def test_readings_come_four_times_a_cycle_with_the_ripple_on_the_process_part_on
     expected = 5.0 + 100.0 * (1.0 + 0.5 * np.sin(2.0 * np.pi * 100.0 * time))
     np.testing.assert_allclose(raw[:, 0], expected, rtol=1e-9)
     np.testing.assert_allclose(raw[:, 1], 5.0)
+
+
+def test_encoders_are_zeroed_in_the_air_and_read_in_every_cycle():
+    listener, cell, made = Listener(), Seeing(), course(np.full(6, 100.0))
+    run_courses(cell, robot(), [Passage(made, air_shifts(cell, made), listener)], PROMPT)
+    assert listener.zeroed >= 100
+    np.testing.assert_allclose(listener.links[: listener.zeroed], 0.0, atol=1e-15)
+    # The force rises from the air to the first row in the cycles before it.
+    np.testing.assert_allclose(listener.links[-1], 100e-6, rtol=1e-9)
+    assert np.all(np.diff(np.concatenate(listener.time)) > 0.0)
 
 
 def test_a_sample_time_that_does_not_divide_the_cycle_is_refused():

@@ -38,6 +38,8 @@ class LoadValues:
     """Moment on the robot about the tcp, shape (3,), in N·m."""
     force_sigma: FloatArray
     """Shape (3,), in N."""
+    link: FloatArray | None = None
+    """Positions of the links by secondary encoders, shape (joint,); None: there are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +180,7 @@ def _numbers(pair: _LoadAndReference, lever: FloatArray, tool: SensorLoad) -> Lo
         force=wrench.force,
         moment=wrench.moment,
         force_sigma=turned_sigma(tool.R_base_sensor(T), load.force.sigma, pair.tare.force.sigma),
+        link=load.link,
     )
 
 
@@ -212,6 +215,8 @@ class UnloadedReferences(NamedTuple):
     """Force on the robot there, in base, shape (pose, 3), in N; 0 where it is not known."""
     tcp: FloatArray
     """Tcp without load, in base, shape (pose, 3), in m."""
+    link: FloatArray
+    """Links there by secondary encoders, shape (pose, joint), in rad or m."""
 
 
 def unloaded_references(
@@ -224,10 +229,14 @@ def unloaded_references(
         if pose.zero and pose.zero.tool and pose.reference and pose.reference.tool
     }
     joints = max((len(zero.q) for zero, _ in found.values()), default=0)
-    q, force, tcp = (np.full((len(labels), width), np.nan) for width in (joints, 3, 3))
+    q, force, tcp, link = (
+        np.full((len(labels), width), np.nan) for width in (joints, 3, 3, joints)
+    )
     force[:] = 0.0
     for pose, (zero, tare) in found.items():
         index = labels.index(pose)
         q[index], tcp[index] = zero.q, tare.T_base_tcp[:3, 3]
         force[index] = wrench_on_robot(zero.wrench, tare.wrench, sensor).force
-    return UnloadedReferences(q, force, tcp)
+        if zero.link is not None:
+            link[index] = zero.link
+    return UnloadedReferences(q, force, tcp, link)

@@ -740,14 +740,15 @@ def _by_pose_and_case(
     kept = [row for row in rows if row.load_case in load_cases]
     shape = len(labels), len(load_cases)
     status = np.full(shape, STATUSES.index(ReadingStatus.MISSING.value))
-    widths = dict.fromkeys(_NUMBERS, 3) | {"q": joints}
+    widths = dict.fromkeys(_NUMBERS, 3) | {"q": joints, "link": joints}
     arrays = {name: np.full((*shape, width), np.nan) for name, width in widths.items()}
     for row in kept:
         place = labels.index(row.pose), load_cases.index(row.load_case)
         status[place] = STATUSES.index(row.status.value)
         for name, array in arrays.items():
-            if row.numbers is not None:
-                array[place] = getattr(row.numbers, name)
+            value = None if row.numbers is None else getattr(row.numbers, name)
+            if value is not None:
+                array[place] = value
     return status, arrays
 
 
@@ -810,6 +811,7 @@ def dataset_of(
 
     zero = unloaded_references(poses, labels, sensor)
     displacement = arrays["marker_displacement"]
+    has_links = not np.isnan(arrays["link"][ok]).all()
     is_unseen = bool(ok.any() and np.isnan(displacement[ok]).all())
     return Dataset.from_arrays(
         joint_position=arrays["q"],
@@ -828,6 +830,8 @@ def dataset_of(
         marker_position=None if is_unseen else seen_markers(poses, labels, registration),
         stations=None if is_unseen else _stations(registration),
         reference_joint_position=zero.q,
+        link_joint_position=arrays["link"] if has_links else None,
+        reference_link_joint_position=zero.link if has_links else None,
         # As all forces counted from where the tool was off the surface: none, or light contact.
         reference_force=zero.force,
         robot_name=robot.name,

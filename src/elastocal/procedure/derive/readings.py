@@ -68,6 +68,9 @@ class ToolState:
     """Raw, sensor frame, in N."""
     moment: Mean
     """Raw, sensor frame, in N·m."""
+    link: FloatArray | None = None
+    """Mean positions of the links by secondary encoders, shape (joint,), in rad or m; NaN at a
+    joint without one. None: there are none."""
 
     @property
     def wrench(self) -> RawWrench:
@@ -117,7 +120,8 @@ def average(streams: Streams, window: Window, least: int = LEAST_SAMPLES) -> Rea
     tool = None
     if at_arm.any() and force is not None and moment is not None:
         q, T = arm.q[at_arm].mean(axis=0), _mean_pose(arm.T_base_tcp[at_arm])
-        tool = ToolState(q, T, force, moment)
+        link = None if arm.link is None else arm.link[at_arm].mean(axis=0)
+        tool = ToolState(q, T, force, moment, link)
     counts = {
         "states of the arm": (int(at_arm.sum()), 1),
         "wrenches": (int(at_wrench.sum()), least),

@@ -255,14 +255,17 @@ _XYZ = f'{{"x":{_HERE},"y":{_HERE},"z":{_HERE}}}'
 _XYZW = f'{_XYZ[:-1]},"w":{_HERE}}}'
 
 
-def schemas(joint_names: Sequence[str]) -> dict[str, tuple[str, str]]:
+def schemas(joint_names: Sequence[str], links: bool = False) -> dict[str, tuple[str, str]]:
     """Return name and text of the JSON schema of each topic.
 
     Parameters
     ----------
     joint_names : sequence of str
         Joints, which are the keys of ``q``.
+    links : bool
+        Whether the arm has secondary encoders.
     """
+    link = _object("links by secondary encoders, in rad (m if prismatic)", joint_names)
     fields: dict[str, tuple[str, dict[str, object]]] = {
         ARM: (
             "elastocal.ArmState",
@@ -270,6 +273,7 @@ def schemas(joint_names: Sequence[str]) -> dict[str, tuple[str, str]]:
                 "q": _object(
                     "joint positions of the controller, in rad (m if prismatic)", joint_names
                 ),
+                **({"link": link} if links else {}),
                 "position": _object("tcp of the controller in base, in m", "xyz"),
                 "orientation": _object("tcp of the controller in base, quaternion", "xyzw"),
                 "motion": _text("what the arm is doing"),
@@ -310,9 +314,14 @@ def arm_messages(states: Sequence[ArmState], joint_names: Sequence[str]) -> list
         return []
     poses = np.array([state.T_base_tcp for state in states])
     quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
-    numbers = np.hstack([np.array([state.q for state in states]), poses[:, :3, 3], quaternions])
     keys = ",".join(json.dumps(name) + ":" + _HERE for name in joint_names)
-    head = f'{{"q":{{{keys}}},"position":{_XYZ},"orientation":{_XYZW}'
+    head, joints = f'{{"q":{{{keys}}}', [np.array([state.q for state in states])]
+    if has_links(states):
+        head += f',"link":{{{keys}}}'
+        unread = np.full(len(joint_names), np.nan)
+        joints.append(np.array([unread if s.link is None else s.link for s in states]))
+    head += f',"position":{_XYZ},"orientation":{_XYZW}'
+    numbers = np.hstack([*joints, poses[:, :3, 3], quaternions])
     tails = [
         _tail(
             motion=state.motion.value,
@@ -323,6 +332,11 @@ def arm_messages(states: Sequence[ArmState], joint_names: Sequence[str]) -> list
         for state in states
     ]
     return _joined(head, numbers, tails)
+
+
+def has_links(states: Sequence[ArmState]) -> bool:
+    """Return whether any state holds positions by secondary encoders."""
+    return any(state.link is not None for state in states)
 
 
 def wrench_messages(blocks: Sequence[WrenchBlock]) -> list[bytes]:
@@ -523,7 +537,7 @@ class PoseRecorder:
         }
         return [
             Topic(topic, name, schema, _nanoseconds(topic, times[topic]), texts[topic])
-            for topic, (name, schema) in schemas(self._joint_names).items()
+            for topic, (name, schema) in schemas(self._joint_names, has_links(self._arm)).items()
         ]
 
 
@@ -549,6 +563,9 @@ class ArmStream:
     """Joint positions, shape (sample, joint), in rad or m."""
     T_base_tcp: FloatArray
     """Tool frame, shape (sample, 4, 4), in m."""
+    link: FloatArray | None = None
+    """Positions of the links by secondary encoders, shape (sample, joint), in rad or m; NaN at a
+    joint without one. None: there are none."""
 
 
 @brief_repr
@@ -668,7 +685,10 @@ def _arm_stream(time: FloatArray, messages: list[Any], joints: tuple[str, ...]) 
     if messages:
         quaternions = _columns(messages, "orientation", "xyzw")
         T[:, :3, :3] = Rotation.from_quat(quaternions).as_matrix()
-    return ArmStream(_frozen(time), _frozen(_columns(messages, "q", joints)), _frozen(T))
+    link = None
+    if messages and "link" in messages[0]:
+        link = _frozen(_columns(messages, "link", joints))
+    return ArmStream(_frozen(time), _frozen(_columns(messages, "q", joints)), _frozen(T), link)
 
 
 def _wrench_stream(time: FloatArray, messages: list[Any]) -> WrenchStream:

@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import BeamState, Cell, PointBlock, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError, nearest, present
+from elastocal.results import brief_repr
 from elastocal.sim.truth import truth_of
 from elastocal.sim.workcell._imperfections import ForceGain, SensorHysteresis
 from elastocal.sim.workcell._plant import Plant
@@ -84,6 +85,7 @@ class SampleBuffer:
         return times[-NEWEST:] / MICROSECONDS, values[-NEWEST:]
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class LinkEncoders:
     """Secondary encoders behind the gears of the arm, with errors of their own."""

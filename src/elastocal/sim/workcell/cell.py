@@ -79,6 +79,7 @@ class SimulatedArm:
         self._touched = False
         self._leaving: Contact | None = None
         self._pose: tuple[Segment, FloatArray] | None = None
+        self._encoders = LinkEncoders.of(plant.cell)
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -96,6 +97,14 @@ class SimulatedArm:
             T = plant.statics.robot.forward(q)
             self._pose = (segment, T) if done else None
         motion = segment.motion_after if done else segment.motion
+        link = None
+        if self._encoders is not None:
+            gears = plant.statics.robot.gear_angles
+            start, end = gears(segment.path.start.theta), gears(segment.path.end.theta)
+            bent = end if done else start + segment.progress(now) * (end - start)
+            rng = generator(plant.seed, "links", now)
+            noise = self._encoders.noise * rng.standard_normal(len(self._encoders.joints))
+            link = self._encoders.read(q, bent, noise)
         return ArmState(
             time=time / MICROSECONDS,
             q=q.copy(),
@@ -104,6 +113,7 @@ class SimulatedArm:
             in_contact=self._in_contact(done),
             fault=segment.fault_after if done else None,
             source=_SOURCE,
+            link=link,
         )
 
     def enable(self) -> None:
