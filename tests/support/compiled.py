@@ -26,10 +26,17 @@ class CompiledCorrector:
         self._joints = compensator.design.joints
         triple, joints = 3 * ctypes.c_double, self._joints * ctypes.c_double
 
+        self._encoders = len(compensator.design.settings.encoders.joints)
+        links = (
+            (("links", self._encoders * ctypes.c_double), ("linked", ctypes.c_int))
+            if self._encoders
+            else ()
+        )
+
         class Reading(ctypes.Structure):
             _fields_ = (
                 ("time", ctypes.c_double), ("q", joints), ("force", triple), ("moment", triple),
-                ("ok", ctypes.c_int),
+                ("ok", ctypes.c_int), *links,
             )  # fmt: skip
 
         class Correction(ctypes.Structure):
@@ -50,8 +57,26 @@ class CompiledCorrector:
         for t, raw in zip(cycle.time.tolist(), cycle.raw.tolist(), strict=True):
             reading = self._reading(t, self._of(cycle.q), tuple(raw[:3]), tuple(raw[3:]), 1)
             self._c.elastocal_condition(self._state, ctypes.byref(reading))
-        self._c.elastocal_correct(self._state, self._of(cycle.q), ctypes.byref(self._told))
+        answer = ctypes.byref(self._told)
+        if cycle.links is None:
+            self._c.elastocal_correct(self._state, self._of(cycle.q), answer)
+        else:
+            links = (self._encoders * ctypes.c_double)(*cycle.links.tolist())
+            self._c.elastocal_correct_with_links(self._state, self._of(cycle.q), links, answer)
         return np.array(self._told.correction)
+
+    @property
+    def told(self) -> tuple[float, ...]:
+        """Correction, deflection, half width and status of the last cycle."""
+        return (
+            *self._told.correction,
+            *self._told.deflection,
+            self._told.half_width,
+            self._told.status,
+        )
+
+    def zero_encoders(self) -> None:
+        self._c.elastocal_zero_encoders(self._state)
 
     def begin_course(self, q: np.ndarray, deviation: np.ndarray) -> None:
         shown = (3 * ctypes.c_double)(*deviation.tolist())

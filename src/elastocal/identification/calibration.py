@@ -210,6 +210,7 @@ def calibrate(
     draws[:, weighted.springs] = _as_of_arms(draws[:, weighted.springs], model.parameters)
     by = _widening(weighted, solution.compliance, draws, held_out, ladder, unexplained)
     widened = widen_draws(weighted, solution.compliance, draws, by)
+    spread = widened - solution.compliance
     springs, frames = weighted.springs, weighted.frame_columns
     compliance, plain = solution.compliance[springs], weighted.of_springs()
     calibrated = CalibratedModel(
@@ -236,9 +237,7 @@ def calibrate(
         attainable_rank=reach,
         held_out=held_out,
         ladder=tuple(ladder),
-        coverage=measured_coverage(
-            weighted, held_out, widened - solution.compliance, low_loads(fitted)
-        ),
+        coverage=measured_coverage(weighted, held_out, spread, low_loads(fitted)),
         widening=by,
         screening=screening,
         solution=solution,

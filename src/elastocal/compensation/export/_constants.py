@@ -15,7 +15,7 @@ from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, Design
 _FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
 """FNV-1a, 64 bits (Fowler, Noll and Vo)."""
 _INDENT = " " * 4
-_COUNTS = ("JOINTS", "SPRINGS", "SECTIONS", "MEDIAN", "MEMORY")
+_COUNTS = ("JOINTS", "SPRINGS", "SECTIONS", "MEDIAN", "MEMORY", "ENCODERS")
 _ARC = (
     -0.3333333333333325,
     0.19999999999898407,
@@ -98,6 +98,7 @@ def constants_of(numbers: Design) -> list[Constant]:
         *_conditioning(numbers),
         *_compensation(numbers),
         *(_friction(numbers) if numbers.deflection.memory else ()),
+        *_encoders(numbers),
     ]
 
 
@@ -115,6 +116,8 @@ def _header(numbers: Design) -> list[Constant]:
     }
     if numbers.deflection.memory:
         values["MEMORY"] = len(numbers.deflection.memory)
+    if numbers.links is not None:
+        values["ENCODERS"] = len(numbers.settings.encoders.joints)
     return [
         Constant(f"ELASTOCAL_{name}", np.array(float(value)), whole=name in _COUNTS, in_header=True)
         for name, value in values.items()
@@ -165,6 +168,22 @@ def _friction(numbers: Design) -> list[Constant]:
     ]
 
 
+def _encoders(numbers: Design) -> list[Constant]:
+    """Return the constants of secondary encoders, where there are any."""
+    if numbers.links is None or numbers.rest_spread is None:
+        return []
+    names, settings = numbers.calibrated.model.robot.joint_names, numbers.settings
+    own = np.array([float(names.index(joint)) for joint in settings.encoders.joints])
+    found = [
+        Constant("ENCODER_JOINT", own, "numbers in q", whole=True),
+        _one("ENCODER_SHARE", settings.encoder_share, "of a new reading"),
+        Constant("REST_SPREAD", numbers.rest_spread, "SPREAD of what encoders do not see"),
+    ]
+    if numbers.deflection.memory:
+        found.append(_one("SEES_FRICTION", numbers.encoders_see_friction, whole=True))
+    return found
+
+
 def _model(numbers: Design) -> list[Constant]:
     """Return the numbers of the chain and the springs, by the names that the routines use."""
     comments = {
@@ -178,6 +197,7 @@ def _model(numbers: Design) -> list[Constant]:
         **numbers.rest.constants,
         **(numbers.growth.constants if numbers.growth else {}),
         **(numbers.arm_error.constants if numbers.arm_error else {}),
+        **(numbers.links.constants if numbers.links else {}),
     }
     return [
         *(_one(name.upper(), number, comments.get(name, "")) for name, number in named.items()),

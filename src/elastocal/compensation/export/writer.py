@@ -12,6 +12,7 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -53,26 +54,31 @@ def filled(
     remembers: bool = False,
     grown: bool = False,
     built: bool = False,
+    linked: bool = False,
 ) -> str:
     """Return a template with its places filled.
 
     Lines that begin with ``@FRICTION@`` are for models that remember friction only, those with
     ``@PLAIN@`` for the others; those with ``@GROWN@`` for arms that have grown, with ``@COLD@`` for
-    the others; those with ``@BUILT@`` for arms whose geometry is known.
+    the others; those with ``@BUILT@`` for arms whose geometry is known; those with ``@LINKS@`` for
+    arms with secondary encoders, with ``@ALONE@`` for the others. A line may have several marks.
     """
     marks = {"@FRICTION@": remembers, "@PLAIN@": not remembers, "@GROWN@": grown, "@BUILT@": built}
-    text = "".join(_meant(template(name), marks | {"@COLD@": not grown}))
+    marks |= {"@COLD@": not grown, "@LINKS@": linked, "@ALONE@": not linked}
+    text = "".join(_meant(template(name), marks))
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
     return text
 
 
 def _meant(text: str, marks: dict[str, bool]) -> Iterator[str]:
-    """Yield the lines of a text without their mark, but those whose mark is not meant."""
+    """Yield the lines of a text without their marks, but those with one that is not meant."""
     for line in text.splitlines(keepends=True):
-        mark = next((each for each in marks if line.startswith(each)), "")
-        if not mark or marks[mark]:
-            yield line.removeprefix(mark)
+        rest = line
+        while mark := next((each for each in marks if marks[each] and rest.startswith(each)), ""):
+            rest = rest.removeprefix(mark)
+        if not any(map(rest.startswith, marks)):
+            yield rest
 
 
 _VECTORS = {"f": "force", "m": "moment"}
@@ -149,8 +155,9 @@ def c_files(numbers: Design) -> dict[str, str]:
     data = selftest_tables(numbers)
     mixing = "\n".join(line for constant in constants for line in constant.mixing())
     values |= data | {"MIXING": mixing, "CHECKSUM": str(checksum(constants))}
+    linked = numbers.links is not None
     head, sin_cos, arc, condition, correct, selftest = (
-        filled(part, values, remembers, grown) for part in _PARTS
+        filled(part, values, remembers, grown, linked=linked) for part in _PARTS
     )
     definitions = "".join(f"{each.definition()}\n" for each in constants if not each.in_header)
     model = "".join(
@@ -167,7 +174,7 @@ def c_files(numbers: Design) -> dict[str, str]:
     )
     values |= _readme_values(numbers)
     built = numbers.arm_error is not None
-    beside = {name: filled(name, values, remembers, grown, built) for name in _BESIDE}
+    beside = {name: filled(name, values, remembers, grown, built, linked) for name in _BESIDE}
     return {"elastocal_model.c": model} | beside
 
 
@@ -184,8 +191,10 @@ def _values(numbers: Design) -> dict[str, str]:
         for k, (name, turns) in enumerate(zip(robot.joint_names, robot.revolute, strict=True))
     ]
     frame = numbers.settings.frame
-    median = numbers.filters.median
+    median, encoders = numbers.filters.median, numbers.settings.encoders.joints
     return {
+        "ENCODERS": str(len(encoders)),
+        "ENCODER_NAMES": "\n".join(f" *   {k}  {remark(n)}" for k, n in enumerate(encoders)),
         "VERSION": __version__,
         "ABOUT": "\n".join(f" * {remark(line)}" for line in about),
         "JOINT_NAMES": "\n".join(f" *   {remark(name)}" for name in names),
@@ -271,8 +280,20 @@ def _routines(numbers: Design) -> str:
             *begins,
             _function(total, numbers.deflection, deflection, inputs, joints),
             _function(columns, of_block, block, inputs, joints),
+            *_yielding(numbers, load),
         )
     )
+
+
+def _yielding(numbers: Design, load: str) -> Iterator[str]:
+    """Yield the function of what joints with a secondary encoder yield, where there are any."""
+    if numbers.links is not None:
+        kept = ",\n    const double memory[ELASTOCAL_MEMORY]" if numbers.links.memory else ""
+        yield "/* What joints with an encoder yield, then what a unit of each moves the tool by. */"
+        head = f"static void yielding({load}{kept}, double out[])"
+        outputs = [f"out[{i}]" for i in range(len(numbers.links.outputs))]
+        inputs = ("q", "force", "moment")
+        yield _function(head, numbers.links, outputs, inputs, numbers.joints)
 
 
 def _growth(numbers: Design) -> Iterator[str]:
@@ -383,6 +404,7 @@ class _Course(Enum):
     GOES_ON = 0
     BEGINS = 1
     ENDS = 2
+    ZEROES = 3
 
 
 class _Stretch(NamedTuple):
@@ -403,6 +425,7 @@ class _Episode:
     stretch: _Stretch
     correction: tuple[float, ...]
     status: int
+    encoders: int
 
 
 def _from_model(numbers: Design) -> ModelFunctions:
@@ -418,6 +441,7 @@ def _from_model(numbers: Design) -> ModelFunctions:
             deflection=remembering.deflection,
             block=remembering.block,
             growth=growth,
+            links=None if numbers.links is None else partial(_links_of, numbers, remembering),
         )
     return ModelFunctions(
         orientation=lambda q: _floats(model.robot.forward(q)[:3, :3]),
@@ -425,7 +449,27 @@ def _from_model(numbers: Design) -> ModelFunctions:
         deflection=lambda q, force, moment: _floats(model.deflection(c, q, force, moment)),
         block=lambda q, force, moment: _floats(model.observation_blocks(q, force, moment)),
         growth=growth,
+        links=None if numbers.links is None else partial(_links_of, numbers, None),
     )
+
+
+def _links_of(
+    numbers: Design, remembering: "_Remembering | None", q: Sequence[float], *given: Sequence[float]
+) -> tuple[float, ...]:
+    """Return what joints with encoders yield, and their Jacobian, from the model."""
+    calibrated, force, moment = numbers.calibrated, given[0], given[1]
+    model, posed, friction = calibrated.model, calibrated.model.at(q), None
+    if remembering is not None:
+        friction, _ = remembering.loaded(q, *given)
+    known = {zero.joint: zero for zero in calibrated.encoders}
+    yields = model.joint_blocks(posed, force, moment, friction) @ calibrated.compliance
+    seen, J = [], model.robot.jacobian(q).translation
+    own = [model.robot.joint_names.index(joint) for joint in numbers.settings.encoders.joints]
+    for joint in own:
+        zero = known[model.robot.joint_names[joint]]
+        waves = zero.sine * math.sin(q[joint]) + zero.cosine * math.cos(q[joint])
+        seen.append(zero.offset + zero.weight * posed.joint_weight[joint] + waves + yields[joint])
+    return (*map(float, seen), *_floats(J[:, own].T))
 
 
 @dataclass(frozen=True, eq=False)
@@ -447,13 +491,13 @@ class _Remembering:
 
     def deflection(self, q: Sequence[float], *given: Sequence[float]) -> tuple[float, ...]:
         force, moment, _ = given
-        friction_torque, after = self._loaded(q, *given)
+        friction_torque, after = self.loaded(q, *given)
         found = self.model.deflection(self.compliance, q, force, moment, friction=friction_torque)
         return (*_floats(found), *after)
 
     def block(self, q: Sequence[float], *given: Sequence[float]) -> tuple[float, ...]:
         force, moment, _ = given
-        friction_torque, after = self._loaded(q, *given)
+        friction_torque, after = self.loaded(q, *given)
 
         # Each friction element alone moves the deflection by the torque that it may bear.
         limit, axes = self.model.friction.limit, self._axes
@@ -480,7 +524,7 @@ class _Remembering:
                 moved += np.abs(J[:, axis : axis + axes] @ turned)
         return moved
 
-    def _loaded(
+    def loaded(
         self,
         q: Sequence[float],
         force: Sequence[float],
@@ -521,6 +565,8 @@ def _check_statements(
         ("deflection", found[:3], expected[:3]),
         ("observation block", block[:size], expected_block[:size]),
     ]
+    if exported.links is not None and model.links is not None:
+        compared.append(("yield of joints", exported.links(*given), model.links(*given)))
     if exported.growth is not None and model.growth is not None:
         compared.append(("growth", exported.growth(load.q), model.growth(load.q)))
     if memory:
@@ -586,6 +632,7 @@ def _episodes(numbers: Design, model: ModelFunctions) -> list[_Episode]:
         *_without_numbers(middle),
         *_courses(numbers, first),
         *_free_motion(numbers, (first, large)),
+        *_encoders(numbers, model, (first, middle)),
     ]
     return _played(Compensator(numbers, model), course)
 
@@ -603,6 +650,26 @@ def _courses(numbers: Design, light: Reading) -> list[_Stretch]:
     begun = [_Stretch(20, light, _Course.BEGINS, each) for each in part]
     return [_Stretch(40, light), *begun, _Stretch(2, still), *begun[:1],
             _Stretch(20, light, _Course.ENDS)]  # fmt: skip
+
+
+def _encoders(
+    numbers: Design, model: ModelFunctions, readings: tuple[Reading, Reading]
+) -> list[_Stretch]:
+    """Return readings of links before and after they were zeroed, and one that fails."""
+    if numbers.links is None or model.links is None:
+        return []
+    names, joints = numbers.calibrated.model.robot.joint_names, numbers.settings.encoders.joints
+    course = []
+    for event, reading, beyond in (
+        (_Course.GOES_ON, readings[0], 2e-4),
+        (_Course.ZEROES, readings[0], 5e-4),
+        (_Course.GOES_ON, readings[1], -3e-4),
+    ):
+        q = reading.q
+        links = [q[names.index(joint)] + beyond * k for k, joint in enumerate(joints, start=1)]
+        course.append(_Stretch(20, reading._replace(links=links), event))
+    wrong = course[-1].reading._replace(links=[1e4] * len(joints))
+    return [*course, _Stretch(2, wrong), course[-1]]
 
 
 def _without_numbers(good: Reading) -> list[_Stretch]:
@@ -644,10 +711,13 @@ def _played(compensator: Compensator, course: list[_Stretch]) -> list[_Episode]:
             state = compensator.begin_course(state, reading.q, stretch.deviation)
         if stretch.course is _Course.ENDS:
             state = compensator.end_course(state)
+        if stretch.course is _Course.ZEROES:
+            state = compensator.zero_encoders(state)
         for _ in range(stretch.times):
             clock += compensator.design.filters.sample
             state, corrected = compensator.step(state, reading._replace(time=reading.time + clock))
-        played.append(_Episode(stretch, corrected.correction, corrected.status))
+        encoders = len(compensator.design.settings.encoders.joints)
+        played.append(_Episode(stretch, corrected.correction, corrected.status, encoders))
     return played
 
 
@@ -701,9 +771,14 @@ def _episode_row(episode: _Episode) -> str:
         [x if math.isfinite(x) else 0.0 for x in part]
         for part in ([reading.time], reading.q, reading.force, reading.moment, stretch.deviation)
     )
+    read = reading.links is not None
+    links = [*(reading.links or [0.0] * episode.encoders)]
     return _struct(
         str(stretch.times),
-        _struct(time[0], q, force, moment, str(int(reading.ok))),
+        _struct(
+            *(time[0], q, force, moment, str(int(reading.ok))),
+            *((links, str(int(read))) if episode.encoders else ()),
+        ),
         str(stretch.course.value),
         deviation,
         str(place),

@@ -133,6 +133,12 @@ void elastocal_start(elastocal_state *state)
         state->offset[i] = 0.0;
     }
     state->refused = 0U;
+@LINKS@    state->seen = 0;
+@LINKS@    state->zeroed = 0;
+@LINKS@    for (i = 0; i < ELASTOCAL_ENCODERS; i++) {
+@LINKS@        state->beyond[i] = 0.0;
+@LINKS@        state->zero[i] = 0.0;
+@LINKS@    }
 }
 
 void elastocal_condition(elastocal_state *state, const elastocal_reading *reading)

@@ -1,9 +1,14 @@
 
 /* ---- From the wrench to the correction ------------------------------------------------ */
 
-@PLAIN@double elastocal_half_width(const double q[], const double force[3], const double moment[3])
-@FRICTION@double elastocal_half_width(const double q[], const double force[3], const double moment[3],
-@FRICTION@                            const double memory[ELASTOCAL_MEMORY])
+@ALONE@@PLAIN@double elastocal_half_width(const double q[], const double force[3], const double moment[3])
+@ALONE@@FRICTION@double elastocal_half_width(const double q[], const double force[3], const double moment[3],
+@ALONE@@FRICTION@                            const double memory[ELASTOCAL_MEMORY])
+@LINKS@/* Half the interval; where encoders are zeroed, of what they do not see. */
+@LINKS@@PLAIN@static double width(const double q[], const double force[3], const double moment[3],
+@LINKS@@FRICTION@static double width(const double q[], const double force[3], const double moment[3],
+@LINKS@@FRICTION@                    const double memory[ELASTOCAL_MEMORY],
+@LINKS@                    int zeroed)
 {
     double block[3][ELASTOCAL_SPRINGS];
 @FRICTION@    double unknown[3];
@@ -18,17 +23,29 @@
         for (direction = 0; direction < DIRECTIONS; direction++) {
             double part = 0.0;
             for (spring = 0; spring < ELASTOCAL_SPRINGS; spring++) {
-                part += block[row][spring] * SPREAD[spring][direction];
+@ALONE@                part += block[row][spring] * SPREAD[spring][direction];
+@LINKS@                part += block[row][spring] * ((zeroed != 0) ? REST_SPREAD[spring][direction]
+@LINKS@                                                            : SPREAD[spring][direction]);
             }
             variance += part * part;
         }
 @PLAIN@        largest = (variance > largest) ? variance : largest;
-@FRICTION@        variance = sqrt(variance) + unknown[row];
+@ALONE@@FRICTION@        variance = sqrt(variance) + unknown[row];
+@LINKS@@FRICTION@        variance = sqrt(variance)
+@LINKS@@FRICTION@                   + (((zeroed != 0) && (SEES_FRICTION != 0)) ? 0.0 : unknown[row]);
 @FRICTION@        largest = (variance > largest) ? variance : largest;
     }
 @PLAIN@    return sqrt(largest);
 @FRICTION@    return largest;
 }
+@LINKS@
+@LINKS@@PLAIN@double elastocal_half_width(const double q[], const double force[3], const double moment[3])
+@LINKS@@FRICTION@double elastocal_half_width(const double q[], const double force[3], const double moment[3],
+@LINKS@@FRICTION@                            const double memory[ELASTOCAL_MEMORY])
+@LINKS@{
+@LINKS@@PLAIN@    return width(q, force, moment, 0);
+@LINKS@@FRICTION@    return width(q, force, moment, memory, 0);
+@LINKS@}
 
 /* Move the correction towards a target by no more than a step; whether it came late. */
 static unsigned int move(double correction[3], const double target[3], double step)
@@ -107,8 +124,47 @@ static void off_by(const double q[], const double deflection[3], const double of
     }
 }
 
-static unsigned int follow(elastocal_state *state, const double q[])
+@LINKS@/* What encoders see beyond the model, smoothed, and how that moves the tool since they were zeroed. */
+@LINKS@static unsigned int look(elastocal_state *state, const double q[], const double links[],
+@LINKS@                         const double force[3], const double moment[3], double shift[3])
+@LINKS@{
+@LINKS@    double out[4 * ELASTOCAL_ENCODERS];
+@LINKS@    unsigned int status = 0U;
+@LINKS@    int usable = (links == NULL) ? 0 : 1;
+@LINKS@    int i;
+@LINKS@    int k;
+@LINKS@@PLAIN@    yielding(q, force, moment, out);
+@LINKS@@FRICTION@    yielding(q, force, moment, state->memory, out);
+@LINKS@    for (k = 0; (k < ELASTOCAL_ENCODERS) && (usable != 0); k++) {
+@LINKS@        usable = ((links[k] > -JOINT_RANGE) && (links[k] < JOINT_RANGE)) ? 1 : 0;
+@LINKS@    }
+@LINKS@    if (usable != 0) {
+@LINKS@        for (k = 0; k < ELASTOCAL_ENCODERS; k++) {
+@LINKS@            const double seen = (links[k] - q[ENCODER_JOINT[k]]) - out[k];
+@LINKS@            const double before = (state->seen != 0) ? state->beyond[k] : seen;
+@LINKS@            state->beyond[k] = before + (ENCODER_SHARE * (seen - before));
+@LINKS@        }
+@LINKS@        state->seen = 1;
+@LINKS@    } else {
+@LINKS@        status = ELASTOCAL_ENCODER;
+@LINKS@    }
+@LINKS@    for (i = 0; i < 3; i++) {
+@LINKS@        shift[i] = 0.0;
+@LINKS@    }
+@LINKS@    for (k = 0; (k < ELASTOCAL_ENCODERS) && (state->zeroed != 0); k++) {
+@LINKS@        const double change = state->beyond[k] - state->zero[k];
+@LINKS@        for (i = 0; i < 3; i++) {
+@LINKS@            shift[i] += change * out[ELASTOCAL_ENCODERS + (3 * k) + i];
+@LINKS@        }
+@LINKS@    }
+@LINKS@    return status;
+@LINKS@}
+@LINKS@
+@ALONE@static unsigned int follow(elastocal_state *state, const double q[])
+@LINKS@static unsigned int follow(elastocal_state *state, const double q[], const double links[])
 {
+@LINKS@    double shift[3];
+@LINKS@    unsigned int unread;
     double r[9];
     double force[3];
     double moment[3];
@@ -123,16 +179,24 @@ static unsigned int follow(elastocal_state *state, const double q[])
         force[i] = (row[0] * w[0]) + (row[1] * w[1]) + (row[2] * w[2]);
         moment[i] = (row[0] * w[3]) + (row[1] * w[4]) + (row[2] * w[5]);
     }
+@LINKS@@PLAIN@    unread = look(state, q, links, force, moment, shift);
 @PLAIN@    elastocal_deflection(q, force, moment, state->deflection);
-@PLAIN@    state->half_width = elastocal_half_width(q, force, moment);
+@ALONE@@PLAIN@    state->half_width = elastocal_half_width(q, force, moment);
+@LINKS@@PLAIN@    state->half_width = width(q, force, moment, state->zeroed);
 @FRICTION@    if (state->unloaded >= FREE_CYCLES) {
 @FRICTION@        elastocal_rest(q, state->memory);
 @FRICTION@    }
+@LINKS@@FRICTION@    unread = look(state, q, links, force, moment, shift);
 @FRICTION@    elastocal_deflection(q, force, moment, state->memory, state->deflection);
-@FRICTION@    state->half_width = elastocal_half_width(q, force, moment, state->memory);
+@ALONE@@FRICTION@    state->half_width = elastocal_half_width(q, force, moment, state->memory);
+@LINKS@@FRICTION@    state->half_width = width(q, force, moment, state->memory, state->zeroed);
 @FRICTION@    watch(state);
+@LINKS@    for (i = 0; i < 3; i++) {
+@LINKS@        state->deflection[i] = state->deflection[i] + shift[i];
+@LINKS@    }
     off_by(q, state->deflection, state->offset, off);
     status = aim(off, r, target);
+@LINKS@    status |= unread;
     if (state->half_width > UNCERTAIN_ABOVE) {
         status |= ELASTOCAL_UNCERTAIN;
     }
@@ -185,7 +249,9 @@ static unsigned int go_without(elastocal_state *state)
     return status;
 }
 
-void elastocal_correct(elastocal_state *state, const double q[], elastocal_correction *out)
+@ALONE@void elastocal_correct(elastocal_state *state, const double q[], elastocal_correction *out)
+@LINKS@void elastocal_correct_with_links(elastocal_state *state, const double q[], const double links[],
+@LINKS@                                  elastocal_correction *out)
 {
     int usable = state->fresh;
     int i;
@@ -195,7 +261,8 @@ void elastocal_correct(elastocal_state *state, const double q[], elastocal_corre
         out->status |= ELASTOCAL_INVALID;
     }
     if (usable != 0) {
-        out->status |= follow(state, q);
+@ALONE@        out->status |= follow(state, q);
+@LINKS@        out->status |= follow(state, q, links);
     } else {
         out->status |= go_without(state);
     }
@@ -206,12 +273,27 @@ void elastocal_correct(elastocal_state *state, const double q[], elastocal_corre
     }
     out->half_width = state->half_width;
 }
+@LINKS@
+@LINKS@void elastocal_correct(elastocal_state *state, const double q[], elastocal_correction *out)
+@LINKS@{
+@LINKS@    elastocal_correct_with_links(state, q, NULL, out);
+@LINKS@}
+@LINKS@
+@LINKS@void elastocal_zero_encoders(elastocal_state *state)
+@LINKS@{
+@LINKS@    if ((state->seen != 0) && (state->missed == 0) && (state->problem == 0U)) {
+@LINKS@        (void)memcpy(state->zero, state->beyond, sizeof state->zero);
+@LINKS@        state->zeroed = 1;
+@LINKS@    }
+@LINKS@}
 
 void elastocal_step(elastocal_state *state, const elastocal_reading *reading,
                     elastocal_correction *out)
 {
     elastocal_condition(state, reading);
-    elastocal_correct(state, reading->q, out);
+@ALONE@    elastocal_correct(state, reading->q, out);
+@LINKS@    elastocal_correct_with_links(state, reading->q, (reading->linked != 0) ? reading->links : NULL,
+@LINKS@                                 out);
 }
 
 unsigned int elastocal_begin_course(elastocal_state *state, const double q[],

@@ -21,6 +21,7 @@ extern "C" {
 #define ELASTOCAL_SECTIONS @SECTIONS@ /* second-order filter sections */
 #define ELASTOCAL_MEDIAN @MEDIAN@ /* readings that the median takes */
 @FRICTION@#define ELASTOCAL_MEMORY @MEMORY@ /* numbers that friction remembers */
+@LINKS@#define ELASTOCAL_ENCODERS @ENCODERS@ /* joints with a secondary encoder */
 
 #define ELASTOCAL_CYCLE @CYCLE@ /* s between two calls of elastocal_correct */
 #define ELASTOCAL_SAMPLE @SAMPLE@ /* s between two calls of elastocal_condition */
@@ -29,6 +30,10 @@ extern "C" {
 /* Joints, in the order of every array q:
 @JOINT_NAMES@
  */
+@LINKS@
+@LINKS@/* Joints with a secondary encoder, in the order of every array links:
+@LINKS@@ENCODER_NAMES@
+@LINKS@ */
 
 /* What a correction is to be read with: flags of `status`. */
 #define ELASTOCAL_OK 0U
@@ -43,6 +48,7 @@ extern "C" {
 #define ELASTOCAL_INVALID 256U /* the reading holds a NaN, an infinity or no joint position */
 #define ELASTOCAL_SENSOR 512U /* the sensor called the reading bad */
 #define ELASTOCAL_OFFSET 1024U /* the offset of the course was not taken: it is what it was */
+@LINKS@#define ELASTOCAL_ENCODER 2048U /* a link was not read: what encoders saw last counts */
 
 /* What arm and sensor say. */
 typedef struct {
@@ -51,6 +57,8 @@ typedef struct {
     double force[3]; /* raw, sensor frame, N */
     double moment[3]; /* raw, sensor frame, about its origin, N m */
     int ok; /* not 0: the sensor calls the reading good */
+@LINKS@    double links[ELASTOCAL_ENCODERS]; /* by secondary encoders, rad or m */
+@LINKS@    int linked; /* not 0: they were read */
 } elastocal_reading;
 
 /* What is remembered from one call to the next; the caller owns it. */
@@ -68,6 +76,10 @@ typedef struct {
     double half_width;
     double offset[3]; /* of the course, base, m */
     unsigned int refused; /* ELASTOCAL_OFFSET, or 0 */
+@LINKS@    double beyond[ELASTOCAL_ENCODERS]; /* what encoders see beyond the model, rad or m */
+@LINKS@    double zero[ELASTOCAL_ENCODERS]; /* the same when they were zeroed */
+@LINKS@    int seen; /* whether they were read */
+@LINKS@    int zeroed;
 @FRICTION@    double memory[ELASTOCAL_MEMORY]; /* of friction */
 @FRICTION@    int unloaded; /* corrections in a row without load */
 } elastocal_state;
@@ -121,6 +133,15 @@ void elastocal_condition(elastocal_state *state, const elastocal_reading *readin
  * these calls. */
 void elastocal_correct(elastocal_state *state, const double q[], elastocal_correction *out);
 
+@LINKS@/* The same with positions of the links by secondary encoders; NULL: not read. Once zeroed, these take
+@LINKS@ * the place of the model about the axes of their joints. */
+@LINKS@void elastocal_correct_with_links(elastocal_state *state, const double q[], const double links[],
+@LINKS@                                  elastocal_correction *out);
+@LINKS@
+@LINKS@/* Zero the encoders: the tool is in the air above its course, and a correction with links was just
+@LINKS@ * given. Without one, or without a usable reading of the sensor, nothing changes. */
+@LINKS@void elastocal_zero_encoders(elastocal_state *state);
+@LINKS@
 /* Both, where sensor and controller have the same cycle. */
 void elastocal_step(elastocal_state *state, const elastocal_reading *reading,
                     elastocal_correction *out);

@@ -16,7 +16,8 @@ typedef struct {
 typedef struct {
     int times;
     elastocal_reading reading;
-    int course; /* 0 goes on, 1 begins, 2 ends */
+@ALONE@    int course; /* 0 goes on, 1 begins, 2 ends */
+@LINKS@    int course; /* 0 goes on, 1 begins, 2 ends, 3: encoders are zeroed */
     double deviation[3];
     int place; /* of that number: 0 none, 1 time, then q, force, moment, deviation */
     uint64_t bits;
@@ -122,6 +123,9 @@ static int episodes_agree(void)
         if (EPISODES[k].course == 2) {
             elastocal_end_course(&state);
         }
+@LINKS@        if (EPISODES[k].course == 3) {
+@LINKS@            elastocal_zero_encoders(&state);
+@LINKS@        }
         reading.time = EPISODES[k].reading.time;
         for (i = 0; i < EPISODES[k].times; i++) {
             time += ELASTOCAL_SAMPLE;
