@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,20 @@ def test_streams_come_back_to_twelve_digits(path):
     np.testing.assert_allclose(found.arm.T_base_tcp[3], station(1), atol=1e-11)
     assert found.points.station.tolist() == ["A"] * 20
     assert np.all(found.wrench.ok)
+
+
+def test_links_of_an_arm_with_secondary_encoders_come_back(tmp_path):
+    recorder = PoseRecorder(JOINTS)
+    recorder.arm(replace(state(1.0), link=np.array([np.nan, -1.0 / 3.0 + 1e-6])))
+    recorder.arm(state(1.1))  # not read
+    recorder.save(tmp_path / "linked.mcap")
+    found = read_streams(tmp_path / "linked.mcap").arm
+    np.testing.assert_allclose(found.link, [[np.nan, -1 / 3 + 1e-6], [np.nan] * 2], rtol=1e-11)
+    assert read_streams(tmp_path / "linked.mcap").arm.q.shape == (2, 2)
+
+
+def test_an_arm_without_them_has_none(path):
+    assert read_streams(path).arm.link is None
 
 
 def test_a_file_from_before_the_mcap_package_wrote_it_is_read(path):
