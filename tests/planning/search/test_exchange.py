@@ -252,8 +252,9 @@ def test_a_choice_that_comes_back_ends_the_run():
             assert len(matrix) == 2  # those that are not chosen; the old and the new
             self.asked += 1
             adds, turn = self.asked % 2, (self.asked + 1) // 2
-            # Of these the next of the circle; then the old one is dropped.
-            return np.eye(2)[int(turn % 2 == 0)] if adds else np.array([1.0, 0.0])
+            # Of these the next of the circle; then the old one is dropped, whose number is the
+            # smaller one until the circle is closed.
+            return np.eye(2)[int(turn % 2 == 0 if adds else turn % 3 == 0)]
 
     (run,) = _exchange_poses(build_information(dome(3)), Circle(None), [_Run.of([0])], 50)
     assert run.ended == "cycle"
