@@ -139,6 +139,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/ladder.py
 	$(BIN)/python benchmarks/geometry.py
 	$(BIN)/python benchmarks/codec.py
+	$(BIN)/python benchmarks/demo.py
 	$(BIN)/python benchmarks/record.py
 
 # CASES and SEED choose; what falls is printed as lines for tests/fuzz/corpus.json.

@@ -6,11 +6,10 @@ of a ``pip install --target`` on PYTHONPATH. Run with ``python benchmarks/codec.
 """
 
 import importlib.util
-import time
 import warnings
 
 import numpy as np
-from timing import seconds
+from timing import figure, seconds
 
 from elastocal.codec import CodecData, Variant, cross_validate
 from elastocal.dataset import Readings
@@ -79,20 +78,16 @@ def main() -> None:
     data = cross_validate(robot, readings, [PAPER])
     fits = data.error_mean[..., 0].size
     taken = seconds(lambda: cross_validate(robot, readings, [PAPER]), 7)
-    print(
-        f"codec, {POSES} poses, {len(data.seed_pose)} sets, COVER, 18 springs, bounded,"
-        f" {fits} fits, one process: {taken:.3f} s"
-    )
     usual = learning_curve_seconds(robot, readings, data)
     if usual is None:
-        print("  scikit-learn's learning_curve: left out, scikit-learn is not installed")
-    else:
-        print(f"  scikit-learn's learning_curve: {usual:.3f} s; ratio {usual / taken:.1f}")
+        print("scikit-learn's learning_curve: left out, scikit-learn is not installed")
+    reference = None if usual is None else ("scikit-learn's learning_curve", usual)
+    figure(f"codec of {fits} fits: COVER, 18 springs, one process", taken, reference, aim=0.06)
     ioops = [Variant(search="ioops", springs="bearing")]
     for jobs in (1, core_count()):
-        start = time.perf_counter()
-        cross_validate(robot, readings, ioops, jobs=jobs)
-        print(f"  with IOOPS, {jobs} processes: {time.perf_counter() - start:.1f} s")
+        each = seconds(lambda jobs=jobs: cross_validate(robot, readings, ioops, jobs=jobs), 3)
+        name, aim = f"the same with IOOPS, processes: {jobs}", 0.6 if jobs == 1 else None
+        figure(name, each, ("the codec with COVER", taken), aim=aim)
 
 
 if __name__ == "__main__":

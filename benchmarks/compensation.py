@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from timing import figure
 
 from elastocal.compensation import CompensatorSettings
 from elastocal.compensation.export import write_c
@@ -149,27 +150,22 @@ def main() -> None:
     model, rich = calibrated(), calibrated(gears=True)
     data = rows(model.model)
     designs, (plain, geared) = side_by_side((model, rich), data)
-    print(
-        f"Python step with median, notch and low-pass: {plain:.1f} us with 18 springs,"
-        f" {geared:.1f} us with gears, weight and friction, {geared / plain:.2f} of it"
-    )
+    step = ("18 springs", 1e-6 * plain)
     called, own = (1e6 * each for each in pinocchio_seconds(model.model, data))
-    print(
-        f"Pinocchio's Jacobian of the same 18 springs: {called:.2f} us from Python,"
-        f" {own:.2f} us without the call"
-    )
+    jacobian = ("Pinocchio's Jacobian of the same springs, from Python", 1e-6 * called)
+    figure("Python step, 18 springs, filters and interval", 1e-6 * plain, jacobian, aim=20e-6)
+    figure("Python step, gears, weight, friction", 1e-6 * geared, step, aim=35e-6)
     timed = c_microseconds(designs, data)
     if timed is None:
         return
-    (deflection, step), (richer, further) = timed
-    print(
-        f"C deflection, -O2: {deflection:.3f} us, {deflection / called:.2f} and"
-        f" {deflection / own:.2f} of these; C step with filters and interval: {step:.2f} us"
+    (deflection, stepped), (richer, further) = timed
+    bare = ("Pinocchio's Jacobian of the same springs, without the call", 1e-6 * own)
+    figure("C deflection, 18 springs", 1e-6 * deflection, bare)
+    figure("C step with filters and interval", 1e-6 * stepped, bare)
+    figure(
+        "C deflection, gears, weight, friction", 1e-6 * richer, ("18 springs", 1e-6 * deflection)
     )
-    print(
-        f"C deflection with gears, weight and friction: {richer:.3f} us,"
-        f" {richer / deflection:.1f} times the 18 springs; its step: {further:.2f} us"
-    )
+    figure("C step with them", 1e-6 * further, ("18 springs", 1e-6 * stepped))
 
 
 if __name__ == "__main__":

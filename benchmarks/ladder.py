@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from record import processor_seconds
+from timing import figure
 
 from compensation import HARNESS, TOOL, c_microseconds, rows, side_by_side
 from elastocal.compensation.export import write_c
@@ -88,32 +89,24 @@ def main() -> None:
     """Measure and print."""
     robot, readings = measured()
     reference = processor_seconds(lambda: single(robot, readings))
-    print(f"calibrate, 18 springs, {len(readings)} readings, 200 draws: {1e3 * reference:.0f} ms")
+    alone = ("18 springs alone, 200 draws", reference)
     sought = processor_seconds(lambda: find_undone(robot, readings))
-    print(
-        f"  mistakes undone, as in every calibrate: {1e3 * sought:.0f} ms; {sought / reference:.2f}"
-    )
+    figure("mistakes undone, as in every `calibrate`", sought, alone)
     for springs in ("auto", "gears"):
         taken = processor_seconds(lambda springs=springs: whole(robot, readings, springs))
-        print(
-            f"  the whole ladder, --springs {springs}: {1e3 * taken:.0f} ms;"
-            f" ratio {taken / reference:.1f}"
-        )
+        name = f"the whole ladder, `--springs {springs}`, {len(readings)} readings"
+        figure(name, taken, alone)
     plain, rich = (single(robot, readings, s).calibrated for s in ("bearing", "gears+friction"))
     data = rows(rich.model)
     pair, steps = side_by_side((plain, rich), data)
-    print(
-        f"Python step with filters and interval: {steps[0]:.1f} us with 18 springs,"
-        f" {steps[1]:.1f} us with {len(rich.model.parameters)} parameters of the last rung"
-    )
+    last = f"{len(rich.model.parameters)} parameters of the last rung"
+    figure(f"Python step, {last}", 1e-6 * steps[1], ("18 springs", 1e-6 * steps[0]))
     timed = c_microseconds(pair, data)
     if timed is None:
         return
     (bare, _), (full, step) = timed
-    print(
-        f"C deflection, -O2: {bare:.3f} us with 18 springs, {full:.3f} us with the"
-        f" last rung; its step: {step:.2f} us"
-    )
+    figure(f"C deflection, {last}", 1e-6 * full, ("18 springs", 1e-6 * bare))
+    print(f"  its step: {step:.2f} us")
     if shutil.which("valgrind") is None:
         print("no valgrind: instructions are not counted")
         return

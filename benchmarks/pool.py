@@ -16,6 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 from elastocal.planning.pool_sampling import SampledPool
+from timing import figure
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
@@ -68,12 +69,18 @@ def report(like: str, sizes: tuple[int, ...], cores: int) -> None:
                 rounds.append((alone, helped, bare))
             alone, helped, bare = map(statistics.median, zip(*rounds, strict=True))
             same = np.array_equal(q, again.pool.postures.q)
-            print(
-                f"  {size:6d}: {alone:6.2f} s by one process ({1e3 * alone / size:.2f} ms each),"
-                f" {alone / bare:.1f} x the inverse kinematics of as many poses;"
-                f" {helped:6.2f} s by {cores}, ratio {alone / helped:.2f}; same pool: {same}",
-                flush=True,
+            figure(
+                f"{size} candidates with all checks, {like}, one process",
+                alone,
+                ("inverse kinematics of as many poses", bare),
+                aim=1.2 if (size, like) == (3000, "afp") else None,
             )
+            figure(
+                f"{size} candidates with all checks, {like}, {cores} processes",
+                helped,
+                ("one process", alone),
+            )
+            print(f"  same pool: {same}", flush=True)
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import lsq_linear
-from timing import seconds
+from timing import figure, seconds
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import Problem, build, calibrate, solve
@@ -60,16 +60,11 @@ def main() -> None:
         median_ms(lambda: solve(problem), 50),
         median_ms(lambda: full_system(problem), 20),
     )
-    print(f"bounded fit, 18 springs, 31 x 5 readings: {fit:.2f} ms")
-    print(
-        f"  scipy.optimize.lsq_linear, full system: {reference:.2f} ms;"
-        f" ratio 1/{reference / fit:.1f}"
-    )
+    full = ("scipy.optimize.lsq_linear on the full system", 1e-3 * reference)
+    figure("one bounded fit: 18 springs, 31 poses × 5 load cases", 1e-3 * fit, full)
 
     whole = median_ms(lambda: calibrate(model, readings, np.random.default_rng(0)), 20)
-    print(
-        f"calibrate, 200 bootstrap draws: {whole:.1f} ms; {whole / reference:.2f} x that lsq_linear"
-    )
+    figure("`calibrate` with 200 bootstrap draws, same data", 1e-3 * whole, full)
 
     q = rng.uniform(-1.0, 1.0, (3000, 1, 6))
     force = rng.uniform(-1e3, 1e3, (3000, 5, 3))
@@ -77,18 +72,14 @@ def main() -> None:
     shared_ms = median_ms(lambda: model.observation_blocks(q, force), 20)
     each_ms = median_ms(lambda: model.observation_blocks(each, force), 20)
     rigid_ms = median_ms(lambda: robot.jacobian(each), 20)
-    print(f"observation blocks, 3000 poses x 5 loads, joints a pose: {shared_ms:.1f} ms")
-    print(
-        f"  joints a reading: {each_ms:.1f} ms; {each_ms / rigid_ms:.2f} x the rigid robot's"
-        " 6-joint Jacobians"
-    )
+    rigid = ("the rigid robot's 6-joint Jacobians, a reading each", 1e-3 * rigid_ms)
+    figure("observation blocks, 3000 poses × 5 loads, joints once a pose", 1e-3 * shared_ms, rigid)
+    figure("the same, joints given for every reading", 1e-3 * each_ms, rigid)
 
     python = command_ms(sys.executable, "-c", "pass")
     shown = command_ms(str(Path(sys.executable).parent / "elastocal"), "--help")
-    print(
-        f"elastocal --help: {shown:.0f} ms;"
-        f" {shown / python:.1f} x an empty Python ({python:.0f} ms)"
-    )
+    empty = ("an empty Python process", 1e-3 * python)
+    figure("`elastocal --help`", 1e-3 * shown, empty, aim=0.3)
 
 
 if __name__ == "__main__":
