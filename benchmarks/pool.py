@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from elastocal.planning.pool_sampling import SampledPool
 from timing import figure
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.parallel import core_count
 from elastocal.planning import cell_surface, sample_pool
+from elastocal.planning.pool import SampledPool
 from elastocal.robot.inverse import inverse_for
 
 SIZES = (1000, 3000, 10_000)

@@ -27,7 +27,7 @@ from elastocal.cell import (
 )
 from elastocal.files import replacing
 from elastocal.procedure import PoseRecorder, read_streams
-from elastocal.procedure.record import _mcap, streams
+from elastocal.procedure.record import streams
 
 SECONDS, CYCLE = 20.0, 0.04
 CHUNK = 4096
@@ -55,7 +55,7 @@ def recorded(rate: float) -> PoseRecorder:
     return recorder
 
 
-def pack(path: Path, topics: Sequence[_mcap.Topic], *_: object) -> None:
+def pack(path: Path, topics: Sequence[streams.Topic], *_: object) -> None:
     """Write chunks of messages that are framed many at once, with their checksums."""
     time = np.concatenate([topic.time for topic in topics])
     channel = np.repeat(np.arange(len(topics)), [len(topic.time) for topic in topics])
@@ -76,10 +76,10 @@ def pack(path: Path, topics: Sequence[_mcap.Topic], *_: object) -> None:
         temporary.write_bytes(file)
 
 
-def unpack(path: Path) -> _mcap.Contents:
+def unpack(path: Path) -> streams.Contents:
     """Read what `pack` has written; the last file's metadata are those of the package."""
     file, position = path.read_bytes(), 0
-    topics = [_mcap.Messages() for _ in range(4)]
+    topics = [streams.Messages() for _ in range(4)]
     message_head = struct.Struct("<BQHIQQ")
     while position < len(file):
         length, plain_length, checksum = struct.unpack_from("<QQI", file, position)
@@ -95,7 +95,7 @@ def unpack(path: Path) -> _mcap.Contents:
     names = ("/arm", "/wrench", "/marker", "/marks")
     joints = '["joint_1","joint_2","joint_3","joint_4","joint_5","joint_6"]'
     note = {"elastocal": {"schema": streams.STREAMS_SCHEMA, "joints": joints}}
-    return _mcap.Contents(note, dict(zip(names, topics, strict=True)))
+    return streams.Contents(note, dict(zip(names, topics, strict=True)))
 
 
 def processor_seconds(work: Callable[[], object], repetitions: int = 7) -> float:

@@ -61,7 +61,8 @@ def figure(
     parts = [f"{name}: {shown(taken)}"]
     if reference is not None:
         what, other = reference
-        parts.append(f"{what}: {shown(other)}, ratio {other / taken:.3g}")
+        ratio = f"{other / taken:.3g}" if other >= taken else f"1/{taken / other:.3g}"
+        parts.append(f"{what}: {shown(other)}, ratio {ratio}")
     if aim is not None:
         parts.append(f"asked: {shown(aim)}{'' if taken <= aim else ', short'}")
     print("; ".join(parts), flush=True)

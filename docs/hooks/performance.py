@@ -32,7 +32,8 @@ def _cells(row: dict[str, str]) -> tuple[str, ...]:
     reference, other, ratio = row["reference"], row["reference_seconds"], ""
     if other:
         reference = f"{reference}, {_shown(float(other))}"
-        ratio = f"{float(other) / taken:.3g}"
+        times = float(other) / taken
+        ratio = f"{times:.3g}" if times >= 1.0 else f"1/{1.0 / times:.3g}"
     if asked:
         asked = _shown(float(asked)) + ("" if taken <= float(asked) else ": **short**")
     return row["figure"], _shown(taken), reference, ratio, asked, f"{row['date']}, {row['commit']}"
