@@ -133,6 +133,31 @@ def test_noise_of_the_encoders_shows_in_what_is_left():
     assert np.sqrt(np.mean(np.square(left))) == pytest.approx(2e-5 * np.sqrt(2.0), rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("joint", "factor", "message"),
+    [(1, -1.0, "see what no load on their gears makes"), (2, 0.0, "see nothing of their gears")],
+)
+def test_an_encoder_that_is_turned_or_repeats_its_motor_is_named(joint, factor, message):
+    own = np.where(np.arange(6) == joint, factor, 1.0)
+    q, q_0 = data().joint_position, data().reference_joint_position
+    wrong = replace(
+        data(),
+        link_joint_position=q + own * (data().link_joint_position - q),
+        reference_link_joint_position=q_0 + own * (data().reference_link_joint_position - q_0),
+    )
+    model, readings = ElasticModel(arm(), bearing(arm())), wrong.readings(arm().joint_names)
+    found = calibrate(model, readings, np.random.default_rng(0), FitOptions(draws=40))
+    (warning,) = [str(each) for each in found.warnings if "encoders" in str(each)]
+    assert message in warning
+    assert arm().joint_names[joint] in warning
+
+
+def test_sound_encoders_are_not_warned_of():
+    model, readings = ElasticModel(arm(), bearing(arm())), data().readings(arm().joint_names)
+    found = calibrate(model, readings, np.random.default_rng(0), FitOptions(draws=40))
+    assert not [each for each in found.warnings if "encoders" in str(each)]
+
+
 def test_the_command_uses_and_leaves_them(tmp_path):
     path = tmp_path / "data.nc"
     write(data(), path)

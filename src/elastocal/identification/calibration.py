@@ -20,7 +20,13 @@ from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.contact import ContactSummary, contact_summary
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
-from elastocal.identification.encoders import EncoderSummary, EncoderZero, encoder_zeros
+from elastocal.identification.encoders import (
+    EncoderSummary,
+    EncoderZero,
+    encoder_zeros,
+    silent_encoders,
+    strange_encoders,
+)
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.knowledge import expected_sizes
 from elastocal.identification.ladder import Climbed
@@ -104,6 +110,16 @@ OTHER_CONTACT = Kind(
     "the readings have the {name} compliance of the contact at {found} nm/N, where the contact"
     " file states {stated} nm/N: does it describe this tip or disk?",
     shown={"found": as_number(".3g", 1e9), "stated": as_number(".3g", 1e9)},
+)
+SILENT_ENCODERS = Kind(
+    "calibration.silent-encoders",
+    "the secondary encoders of {joints} see nothing of their gears: do link positions repeat those"
+    " of the motors?",
+)
+STRANGE_ENCODERS = Kind(
+    "calibration.strange-encoders",
+    "the secondary encoders of {joints} see what no load on their gears makes: is a sign turned, or"
+    " a column that of another joint?",
 )
 NOT_SETTLED = Kind(
     "calibration.loss-not-settled",
@@ -199,8 +215,7 @@ def calibrate(
     options = options or FitOptions()
     problem = build(model, readings, options, marker_offset)
     warnings = _data_warnings(model, readings, problem, options, marker_offset)
-    screening = screen(problem)
-    used = ~screening.blunder if options.set_blunders_aside else np.ones_like(screening.blunder)
+    screening, used = _screened(problem, options)
     kept, fitted = problem.take(used), readings.take(used)
     solution = solve(kept, options.loss)
     weighted = kept.reweighted(solution.reading_weight)
@@ -210,9 +225,8 @@ def calibrate(
     draws[:, weighted.springs] = _as_of_arms(draws[:, weighted.springs], model.parameters)
     by = _widening(weighted, solution.compliance, draws, held_out, ladder, unexplained)
     widened = widen_draws(weighted, solution.compliance, draws, by)
-    spread = widened - solution.compliance
-    springs, frames = weighted.springs, weighted.frame_columns
-    compliance, plain = solution.compliance[springs], weighted.of_springs()
+    springs, frames, c = weighted.springs, weighted.frame_columns, solution.compliance
+    compliance, plain = c[springs], weighted.of_springs()
     calibrated = CalibratedModel(
         model,
         compliance,
@@ -226,26 +240,33 @@ def calibrate(
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
+    encoders = _encoders(weighted, solution, held_out, calibrated.encoders)
     contact = _contact(model, weighted, fitted, options, widened)
-    warnings += _contact_warnings(contact, options)
+    warnings += _encoder_warnings(encoders) + _contact_warnings(contact, options)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
         used=used,
-        residual=problem.residuals(solution.compliance),
+        residual=problem.residuals(c),
         poses=len(np.unique(kept.block)),
         attainable_rank=reach,
         held_out=held_out,
         ladder=tuple(ladder),
-        coverage=measured_coverage(weighted, held_out, spread, low_loads(fitted)),
+        coverage=measured_coverage(weighted, held_out, widened - c, low_loads(fitted)),
         widening=by,
         screening=screening,
         solution=solution,
         warnings=tuple(warnings),
-        frames=frame_summaries(weighted.frames, solution.compliance[frames], widened[:, frames]),
+        frames=frame_summaries(weighted.frames, c[frames], widened[:, frames]),
         contact=contact,
-        encoders=_encoders(weighted, solution, held_out, calibrated.encoders),
+        encoders=encoders,
     )
+
+
+def _screened(problem: Problem, options: FitOptions) -> tuple[Screening, BoolArray]:
+    """Return the blunders among readings, and which readings are fitted."""
+    found = screen(problem)
+    return found, ~found.blunder if options.set_blunders_aside else np.ones_like(found.blunder)
 
 
 def _seen(
@@ -268,6 +289,14 @@ def _encoders(
     folds = held_out.compliance[held_out.fold]
     found = problem.encoders.summary(problem.O, problem.d, solution.compliance, folds)
     return replace(found, zeros=zeros)
+
+
+def _encoder_warnings(found: EncoderSummary | None) -> list[Finding]:
+    """Return a finding about encoders that see nothing, or what gears do not do."""
+    if found is None:
+        return []
+    kinds = (SILENT_ENCODERS, silent_encoders(found)), (STRANGE_ENCODERS, strange_encoders(found))
+    return [kind(joints=", ".join(joints)) for kind, joints in kinds if joints]
 
 
 def _contact(

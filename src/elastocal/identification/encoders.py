@@ -37,6 +37,13 @@ _WAVE = 3e-4
 """Size of an error once a turn, and of a balancer's effect on its gear, in rad."""
 _STIFF = 1e-9
 """Smallest softness of a gear that its sag is expected by, in rad/(N·m) or m/N."""
+_SILENT = 1e-7
+"""What an encoder sees at least of a gear under load, in rad or m."""
+_STRANGE = 0.9
+"""Share of what an encoder sees from which on loads do not explain it: gears of the simulated cells
+leave up to 0.4, one with the wrong sign or of another joint all."""
+_FRICTION = 6e-5
+"""What friction alone may show at a joint that is hardly loaded, in rad or m."""
 _LEAST_LEVER = 0.1
 """Lever of a joint whose axis passes through the tool, in m: its encoder sees it all the same."""
 
@@ -128,7 +135,9 @@ class EncoderRows:
             predicted = np.einsum("rin,rn->ri", O - self.seen[..., :-1], folds)
             error = predicted - (d - self.seen[..., -1])
             held_out = float(np.linalg.norm(error, axis=1).mean())
-        return EncoderSummary(self.joints, self.units, tuple(left.tolist()), (), held_out)
+        seen = np.sqrt(np.mean(np.square(self.rows[..., -1] / self.lever), axis=0))
+        figures = tuple(seen.tolist()), tuple(left.tolist())
+        return EncoderSummary(self.joints, self.units, *figures, (), held_out)
 
 
 @record()
@@ -161,13 +170,27 @@ class EncoderSummary:
     """Joints with an encoder."""
     units: tuple[str, ...]
     """``rad`` or ``m``, of each."""
+    seen: tuple[float, ...]
+    """Root mean square of what each sees of its joint, in rad or m."""
     unexplained: tuple[float, ...]
-    """Root mean square of what the model leaves of what each sees, in rad or m."""
+    """The same of what the model leaves of it."""
     zeros: tuple[EncoderZero, ...]
     """What each reads in the air; empty: the links were not read at the reference."""
     held_out: float | None
     """Mean error at left-out poses where the encoders are read in production, too, in m; None:
     the links were not read at the reference."""
+
+
+def silent_encoders(found: EncoderSummary) -> tuple[str, ...]:
+    """Return the joints whose encoders see nothing: they follow their motors."""
+    pairs = zip(found.joints, found.seen, strict=True)
+    return tuple(joint for joint, seen in pairs if seen < _SILENT)
+
+
+def strange_encoders(found: EncoderSummary) -> tuple[str, ...]:
+    """Return the joints whose encoders see what no load on their gears makes."""
+    each = zip(found.joints, found.seen, found.unexplained, strict=True)
+    return tuple(joint for joint, seen, left in each if left > max(_STRANGE * seen, _FRICTION))
 
 
 def encoder_rows(

@@ -457,9 +457,12 @@ def show_encoders(encoders: EncoderSummary | None, alone: float) -> Iterator[Blo
                 both=mm(encoders.held_out),
             )
         )
-    heads = phrases("Joint", "What the model leaves of what its encoder sees, rms")
-    figures = zip(encoders.joints, encoders.units, encoders.unexplained, strict=True)
-    rows = tuple((joint, f"{1e6 * left:.3g} µ{unit}") for joint, unit, left in figures)
+    heads = phrases("Joint", "Its encoder sees, rms", "What the model leaves of it")
+    figures = zip(encoders.joints, encoders.units, encoders.seen, encoders.unexplained, strict=True)
+    rows = tuple(
+        (joint, f"{1e6 * seen:.3g} µ{unit}", f"{1e6 * left:.3g} µ{unit}")
+        for joint, unit, seen, left in figures
+    )
     yield Table(phrase("Joints with a secondary encoder"), heads, rows, texts=1)
 
 
