@@ -16,6 +16,7 @@ from elastocal.planning import cell_surface
 from support.cli import elastocal
 from support.compiled import CompiledCorrector
 from support.exported import needs_gcc
+from support.live_loop import LiveCorrector
 from support.paths import made_up
 from support.simulated import example_cell
 
@@ -92,6 +93,30 @@ def test_the_c_of_the_target_gives_the_same_figures(folder, tmp_path, monkeypatc
         for one, other in zip(by_python[key], by_c[key], strict=True):
             for when in ("before", "after"):
                 assert other[when] == pytest.approx(one[when], rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("option", "within"),
+    # The offset of a course enters one cycle later, with the next reading of the sensor.
+    [((), 1e-12), (("--course-offset",), 2e-7)],
+)
+def test_the_loop_of_live_gives_the_same_figures(folder, monkeypatch, option, within):
+    given = "--seed", 2, *option, "--json"
+    word = "offset" if option else "bare"
+    by_python = json.loads(run(folder, f"python {word}", *given).out)
+    made = []
+
+    def looped(compensator):
+        made.append(LiveCorrector(compensator))
+        return made[-1]
+
+    monkeypatch.setattr(process, "ModelCorrector", looped)
+    by_live = json.loads(run(folder, f"live {word}", *given).out)
+    assert made
+    for key in ("lines", "spatial"):
+        for one, other in zip(by_python[key], by_live[key], strict=True):
+            for when in ("before", "after"):
+                assert other[when] == pytest.approx(one[when], rel=0, abs=within)
 
 
 def test_check_knows_the_table_and_the_folder(folder):
