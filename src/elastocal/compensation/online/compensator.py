@@ -152,7 +152,7 @@ class Compensator:
         self.design = numbers
         limits, functions = numbers.settings.limits, functions or numbers.functions()
         self._conditioner = Conditioner(numbers, functions.orientation)
-        self._deflection, self._block = functions.deflection, functions.block
+        self._block = functions.block
         self._orientation, self._rest = functions.orientation, functions.rest
         self._growth = functions.growth
         self._spread = np.ascontiguousarray(numbers.spread)
@@ -366,11 +366,13 @@ class Compensator:
         self, q: Sequence[float], load: _Load, spread: FloatArray
     ) -> tuple[Triple, float]:
         """Return the deflection in base, and half its 95 % interval where that is widest."""
-        dx, dy, dz = self._deflection(q, *load)
         # O L has the interval's half widths as lengths of its rows: products of a fixed number, in
-        # every cycle the same time, where percentiles of the draws would need a sort.
-        rows = np.array(self._block(q, *load)).reshape(self._shape) @ spread
-        return (dx, dy, dz), math.sqrt(max(_squares(rows)))
+        # every cycle the same time, where percentiles of the draws would need a sort. The
+        # deflection is the block times the compliances: the model need not be asked twice.
+        weighted = self._weighted if spread is self._spread else self._rest_weighted
+        rows = np.array(self._block(q, *load)).reshape(self._shape) @ weighted
+        dx, dy, dz = rows[:, 0].tolist()
+        return (dx, dy, dz), math.sqrt(max(_squares(rows[:, 1:])))
 
     def _remembering(
         self, q: Sequence[float], load: _Load, state: State, spread: FloatArray
@@ -382,7 +384,6 @@ class Compensator:
         """
         free = state.unloaded >= self._free
         block = self._block(q, *load, self._rest(q) if free else state.friction)
-        # The deflection is the block times the compliances: the model need not be asked twice.
         size = self._shape[0] * self._shape[1]
         weighted = self._weighted if spread is self._spread else self._rest_weighted
         rows = np.array(block[:size]).reshape(self._shape) @ weighted
