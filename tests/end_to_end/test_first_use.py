@@ -14,9 +14,14 @@ BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "first_use.py"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arm", ["irb6700", "tx2_90"])
-def test_the_planted_compliances_lie_within_the_certificate(arm, tmp_path):
-    """With masses in the URDF, since the arm's sag is in what the tracker saw.
+@pytest.mark.parametrize(("arm", "least"), [("irb6700", 5), ("tx2_90", 1)])
+def test_the_planted_compliances_lie_within_the_certificate(arm, least, tmp_path):
+    """Joint 6 turns about the tool, so that no press tells it.
+
+    At the small arm `auto` takes springs at both ends of the bearings, for 0.3 µm of 6 µm less at
+    left-out poses: beside them most gears are known in sums alone.
+
+    With masses in the URDF, since the arm's sag is in what the tracker saw.
 
     Of intervals of 95 % one in twenty misses by chance, of those wider by half one in 300.
     """
@@ -25,7 +30,7 @@ def test_the_planted_compliances_lie_within_the_certificate(arm, tmp_path):
     subprocess.run([sys.executable, str(BENCHMARK), *words], check=True)
     found = json.loads(figures.read_text(encoding="utf-8"))[arm]
     known = [each for each in found["springs"] if each["is_known"]]
-    assert len(known) >= 5, "joint 6 turns about the tool: no press tells it"
+    assert len(known) >= least
     for each in known:
         spare = 0.25 * (each["high"] - each["low"])
         assert each["low"] - spare <= each["planted"] <= each["high"] + spare, each
