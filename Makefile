@@ -137,7 +137,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/study.py 50
 	$(BIN)/python benchmarks/compensation.py
 	$(BIN)/python benchmarks/ladder.py
-	$(BIN)/python benchmarks/geometry.py
+	$(BIN)/python benchmarks/geometry.py 16811
 	$(BIN)/python benchmarks/codec.py
 	$(BIN)/python benchmarks/demo.py
 	$(BIN)/python benchmarks/record.py
