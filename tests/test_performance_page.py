@@ -27,9 +27,10 @@ def test_the_table_has_the_newest_of_every_figure_beside_its_reference(hook, tmp
     )
     monkeypatch.setattr(hook, "HISTORY", tmp_path / "history.csv")
     hook.HISTORY.write_text(head + rows)
-    _, _, first, second = hook.table().splitlines()
-    assert first == "| one fit | 500 µs | SciPy, 4 ms | 8 | 1 ms | 2026-01-03, ccc+ |"
-    assert second == "| help | 100 ms | Python, 10 ms | 1/10 |  | 2026-01-02, bbb |"
+    _, _, first, second, _, said = hook.table().splitlines()
+    assert first == "| one fit | 500 µs | SciPy, 4 ms | 8 | 1 ms |"
+    assert second == "| help | 100 ms | Python, 10 ms | 1/10 |  |"
+    assert said == "Measured 2026-01-02 to 2026-01-03."
 
 
 def test_what_misses_its_aim_says_so(hook, tmp_path, monkeypatch):

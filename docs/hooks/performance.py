@@ -8,7 +8,7 @@ from pathlib import Path
 
 HISTORY = Path(__file__).parents[2] / "benchmarks" / "history.csv"
 _MARK = "<!-- benchmarks -->"
-_HEAD = ("figure", "measured", "reference in the same run", "ratio", "asked", "date, commit")
+_HEAD = ("figure", "measured", "reference in the same run", "ratio", "asked")
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
@@ -24,7 +24,10 @@ def table() -> str:
         for row in csv.DictReader(file):
             newest[row["figure"]] = row
     lines = [_HEAD, ("---",) * len(_HEAD), *map(_cells, newest.values())]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    days = sorted({row["date"] for row in newest.values()})
+    when = days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
+    rows = [f"| {' | '.join(line)} |" for line in lines]
+    return "\n".join((*rows, "", f"Measured {when}."))
 
 
 def _cells(row: dict[str, str]) -> tuple[str, ...]:
@@ -36,7 +39,7 @@ def _cells(row: dict[str, str]) -> tuple[str, ...]:
         ratio = f"{times:.3g}" if times >= 1.0 else f"1/{1.0 / times:.3g}"
     if asked:
         asked = _shown(float(asked)) + ("" if taken <= float(asked) else ": **short**")
-    return row["figure"], _shown(taken), reference, ratio, asked, f"{row['date']}, {row['commit']}"
+    return row["figure"], _shown(taken), reference, ratio, asked
 
 
 def _shown(duration: float) -> str:
