@@ -29,6 +29,7 @@ def test_a_folder_that_holds_none_is_refused_with_where_they_are(tmp_path, monke
         ec.datasets.fanuc_r2000ic()
 
 
+@pytest.mark.slow
 def test_the_simulated_campaign_is_made_once(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path))
@@ -40,7 +41,15 @@ def test_the_simulated_campaign_is_made_once(tmp_path, monkeypatch):
     assert (again.force == found.force).all()
 
 
-@pytest.mark.parametrize("name", ["calibrate", "compare", "predict"])
+SIMULATED = ("plan", "run", "derive", "verify", "stiffness")
+"""Their examples plan for the example cell, and measure there: half a minute."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["calibrate", "compare", "predict", "new"]
+    + [pytest.param(name, marks=pytest.mark.slow) for name in SIMULATED],
+)
 def test_the_example_of_a_command_runs(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     command = getattr(ec, name)

@@ -307,6 +307,7 @@ def test_files_for_some_seeds_only_are_refused(folder):
     assert "--model is given 2 times for 3 seeds" in result.reason
 
 
+@pytest.mark.slow
 def test_the_figures_do_not_depend_on_the_number_of_processes(folder):
     two = ("--courses", 2, "--seed", 2)
     for jobs in (1, 2):

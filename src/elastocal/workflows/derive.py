@@ -85,6 +85,15 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
         If the folder holds no run, or its streams cannot be derived.
     FileAccessError
         If a file cannot be read or written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> _ = ec.init("cell")
+    >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
+    >>> _ = ec.run("cell/cell.yaml", plan="plan", out="run")
+    >>> dict(ec.derive("run").facts())["readings"]
+    '32 ok'
     """
     folder = RunFolder(Path(settings.run))
     derived = derive_run(folder.path, _sensor(folder, settings.tool), settings.tool)

@@ -73,6 +73,14 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001
         If ``check`` refuses the cell wherever the surface is tried, with its first reason.
     FileAccessError
         If the file is there already, or a file cannot be read or written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> _ = ec.init("cell")
+    >>> made = ec.new("own.yaml", robot="KR 120 R2700 extra HA", mesh="cell/dome.stl")
+    >>> made.facts()[:2]
+    (('cell', 'own.yaml'), ('robot', 'KR 120 R2700 extra HA'))
     """
     settings.require_free()
     out, known = Path(settings.out), settings.filled()

@@ -155,6 +155,14 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
         If no plan can be made of this cell, or a controller does not accept the program's name.
     FileAccessError
         If a file cannot be read or written, or the folder holds files.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> _ = ec.init("cell")
+    >>> found = ec.plan("cell/cell.yaml", out="plan", poses=4)
+    >>> dict(found.facts())["poses"]
+    '4 by i_optimal from 3000 candidates'
     """
     cell = _wanted_cell(settings)
     added = None

@@ -306,6 +306,15 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
         fault; its message states the fault and the position of the arm.
     ElastocalError
         If cell, plan, a file or a device cannot be used.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> _ = ec.init("cell")
+    >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
+    >>> found = ec.run("cell/cell.yaml", plan="plan", out="run")
+    >>> dict(found.facts())["poses"]
+    '4 of 4 committed'
     """
     job = _prepare(settings)
     (settings.arming or Arming.of(job.cell)).require(job.cell, job.rig.real)

@@ -221,6 +221,17 @@ def stiffness(settings: StiffnessSettings, progress: Progress) -> StiffnessResul
         If the cell has another robot, or ``start`` does not fit.
     FileAccessError
         If a file cannot be read or written, or the folder holds files and ``force`` is not given.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> _ = ec.init("cell")
+    >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
+    >>> _ = ec.run("cell/cell.yaml", plan="plan", out="run")
+    >>> _ = ec.calibrate("run/dataset.nc", springs="actuated", draws=40, out="model.json")
+    >>> found = ec.stiffness("model.json", "cell/process.csv", out="stiffness", stations=5)
+    >>> dict(found.facts())["stiffness along"]
+    "the tool's axis (normal)"
     """
     calibrated = settings.read_model(Path(settings.model))
     start = parse_posture(calibrated.model.robot, settings.start)

@@ -111,6 +111,15 @@ def verify(settings: VerifySettings, progress: Progress) -> VerifyResult:  # noq
         If the page is no report, or one made before reports could be verified.
     VerificationError
         If the key cannot be read.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> _ = ec.init("cell")
+    >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
+    >>> _ = ec.run("cell/cell.yaml", plan="plan", out="run")
+    >>> dict(ec.verify("run").facts())["dataset"]
+    'whole: the dataset is what the streams give, made again from them'
     """
     target = Path(settings.file)
     trusted = None if settings.key is None else read_public_key(settings.key)
