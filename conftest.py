@@ -7,3 +7,13 @@ import pytest
 def _in_an_empty_folder(request, monkeypatch, tmp_path_factory):
     if isinstance(request.node, pytest.DoctestItem):
         monkeypatch.chdir(tmp_path_factory.mktemp("example"))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Leave to the night what plans for an example cell first: ten seconds of processor each."""
+    for item in items:
+        if isinstance(item, pytest.DoctestItem) and any(
+            "ec.plan(" in example.source for example in item.dtest.examples
+        ):
+            item.add_marker(pytest.mark.slow)

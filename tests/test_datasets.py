@@ -1,7 +1,5 @@
 """Readings to try things on."""
 
-import doctest
-
 import pytest
 
 import elastocal as ec
@@ -39,21 +37,3 @@ def test_the_simulated_campaign_is_made_once(tmp_path, monkeypatch):
     monkeypatch.setattr(datasets, "_measure", None)
     again = ec.datasets.afp_simulated(seed=3, poses=4)
     assert (again.force == found.force).all()
-
-
-SIMULATED = ("plan", "run", "derive", "verify", "stiffness")
-"""Their examples plan for the example cell, and measure there: half a minute."""
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["calibrate", "compare", "predict", "new"]
-    + [pytest.param(name, marks=pytest.mark.slow) for name in SIMULATED],
-)
-def test_the_example_of_a_command_runs(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    command = getattr(ec, name)
-    examples = doctest.DocTestFinder(recurse=False).find(command, name, globs={})
-    assert examples[0].examples
-    ran = doctest.DocTestRunner().run(examples[0])
-    assert ran.failed == 0

@@ -26,7 +26,12 @@ from elastocal.compensation.programs import (
     compensate_program,
 )
 from elastocal.errors import FileAccessError, PlanningError
-from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
+from elastocal.identification import (
+    CalibratedModel,
+    CalibrateResult,
+    PredictionDoubt,
+    ProductionCoverage,
+)
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -56,8 +61,8 @@ _PROGRAM_MARKS = ("NOT TRIED ON A ROBOT", "DECL E6AXIS XBEFORE=")
 class CompensateSettings(NewTool, ArmAsBuilt, TouchedArm):
     """Settings of a correction: the model and the path."""
 
-    model: Annotated[str | PathLike[str], Option(argument=True)]
-    """Model file of `calibrate`."""
+    model: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    """Model file of `calibrate`; in Python also what it returned."""
     path: Annotated[Path, Option(argument=True)]
     """Path, ``.csv``, or program of a controller, such as a KUKA ``.src`` beside its ``.dat``."""
     out: Path
@@ -157,11 +162,11 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     >>> from pathlib import Path
     >>> import elastocal as ec
     >>> readings = ec.datasets.fanuc_r2000ic()
-    >>> _ = ec.calibrate(readings, springs="actuated", draws=40, out="model.json")
+    >>> model = ec.calibrate(readings, springs="actuated", draws=40)
     >>> joints = ",".join(f"joint_{n}[deg]" for n in range(1, 7))
     >>> heads = f"{joints},force_x[N],force_y[N],force_z[N]"
     >>> _ = Path("path.csv").write_text(f"{heads}\n0,0,0,0,-60,0,0,0,500\n")
-    >>> found = ec.compensate("model.json", path="path.csv", out="corrected.csv")
+    >>> found = ec.compensate(model, path="path.csv", out="corrected.csv")
     >>> dict(found.facts())["correction"]
     '1.62 mm mean, 1.62 mm max at row 2'
     """
@@ -175,7 +180,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         raise FileAccessError(f"--program is for paths (.csv), {path} is a program already")
     if not is_program and (forces or settings.base):
         raise FileAccessError(f"--forces and --base are for KUKA programs (.src), not for {path}")
-    calibrated = settings.read_model(Path(settings.model))
+    calibrated = settings.read_model(settings.model)
     robot = calibrated.model.robot
     start = parse_posture(robot, settings.start)
     usual = None if is_program or start is not None else _usual_posture(calibrated)

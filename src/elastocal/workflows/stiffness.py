@@ -18,7 +18,7 @@ from elastocal.cell import load_cell
 from elastocal.compensation import PathPostures, PathStations, PostureChoice, PostureSurvey
 from elastocal.errors import PathError
 from elastocal.files import filling
-from elastocal.identification import CalibratedModel
+from elastocal.identification import CalibratedModel, CalibrateResult
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
@@ -40,8 +40,8 @@ _FILES = ("postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", _SUMMA
 class StiffnessSettings(NewTool):
     """Settings of a survey of stiffness: the model, the path, and the free choices."""
 
-    model: Annotated[str | PathLike[str], Option(argument=True)]
-    """Model file of `calibrate`."""
+    model: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    """Model file of `calibrate`; in Python also what it returned."""
     path: Annotated[Path, Option(argument=True)]
     """CSV as for `compensate`; forces are not needed."""
     out: Annotated[
@@ -228,12 +228,12 @@ def stiffness(settings: StiffnessSettings, progress: Progress) -> StiffnessResul
     >>> _ = ec.init("cell")
     >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
     >>> _ = ec.run("cell/cell.yaml", plan="plan", out="run")
-    >>> _ = ec.calibrate("run/dataset.nc", springs="actuated", draws=40, out="model.json")
-    >>> found = ec.stiffness("model.json", "cell/process.csv", out="stiffness", stations=5)
+    >>> model = ec.calibrate("run/dataset.nc", springs="actuated", draws=40)
+    >>> found = ec.stiffness(model, "cell/process.csv", out="stiffness", stations=5)
     >>> dict(found.facts())["stiffness along"]
     "the tool's axis (normal)"
     """
-    calibrated = settings.read_model(Path(settings.model))
+    calibrated = settings.read_model(settings.model)
     start = parse_posture(calibrated.model.robot, settings.start)
     out = settings.out
     with nullcontext() if out is None else filling(out, _SUMMARY, settings.force) as folder:
@@ -302,7 +302,8 @@ def _grid(
     if settings.cell is None:
         return compensation.PostureGrid(spins, external), ()
     cell = load_cell(settings.cell)
-    require_same_robot(robot, cell.robot, (str(settings.model), cell.name))
+    model = str(settings.model) if isinstance(settings.model, str | PathLike) else "the model"
+    require_same_robot(robot, cell.robot, (model, cell.name))
     return compensation.PostureGrid(spins, cell.external_positions), compensation.cell_constraints(
         cell
     )
