@@ -25,7 +25,7 @@ from support.paths import (
 from support.simulated import example_cell, places
 from support.urdfs import KR_LIKE, opw_arm_urdf
 
-FILES = {"postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", "stiffness.json"}
+FILES = {"postures.csv", "choice.csv", "stiffness.svg", "stiffness.json"}
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +77,8 @@ def read_csv_text(path: Path, name: str) -> np.ndarray:
 def test_the_same_question_gives_the_same_picture(folder):
     for name in ("a", "b"):
         assert run(folder, name, "--direction", "1,0,0").code == 0
-    for name in ("stiffness.svg", "stiffness.png"):
-        assert (folder / "a" / name).read_bytes() == (folder / "b" / name).read_bytes()
+    one, other = (folder / name / "stiffness.svg" for name in ("a", "b"))
+    assert one.read_bytes() == other.read_bytes()
     assert "stiffness along (1,0,0) in base" in (folder / "a/stiffness.svg").read_text()
 
 

@@ -13,7 +13,7 @@ from elastocal.errors import ElastocalError
 from elastocal.procedure import file_sha256
 from elastocal.records import read_arrays, write_arrays
 from elastocal.verdict import EvidenceOptions, Light, LinkState, find_everything, gather_evidence
-from elastocal.verdict._files import read_seal
+from elastocal.verdict._files import read_hash
 from elastocal.verdict.evidence import Seal
 from elastocal.verdict.findings import codec_findings, missing_findings, reading_findings
 from elastocal.verdict.judgement import judge
@@ -261,7 +261,7 @@ def test_every_damaged_part_holds_back(parts):
 def test_a_seal_is_read_of_whatever_there_is(tmp_path, text, seal):
     path = tmp_path / "a.json"
     path.write_text(text)
-    assert read_seal(path) is seal
+    assert read_hash(path)[2] is seal
 
 
 def test_a_bad_statement_in_a_dataset_is_refused(finished):

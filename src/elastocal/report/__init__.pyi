@@ -14,5 +14,5 @@ from .plots import (
     write_plan_figure as write_plan_figure,
     write_recertification_figure as write_recertification_figure,
     write_stiffness_figure as write_stiffness_figure,
-    write_study_figures as write_study_figures,
+    write_study_figure as write_study_figure,
 )

@@ -8,8 +8,9 @@ hashes: of their JSON, keys sorted, or of their arrays, without the fields of `_
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,7 +26,6 @@ from elastocal.records import (
     json_sha256,
     parse_json,
     read_arrays,
-    read_json_data,
 )
 from elastocal.verdict.evidence import MissingPart, Seal, UsedFile
 from elastocal.wording import phrases
@@ -45,34 +45,62 @@ _SEALED = (
 """Schemas of files that state the hash of their own content."""
 
 
-def content_hash(path: Path) -> tuple[str, str]:
-    """Return the hash of a file and what it was taken of, `BYTES` or `CONTENT`.
+def read_hash(path: Path) -> tuple[str, str, Seal]:
+    """Return the hash of a file, what it was taken of, and what its own seal says.
+
+    Returns
+    -------
+    sha256 : str
+        Hash.
+    of : str
+        `BYTES` or `CONTENT`.
+    seal : Seal
+        Whether the file says what it said when it was written, by the hash that it states.
 
     Raises
     ------
     FileAccessError
         If it cannot be read.
     """
-    if path.suffix in _STAMPED:
-        try:
-            return _content(path), CONTENT
-        except (ElastocalError, ValueError, RecursionError):
-            # Damaged files have no content to compare.
-            return file_sha256(path), BYTES
-    return file_sha256(path), BYTES
+    if path.suffix not in _STAMPED:
+        return file_sha256(path), BYTES, Seal.NONE
+    try:
+        content, seal = _of_arrays(path) if path.suffix == ".nc" else _of_json(path)
+        return content, CONTENT, seal
+    except (ElastocalError, ValueError, RecursionError):
+        # Damaged files have no content to compare.
+        states = path.name == ARRAYS or path.suffix == ".json"
+        return file_sha256(path), BYTES, Seal.BROKEN if states else Seal.NONE
 
 
-def _content(path: Path) -> str:
-    if path.suffix == ".nc":
-        return arrays_sha256(read_arrays(path), (*_LEFT_OUT, MADE_FROM))
+def _of_arrays(path: Path) -> tuple[str, Seal]:
+    arrays = read_arrays(path)
+    content = arrays_sha256(arrays, (*_LEFT_OUT, MADE_FROM))
+    if path.name != ARRAYS:
+        return content, Seal.NONE
+    return content, _seal(arrays.attributes, lambda: arrays_sha256(arrays))
+
+
+def _of_json(path: Path) -> tuple[str, Seal]:
     whole = read_text(path)
     documents = whole.splitlines() if path.suffix == ".jsonl" else [whole]
-    digest = hashlib.sha256()
+    digest, seal = hashlib.sha256(), Seal.NONE
     for document in documents:
-        kept = _kept(parse_json(document, str(path)))
-        text = json.dumps(kept, sort_keys=True, separators=(",", ":"))
+        data = parse_json(document, str(path))
+        text = json.dumps(_kept(data), sort_keys=True, separators=(",", ":"))
         digest.update(text.encode("utf-8") + b"\n")
-    return digest.hexdigest()
+        if path.suffix == ".json" and isinstance(data, dict):
+            seal = _seal(data, partial(json_sha256, data))
+    return digest.hexdigest(), seal
+
+
+def _seal(states: Mapping[str, Any], content: Callable[[], str]) -> Seal:
+    if str(states.get("schema")).partition("/")[0] not in _SEALED:
+        return Seal.NONE
+    stated = states.get(SEAL)
+    if stated is None:
+        return Seal.ABSENT
+    return Seal.WHOLE if stated == content() else Seal.BROKEN
 
 
 def _kept(value: Any) -> Any:
@@ -84,28 +112,6 @@ def _kept(value: Any) -> Any:
 def _left_out(key: str, value: Any) -> bool:
     # A section of that name, such as the tool in the summary of a run, says more than where.
     return key in _WHOLE_LEFT_OUT or (key in _LEFT_OUT and not isinstance(value, dict))
-
-
-def read_seal(path: Path) -> Seal:
-    """Return whether a file says what it said when it was written, by the hash that it states."""
-    try:
-        if path.name == ARRAYS:
-            arrays = read_arrays(path)
-            stated, schema = arrays.attributes.get(SEAL), arrays.attributes.get("schema")
-            found = arrays_sha256(arrays)
-        elif path.suffix == ".json":
-            data = read_json_data(path)
-            held = data if isinstance(data, dict) else {}
-            stated, schema, found = held.get(SEAL), held.get("schema"), json_sha256(held)
-        else:
-            return Seal.NONE
-    except ElastocalError:
-        return Seal.BROKEN
-    if str(schema).partition("/")[0] not in _SEALED:
-        return Seal.NONE
-    if stated is None:
-        return Seal.ABSENT
-    return Seal.WHOLE if stated == found else Seal.BROKEN
 
 
 MODEL, TOOL, CODEC, PROCESS = "model.json", "tool.json", "codec", "process"
@@ -185,8 +191,8 @@ class PartReader:
         for file in sorted(_files_of(path)):
             shown = self.folders.shown(file)
             if shown not in {each.name for each in self.files}:
-                hashes = *content_hash(file), file_sha256(file)
-                self.files.append(UsedFile(shown, *hashes, read_seal(file)))
+                content, of, seal = read_hash(file)
+                self.files.append(UsedFile(shown, content, of, file_sha256(file), seal))
 
     def without_folders(self, error: ElastocalError) -> str:
         """Return a reason without the folder that the run happens to lie in."""

@@ -70,7 +70,7 @@ class UsedFile:
     """Its path relative to the run."""
     sha256: str
     of: str
-    """The part of the file that was hashed; see `content_hash`."""
+    """The part of the file that was hashed; see `read_hash`."""
     bytes_sha256: str = ""
     """Hash of the file as it is: what ``sha256sum`` gives."""
     seal: Seal = Seal.NONE

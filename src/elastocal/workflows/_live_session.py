@@ -145,10 +145,10 @@ class LiveEnd:
 def quiet_interpreter() -> Iterator[None]:
     """Keep Python's pauses short in the loop: no garbage collection, short thread switching.
 
-    Existing objects are never scanned; those of the loop are freed by reference counting.
+    Existing objects are never scanned, nor is garbage among them freed before the end; objects of
+    the loop are freed by reference counting.
     """
     collects, switch = gc.isenabled(), sys.getswitchinterval()
-    gc.collect()
     gc.freeze()
     gc.disable()
     sys.setswitchinterval(_SWITCH)

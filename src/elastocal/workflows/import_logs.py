@@ -20,7 +20,7 @@ from elastocal.options import Option
 from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
 from elastocal.records import record
-from elastocal.report.plots import require_kinds, write_timeline_figure
+from elastocal.report.plots import require_kind, write_timeline_figure
 from elastocal.results import Result, brief_repr
 from elastocal.wording import counted
 from elastocal.workflows._workflow import workflow
@@ -122,7 +122,7 @@ def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsR
     """
     files, path = _files(settings.logs), Path(settings.map)
     if settings.picture is not None:
-        require_kinds([Path(settings.picture)])
+        require_kind(Path(settings.picture))
     log_map = foreign.read_map(path)
     found = foreign.import_streams(log_map, foreign.site(path, log_map), files, progress)
     picture = settings.picture

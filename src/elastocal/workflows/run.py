@@ -5,6 +5,7 @@ before the operator has agreed. A fault is reported at once, before the arm retr
 """
 
 import contextlib
+import os
 import threading
 from collections import Counter, defaultdict
 from collections.abc import Iterator
@@ -323,7 +324,7 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
     _check_folder(job, entries, settings.resume)
     with job.rig.reserved("run") as rig:
         procedure.make_folder(job.folder.path)
-        with Journal(journal_file) as journal:
+        with Journal(journal_file, os.fsync if job.rig.real else None) as journal:
             # Read again: between the look above and the lock another process may have been here.
             if procedure.read_journal(journal_file) != entries:
                 raise ProcedureError(f"{job.folder.path}: another process has just run here")

@@ -33,7 +33,7 @@ from elastocal.workflows._workflow import workflow
 
 _SUMMARY = "stiffness.json"
 """Name of the file by which the folder is known."""
-_FILES = ("postures.csv", "choice.csv", "stiffness.svg", "stiffness.png", _SUMMARY)
+_FILES = ("postures.csv", "choice.csv", "stiffness.svg", _SUMMARY)
 
 
 @dataclass(frozen=True)
@@ -287,8 +287,7 @@ def _surveyed(
     if folder is not None:
         compensation.write_survey(folder / _FILES[0], robot, stations, survey)
         compensation.write_choice(folder / _FILES[1], calibrated, stations, direction, choices)
-        for name in _FILES[2:4]:
-            write_stiffness_figure(folder / name, result.title, stations, survey, curves)
+        write_stiffness_figure(folder / _FILES[2], result.title, stations, survey, curves)
         write_json(folder / _SUMMARY, summary)
     return result
 

@@ -37,7 +37,7 @@ from elastocal.identification import AUTO, RUNGS, FitOptions, choose_model, with
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import to_data
-from elastocal.report import drawn, study_figure, write_study_figures
+from elastocal.report import drawn, study_figure, write_study_figure
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.sim.workcell import (
@@ -154,7 +154,7 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
         )
     summary = studies.study_summary(design, results, settings.target)
     names = studies.write_study(settings.out, design, results, summary)
-    names += write_study_figures(settings.out, design, results, summary)
+    names.append(write_study_figure(settings.out, design, results, summary))
     return StudyResult(summary, design, results, tuple(names))
 
 

@@ -35,11 +35,9 @@ from elastocal.report.plots import (
     how_to_read,
     index_chart,
     variant_styles,
-    write_kinds,
+    write_figure,
 )
 
-KINDS = (".svg", ".png")
-"""File formats in which every figure is written."""
 PAGE = "codec.html"
 _MOST_PAIRS = 3
 """Pairs of variants that are shown unfolded on the page."""
@@ -58,8 +56,8 @@ def write_codec_figures(
     """Write the figures of a codec, each atomically; return their paths.
 
     ``codec.svg`` has the error norms, ``codec-x.svg`` and so on those along an axis,
-    ``compliances.svg`` the compliances, ``indices.svg`` the indices; all also as PNG; and
-    ``codec.html`` all but the growth of the indices.
+    ``compliances.svg`` the compliances, ``indices.svg`` the indices, and ``codec.html`` all but
+    the growth of the indices.
 
     Parameters
     ----------
@@ -93,17 +91,16 @@ def write_codec_figures(
         figures["indices"] = partial(index_chart, data, found.indices, found.correlations)
     many = bool(found.seen) and max(len(each.names) for each in data.springs) > _MANY
     processes = process_count(jobs or None, worthwhile=many)
-    # The largest figure first. One process draws it once for all kinds, several once for each.
-    tasks: list[Callable[[], object]] = []
-    for name, draw in reversed(figures.items()):
-        kinds = [folder / f"{name}{kind}" for kind in KINDS]
-        shares = [kinds] if processes == 1 else [[each] for each in reversed(kinds)]
-        title = f"{headline(data)} ({name})"
-        tasks += [partial(write_kinds, share, draw, title, description) for share in shares]
+    paths = {name: folder / f"{name}.svg" for name in figures}
     page = folder / PAGE
+    # The largest figure first.
+    tasks: list[Callable[[], object]] = [
+        partial(write_figure, paths[name], draw, f"{headline(data)} ({name})", description)
+        for name, draw in reversed(figures.items())
+    ]
     tasks.append(partial(write_codec_page, page, data, verdicts, found.seen, found.correlations))
     deque(map_in_processes(_call, tasks, process_count(processes, len(tasks))), maxlen=0)
-    return [*(folder / f"{name}{kind}" for name in figures for kind in KINDS), page]
+    return [*paths.values(), page]
 
 
 def _call(task: Callable[[], object]) -> None:

@@ -14,7 +14,7 @@ from .codec_chart import (
     how_to_read as how_to_read,
     pose_count_figure as pose_count_figure,
     study_figure as study_figure,
-    write_study_figures as write_study_figures,
+    write_study_figure as write_study_figure,
 )
 from .geometry_figures import (
     MANY_POSITIONS as MANY_POSITIONS,
@@ -57,12 +57,11 @@ from .style import (
     figure_bytes as figure_bytes,
     new_figure as new_figure,
     open_frame as open_frame,
-    require_kinds as require_kinds,
+    require_kind as require_kind,
     sequential_stops as sequential_stops,
     themed_svg as themed_svg,
     variant_styles as variant_styles,
     write_figure as write_figure,
-    write_kinds as write_kinds,
 )
 from .timeline_figure import (
     write_timeline_figure as write_timeline_figure,

@@ -45,8 +45,8 @@ _LEFT, _RIGHT, _BOTTOM, _GAP = 0.75, 0.2, 0.95, 0.2
 _PANEL, _ROW = 2.9, 0.34
 """Heights of a panel and of a row of the saturation strip, in inches."""
 _HEADLINE, _STRIP_TITLE = 0.42, 0.22
-_STUDY_FIGURES = ("study.svg", "study.png")
-"""Names of the files in a study's folder."""
+_STUDY_FIGURE = "study.svg"
+"""Name of the file in a study's folder."""
 _STUDY_WIDTH, _STUDY_PANEL, _STUDY_BOTTOM, _STUDY_HEAD = 7.5, 2.6, 0.9, 0.5
 """Sizes of a study's figure, in inches."""
 _HOW_TO_READ = (
@@ -273,24 +273,24 @@ def how_to_read(data: CodecData) -> str:
     )
 
 
-def write_study_figures(
+def write_study_figure(
     folder: Path, settings: StudyDesign, results: Sequence[SampleResult], record: StudySummary
-) -> list[str]:
-    """Write the chart of a study for print; return the names of the files.
+) -> str:
+    """Write the chart of a study for print; return the name of the file.
 
     Raises
     ------
     FileAccessError
-        If a file cannot be written.
+        If it cannot be written.
     """
     title = f"{record.cell}: error at unseen poses of {record.samples} simulated arms"
     description = "; ".join(
         f"{each.name}: median mean error {micrometres(each.error_mean.median)} µm"
         for each in record.conditions
     )
-    places = [Path(folder) / name for name in _STUDY_FIGURES]
-    style.write_kinds(places, lambda: study_figure(settings, results, record), title, description)
-    return list(_STUDY_FIGURES)
+    path = Path(folder) / _STUDY_FIGURE
+    style.write_figure(path, lambda: study_figure(settings, results, record), title, description)
+    return _STUDY_FIGURE
 
 
 def study_figure(

@@ -7,8 +7,7 @@ colour to be read. The same figure has the same bytes, and a description in word
 
 import io
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -26,7 +25,7 @@ from matplotlib.ticker import Formatter
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import FileAccessError
-from elastocal.files import replacing
+from elastocal.files import write_bytes
 
 INK = "#1b1b1b"
 MUTED = "#595959"
@@ -249,36 +248,28 @@ def print_settings() -> dict[Any, Any]:
     }
 
 
-def write_figure(
-    path: Path, draw: Callable[[], Figure], title: str = "", description: str = ""
-) -> Path:
-    """Write a figure, atomically; return its path. See `write_kinds`."""
-    return write_kinds([path], draw, title, description)[0]
-
-
-def require_kinds(paths: Iterable[Path]) -> None:
-    """Refuse figures of other kinds than can be written, before the work for them is done.
+def require_kind(path: Path) -> None:
+    """Refuse a figure of another kind than can be written, before the work for it is done.
 
     Raises
     ------
     FileAccessError
-        By the first such suffix.
+        By its suffix.
     """
-    for path in paths:
-        if path.suffix.lower() not in SUFFIXES:
-            raise FileAccessError(
-                f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
-            )
+    if path.suffix.lower() not in SUFFIXES:
+        raise FileAccessError(
+            f"figure {path}: suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}"
+        )
 
 
-def write_kinds(
-    paths: Sequence[Path], draw: Callable[[], Figure], title: str = "", description: str = ""
-) -> list[Path]:
-    """Write one figure in several kinds, each atomically; return their paths.
+def write_figure(
+    path: Path, draw: Callable[[], Figure], title: str = "", description: str = ""
+) -> Path:
+    """Write a figure, atomically; return its path.
 
     Parameters
     ----------
-    paths : sequence of Path
+    path : Path
         The suffix decides the kind: SVG, PNG or PDF.
     draw : callable
         Returns the figure; called once, with the settings of print.
@@ -288,24 +279,18 @@ def write_kinds(
     Raises
     ------
     FileAccessError
-        If a suffix is another or a file cannot be written.
+        If the suffix is another or the file cannot be written.
     """
-    paths = [Path(path) for path in paths]
-    require_kinds(paths)
-    with matplotlib.rc_context(print_settings()), ExitStack() as files:
-        temporary = [files.enter_context(replacing(path)) for path in paths]
-        figure = draw()
-        for path, place in zip(paths, temporary, strict=True):
-            suffix = path.suffix.lower()
-            notes = _metadata(suffix, title, description)
-            # In memory: what a library leaves of a file on a full disk is its own affair.
-            image = io.BytesIO()
-            figure.savefig(image, format=suffix[1:], dpi=_DPI, metadata=notes)
-            place.write_bytes(image.getbuffer())
-    return paths
+    path = Path(path)
+    require_kind(path)
+    # In memory: what a library leaves of a file on a full disk is its own affair.
+    write_bytes(path, figure_bytes(draw, path.suffix.lower(), _DPI, title, description))
+    return path
 
 
-def figure_bytes(draw: Callable[[], Figure], suffix: str, dpi: int) -> bytes:
+def figure_bytes(
+    draw: Callable[[], Figure], suffix: str, dpi: int, title: str = "", description: str = ""
+) -> bytes:
     """Return a figure as the bytes of a file; the same figure has the same bytes.
 
     Parameters
@@ -316,10 +301,12 @@ def figure_bytes(draw: Callable[[], Figure], suffix: str, dpi: int) -> bytes:
         ``.svg``, ``.png`` or ``.pdf``.
     dpi : int
         Resolution of what is stored as an image.
+    title, description : str, optional
+        See `write_figure`.
     """
-    buffer = io.BytesIO()
+    buffer, notes = io.BytesIO(), _metadata(suffix, title, description)
     with matplotlib.rc_context(print_settings()):
-        draw().savefig(buffer, format=suffix[1:], dpi=dpi, metadata=_metadata(suffix))
+        draw().savefig(buffer, format=suffix[1:], dpi=dpi, metadata=notes)
     return buffer.getvalue()
 
 
