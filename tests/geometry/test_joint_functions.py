@@ -8,6 +8,7 @@ import pytest
 
 from elastocal.errors import SchemaError
 from elastocal.geometry import (
+    AngleCheck,
     GeometryModel,
     GeometryProblem,
     errors_at,
@@ -15,7 +16,12 @@ from elastocal.geometry import (
     read_geometry,
 )
 from elastocal.geometry.arm import ArmErrors, motion_terms, series, waves
-from elastocal.geometry.joint_functions import beyond_low_orders
+from elastocal.geometry.joint_functions import (
+    REACH,
+    JointFunction,
+    beyond_low_orders,
+    measured_ranges,
+)
 from elastocal.geometry.ladder import climb, joint_regions
 from elastocal.geometry.solve import register
 from elastocal.progress import silent
@@ -34,6 +40,10 @@ FUNCTIONS, NOISE = 2.5e-4, 5e-5
 FLOOR = NOISE * np.sqrt(8.0 / np.pi)
 """Mean distance of the noise."""
 PLANTED = {"error": 3e-4, "noise": NOISE, "markers": 1, "stations": 1, "gears": 1e-4}
+
+
+NONE = np.zeros(2)
+FUNCTION = JointFunction("j", NONE, NONE, NONE, NONE, 8, 0.0, known=True)
 
 
 def fitted(measured: Measured, rows: np.ndarray | None = None) -> GeometryModel:
@@ -151,6 +161,38 @@ def test_the_file_keeps_them_and_older_files_are_read(model, tmp_path):
         path.write_text(json.dumps(data | {"motion": bad}), encoding="utf-8")
         with pytest.raises(SchemaError, match=rf"motion has shape {shape}, not \(6, 7\)"):
             read_geometry(path)
+
+
+def test_ranges_are_what_lies_near_measured_angles():
+    rng = np.random.default_rng(0)
+    asked = np.linspace(-10.0, 10.0, 4001)
+    for count in (1, 2, 5, 30, 400):
+        angle = rng.uniform(-7.0, 7.0, count)
+        apart = np.abs((asked[:, None] - angle + np.pi) % (2.0 * np.pi) - np.pi).min(axis=1)
+        clear = np.abs(apart - REACH) > 1e-9
+        known = replace(FUNCTION, measured=measured_ranges(angle))
+        assert np.array_equal(known.holds(asked)[clear], (apart < REACH)[clear])
+    assert measured_ranges(angle) == ((-np.pi, np.pi),)
+    assert measured_ranges(np.array([3.1, -3.1]))[0][1] > np.pi
+
+
+def test_where_no_angle_was_measured_errors_are_larger_and_that_is_said(measured):
+    """Joint 2 is measured on one side of a half turn, and used on the other, too."""
+    known, asked = measured.data.rows(np.arange(500)), measured.data.rows(np.arange(500, 700))
+    model = fitted(measured, np.flatnonzero(measured.data.q[:500, 1] < 0.5))
+    assert rung(model) == "joint-functions"
+    check = AngleCheck(model.functions, measured.robot.joint_names)
+    check.add(known.rows(known.q[:, 1] < 0.5).q)
+    assert check.findings() == ()
+    check.add(asked.q)
+    beyond = ~model.functions[1].holds(asked.q[:, 1])
+    (found,) = check.findings()
+    assert found.values["rows"] == beyond.sum() == (asked.q[:, 1] > 0.5 + REACH).sum()
+    for text in (found, check.ranges):
+        assert "j2 " in text
+        assert "j1 " not in text
+    off = np.linalg.norm(model.predict(asked) - asked.markers, axis=2)[:, 0]
+    assert off[beyond].mean() > 2.0 * off[~beyond].mean()
 
 
 def test_a_whole_turn_of_a_joint_changes_nothing(model, measured):

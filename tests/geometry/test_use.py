@@ -12,10 +12,12 @@ from elastocal.compensation.offline import PathCorrection, correct_rows
 from elastocal.dataset import PathTable, find_columns
 from elastocal.errors import GeometryError, PathError
 from elastocal.geometry import GeometryModel, GeometryProblem, Payload, Positions, geometry_model
+from elastocal.geometry.joint_functions import JointFunction
 from elastocal.geometry.ladder import climb
 from elastocal.geometry.solve import register
 from elastocal.identification import read_model, write_model
 from elastocal.progress import silent
+from elastocal.records import write_json
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.robot.inverse import inverse_for
 from elastocal.sim.workcell import ProcessCell, SimulatedCell
@@ -138,6 +140,28 @@ def test_predict_and_compensate_take_the_geometry(tmp_path):
     assert any("elastocal_arm_error" in note for note in notes["notes"])
     header = (tmp_path / "c" / "elastocal_model.h").read_text(encoding="utf-8")
     assert "void elastocal_arm_error(const double q[], double error[3]);" in header
+
+
+def test_angles_that_no_function_was_measured_at_are_named_by_every_command(tmp_path):
+    measured = measure(kuka(), 30)
+    robot, geometry, model = measured.robot, tmp_path / "geometry.json", tmp_path / "model.json"
+    joint, none = robot.joint_names[1], np.zeros(2)
+    function = JointFunction(joint, none, none, none, none, 8, 0.0, True, ((-0.5, 0.5),))
+    write_json(geometry, replace(fitted(measured), functions=(function,)))
+    write_model(model, calibrated(robot))
+    names = [f"{name}[rad]" for name in robot.joint_names]
+    heads = ",".join([*names, *(f"force_{axis}[N]" for axis in "xyz")])
+    rows, loaded = tmp_path / "rows.csv", "0.1,0,0.5,0,0,0,-500"
+    rows.write_text(f"{heads}\n0,-1,{loaded}\n0,-0.4,{loaded}\n0,-0.9,{loaded}\n", "utf-8")
+    out = tmp_path / "out.csv"
+    for command in ("predict", "compensate"):
+        told = elastocal(command, model, rows, "--out", out, "--geometry", geometry, "--json")
+        (note,) = [each for each in json.loads(told.out)["notes"] if "its function" in each]
+        assert note.startswith("2 rows of 3 have a joint where no position was measured within 4.5")
+        assert f"({joint} at -57 to -52 deg)" in note
+        out.unlink()
+    told = elastocal("export", model, "--c", tmp_path / "c", "--geometry", geometry, "--json")
+    assert any(f"{joint} -29 to 29 deg" in note for note in json.loads(told.out)["notes"])
 
 
 @pytest.mark.parametrize("largest", [0.0, 0.15, 0.5])

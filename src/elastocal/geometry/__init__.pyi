@@ -11,6 +11,7 @@ from .fitted_model import (
     geometry_model as geometry_model,
 )
 from .joint_functions import (
+    AngleCheck as AngleCheck,
     JointFunction as JointFunction,
 )
 from .model import (

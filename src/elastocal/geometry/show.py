@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from elastocal.blocks import Block, Facts, Paragraph, Row, Table
+from elastocal.findings import Finding
 from elastocal.geometry.accuracy import GeometryAccuracy, PoseAccuracy
 from elastocal.geometry.model import DistanceFigures, GeometryModel
 from elastocal.geometry.position_plan import PositionPlan
@@ -32,7 +33,10 @@ _SHOWN = {
 
 
 def show_geometry(
-    model: GeometryModel, accuracy: GeometryAccuracy, test: DistanceFigures | None = None
+    model: GeometryModel,
+    accuracy: GeometryAccuracy,
+    test: DistanceFigures | None = None,
+    test_findings: Sequence[Finding] = (),
 ) -> Iterator[Block]:
     """Yield the tables of a calibrated geometry.
 
@@ -44,6 +48,8 @@ def show_geometry(
         Its errors at left-out poses.
     test : DistanceFigures, optional
         Its errors at the positions of another table.
+    test_findings : sequence of Finding
+        Warnings about these positions.
     """
     yield axis_table(accuracy)
     yield rung_table(model)
@@ -53,7 +59,7 @@ def show_geometry(
         yield function_table(model)
     if accuracy.poses:
         yield repeatability_facts(accuracy.poses)
-    facts = [("warning", str(each)) for each in model.findings]
+    facts = [("warning", str(each)) for each in (*model.findings, *test_findings)]
     if model.blunders:
         rows = listed(tuple(map(str, model.blunders)), _MOST_ROWS)
         facts.append(

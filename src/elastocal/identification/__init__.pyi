@@ -70,6 +70,7 @@ from .model_file import (
     CalibrateResult as CalibrateResult,
     ModelSource as ModelSource,
     RobotRecord as RobotRecord,
+    model_name as model_name,
     read_model as read_model,
     write_model as write_model,
 )

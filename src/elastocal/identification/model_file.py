@@ -256,6 +256,11 @@ ModelSource = str | PathLike[str] | CalibrateResult | CalibratedModel
 """A model, or the file that holds it."""
 
 
+def model_name(source: ModelSource, otherwise: str = "the model") -> str:
+    """Return the path of a model for a message, or other words where it came from no file."""
+    return str(source) if isinstance(source, str | PathLike) else otherwise
+
+
 def read_model(source: ModelSource) -> CalibratedModel:
     """Return the calibrated model of a file; a model is returned as it is.
 

@@ -52,7 +52,7 @@ from elastocal.wording import listed
 if TYPE_CHECKING:
     from elastocal.compensation import ArmGrowth
     from elastocal.compensation.kernel import BuiltArm
-    from elastocal.geometry import GeometryModel, Payload
+    from elastocal.geometry import AngleCheck, GeometryModel, Payload
 
 _LONGEST_TOOL = 10.0
 """In m: no tool of a robot is longer; a longer one was meant in mm."""
@@ -175,6 +175,24 @@ class NewTool:
         return calibrated.with_tool(T_tcp_tool, mass, centre)
 
 
+@dataclass(frozen=True)
+class UnloadedArm:
+    """An arm without process force, as its controller knows it and as it stands."""
+
+    controller: Robot
+    """The model's own arm where its geometry is unknown."""
+    tool: Callable[[FloatArray], FloatArray] | None = None
+    """From joints, shape (row, joint), to the true position of the tool in base, shape (row, 3), in
+    m; None where its geometry is unknown."""
+    angles: "AngleCheck | None" = None
+    """Is told the rows that are worked at; see `AngleCheck.findings`."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of the rows so far."""
+        return () if self.angles is None else tuple(map(str, self.angles.findings()))
+
+
 @dataclass(frozen=True, kw_only=True)
 class ArmAsBuilt:
     """Settings of every command that may use the true position of the unloaded arm."""
@@ -186,11 +204,8 @@ class ArmAsBuilt:
     payload_centre: str | None = None
     """Its centre in that model's tcp, ``"x, y, z"`` with units."""
 
-    def unloaded(self, robot: Robot) -> tuple[Robot, Callable[[FloatArray], FloatArray] | None]:
-        """Return the arm as its controller knows it, and the true position of its tool.
-
-        The latter is None where its geometry is unknown; the controller's arm is then the model's
-        own.
+    def unloaded(self, robot: Robot) -> "UnloadedArm":
+        """Return the arm without process force.
 
         Raises
         ------
@@ -201,9 +216,12 @@ class ArmAsBuilt:
         """
         known = self._geometry()
         if known is None:
-            return robot, None
+            return UnloadedArm(robot)
+        from elastocal.geometry import AngleCheck
+
         found, payload = known
-        return found.as_drawn(robot), found.tool_of(robot, payload)
+        check = AngleCheck(found.functions, robot.joint_names)
+        return UnloadedArm(found.as_drawn(robot), found.tool_of(robot, payload), check)
 
     def built(self, robot: Robot) -> "BuiltArm | None":
         """Return the arm as it was built, for a program of its errors; None: it is unknown.
@@ -282,7 +300,7 @@ def _require_near(what: str, point: ArrayLike, origin: str) -> None:
         )
 
 
-def require_model_of_arm(calibrated: CalibratedModel, file: Path) -> None:
+def require_model_of_arm(calibrated: CalibratedModel, name: str) -> None:
     """Refuse a model that leaves too much unexplained for an arm to be corrected by it.
 
     Raises
@@ -292,7 +310,7 @@ def require_model_of_arm(calibrated: CalibratedModel, file: Path) -> None:
     """
     if calibrated.unexplained > MOST_UNEXPLAINED:
         raise CompensationError(
-            f"{file} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
+            f"{name} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
             f" poses, at most {MOST_UNEXPLAINED:.0%} is allowed: it is no model of this arm"
         )
 

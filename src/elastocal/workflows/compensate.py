@@ -1,7 +1,6 @@
 """``compensate``: a programmed path with its forces, corrected offline."""
 
 from dataclasses import dataclass, fields
-from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
@@ -28,7 +27,7 @@ from elastocal.compensation.programs import (
 from elastocal.errors import FileAccessError, PlanningError
 from elastocal.identification import (
     CalibratedModel,
-    CalibrateResult,
+    ModelSource,
     PredictionDoubt,
     ProductionCoverage,
 )
@@ -43,6 +42,7 @@ from elastocal.workflows._inputs import (
     ArmAsBuilt,
     NewTool,
     TouchedArm,
+    UnloadedArm,
     coverage_notes,
     growth_notes,
     parse_frame,
@@ -61,7 +61,7 @@ _PROGRAM_MARKS = ("NOT TRIED ON A ROBOT", "DECL E6AXIS XBEFORE=")
 class CompensateSettings(NewTool, ArmAsBuilt, TouchedArm):
     """Settings of a correction: the model and the path."""
 
-    model: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    model: Annotated[ModelSource, Option(argument=True)]
     """Model file of `calibrate`; in Python also what it returned."""
     path: Annotated[Path, Option(argument=True)]
     """Path, ``.csv``, or program of a controller, such as a KUKA ``.src`` beside its ``.dat``."""
@@ -185,22 +185,21 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     start = parse_posture(robot, settings.start)
     usual = None if is_program or start is not None else _usual_posture(calibrated)
     start = start if usual is None else usual
-    controller, built = settings.unloaded(robot)
+    arm = settings.unloaded(robot)
     state = settings.growth(robot)
-    unloaded = _grown(state, controller, built)
-    how = CorrectionSettings(start, settings.largest, unloaded, controller)
+    program, language = _program_of(settings, robot)
+    hear = [each.add for each in (arm.angles, program) if each is not None]
+    unloaded = _grown(state, arm)
+    how = CorrectionSettings(start, settings.largest, unloaded, arm.controller, hear)
     if is_program:
         if forces is None:
             raise FileAccessError(f"{path} has no forces: name a table of them with --forces")
         T_base_frame = None if settings.base is None else parse_frame(settings.base)
         found = compensate_program(calibrated, path, forces, settings.out, how, T_base_frame)
         summary, notes = found.summary, found.notes
-        program: PathProgram | None = None
     else:
-        program, reason = _program_of(settings, robot)
-        hear = None if program is None else program.add
-        summary = compensate_path(calibrated, path, settings.out, how, progress, hear)
-        notes = (*_path_notes(summary, robot, settings.start, usual is not None), *reason)
+        summary = compensate_path(calibrated, path, settings.out, how, progress)
+        notes = (*_path_notes(summary, robot, settings.start, usual is not None), *language)
     figures = summary.figures()
     further = (*_force_notes(summary), *_covered(summary))
     return CompensateResult(
@@ -208,6 +207,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
         tool=calibrated.tool_name,
         notes=(
             *_built(settings),
+            *arm.notes,
             *growth_notes(state),
             *coverage_notes(calibrated),
             *notes,
@@ -219,14 +219,14 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     )
 
 
-def _grown(state: ArmGrowth | None, controller: Robot, built: Unloaded | None) -> Unloaded | None:
+def _grown(state: ArmGrowth | None, arm: UnloadedArm) -> Unloaded | None:
     """Return where the unloaded tool stands when the arm has grown as well; None: as programmed."""
     if state is None or not state.corrects:
-        return built
+        return arm.tool
 
     def unloaded(q: FloatArray) -> FloatArray:
-        cold = controller.forward(q)[:, :3, 3] if built is None else built(q)
-        return cold + state.shift(controller, q)
+        cold = arm.controller.forward(q)[:, :3, 3] if arm.tool is None else arm.tool(q)
+        return cold + state.shift(arm.controller, q)
 
     return unloaded
 

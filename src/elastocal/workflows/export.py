@@ -1,7 +1,6 @@
 """``export``: C99 of a model and its compensator for a real-time target."""
 
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +15,7 @@ from elastocal.compensation.online import design
 from elastocal.drivers.kuka_rsi import DRIVER as KUKA, PostureReader
 from elastocal.drivers.net_ft import NetFtSettings
 from elastocal.errors import CompensationError, nearest, present
-from elastocal.identification import PredictionDoubt
+from elastocal.identification import ModelSource, PredictionDoubt, model_name
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record
@@ -45,8 +44,8 @@ EXPORT_TARGETS = ("linux",)
 class ExportSettings(NewTool, ArmAsBuilt, TouchedArm):
     """Settings of an export: the model and the compensator."""
 
-    model: Annotated[str | PathLike[str], Option(argument=True)]
-    """Model file of `calibrate`."""
+    model: Annotated[ModelSource, Option(argument=True)]
+    """Model file of `calibrate`; in Python also what it returned."""
     out: Annotated[Path, Option("--c")]
     """Folder to write the C files into."""
     compensator: Annotated[Path | None, Option("--settings")] = None
@@ -68,6 +67,9 @@ _NO_TOOL = (
 _ARM_ERROR = (
     "elastocal_arm_error gives what the unloaded arm as built is off by; the step corrects the"
     " deflection alone"
+)
+_MEASURED_ANGLES = (
+    "functions of joints in elastocal_arm_error hold where these were measured: {ranges} deg"
 )
 _AGREEMENT = 1e-12
 """Largest difference between statements and the geometry itself, in m: rounding is some 1e-15."""
@@ -141,13 +143,13 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     --------
     >>> import elastocal as ec
     >>> readings = ec.datasets.fanuc_r2000ic()
-    >>> _ = ec.calibrate(readings, springs="actuated", draws=40, out="model.json")
-    >>> dict(ec.export("model.json", out="c").facts())["cycle"]
+    >>> model = ec.calibrate(readings, springs="actuated", draws=40)
+    >>> dict(ec.export(model, out="c").facts())["cycle"]
     '4 ms'
     """
-    model = Path(settings.model)
-    calibrated = settings.read_model(model)
-    require_model_of_arm(calibrated, model)
+    name = model_name(settings.model)
+    calibrated = settings.read_model(settings.model)
+    require_model_of_arm(calibrated, name)
     around = _around(settings, calibrated.model.robot)
     if around is None:
         chosen = None if settings.compensator is None else read_settings(settings.compensator)
@@ -159,7 +161,7 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     try:
         numbers = design(calibrated, chosen, load, state, built)
     except CompensationError as error:
-        raise CompensationError(f"{model}: {error}") from error
+        raise CompensationError(f"{name}: {error}") from error
     if numbers.arm_error is not None:
         _require_agreement(settings, calibrated.model.robot, numbers.arm_error)
     on_production = calibrated.on_production
@@ -181,16 +183,24 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
             *((_NO_TOOL,) if settings.tool is None else ()),
             *growth_notes(state),
             *((_ARM_ERROR,) if built is not None else ()),
+            *_measured_angles(settings, calibrated.model.robot),
         ),
         on_production=on_production,
     )
 
 
+def _measured_angles(settings: ExportSettings, robot: Robot) -> tuple[str, ...]:
+    """Return where the statements hold, if functions of joints are among them."""
+    angles = settings.unloaded(robot).angles
+    ranges = "" if angles is None else angles.ranges
+    return (_MEASURED_ANGLES.format(ranges=ranges),) if ranges else ()
+
+
 def _require_agreement(settings: ExportSettings, robot: Robot, error: Routine) -> None:
     """Refuse statements that give something else than the geometry, before C is made of them."""
-    controller, unloaded = settings.unloaded(robot)
-    q = probe_configurations(controller)
-    known = present(unloaded, "geometry")(q) - controller.forward(q)[:, :3, 3]
+    arm = settings.unloaded(robot)
+    q = probe_configurations(arm.controller)
+    known = present(arm.tool, "geometry")(q) - arm.controller.forward(q)[:, :3, 3]
     of = compiled(error, len(robot.joint_names), loaded=False)
     off = float(np.abs(np.array([of(each) for each in q.tolist()]) - known).max())
     if not off <= _AGREEMENT:
@@ -222,7 +232,7 @@ def _around(settings: ExportSettings, model: Robot) -> tuple[LinuxTarget, PathLi
             " raw wrenches"
         )
     cell = load_cell(settings.cell)
-    require_same_robot(model, cell.robot, (str(settings.model), cell.name))
+    require_same_robot(model, cell.robot, (model_name(settings.model), cell.name))
     arm = kuka_settings(cell)
     limits = KUKA.path_limits(cell, arm)
     sensor = rig_of(cell).wanted.get("net_ft", {}).get("sensor")

@@ -11,7 +11,9 @@ import numpy as np
 from elastocal.blocks import Block
 from elastocal.errors import FileAccessError, GeometryError, present
 from elastocal.files import write_text
+from elastocal.findings import Finding
 from elastocal.geometry import (
+    AngleCheck,
     DistanceFigures,
     GeometryAccuracy,
     GeometryModel,
@@ -90,6 +92,8 @@ class GeometryResult(Result):
     """Errors of every position before and after, at poses that were left out."""
     test: DistanceFigures | None = None
     """Errors at the positions of the other table."""
+    test_findings: tuple[Finding, ...] = ()
+    """Warnings about that table."""
 
     @property
     def expressed(self) -> DistanceFigures:
@@ -113,12 +117,12 @@ class GeometryResult(Result):
                 else ()
             ),
             ("errors of the arm", f"{known} known of {len(model.parameters)} fitted"),
-            *(("warning", each) for each in model.findings),
+            *(("warning", each) for each in (*model.findings, *self.test_findings)),
         )
 
     def show(self) -> Iterator[Block]:
         """Yield the tables of a calibrated geometry, and its warnings."""
-        return show_geometry(self.model, self.accuracy, self.test)
+        return show_geometry(self.model, self.accuracy, self.test, self.test_findings)
 
     def plot(self) -> Any:
         """Return maps of the errors before and after, as a Matplotlib figure."""
@@ -173,8 +177,10 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     if settings.urdf is not None:
         write_text(settings.urdf, model.calibrated_urdf())
     accuracy, test = accuracy_figures(problem, found), None
+    angles = AngleCheck(model.functions, robot.joint_names)
     if other is not None:
         test = DistanceFigures.of(errors_at(model, problem.data, other))
+        angles.add(other.q)
     if settings.report_file is not None or settings.table is not None:
         links = link_table(problem, found)
         if settings.table is not None:
@@ -183,7 +189,7 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
             write_geometry_page(
                 settings.report_file, GeometryFindings(model, accuracy, links), language
             )
-    return GeometryResult(model, accuracy, test)
+    return GeometryResult(model, accuracy, test, angles.findings())
 
 
 def _check_suffixes(settings: GeometrySettings) -> None:

@@ -223,7 +223,7 @@ def _prepare(settings: LiveSettings) -> Prepared:
     limits = driver.path_limits(cell, arm)
     calibrated = settings.read_model(settings.model)
     require_same_robot(calibrated.model.robot, cell.robot, (str(settings.model), cell.name))
-    require_model_of_arm(calibrated, settings.model)
+    require_model_of_arm(calibrated, str(settings.model))
     chosen = settings_within(settings.compensator, limits, cell)
     load = read_sensor_load(settings.tool, calibrated.model.robot) or sensor_load(cell)
     state = settings.growth(calibrated.model.robot)

@@ -21,10 +21,9 @@ from elastocal.dataset import (
     new_rows,
 )
 from elastocal.identification import (
-    CalibratedModel,
-    CalibrateResult,
     CoveredRows,
     DeflectionSummary,
+    ModelSource,
     Prediction,
     ProductionCoverage,
 )
@@ -48,7 +47,7 @@ _NO_MISFIT = (
 class PredictSettings(NewTool, ArmAsBuilt):
     """Settings of a prediction: the model and the rows."""
 
-    model: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    model: Annotated[ModelSource, Option(argument=True)]
     """Model file of `calibrate`; in Python also what it returned."""
     rows: Annotated[str | PathLike[str] | Dataset | Columns, Option(argument=True)]
     """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``; in
@@ -144,26 +143,28 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     """
     calibrated = settings.read_model(settings.model)
     robot = calibrated.model.robot
-    controller, unloaded = settings.unloaded(robot)
+    arm = settings.unloaded(robot)
     file = settings.rows
     with in_file(Path(file)) if isinstance(file, str | PathLike) else nullcontext():
         table = _table(settings.rows, robot)
         loads = table.rows()
-        T_base_tcp = controller.forward(loads.joints)
+        T_base_tcp = arm.controller.forward(loads.joints)
         wrench = loads.wrench_in_base(T_base_tcp)
         prediction = calibrated.predict(loads.joints, *wrench, loads.names("visit"))
         misfit = calibrated.misfit
         covered = calibrated.covered_rows(loads.joints, *wrench)
         if settings.out is not None:
             added = _columns(prediction, covered, misfit.is_known)
-            if unloaded is not None:
-                off = unloaded(loads.joints) - T_base_tcp[:, :3, 3]
+            if arm.tool is not None:
+                off = arm.tool(loads.joints) - T_base_tcp[:, :3, 3]
                 added |= {f"arm_error_{axis}[m]": off[:, i] for i, axis in enumerate("xyz")}
             with new_rows(settings.out, table, tuple(added)) as write:
                 write(loads, np.column_stack([*added.values()]), ())
     norms = np.linalg.norm(prediction.deflection, axis=1)
     size = DeflectionSummary(float(norms.mean()), float(norms.max()))
     notes = coverage_notes(calibrated) if calibrated.tool is not None else ()
+    if arm.angles is not None:
+        arm.angles.add(loads.joints)
     coverage = None
     if covered is not None:
         coverage = covered.figures(name=loads.label)
@@ -173,7 +174,7 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
         misfit=misfit.share if misfit.is_known else None,
         misfit_floor=misfit.floor if misfit.is_known else None,
         tool=calibrated.tool_name,
-        notes=notes,
+        notes=(*arm.notes, *notes),
         coverage=coverage,
     )
     return PredictResult(prediction, summary)

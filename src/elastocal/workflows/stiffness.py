@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
-from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +17,7 @@ from elastocal.cell import load_cell
 from elastocal.compensation import PathPostures, PathStations, PostureChoice, PostureSurvey
 from elastocal.errors import PathError
 from elastocal.files import filling
-from elastocal.identification import CalibratedModel, CalibrateResult
+from elastocal.identification import CalibratedModel, ModelSource, model_name
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import record, write_json
@@ -40,7 +39,7 @@ _FILES = ("postures.csv", "choice.csv", "stiffness.svg", _SUMMARY)
 class StiffnessSettings(NewTool):
     """Settings of a survey of stiffness: the model, the path, and the free choices."""
 
-    model: Annotated[str | PathLike[str] | CalibrateResult | CalibratedModel, Option(argument=True)]
+    model: Annotated[ModelSource, Option(argument=True)]
     """Model file of `calibrate`; in Python also what it returned."""
     path: Annotated[Path, Option(argument=True)]
     """CSV as for `compensate`; forces are not needed."""
@@ -301,8 +300,7 @@ def _grid(
     if settings.cell is None:
         return compensation.PostureGrid(spins, external), ()
     cell = load_cell(settings.cell)
-    model = str(settings.model) if isinstance(settings.model, str | PathLike) else "the model"
-    require_same_robot(robot, cell.robot, (model, cell.name))
+    require_same_robot(robot, cell.robot, (model_name(settings.model), cell.name))
     return compensation.PostureGrid(spins, cell.external_positions), compensation.cell_constraints(
         cell
     )

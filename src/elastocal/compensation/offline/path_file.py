@@ -1,6 +1,6 @@
 """``PATH.csv`` to ``OUT.csv``: rows corrected block by block, everything else unchanged."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -55,6 +55,8 @@ class CorrectionSettings:
     """True tcp position without process force; by default the nominal one."""
     controller: Robot | None = None
     """The arm as its controller knows it, which paths are written for; by default the model's."""
+    hear: Sequence[HearRows] = ()
+    """Hear the corrected rows, block by block; what one raises leaves no file."""
 
 
 def compensate_path(
@@ -63,7 +65,6 @@ def compensate_path(
     out: Path,
     settings: CorrectionSettings | None = None,
     progress: Progress = silent,
-    hear: HearRows | None = None,
 ) -> CorrectionSummary:
     """Correct a path file; write the same columns corrected, and the predicted deflection.
 
@@ -74,12 +75,9 @@ def compensate_path(
     path, out : Path
         The file as programmed, and the one to write, atomically.
     settings : CorrectionSettings, optional
-        Posture at the start, and the largest deflection.
+        Posture at the start, the largest deflection, and who hears the rows.
     progress : Progress
         Hears how many rows are done.
-    hear : callable, optional
-        Hears joints and poses of the corrected rows, block by block, and their names; what it
-        raises leaves no file.
 
     Raises
     ------
@@ -123,7 +121,7 @@ def compensate_path(
                 previous, memory = q[-1], found.memory
                 ends = np.hstack([found.deflection, found.low, found.high])
                 write(rows, ends, _corrected_columns(rows, found, robot.external_axes))
-                if hear is not None:
+                for hear in settings.hear:
                     hear(found.q, found.T_base_tcp, rows.label)
                 progress("rows", summary.rows, total)
     return summary

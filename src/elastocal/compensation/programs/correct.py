@@ -203,6 +203,8 @@ def _corrected(
         largest=settings.largest,
         unloaded=settings.unloaded,
     )
+    for hear in settings.hear:
+        hear(found.q, found.T_base_tcp, labels.__getitem__)
     shift = found.T_base_tcp[:, :3, 3] - T[:, :3, 3]
     return found, CorrectionSummary().plus(found, shift, labels, [])
 

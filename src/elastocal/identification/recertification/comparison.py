@@ -47,7 +47,7 @@ from elastocal.identification.calibrated import CalibratedModel, check_rows
 from elastocal.identification.displacement import displacement_blocks
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
 from elastocal.identification.figures import CalibrationSummary
-from elastocal.identification.model_file import CalibrateResult, ModelSource
+from elastocal.identification.model_file import CalibrateResult, ModelSource, model_name
 from elastocal.identification.production import CoveredRows, covered_rows
 from elastocal.identification.recertification._sums import (
     common_springs,
@@ -586,7 +586,7 @@ def recertify_files(
     IdentificationError, SpringError, RobotError
         See `recertify`.
     """
-    names = _named(old, "the old model"), _named(new, "the new model")
+    names = model_name(old, "the old model"), model_name(new, "the new model")
     files = isinstance(old, str | PathLike) and isinstance(new, str | PathLike)
     if old is new or (files and Path(names[0]).resolve() == Path(names[1]).resolve()):
         kind = "file" if files else "model"
@@ -739,15 +739,11 @@ def _given_rows(
     return rows or ComparedRows(joints, forces, moments)
 
 
-def _named(source: ModelSource, otherwise: str) -> str:
-    return str(source) if isinstance(source, str | PathLike) else otherwise
-
-
 def _read(source: ModelSource) -> tuple[CalibratedModel, CalibrationSummary | None]:
     """Return a model, and the figures of its calibration."""
     if isinstance(source, CalibratedModel):
         return source, None
-    path = _named(source, "the model")
+    path = model_name(source)
     found = (
         source if isinstance(source, CalibrateResult) else read_json(Path(path), CalibrateResult)
     )
