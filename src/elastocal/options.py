@@ -147,7 +147,7 @@ def settings_fields(module: str, name: str) -> tuple[SettingsField, ...]:
     tree = _source(module)
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and node.name == name:
-            own = tuple(_own_fields(node))
+            own = tuple(_own_fields(module, node))
             bases = (base.id for base in node.bases if isinstance(base, ast.Name))
             above = (each for base in bases for each in settings_fields(module, base))
             names = {each.name for each in own}
@@ -197,11 +197,11 @@ def _defining(module: str, name: str) -> str:
     return module
 
 
-def _own_fields(node: ast.ClassDef) -> Iterator[SettingsField]:
+def _own_fields(module: str, node: ast.ClassDef) -> Iterator[SettingsField]:
     for each, after in zip(node.body, [*node.body[1:], None], strict=True):
         if not isinstance(each, ast.AnnAssign) or not isinstance(each.target, ast.Name):
             continue
-        kind, option = _option(each.annotation)
+        kind, option = _option(module, each.annotation)
         default: Any = REQUIRED
         if each.value is not None:
             default = _default(each.value)
@@ -220,7 +220,7 @@ def _default(value: ast.expr) -> Any:
         return OWN
 
 
-def _option(annotation: ast.expr) -> tuple[str, Option]:
+def _option(module: str, annotation: ast.expr) -> tuple[str, Option]:
     """Return the type of a field, and what ``Annotated`` says of its option."""
     if isinstance(annotation, ast.Name) and annotation.id in SHARED:
         return SHARED[annotation.id]
@@ -231,9 +231,23 @@ def _option(annotation: ast.expr) -> tuple[str, Option]:
             if isinstance(note, ast.Call) and ast.unparse(note.func) == Option.__name__:
                 places = dict(zip(("name",), map(ast.literal_eval, note.args), strict=False))
                 words = {str(word.arg): ast.literal_eval(word.value) for word in note.keywords}
-                return ast.unparse(kind), Option(**places, **words)
-        return ast.unparse(kind), Option()
-    return ast.unparse(annotation), Option()
+                return _meant(module, kind), Option(**places, **words)
+        return _meant(module, kind), Option()
+    return _meant(module, annotation), Option()
+
+
+def _meant(module: str, kind: ast.expr) -> str:
+    """Return a type, written out if it is a name that a module of elastocal gives another."""
+    if not isinstance(kind, ast.Name):
+        return ast.unparse(kind)
+    for node in _source(module).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == kind.id:
+            return ast.unparse(node.value)
+        if isinstance(node, ast.ImportFrom) and kind.id in (alias.name for alias in node.names):
+            origin = node.module or ""
+            if origin.startswith("elastocal."):
+                return _meant(_defining(origin, kind.id), kind)
+    return ast.unparse(kind)
 
 
 def _plain(text: str) -> str:

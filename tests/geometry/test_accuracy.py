@@ -7,7 +7,7 @@ import pytest
 
 import elastocal as ec
 from elastocal.geometry import GeometryProblem, accuracy_figures, link_table
-from elastocal.geometry.arm import ArmErrors, frames
+from elastocal.geometry.arm import ArmErrors, JointLoads, frames
 from elastocal.geometry.denavit_hartenberg import link_numbers, link_transform
 from elastocal.geometry.ladder import climb
 from elastocal.progress import silent
@@ -80,7 +80,7 @@ def test_the_arm_is_rebuilt_from_its_link_numbers(arm):
     errors.place[1:] = rng.normal(0.0, 1e-3, (joints - 1, 6))
     errors.motion[:, 0] = rng.normal(0.0, 1e-3, joints)
     q = rng.uniform(-1.0, 1.0, (4, joints))
-    none = np.zeros_like(q)
+    none = JointLoads.none(q)
     first = robot.chain.joints[0]
     # The ways of the links are those of the arm as drawn for both.
     for each in (ArmErrors.none(joints), errors):
@@ -105,8 +105,8 @@ def test_planted_link_numbers_are_found_with_their_intervals():
     planted.place[2, 2], planted.motion[3, 0] = 1e-3, 2e-3
     q = measured.data.q
     shift = (
-        frames(robot, q, np.zeros_like(q), planted).T_base_tcp
-        - frames(robot, q, np.zeros_like(q), ArmErrors.none(6)).T_base_tcp
+        frames(robot, q, JointLoads.none(q), planted).T_base_tcp
+        - frames(robot, q, JointLoads.none(q), ArmErrors.none(6)).T_base_tcp
     )
     tool = np.column_stack([MARKERS, np.ones(3)])
     station = (measured.data.station == "s1").astype(int)

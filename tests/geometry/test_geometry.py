@@ -1,20 +1,29 @@
 """Planted geometries are found again, to the noise, with blunders named and intervals that hold."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray
 
 from elastocal.errors import GeometryError
-from elastocal.geometry import GeometryModel, GeometryProblem, geometry_model, read_positions
-from elastocal.geometry.arm import ArmErrors, frames, motion_terms, point_motions
+from elastocal.geometry import (
+    GeometryModel,
+    GeometryProblem,
+    Payload,
+    Positions,
+    geometry_model,
+    read_positions,
+)
+from elastocal.geometry.arm import ArmErrors, JointLoads, frames, motion_terms, point_motions
 from elastocal.geometry.determined import told_apart
 from elastocal.geometry.ladder import climb
+from elastocal.geometry.positions import joint_loads
 from elastocal.geometry.solve import fit, register
 from elastocal.progress import silent
 from elastocal.records import read_json
-from elastocal.robot import GRAVITY, Robot, with_joint_origins
+from elastocal.robot import GRAVITY, Robot, catalogue, with_joint_origins
 from elastocal.units import split_column
 from support.cli import elastocal
 from support.measured_arms import (
@@ -23,6 +32,8 @@ from support.measured_arms import (
     kuka,
     measure,
     universal,
+    weight_torque,
+    with_bearings,
     write_positions,
 )
 
@@ -41,16 +52,20 @@ def test_motions_of_a_point_are_those_of_finite_differences(error):
     """Also of an arm with errors, which turn the axes of those behind them."""
     robot, rng, step = kuka(), np.random.default_rng(2), 1e-6
     q, torque = rng.uniform(-1.0, 1.0, (3, 6)), rng.normal(0.0, 1.0, (3, 6))
+    loads = JointLoads(torque, rng.normal(0.0, 1.0, (3, 6, 3)))
 
     def place(errors):
-        T = frames(robot, q, torque, errors).T_base_tcp
+        T = frames(robot, q, loads, errors).T_base_tcp
         return T[:, :3, 3] + T[:, :3, :3] @ np.array([0.1, 0.2, 0.3])
 
     motion = error * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-    nominal = ArmErrors(error * rng.normal(size=(6, 6)), motion * rng.normal(size=(6, 7)))
-    at, terms, points = frames(robot, q, torque, nominal), motion_terms(q, torque), place(nominal)
-    found = np.stack([*point_motions(robot, at, terms, points, np.arange(3))], axis=2)
-    for which, columns in (("place", found[..., :6]), ("motion", found[..., 6:])):
+    shapes = {"place": (6, 6), "motion": (6, 7), "bend": (6, 3)}
+    sizes = {"place": error, "motion": motion, "bend": error}
+    nominal = ArmErrors(**{n: sizes[n] * rng.normal(size=shape) for n, shape in shapes.items()})
+    at, terms, points = frames(robot, q, loads, nominal), motion_terms(q, torque), place(nominal)
+    motions = point_motions(robot, at, terms, loads.moment, points, np.arange(3))
+    parts = np.split(np.stack([*motions], axis=2), [6, 13], axis=-1)
+    for which, columns in zip(shapes, parts, strict=True):
         for index in np.ndindex(*columns.shape[2:]):
             up, down = ({n: v.copy() for n, v in vars(nominal).items()} for _ in range(2))
             up[which][index] += step
@@ -116,6 +131,45 @@ def test_sag_under_weight_and_payload_is_told_from_geometry():
         index = names.index(f"{joint}.compliance")
         assert 0.9 * low[index] < 2e-7 < 1.1 * high[index]
         assert abs(found.whole.values[index] - 2e-7) < 2e-8
+
+
+@pytest.mark.parametrize("name", ["KR 210 R2700-2", "UR20"])
+def test_loads_are_those_of_an_arm_whose_bearings_are_joints(name):
+    """The axes' own by Pinocchio; all moments by an arm with a joint about each axis."""
+    robot, rng = catalogue.load(name), np.random.default_rng(3)
+    q, payload = rng.uniform(-1.0, 1.0, (5, 6)), np.array([0.0, 1.0, 2.0, 30.0, 80.0])
+    unloaded = replace(Positions.unloaded(q, Payload()), payload=payload)
+    found = joint_loads(robot, unloaded)
+    bent = Robot.from_urdf(with_bearings(robot), robot.tip)
+    every = np.zeros((5, 18))
+    own = [bent.joint_names.index(each) for each in robot.joint_names]
+    every[:, own] = q
+    expected = weight_torque(bent, every, payload)
+    assert np.allclose(found.torque, expected[:, own], rtol=0.0, atol=1e-4)
+    across = np.abs(np.array([joint.axis for joint in robot.chain.joints])) < 0.5
+    others = np.delete(expected, own, axis=1).reshape(5, 6, 2)
+    assert np.allclose(found.moment[:, across].reshape(5, 6, 2), others, rtol=0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "payload", "bearings"), [("KR 210 R2700-2", 40.0, 1.5e-7), ("UR20", 10.0, 1e-6)]
+)
+def test_bearings_that_bend_under_weight_and_payload_are_found(name, payload, bearings):
+    planted = {"payloads": (0.0, payload), "compliance": 2.0 * bearings, "bearings": bearings}
+    measured = measure(catalogue.load(name), 150, **planted)
+    problem, found = ladder(measured, draws=200)
+    assert found.chosen == "bearings"
+    by_rung = {each.rung: each.distance.mean() for each in found.rungs}
+    assert by_rung["bearings"] < 1.1 * FLOOR < 1.2 * FLOOR < by_rung["weight"]
+    low, high = np.percentile(found.whole.draws, [2.5, 97.5], axis=0)
+    names = [each.name for each in problem.unknowns]
+    # What a second joint across the first bends by is not told from it on every arm.
+    joint = problem.robot.joint_names[2]
+    for index, size in (
+        (names.index(f"{joint}.bend_x"), 1.0),
+        (names.index(f"{joint}.compliance"), 2.0),
+    ):
+        assert low[index] < size * bearings < high[index]
 
 
 def test_a_payload_that_hardly_tells_the_sag_does_not_hold_up_the_fit():

@@ -81,7 +81,7 @@ def test_the_series_is_evaluated_as_it_is_written():
 def test_two_orders_are_one_case_of_many():
     rng = np.random.default_rng(0)
     q, torque, motion = rng.normal(size=(5, 2)), rng.normal(size=(5, 2)), rng.normal(size=(2, 7))
-    errors = ArmErrors(np.zeros((2, 6)), motion)
+    errors = replace(ArmErrors.none(2), motion=motion)
     expected = q + np.einsum("pjm,jm->pj", motion_terms(q, torque), motion)
     assert np.allclose(errors.moved(q, torque), expected, rtol=0.0, atol=1e-13)
     longer = errors.up_to(40)
@@ -172,7 +172,7 @@ def test_ranges_are_what_lies_near_measured_angles():
         clear = np.abs(apart - REACH) > 1e-9
         known = replace(FUNCTION, measured=measured_ranges(angle))
         assert np.array_equal(known.holds(asked)[clear], (apart < REACH)[clear])
-    assert measured_ranges(angle) == ((-np.pi, np.pi),)
+    assert measured_ranges(np.linspace(-3.1, 3.1, 90)) == ((-np.pi, np.pi),)
     assert measured_ranges(np.array([3.1, -3.1]))[0][1] > np.pi
 
 
@@ -187,12 +187,13 @@ def test_where_no_angle_was_measured_errors_are_larger_and_that_is_said(measured
     check.add(asked.q)
     beyond = ~model.functions[1].holds(asked.q[:, 1])
     (found,) = check.findings()
-    assert found.values["rows"] == beyond.sum() == (asked.q[:, 1] > 0.5 + REACH).sum()
-    for text in (found, check.ranges):
-        assert "j2 " in text
-        assert "j1 " not in text
+    last = known.q[known.q[:, 1] < 0.5, 1].max()
+    assert found.values["rows"] == beyond.sum() == (asked.q[:, 1] > last + REACH).sum()
+    assert "j2 at " in found
+    assert "j1 at " not in found
+    assert f"; j2 -119 to {np.degrees(last + REACH):.0f}; " in check.ranges
     off = np.linalg.norm(model.predict(asked) - asked.markers, axis=2)[:, 0]
-    assert off[beyond].mean() > 2.0 * off[~beyond].mean()
+    assert off[beyond].mean() > 1.25 * off[~beyond].mean()
 
 
 def test_a_whole_turn_of_a_joint_changes_nothing(model, measured):

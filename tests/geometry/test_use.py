@@ -151,11 +151,12 @@ def test_angles_that_no_function_was_measured_at_are_named_by_every_command(tmp_
     write_model(model, calibrated(robot))
     names = [f"{name}[rad]" for name in robot.joint_names]
     heads = ",".join([*names, *(f"force_{axis}[N]" for axis in "xyz")])
-    rows, loaded = tmp_path / "rows.csv", "0.1,0,0.5,0,0,0,-500"
+    rows, loaded = tmp_path / "rows.csv", "1,0,0.5,0,0,0,-500"
     rows.write_text(f"{heads}\n0,-1,{loaded}\n0,-0.4,{loaded}\n0,-0.9,{loaded}\n", "utf-8")
     out = tmp_path / "out.csv"
     for command in ("predict", "compensate"):
         told = elastocal(command, model, rows, "--out", out, "--geometry", geometry, "--json")
+        assert told.code == 0, told.err
         (note,) = [each for each in json.loads(told.out)["notes"] if "its function" in each]
         assert note.startswith("2 rows of 3 have a joint where no position was measured within 4.5")
         assert f"({joint} at -57 to -52 deg)" in note

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -37,6 +38,7 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     stations: int = 2,
     payloads: tuple[float, ...] = (0.0,),
     compliance: float = 0.0,
+    bearings: float = 0.0,
     gears: float = 0.0,
     functions: float = 0.0,
     blunders: int = 0,
@@ -45,8 +47,9 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
 ) -> Measured:
     """Return positions of markers on an arm whose joints stand and turn elsewhere than drawn.
 
-    Joints go all over their range, or as far as `span` from one posture, or are given. Gears and
-    encoders may err by functions of their joint, of so many rad at most.
+    Joints go all over their range, or as far as `span` from one posture, or are given. Joints and
+    their bearings may yield, in rad/(N·m). Gears and encoders may err by functions of their joint,
+    of so many rad at most.
     """
     rng = np.random.default_rng(seed)
     truth = Robot.from_urdf(
@@ -65,7 +68,7 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
     ):
         yielded = yielded + a * np.sin((turn + 1) * q) + b * np.cos((turn + 1) * q)
     yielded = yielded + planted_functions(q, functions, seed)
-    T = truth.forward(yielded)
+    T = _bent(truth, yielded, bearings, payload) if bearings else truth.forward(yielded)
     points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], MARKERS[:markers])
     station = np.arange(rows) % stations
     T_station_base = np.tile(np.eye(4), (stations, 1, 1))
@@ -86,6 +89,39 @@ def measure(  # noqa: PLR0913 (a campaign has as many properties)
         force=np.zeros((rows, 3)),
     )
     return Measured(robot, truth, data, frozenset(wrong.tolist()), T_station_base)
+
+
+def _bent(truth: Robot, q: np.ndarray, bearings: float, payload: np.ndarray) -> np.ndarray:
+    """Return the tool of an arm whose bearings are joints of their own, which weight turns."""
+    bent = Robot.from_urdf(with_bearings(truth), truth.tip)
+    own = [bent.joint_names.index(name) for name in truth.joint_names]
+    every = np.zeros((len(q), len(bent.joint_names)))
+    every[:, own] = q
+    turned = bearings * weight_torque(bent, every, payload)
+    turned[:, own] = 0.0
+    return bent.forward(every + turned)
+
+
+def with_bearings(robot: Robot) -> str:
+    """Return the URDF of a robot with two more joints before each, across its axis."""
+    root = ElementTree.fromstring(robot.urdf)
+    for joint in robot.chain.joints:
+        own = root.find(f"joint[@name='{joint.name}']")
+        parent, origin = own.find("parent"), own.find("origin")
+        for number, axis in enumerate(np.eye(3)[np.abs(joint.axis) < 0.5]):
+            link = f"{joint.name}_bearing_{number}"
+            root.append(ElementTree.Element("link", name=link))
+            hinge = ElementTree.SubElement(root, "joint", name=f"{link}_axis", type="revolute")
+            if origin is not None:
+                own.remove(origin)
+                hinge.append(origin)
+                origin = None
+            ElementTree.SubElement(hinge, "parent", link=parent.get("link"))
+            ElementTree.SubElement(hinge, "child", link=link)
+            ElementTree.SubElement(hinge, "axis", xyz=" ".join(map(str, axis)))
+            ElementTree.SubElement(hinge, "limit", lower="-1", upper="1", effort="0", velocity="0")
+            parent.set("link", link)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def planted_functions(q: np.ndarray, largest: float, seed: int) -> np.ndarray:

@@ -6,10 +6,12 @@ and three small turns ``r`` along and about the axes of that frame; the joint th
     q' = q + o + s q + sum_k (a_k sin kq + b_k cos kq) + c tau,
 
 its offset ``o``, transmission ``s``, errors of its gear and encoder ``k`` times a turn, and the
-rotation by its compliance under the torque ``tau`` of weight, payload and process force. A rotation
-of the
-placement about the joint's own axis is its offset and is not counted twice. The poses of the base
-and of the markers are further unknowns (`elastocal.geometry.problem`). This is the product of
+rotation by its compliance under the torque ``tau`` of weight, payload and process force. The
+moments ``m`` of these loads across the joint's axis bend its bearing and the link before it, by the
+compliances ``b``: three turns by ``b m`` about the axes of the frame, one after the other, follow
+``R(r)``, as the virtual joints of `elastocal.elastic` do. A rotation of the placement about the
+joint's own axis is its offset and is not counted twice. The poses of the base and of the markers
+are further unknowns (`elastocal.geometry.problem`). This is the product of
 exponentials about the nominal frames (R. He et al., IEEE Transactions on Robotics 26(3), 2010): it
 needs no case for parallel axes, as Denavit and Hartenberg's parameters do; numbers that the
 positions do not determine are found from the derivatives themselves.
@@ -27,6 +29,8 @@ from elastocal.robot import Robot
 
 KINDS = ("shift_x", "shift_y", "shift_z", "turn_x", "turn_y", "turn_z")
 """Errors of a joint's pose in the link before it."""
+BENDS = ("bend_x", "bend_y", "bend_z")
+"""Compliances of a joint's bearing about the axes of its frame, in rad/(N·m)."""
 LOW_ORDERS, ORDERS = 2, 40
 """Orders of an arm's eccentric gears, and of all that is fitted: how often a turn."""
 
@@ -55,11 +59,14 @@ class ArmErrors:
     motion: FloatArray
     """Shape (joint, 3 + 2 orders): in the order of `motion_names`; rad (m) of each unit term,
     rad/(N·m)."""
+    bend: FloatArray
+    """Shape (joint, 3), in the order of `BENDS`; 0 about the axis of a joint that turns."""
 
     @classmethod
     def none(cls, joints: int) -> "ArmErrors":
         """Return the nominal arm."""
-        return cls(np.zeros((joints, len(KINDS))), np.zeros((joints, len(MOTION))))
+        kinds = (KINDS, MOTION, BENDS)
+        return cls(*(np.zeros((joints, len(each))) for each in kinds))
 
     @property
     def series(self) -> FloatArray:
@@ -71,7 +78,7 @@ class ArmErrors:
         kept = min(2 * orders, self.motion.shape[1] - 3)
         motion = np.zeros((len(self.motion), 3 + 2 * orders))
         motion[:, : 2 + kept], motion[:, -1] = self.motion[:, : 2 + kept], self.motion[:, -1]
-        return ArmErrors(self.place.copy(), motion)
+        return ArmErrors(self.place.copy(), motion, self.bend.copy())
 
     def shortest(self) -> "ArmErrors":
         """Return the same errors without orders that no joint has, beyond the low ones."""
@@ -87,6 +94,22 @@ class ArmErrors:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
+class JointLoads:
+    """What weight, payload and process force ask of each joint."""
+
+    torque: FloatArray
+    """Along its axis, shape (pose, joint), in N·m (N)."""
+    moment: FloatArray
+    """About the axes of its frame before its motion, shape (pose, joint, 3), in N·m."""
+
+    @classmethod
+    def none(cls, q: FloatArray) -> "JointLoads":
+        """Return no loads at joints, shape (pose, joint)."""
+        return cls(np.zeros_like(q), np.zeros((*q.shape, 3)))
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
 class ArmFrames:
     """Frames of the joints and the tcp of an arm at some poses."""
 
@@ -96,6 +119,8 @@ class ArmFrames:
     """Directions of their shifts in base, shape (joint, pose, 3, 3): of the frame as drawn."""
     turns: FloatArray
     """Axes about which an increment of their turns turns them in base, likewise."""
+    bends: FloatArray
+    """Axes about which their bearings bend in base, likewise."""
     origin: FloatArray
     """Their origins, shape (joint, pose, 3), in m."""
     axis: FloatArray
@@ -104,7 +129,7 @@ class ArmFrames:
     """Shape (pose, 4, 4), in m."""
 
 
-def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -> ArmFrames:
+def frames(robot: Robot, q: FloatArray, loads: JointLoads, errors: ArmErrors) -> ArmFrames:
     """Return the frames of an arm with errors.
 
     Parameters
@@ -113,15 +138,15 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
         The nominal arm.
     q : ndarray, shape (pose, joint)
         Joints as the controller states them, in rad or m.
-    torque : ndarray, shape (pose, joint)
-        Torques that the joints yield to, in N·m (N).
+    loads : JointLoads
+        Loads that joints and bearings yield to.
     errors : ArmErrors
         Its errors.
     """
     count, joints = len(q), robot.chain.joints
     R, p = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
-    rotation, origin, axis, shifts, turns = [], [], [], [], []
-    moved = errors.moved(q, torque)
+    rotation, origin, axis, shifts, turns, bends = [], [], [], [], [], []
+    moved = errors.moved(q, loads.torque)
     for index, joint in enumerate(joints):
         place = errors.place[index]
         T = joint.placement
@@ -131,6 +156,8 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
         shifts.append(R)
         R = R @ Rotation.from_rotvec(place[3:]).as_matrix()
         turns.append(R @ _increments(place[3:]))
+        R, across = _bent(R, errors.bend[index] * loads.moment[:, index])
+        bends.append(across)
         rotation.append(R)
         origin.append(p)
         axis.append(R @ joint.axis)
@@ -147,10 +174,29 @@ def frames(robot: Robot, q: FloatArray, torque: FloatArray, errors: ArmErrors) -
         rotation=np.array(rotation),
         shifts=np.array(shifts),
         turns=np.array(turns),
+        bends=np.array(bends),
         origin=np.array(origin),
         axis=np.array(axis),
         T_base_tcp=tip,
     )
+
+
+def _bent(R: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return frames turned about their axes in turn, shape (pose, 3, 3), and these axes in base.
+
+    Parameters
+    ----------
+    R : ndarray, shape (pose, 3, 3)
+        Frames before.
+    angle : ndarray, shape (pose, 3)
+        Turns about x, y and z, in rad.
+    """
+    axes = np.empty_like(R)
+    for k, axis in enumerate(np.eye(3)):
+        axes[:, :, k] = R[:, :, k]
+        if angle[:, k].any():
+            R = R @ Rotation.from_rotvec(angle[:, k, None] * axis).as_matrix()
+    return R, axes
 
 
 def _increments(turn: FloatArray) -> FloatArray:
@@ -211,7 +257,12 @@ def series(q: FloatArray, terms: FloatArray, first: int = 1) -> FloatArray:
 
 
 def point_motions(
-    robot: Robot, at: ArmFrames, terms: FloatArray, points: FloatArray, row: IndexArray
+    robot: Robot,
+    at: ArmFrames,
+    terms: FloatArray,
+    moment: FloatArray,
+    points: FloatArray,
+    row: IndexArray,
 ) -> Iterator[FloatArray]:
     """Yield, joint by joint, the motion of points on the tool by each of its errors.
 
@@ -226,6 +277,8 @@ def point_motions(
         Frames of the arm with its errors.
     terms : ndarray, shape (pose, joint, 7)
         By `motion_terms`.
+    moment : ndarray, shape (pose, joint, 3)
+        `JointLoads.moment`.
     points : ndarray, shape (point, 3)
         In base, in m.
     row : ndarray, shape (point,)
@@ -233,19 +286,24 @@ def point_motions(
 
     Yields
     ------
-    ndarray, shape (point, 3, 13)
-        By shifts and turns of the joint's place (`KINDS`), then errors of its motion (`MOTION`).
+    ndarray, shape (point, 3, 16)
+        By shifts and turns of the joint's place (`KINDS`), then errors of its motion (`MOTION`),
+        then compliances of its bearing (`BENDS`).
     """
     shifts, turns = len(KINDS) // 2, len(KINDS)
+    motions = turns + len(MOTION)
     for number, joint in enumerate(robot.chain.joints):
         lever = points - at.origin[number][row]
         axis, axes = at.axis[number][row], at.turns[number][row]
         x, y, z = lever.T[..., None]
-        found = np.empty((len(points), 3, turns + len(MOTION)))
+        found = np.empty((len(points), 3, motions + len(BENDS)))
         found[:, :, :shifts] = at.shifts[number][row]
         found[:, 0, shifts:turns] = axes[:, 1] * z - axes[:, 2] * y
         found[:, 1, shifts:turns] = axes[:, 2] * x - axes[:, 0] * z
         found[:, 2, shifts:turns] = axes[:, 0] * y - axes[:, 1] * x
         own = np.cross(axis, lever) if joint.revolute else axis
-        found[:, :, turns:] = own[:, :, None] * terms[row, number][:, None]
+        found[:, :, turns:motions] = own[:, :, None] * terms[row, number][:, None]
+        for k in range(len(BENDS)):
+            across = np.cross(at.bends[number][row][:, :, k], lever)
+            found[:, :, motions + k] = across * moment[row, number, k, None]
         yield found

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.geometry.arm import ArmErrors, frames
+from elastocal.geometry.arm import ArmErrors, JointLoads, frames
 from elastocal.geometry.ladder import GeometryLadder
 from elastocal.geometry.problem import GeometryProblem, State
 from elastocal.identification import interval
@@ -124,7 +124,7 @@ def link_numbers(robot: Robot, errors: ArmErrors, ways: Sequence[_Way] | None = 
     """
     joints = robot.chain.joints
     zeros = np.zeros((1, len(joints)))
-    at = frames(robot, zeros, zeros, errors)
+    at = frames(robot, zeros, JointLoads.none(zeros), errors)
     T, numbers = _first(robot, at.rotation[0, 0], at.origin[0, 0]), []
     for index, way in enumerate(_ways(robot) if ways is None else ways):
         line = at.origin[index + 1, 0], at.axis[index + 1, 0]
@@ -176,7 +176,7 @@ def _first(robot: Robot, R: FloatArray, origin: FloatArray) -> FloatArray:
 def _ways(robot: Robot) -> Iterator[_Way]:
     """Yield how each link but the last is described."""
     zeros = np.zeros((1, len(robot.chain.joints)))
-    at = frames(robot, zeros, zeros, ArmErrors.none(zeros.shape[1]))
+    at = frames(robot, zeros, JointLoads.none(zeros), ArmErrors.none(zeros.shape[1]))
     T = _first(robot, at.rotation[0, 0], at.origin[0, 0])
     for origin, axis in zip(at.origin[1:, 0], at.axis[1:, 0], strict=True):
         if np.linalg.norm(np.cross(T[:3, 2], axis)) < np.sin(_PARALLEL):

@@ -75,6 +75,7 @@ def geometry_model(
         tcp=robot.tip,
         place=errors.place,
         motion=errors.motion,
+        bend=errors.bend,
         stations=dict(zip(data.stations, state.T_station_base, strict=True)),
         markers=state.markers,
         held_out=HeldOutFigures(rungs[0].held_out, chosen.held_out),

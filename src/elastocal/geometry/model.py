@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, SchemaError
 from elastocal.findings import Finding
-from elastocal.geometry.arm import KINDS, MOTION, ArmErrors, frames
+from elastocal.geometry.arm import BENDS, KINDS, MOTION, ArmErrors, JointLoads, frames
 from elastocal.geometry.joint_functions import JointFunction
-from elastocal.geometry.positions import Payload, Positions, joint_torques
+from elastocal.geometry.positions import Payload, Positions, joint_loads
 from elastocal.records import read_json, record
 from elastocal.results import brief_repr
 from elastocal.robot import (
@@ -29,7 +29,7 @@ from elastocal.robot import (
 )
 from elastocal.wording import mm
 
-SCHEMA = "elastocal.geometry/4"
+SCHEMA = "elastocal.geometry/5"
 _OFFSET = MOTION.index("offset")
 _DRAWN_TOOL = "tool_as_drawn"
 _SAME = 1e-6
@@ -117,11 +117,11 @@ class ChainErrors:
         """Its errors."""
         motion = np.zeros((len(self.offset), len(MOTION)))
         motion[:, _OFFSET] = self.offset
-        return ArmErrors(self.place.copy(), motion)
+        return ArmErrors(self.place.copy(), motion, np.zeros((len(motion), len(BENDS))))
 
 
 @brief_repr
-@record(SCHEMA, reads=tuple(f"elastocal.geometry/{n}" for n in (1, 2, 3)))
+@record(SCHEMA, reads=tuple(f"elastocal.geometry/{n}" for n in (1, 2, 3, 4)))
 class GeometryModel:
     """A calibrated geometry, which is also its file."""
 
@@ -158,6 +158,9 @@ class GeometryModel:
     """As `held_out`, of every position; none in files of before."""
     functions: tuple[JointFunction, ...] = ()
     """Functions of the joints, where that rung was chosen."""
+    bend: FloatArray | None = None
+    """Compliances of the joints' bearings about the axes of their frames, shape (joint, 3), in
+    rad/(N·m); none in files of before."""
 
     @property
     def robot(self) -> Robot:
@@ -168,7 +171,8 @@ class GeometryModel:
     def errors(self) -> ArmErrors:
         """Its errors."""
         # SciPy takes no arrays that are only to be read.
-        return ArmErrors(self.place.copy(), self.motion.copy())
+        bend = np.zeros((len(self.place), len(BENDS))) if self.bend is None else self.bend
+        return ArmErrors(self.place.copy(), self.motion.copy(), bend.copy())
 
     def predict(self, data: Positions) -> FloatArray:
         """Return the expected markers in the frames of their stations, (row, marker, 3).
@@ -179,7 +183,7 @@ class GeometryModel:
             Joints, loads and stations; its markers are not used.
         """
         robot = self.robot
-        T = frames(robot, data.q, joint_torques(robot, data), self.errors).T_base_tcp
+        T = frames(robot, data.q, joint_loads(robot, data), self.errors).T_base_tcp
         points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], self.markers)
         S = np.stack([self.stations[name] for name in data.station.tolist()])
         return np.asarray(S[:, None, :3, 3] + np.einsum("nij,nmj->nmi", S[:, :3, :3], points))
@@ -209,8 +213,8 @@ class GeometryModel:
         weight = Payload() if payload is None else payload
 
         def stands(q: FloatArray) -> FloatArray:
-            torque = joint_torques(own, Positions.unloaded(q, weight))
-            T = frames(own, q, torque, errors).T_base_tcp
+            loads = joint_loads(own, Positions.unloaded(q, weight))
+            T = frames(own, q, loads, errors).T_base_tcp
             return np.asarray((T @ T_tcp_tool)[:, :3, 3])
 
         return stands
@@ -291,7 +295,7 @@ class GeometryModel:
         """Return the markers in the tcp of an arm by `as_built`, shape (marker, 3), in m."""
         q = np.zeros((1, len(built.joint_names)))
         chain = self._expressed()
-        T_base_own = frames(self.robot, q, np.zeros_like(q), chain.errors).T_base_tcp[0]
+        T_base_own = frames(self.robot, q, JointLoads.none(q), chain.errors).T_base_tcp[0]
         T = inverse_transform(built.forward(q[0])) @ T_base_own
         return np.asarray(chain.markers @ T[:3, :3].T + T[:3, 3])
 
@@ -369,6 +373,7 @@ def read_geometry(path: Path) -> GeometryModel:
             found.motion,
             (joints, max(len(MOTION), sum(found.motion.shape[1:2]) // 2 * 2 + 1)),
         ),
+        **({} if found.bend is None else {"bend": (found.bend, (joints, len(BENDS)))}),
         "markers": (found.markers, (*found.markers.shape[:1], 3)),
         **{f"stations.{name}": (T, (4, 4)) for name, T in found.stations.items()},
     }

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import GeometryError
-from elastocal.geometry.arm import ArmErrors, frames
+from elastocal.geometry.arm import ArmErrors, JointLoads, frames
 from elastocal.results import brief_repr
-from elastocal.robot import Robot
+from elastocal.robot import ChainJoint, Robot
 
 LEAST_READINGS = 4
 """Fewer rows say nothing."""
@@ -85,30 +86,41 @@ class Positions:
         return Positions(**{name: value[chosen] for name, value in own.items()}, lines=lines)
 
 
-def joint_torques(robot: Robot, data: Positions) -> FloatArray:
-    """Return the torques of weight, payload and process force, shape (row, joint).
+def joint_loads(robot: Robot, data: Positions) -> JointLoads:
+    """Return what weight, payload and process force ask of each joint.
 
-    About the nominal axes: the errors of an arm of some millimetres change them by a thousandth.
-    In N·m (N along a rail).
+    About the nominal axes: the errors of an arm of some millimetres change it by a thousandth.
 
     Raises
     ------
     GeometryError
         If joints are not finite.
     """
-    if not np.isfinite(data.q).all():
+    q, joints = data.q, robot.chain.joints
+    if not np.isfinite(q).all():
         raise GeometryError("joints must be finite numbers")
-    gravity = np.asarray(robot.gravity, dtype=float)
-    torque = np.zeros_like(data.q)
-    if robot.has_masses:
-        torque -= robot.gravity_torques(data.q)
-    at = frames(robot, data.q, torque, ArmErrors.none(data.q.shape[1]))
+    at = frames(robot, q, JointLoads.none(q), ArmErrors.none(len(joints)))
     T = at.T_base_tcp
     centre = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], data.payload_centre)
-    weight = data.payload[:, None] * gravity
-    revolute = np.array([joint.revolute for joint in robot.chain.joints])[:, None]
-    for point, force in ((centre, weight), (T[:, :3, 3], data.force)):
-        about = np.einsum("jni,jni->jn", at.axis, np.cross(point - at.origin, force))
-        along = np.einsum("jni,ni->jn", at.axis, force)
-        torque += np.where(revolute, about, along).T
-    return torque
+    gravity = np.asarray(robot.gravity, dtype=float)
+    # Mass and first moment of all that hangs on a joint, from the tool back to the base.
+    mass, first = data.payload, data.payload[:, None] * centre
+    force, moment = np.zeros((2, len(joints), len(q), 3))
+    for k in reversed(range(len(joints))):
+        mass = mass + joints[k].mass
+        first = first + joints[k].mass * _centre(joints[k], q[:, k], at.rotation[k], at.origin[k])
+        force[k] = mass[:, None] * gravity + data.force
+        moment[k] = np.cross(first - mass[:, None] * at.origin[k], gravity)
+        moment[k] += np.cross(T[:, :3, 3] - at.origin[k], data.force)
+    revolute = np.array([joint.revolute for joint in joints])[:, None, None]
+    asked = np.einsum("jni,jni->nj", at.axis, np.where(revolute, moment, force))
+    return JointLoads(asked, np.einsum("jnki,jnk->nji", at.rotation, moment))
+
+
+def _centre(joint: ChainJoint, q: FloatArray, R: FloatArray, origin: FloatArray) -> FloatArray:
+    """Return the centre of mass of the links behind a joint in base, shape (row, 3), in m."""
+    if joint.revolute:
+        turned = Rotation.from_rotvec(q[:, None] * joint.axis).apply(joint.centre_of_mass)
+    else:
+        turned = joint.centre_of_mass + q[:, None] * joint.axis
+    return np.asarray(origin + np.einsum("nij,nj->ni", R, turned))

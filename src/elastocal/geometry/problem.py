@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.arrays import FloatArray
 from elastocal.files import Limit
 from elastocal.geometry.arm import (
+    BENDS,
     KINDS,
     LOW_ORDERS,
     MOTION,
@@ -21,11 +22,19 @@ from elastocal.geometry.arm import (
     point_motions,
 )
 from elastocal.geometry.derivatives import Derivatives
-from elastocal.geometry.positions import Positions, joint_torques
+from elastocal.geometry.positions import Positions, joint_loads
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, ChainJoint, Robot
 
-RUNGS = ("registration", "offsets", "geometry", "weight", "harmonics", "joint-functions")
+RUNGS = (
+    "registration",
+    "offsets",
+    "geometry",
+    "weight",
+    "bearings",
+    "harmonics",
+    "joint-functions",
+)
 """Rungs from the frames alone to functions of each joint; each includes all before, but the last no
 scales of joints that turn."""
 CHAIN_RUNGS = RUNGS[:3]
@@ -41,6 +50,8 @@ _FRAME_WIDTH = 30.0
 _YIELD = {True: 3e-3, False: 1e-3}
 """Rotation (shift) of a joint that turns (slides) under the load of its class, in rad (m): a KR
 210's main axes 1 to 2 mrad, a UR10's 8, an iiwa's with torque sensors 6 to 14."""
+_BEARING = 0.5
+"""Compliance of a bearing across its joint's axis, as part of that of the joint about it."""
 _MASS = 15.0
 """Least mass of an arm, whatever its description has, in kg over the square of its length in m: a
 UR10 has 13, a KR 210 100."""
@@ -56,6 +67,8 @@ together make functions of 0.4 mrad at three sizes, where gears and encoders of 
 0.35."""
 _FIRST = 2 + 2 * LOW_ORDERS
 """Place of the first higher order among errors of motion."""
+_BENT = len(KINDS) + len(MOTION)
+"""Place of the bearings' compliances among the columns of `point_motions`."""
 _MOST_NUMBERS = Limit("ELASTOCAL_MAX_FIT_MB", 150, "MB of derivatives")
 """Thirty thousand positions of two stations and three markers on six axes; a fit takes some times
 as much."""
@@ -101,8 +114,8 @@ class GeometryProblem:
 
     def __init__(self, robot: Robot, data: Positions) -> None:
         self.robot, self.data = robot, data
-        self.torque = joint_torques(robot, data)
-        self._terms = motion_terms(data.q, self.torque)
+        self.loads = joint_loads(robot, data)
+        self._terms = motion_terms(data.q, self.loads.torque)
         self.row, self.marker = np.nonzero(data.seen)
         index = {name: n for n, name in enumerate(data.stations)}
         self.station = np.array([index[name] for name in data.station.tolist()])[self.row]
@@ -118,9 +131,15 @@ class GeometryProblem:
         joints = robot.chain.joints
         # Joint and kind of each error of pose and of motion, in the order of their columns.
         self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)
+        self._bent = tuple(np.array(_bent(joints), dtype=np.intp).T)
         low = np.array(_moving(joints), dtype=np.intp).T
-        # The same of both, counted as `point_motions` does.
-        self._errors = np.concatenate([self._placed, (low[0], low[1] + len(KINDS))], axis=1)
+        # The same of all, counted as `point_motions` does.
+        parts = (
+            (*self._placed,),
+            (self._bent[0], _BENT + self._bent[1]),
+            (low[0], len(KINDS) + low[1]),
+        )
+        self._errors = np.concatenate(parts, axis=1)
         self._waved = np.flatnonzero([joint.revolute for joint in joints])
         names = motion_names(ORDERS)
         kinds = [names.index(MOTION[kind]) for kind in low[1]]
@@ -160,7 +179,8 @@ class GeometryProblem:
             J[each, :, 6 * self.station + 3 + axis] = np.cross(unit, points)
             J[each, :, 6 * stations + 3 * self.marker + axis] = tool[:, :3, axis]
         joint, kind = self._errors
-        motions = point_motions(self.robot, arm, self._terms, points, self.row)
+        at_all = self.robot, arm, self._terms, self.loads.moment
+        motions = point_motions(*at_all, points, self.row)
         for number, motion in enumerate(motions):
             own = np.flatnonzero(joint == number)
             J[:, :, start + own] = motion[:, :, kind[own]]
@@ -168,7 +188,7 @@ class GeometryProblem:
 
     def _expected(self, at: State) -> tuple[FloatArray, ArmFrames, FloatArray, FloatArray]:
         """Return residuals, frames, and by marker: places in base, directions of its station."""
-        arm = frames(self.robot, self.data.q, self.torque, at.errors)
+        arm = frames(self.robot, self.data.q, self.loads, at.errors)
         T = arm.T_base_tcp[self.row]
         points = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], at.markers[self.marker])
         R, t = at.T_station_base[self.station, :3, :3], at.T_station_base[self.station, :3, 3]
@@ -185,15 +205,19 @@ class GeometryProblem:
         shift = step[start : start + 3 * markers].reshape(-1, 3)
         arm = step[start + 3 * markers :]
         errors = at.errors.up_to(ORDERS)
-        placed = len(self._placed[0])
-        errors.place[self._placed] += arm[:placed]
-        errors.motion[self._moving] += arm[placed:]
+        ends = np.cumsum([len(self._placed[0]), len(self._bent[0])])
+        placed, bent, moving = np.split(arm, ends)
+        errors.place[self._placed] += placed
+        errors.bend[self._bent] += bent
+        errors.motion[self._moving] += moving
         return State(T, at.markers + shift, errors)
 
     def values(self, at: State) -> FloatArray:
         """Return the value of each unknown, shape (unknown,); frames and markers count as 0."""
         errors = at.errors.up_to(ORDERS)
-        arm = np.concatenate([errors.place[self._placed], errors.motion[self._moving]])
+        arm = np.concatenate(
+            [errors.place[self._placed], errors.bend[self._bent], errors.motion[self._moving]]
+        )
         return np.concatenate([np.zeros(len(self.unknowns) - len(arm)), arm])
 
 
@@ -202,13 +226,27 @@ def _placed(joints: Sequence[ChainJoint]) -> list[tuple[int, int]]:
 
     The first joint's pose is that of the base, which the stations' frames determine.
     """
-    found = []
-    for index, joint in enumerate(joints):
-        for kind in range(len(KINDS)):
-            own = joint.revolute and kind >= 3 and abs(joint.axis[kind - 3]) > 1.0 - 1e-9
-            if index and not own:
-                found.append((index, kind))
-    return found
+    return [
+        (index, kind)
+        for index, joint in enumerate(joints)
+        for kind in range(len(KINDS))
+        if index and not (kind >= 3 and _along(joint, kind - 3))
+    ]
+
+
+def _along(joint: ChainJoint, axis: int) -> bool:
+    """Return whether a joint turns about an axis of its frame."""
+    return joint.revolute and abs(float(joint.axis[axis])) > 1.0 - 1e-9
+
+
+def _bent(joints: Sequence[ChainJoint]) -> list[tuple[int, int]]:
+    """Return joint and axis of the compliances of bearings, without those of the joints' own."""
+    return [
+        (index, axis)
+        for index, joint in enumerate(joints)
+        for axis in range(len(BENDS))
+        if not _along(joint, axis)
+    ]
 
 
 def _moving(joints: Sequence[ChainJoint]) -> list[tuple[int, int]]:
@@ -235,6 +273,9 @@ def unknowns(robot: Robot, data: Positions) -> tuple[Unknown, ...]:
         unit = "m" if kind < 3 else "rad"
         found.append(Unknown(f"{joints[joint].name}.{KINDS[kind]}", unit, "geometry", size))
     yields = compliance_sizes(robot)
+    for joint, axis in _bent(joints):
+        size, name = _BEARING * float(yields[joint]), f"{joints[joint].name}.{BENDS[axis]}"
+        found.append(Unknown(name, "rad/(N*m)", "bearings", size))
     for joint, kind in _moving(joints):
         found.append(_motion_unknown(joints[joint], MOTION[kind], float(yields[joint])))
     names, sizes = motion_names(ORDERS)[_FIRST:-1], np.repeat(wave_sizes(), 2).tolist()

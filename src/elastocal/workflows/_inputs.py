@@ -239,7 +239,10 @@ class ArmAsBuilt:
         found, payload = known
         errors, tools = found.errors, found.tools(robot)
         return BuiltArm(
-            found.robot, errors.place, errors.motion, *tools, payload.mass, payload.centre
+            found.robot,
+            *(errors.place, errors.motion, errors.bend),
+            *tools,
+            *(payload.mass, payload.centre),
         )
 
     def _geometry(self) -> "tuple[GeometryModel, Payload] | None":

@@ -20,7 +20,7 @@ from elastocal.elastic.springs.hinge import axial
 from elastocal.errors import CompensationError
 from elastocal.geometry import Payload, Positions
 from elastocal.geometry.arm import ArmErrors, frames
-from elastocal.geometry.positions import joint_torques
+from elastocal.geometry.positions import joint_loads
 from elastocal.identification import RobotRecord
 from elastocal.records import record
 from elastocal.robot import Robot
@@ -224,7 +224,7 @@ def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
 
 @pytest.mark.parametrize(("orders", "payload"), some_by_day([(40, 30.0), (2, 0.0)]))
 def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, payload):
-    """Places, zeros, functions of the joints, weight and payload, a tool of its own."""
+    """Places, zeros, functions of the joints, weight and payload on joints and bearings, a tool."""
     model = compensated.arm("on a rail")
     robot, rng = model.model.robot, np.random.default_rng(orders)
     joints = len(robot.joint_names)
@@ -232,17 +232,19 @@ def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, paylo
     motion[~np.array(robot.revolute), 2:-1] = 0.0
     # The compiler takes its time: one joint has all orders.
     motion[2:, 14:-1] = 0.0
-    errors = ArmErrors(1e-3 * place, 1e-4 * motion)
+    bend = 1e-7 * rng.normal(size=(joints, 3))
+    errors = ArmErrors(1e-3 * place, 1e-4 * motion, bend)
     errors.motion[:, -1] *= 1e-3
     T_drawn, T_built = np.eye(4), np.eye(4)
     T_drawn[:3, 3], T_built[:3, 3] = (0.1, 0.0, 0.2), (0.1, 1e-3, 0.2)
-    arm = BuiltArm(robot, errors.place, errors.motion, T_drawn, T_built, payload, (0.0, 0.1, 0.2))
+    of_arm = errors.place, errors.motion, errors.bend
+    arm = BuiltArm(robot, *of_arm, T_drawn, T_built, payload, (0.0, 0.1, 0.2))
     numbers = design(model, compensated.settings(), compensated.load(), built=arm)
     executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
     assert executable.selftest() == 0
     q = rng.uniform(-3.0, 3.0, (200, joints))
     data = Positions.unloaded(q, Payload(payload, (0.0, 0.1, 0.2)))
-    real = frames(robot, q, joint_torques(robot, data), errors).T_base_tcp @ T_built
+    real = frames(robot, q, joint_loads(robot, data), errors).T_base_tcp @ T_built
     expected = (real - robot.forward(q) @ T_drawn)[:, :3, 3]
     assert np.abs(expected).max() > 1e-3
     np.testing.assert_allclose(executable.numbers("arm", q), expected, rtol=0.0, atol=1e-12)

@@ -1,6 +1,7 @@
 """Error of the unloaded tool of an arm whose geometry was calibrated, as statements.
 
-The chain is that of the drawing with each joint's place corrected, and turns by
+The chain is that of the drawing with each joint's place corrected and its bearing bent, and turns
+by
 
     q' = q + o + s q + sum_k (a_k sin kq + b_k cos kq) + c tau
 
@@ -8,7 +9,7 @@ The chain is that of the drawing with each joint's place corrected, and turns by
 number ``cos q + i sin q``, of which the chain of the drawing has both parts.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -26,9 +27,9 @@ from elastocal.compensation.kernel._statics import (
     write_chain,
     write_weights,
 )
-from elastocal.compensation.kernel.program import ONE, ZERO, Program, Routine, Value
+from elastocal.compensation.kernel.program import ONE, ZERO, Program, Routine, Value, Vector
 from elastocal.results import brief_repr
-from elastocal.robot import Robot
+from elastocal.robot import ChainJoint, Robot
 
 _PREFIX = "arm_"
 """Begins the names of its constants: the springs may have been fitted on another arm."""
@@ -46,6 +47,8 @@ class BuiltArm:
     motion: FloatArray
     """Errors of their motion, shape (joint, 3 + 2 orders): offset, scale, sine and cosine of each
     order, compliance."""
+    bend: FloatArray
+    """Compliances of their bearings about x, y and z of their frames, shape (joint, 3)."""
     T_tcp_drawn: FloatArray
     """The tool in that tcp as its controller knows it, shape (4, 4), in m."""
     T_tcp_built: FloatArray
@@ -63,7 +66,7 @@ def arm_error(arm: BuiltArm) -> Routine:
     """
     program = Program()
     drawn = write_chain(program, arm.drawn.chain)
-    torques = _torques(program, arm, drawn)
+    loads = _loads(program, arm, drawn)
     here = Frame(IDENTITY, NOTHING)
     for k, joint in enumerate(arm.drawn.chain.joints, start=1):
         program.remark(f"joint {k} as built")
@@ -72,7 +75,9 @@ def arm_error(arm: BuiltArm) -> Routine:
         error[:3, 3] = arm.place[k - 1, :3]
         place = constant_frame(program, f"built{k}", joint.placement @ error)
         proximal = behind(program, here, place, (f"pb{k}", f"ob{k}"))
-        moved = _moved(program, k, arm.motion[k - 1], torques[k - 1], turns=joint.revolute)
+        torque, about = loads[k - 1]
+        proximal = _bent(program, k, proximal, arm.bend[k - 1], about, joint)
+        moved = _moved(program, k, arm.motion[k - 1], torque, turns=joint.revolute)
         here = turned(program, proximal, joint, f"b{k}", moved)
     program.remark("tool")
     T_last_tip = arm.drawn.chain.T_last_tip
@@ -116,35 +121,60 @@ def _series(program: Program, k: int, terms: FloatArray) -> Value:
     return x
 
 
-def _torques(program: Program, arm: BuiltArm, drawn: ChainFrames) -> list[Value]:
-    """Write the torque of weight and payload about each joint that yields, in N·m (N)."""
-    robot, found = arm.drawn, []
-    yields = [float(row[-1]) != 0.0 for row in arm.motion]
-    heavy = robot.has_masses and any(yields)
+def _loads(program: Program, arm: BuiltArm, drawn: ChainFrames) -> list[tuple[Value, Vector]]:
+    """Write the torque of weight and payload along each joint that yields, in N·m (N).
+
+    And, where a bearing bends, their moments about the axes of its frame, in N·m.
+    """
+    robot, yields, bends = arm.drawn, arm.motion[:, -1] != 0.0, arm.bend != 0.0
+    heavy = robot.has_masses and bool(yields.any() or bends.any())
     weights = write_weights(program, robot, drawn) if heavy else None
     pull = program.constant_vector("payload", arm.payload * np.asarray(robot.gravity))
     centre = program.constant_vector("payload_centre", arm.payload_centre)
     at = program.transformed("hung", drawn.tcp.rotation, centre, drawn.tcp.origin)
-    for k, (joint, frames) in enumerate(zip(robot.chain.joints, drawn.joints, strict=True)):
-        if not yields[k]:
-            found.append(ZERO)
-            continue
-        proximal, label = frames.proximal, f"y{k + 1}"
-        axis = program.transformed(
-            f"axis_{label}",
-            proximal.rotation,
-            program.constant_vector(f"along{k + 1}", joint.axis),
-            NOTHING,
-        )
+
+    def moment(k: int, proximal: Frame) -> Vector:
+        label = f"y{k + 1}"
         lever = program.weighted_sum(f"to_{label}", [(ONE, at), (-ONE, proximal.origin)])
-        load = program.cross(f"of_{label}", lever, pull) if joint.revolute else pull
-        terms = list(zip(axis, load, strict=True))
-        if weights is not None:
-            own = (
-                weights.moment(label, k, proximal.origin)
-                if joint.revolute
-                else weights.force(label, k)
+        load = program.cross(f"of_{label}", lever, pull)
+        if weights is None:
+            return load
+        own = weights.moment(label, k, proximal.origin)
+        return program.weighted_sum(f"moment_{label}", [(ONE, load), (ONE, own)])
+
+    found = []
+    for k, (joint, frames) in enumerate(zip(robot.chain.joints, drawn.joints, strict=True)):
+        torque, about, rotation = ZERO, NOTHING, frames.proximal.rotation
+        if (yields[k] and joint.revolute) or bends[k].any():
+            whole = moment(k, frames.proximal)
+            x, y, z = (
+                program.dot(f"about{k + 1}_{name}", (a, b, c), whole)
+                for name, a, b, c in zip("xyz", *rotation, strict=True)
             )
-            terms += zip(axis, own, strict=True)
-        found.append(program.total(f"torque{k + 1}", terms))
+            about = x, y, z
+        if yields[k]:
+            along = program.constant_vector(f"along{k + 1}", joint.axis)
+            if joint.revolute:
+                torque = program.dot(f"torque{k + 1}", along, about)
+            else:
+                axis = program.transformed(f"axis_y{k + 1}", rotation, along, NOTHING)
+                terms = list(zip(axis, pull, strict=True))
+                if weights is not None:
+                    terms += zip(axis, weights.force(f"y{k + 1}", k), strict=True)
+                torque = program.total(f"torque{k + 1}", terms)
+        found.append((torque, about))
     return found
+
+
+def _bent(
+    program: Program, k: int, proximal: Frame, bend: FloatArray, about: Vector, joint: ChainJoint
+) -> Frame:
+    """Write the frame of a joint behind the turns of its bearing, one axis after the other."""
+    for axis, name in enumerate("xyz"):
+        # Weight has no moment about an upright axis.
+        if bend[axis] and about[axis] != ZERO:
+            compliance = program.quantity(f"bend{k}_{name}", float(bend[axis]))
+            angle = program.total(f"bent{k}_{name}", [(compliance, about[axis])])
+            hinge = replace(joint, revolute=True, axis=np.eye(3)[axis])
+            proximal = turned(program, proximal, hinge, f"h{k}_{name}", angle)
+    return proximal
