@@ -1,6 +1,7 @@
 """Planted geometries are found again, to the noise, with blunders named and intervals that hold."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -52,19 +53,20 @@ def test_motions_of_a_point_are_those_of_finite_differences(error):
     """Also of an arm with errors, which turn the axes of those behind them."""
     robot, rng, step = kuka(), np.random.default_rng(2), 1e-6
     q, torque = rng.uniform(-1.0, 1.0, (3, 6)), rng.normal(0.0, 1.0, (3, 6))
-    loads = JointLoads(torque, rng.normal(0.0, 1.0, (3, 6, 3)))
+    loads = JointLoads(torque, rng.normal(0.0, 1.0, (3, 6, 3)), rng.normal(0.0, 1.0, (3, 6)))
 
     def place(errors):
         T = frames(robot, q, loads, errors).T_base_tcp
         return T[:, :3, 3] + T[:, :3, :3] @ np.array([0.1, 0.2, 0.3])
 
     motion = error * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-    shapes = {"place": (6, 6), "motion": (6, 7), "bend": (6, 3)}
-    sizes = {"place": error, "motion": motion, "bend": error}
+    shapes = {"place": (6, 6), "motion": (6, 7), "bend": (6, 3), "sag": (6,)}
+    sizes = {"place": error, "motion": motion, "bend": error, "sag": 0.0}
     nominal = ArmErrors(**{n: sizes[n] * rng.normal(size=shape) for n, shape in shapes.items()})
     at, terms, points = frames(robot, q, loads, nominal), motion_terms(q, torque), place(nominal)
-    motions = point_motions(robot, at, terms, loads.moment, points, np.arange(3))
-    parts = np.split(np.stack([*motions], axis=2), [6, 13], axis=-1)
+    motions = point_motions(robot, at, terms, loads, points, np.arange(3))
+    parts = np.split(np.stack([*motions], axis=2), [6, 13, 16], axis=-1)
+    parts[-1] = parts[-1][..., 0]
     for which, columns in zip(shapes, parts, strict=True):
         for index in np.ndindex(*columns.shape[2:]):
             up, down = ({n: v.copy() for n, v in vars(nominal).items()} for _ in range(2))
@@ -170,6 +172,32 @@ def test_bearings_that_bend_under_weight_and_payload_are_found(name, payload, be
         (names.index(f"{joint}.compliance"), 2.0),
     ):
         assert low[index] < size * bearings < high[index]
+
+
+@pytest.mark.parametrize(
+    ("name", "payload", "planted", "most"),
+    [("KR 210 R2700-2", 120.0, 6e-7, 2.5), ("UR20", 10.0, 4e-6, 1.2)],
+)
+def test_an_arm_without_masses_sags_as_bars_do(name, payload, planted, most):
+    """The truth has the masses of the catalogue, which the fit does not get."""
+    full = catalogue.load(name)
+    soft = {"compliance": planted, "bearings": 0.25 * planted}
+    measured = measure(full, 150, payloads=(0.0, payload), **soft)
+    bare = Robot.from_urdf(re.sub("(?s)<inertial>.*?</inertial>", "", full.urdf), full.tip)
+    problem, found = ladder(replace(measured, robot=bare))
+    by_rung = {each.rung: each.distance.mean() for each in found.rungs}
+    assert by_rung["harmonics"] < most * FLOOR < 0.2 * by_rung["geometry"]
+    model = geometry_model(problem, found, "test")
+    assert "inertial" not in model.calibrated_urdf()
+    assert "bars" in " ".join(model.findings)
+    known = {each.name for each in model.parameters if each.known}
+    joint = bare.joint_names[2]
+    assert f"{joint}.compliance" in known
+    assert not any(each.endswith((".sag", ".bend_x", ".bend_y", ".bend_z")) for each in known)
+    (found,) = (each for each in model.parameters if each.name == f"{joint}.compliance")
+    assert found.value == pytest.approx(planted, rel=0.1)
+    off = np.linalg.norm(model.predict(measured.data) - measured.data.markers, axis=2)
+    assert off.mean() < most * FLOOR
 
 
 def test_a_payload_that_hardly_tells_the_sag_does_not_hold_up_the_fit():

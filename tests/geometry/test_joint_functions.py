@@ -15,7 +15,7 @@ from elastocal.geometry import (
     geometry_model,
     read_geometry,
 )
-from elastocal.geometry.arm import ArmErrors, motion_terms, series, waves
+from elastocal.geometry.arm import ArmErrors, JointLoads, motion_terms, series, waves
 from elastocal.geometry.joint_functions import (
     REACH,
     JointFunction,
@@ -82,11 +82,12 @@ def test_two_orders_are_one_case_of_many():
     rng = np.random.default_rng(0)
     q, torque, motion = rng.normal(size=(5, 2)), rng.normal(size=(5, 2)), rng.normal(size=(2, 7))
     errors = replace(ArmErrors.none(2), motion=motion)
+    loads = replace(JointLoads.none(q), torque=torque)
     expected = q + np.einsum("pjm,jm->pj", motion_terms(q, torque), motion)
-    assert np.allclose(errors.moved(q, torque), expected, rtol=0.0, atol=1e-13)
+    assert np.allclose(errors.moved(q, loads), expected, rtol=0.0, atol=1e-13)
     longer = errors.up_to(40)
     assert longer.motion.shape == (2, 83)
-    assert np.array_equal(longer.moved(q, torque), errors.moved(q, torque))
+    assert np.array_equal(longer.moved(q, loads), errors.moved(q, loads))
     assert np.array_equal(longer.shortest().motion, motion)
 
 

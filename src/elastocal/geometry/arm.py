@@ -61,12 +61,15 @@ class ArmErrors:
     rad/(N·m)."""
     bend: FloatArray
     """Shape (joint, 3), in the order of `BENDS`; 0 about the axis of a joint that turns."""
+    sag: FloatArray
+    """Compliance to the own weight by assumed masses, shape (joint,), in rad/(N·m), of linear axes
+    in m/N; 0 where masses are known, to which joints yield by their compliance."""
 
     @classmethod
     def none(cls, joints: int) -> "ArmErrors":
         """Return the nominal arm."""
-        kinds = (KINDS, MOTION, BENDS)
-        return cls(*(np.zeros((joints, len(each))) for each in kinds))
+        place, motion, bend = (np.zeros((joints, len(each))) for each in (KINDS, MOTION, BENDS))
+        return cls(place, motion, bend, np.zeros(joints))
 
     @property
     def series(self) -> FloatArray:
@@ -78,18 +81,19 @@ class ArmErrors:
         kept = min(2 * orders, self.motion.shape[1] - 3)
         motion = np.zeros((len(self.motion), 3 + 2 * orders))
         motion[:, : 2 + kept], motion[:, -1] = self.motion[:, : 2 + kept], self.motion[:, -1]
-        return ArmErrors(self.place.copy(), motion, self.bend.copy())
+        return ArmErrors(self.place.copy(), motion, self.bend.copy(), self.sag.copy())
 
     def shortest(self) -> "ArmErrors":
         """Return the same errors without orders that no joint has, beyond the low ones."""
         there = np.flatnonzero(self.series.any(axis=(0, 2)))
         return self.up_to(max(LOW_ORDERS, int(there[-1]) + 1 if len(there) else 0))
 
-    def moved(self, q: FloatArray, torque: FloatArray) -> FloatArray:
+    def moved(self, q: FloatArray, loads: "JointLoads") -> FloatArray:
         """Return how far the joints really turn, shape (pose, joint), in rad or m."""
         waved = series(q, self.shortest().series)
         offset, scale, compliance = self.motion[:, [0, 1, -1]].T
-        return np.asarray(q + offset + scale * q + waved + compliance * torque)
+        yielded = compliance * loads.torque + self.sag * loads.own
+        return np.asarray(q + offset + scale * q + waved + yielded)
 
 
 @brief_repr
@@ -101,11 +105,14 @@ class JointLoads:
     """Along its axis, shape (pose, joint), in N·m (N)."""
     moment: FloatArray
     """About the axes of its frame before its motion, shape (pose, joint, 3), in N·m."""
+    own: FloatArray
+    """Along its axis by the weight of assumed masses, which ``torque`` then does not hold, shape
+    (pose, joint), in N·m (N); 0 where masses are known."""
 
     @classmethod
     def none(cls, q: FloatArray) -> "JointLoads":
         """Return no loads at joints, shape (pose, joint)."""
-        return cls(np.zeros_like(q), np.zeros((*q.shape, 3)))
+        return cls(np.zeros_like(q), np.zeros((*q.shape, 3)), np.zeros_like(q))
 
 
 @brief_repr
@@ -146,7 +153,7 @@ def frames(robot: Robot, q: FloatArray, loads: JointLoads, errors: ArmErrors) ->
     count, joints = len(q), robot.chain.joints
     R, p = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     rotation, origin, axis, shifts, turns, bends = [], [], [], [], [], []
-    moved = errors.moved(q, loads.torque)
+    moved = errors.moved(q, loads)
     for index, joint in enumerate(joints):
         place = errors.place[index]
         T = joint.placement
@@ -260,7 +267,7 @@ def point_motions(
     robot: Robot,
     at: ArmFrames,
     terms: FloatArray,
-    moment: FloatArray,
+    loads: JointLoads,
     points: FloatArray,
     row: IndexArray,
 ) -> Iterator[FloatArray]:
@@ -277,8 +284,8 @@ def point_motions(
         Frames of the arm with its errors.
     terms : ndarray, shape (pose, joint, 7)
         By `motion_terms`.
-    moment : ndarray, shape (pose, joint, 3)
-        `JointLoads.moment`.
+    loads : JointLoads
+        As for `frames`.
     points : ndarray, shape (point, 3)
         In base, in m.
     row : ndarray, shape (point,)
@@ -286,9 +293,9 @@ def point_motions(
 
     Yields
     ------
-    ndarray, shape (point, 3, 16)
+    ndarray, shape (point, 3, 17)
         By shifts and turns of the joint's place (`KINDS`), then errors of its motion (`MOTION`),
-        then compliances of its bearing (`BENDS`).
+        compliances of its bearing (`BENDS`), and its sag.
     """
     shifts, turns = len(KINDS) // 2, len(KINDS)
     motions = turns + len(MOTION)
@@ -296,7 +303,7 @@ def point_motions(
         lever = points - at.origin[number][row]
         axis, axes = at.axis[number][row], at.turns[number][row]
         x, y, z = lever.T[..., None]
-        found = np.empty((len(points), 3, motions + len(BENDS)))
+        found = np.empty((len(points), 3, motions + len(BENDS) + 1))
         found[:, :, :shifts] = at.shifts[number][row]
         found[:, 0, shifts:turns] = axes[:, 1] * z - axes[:, 2] * y
         found[:, 1, shifts:turns] = axes[:, 2] * x - axes[:, 0] * z
@@ -305,5 +312,6 @@ def point_motions(
         found[:, :, turns:motions] = own[:, :, None] * terms[row, number][:, None]
         for k in range(len(BENDS)):
             across = np.cross(at.bends[number][row][:, :, k], lever)
-            found[:, :, motions + k] = across * moment[row, number, k, None]
+            found[:, :, motions + k] = across * loads.moment[row, number, k, None]
+        found[:, :, -1] = own * loads.own[row, number, None]
         yield found

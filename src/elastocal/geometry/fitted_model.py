@@ -20,7 +20,7 @@ from elastocal.geometry.model import (
     HeldOutFigures,
 )
 from elastocal.geometry.plausibility import require_known_markers
-from elastocal.geometry.problem import RUNGS, GeometryProblem
+from elastocal.geometry.problem import RUNGS, GeometryProblem, Unknown
 from elastocal.identification import interval
 
 _LINE = 1e-2
@@ -63,7 +63,7 @@ def geometry_model(
             each.unit,
             float(low[index]),
             float(high[index]),
-            bool(high[index] - low[index] <= 2.0 * each.size),
+            bool(high[index] - low[index] <= 2.0 * each.size) and not _assumed(problem, each),
         )
         for index, each in enumerate(problem.unknowns)
         if index in free and each.rung not in ("registration", RUNGS[-1])
@@ -76,6 +76,7 @@ def geometry_model(
         place=errors.place,
         motion=errors.motion,
         bend=errors.bend,
+        sag=errors.sag if problem.assumed else None,
         stations=dict(zip(data.stations, state.T_station_base, strict=True)),
         markers=state.markers,
         held_out=HeldOutFigures(rungs[0].held_out, chosen.held_out),
@@ -96,6 +97,11 @@ def geometry_model(
         ),
         functions=joint_functions(problem, found),
     )
+
+
+def _assumed(problem: GeometryProblem, unknown: Unknown) -> bool:
+    """Return whether an unknown is no better known than masses that were assumed."""
+    return problem.assumed and (unknown.rung == "bearings" or unknown.name.endswith(".sag"))
 
 
 def _rungs(found: GeometryLadder) -> Iterator[GeometryRung]:

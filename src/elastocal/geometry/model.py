@@ -11,6 +11,7 @@ from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, SchemaError
 from elastocal.findings import Finding
 from elastocal.geometry.arm import BENDS, KINDS, MOTION, ArmErrors, JointLoads, frames
+from elastocal.geometry.assumed_masses import with_assumed_masses
 from elastocal.geometry.joint_functions import JointFunction
 from elastocal.geometry.positions import Payload, Positions, joint_loads
 from elastocal.records import read_json, record
@@ -117,7 +118,8 @@ class ChainErrors:
         """Its errors."""
         motion = np.zeros((len(self.offset), len(MOTION)))
         motion[:, _OFFSET] = self.offset
-        return ArmErrors(self.place.copy(), motion, np.zeros((len(motion), len(BENDS))))
+        none = ArmErrors.none(len(motion))
+        return replace(none, place=self.place.copy(), motion=motion)
 
 
 @brief_repr
@@ -161,6 +163,9 @@ class GeometryModel:
     bend: FloatArray | None = None
     """Compliances of the joints' bearings about the axes of their frames, shape (joint, 3), in
     rad/(N·m); none in files of before."""
+    sag: FloatArray | None = None
+    """Compliances to the own weight by assumed masses, shape (joint,), in rad/(N·m) (m/N); none
+    where the description has masses, and in files of before."""
 
     @property
     def robot(self) -> Robot:
@@ -171,8 +176,17 @@ class GeometryModel:
     def errors(self) -> ArmErrors:
         """Its errors."""
         # SciPy takes no arrays that are only to be read.
-        bend = np.zeros((len(self.place), len(BENDS))) if self.bend is None else self.bend
-        return ArmErrors(self.place.copy(), self.motion.copy(), bend.copy())
+        none = ArmErrors.none(len(self.place))
+        bend, sag = (
+            default if own is None else own.copy()
+            for own, default in ((self.bend, none.bend), (self.sag, none.sag))
+        )
+        return ArmErrors(self.place.copy(), self.motion.copy(), bend, sag)
+
+    @property
+    def weighed(self) -> Robot:
+        """The nominal arm with the masses that its sag was fitted with."""
+        return self.robot if self.sag is None else with_assumed_masses(self.robot)
 
     def predict(self, data: Positions) -> FloatArray:
         """Return the expected markers in the frames of their stations, (row, marker, 3).
@@ -182,11 +196,13 @@ class GeometryModel:
         data : Positions
             Joints, loads and stations; its markers are not used.
         """
-        robot = self.robot
-        T = frames(robot, data.q, joint_loads(robot, data), self.errors).T_base_tcp
+        T = frames(self.robot, data.q, self._loads(data), self.errors).T_base_tcp
         points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], self.markers)
         S = np.stack([self.stations[name] for name in data.station.tolist()])
         return np.asarray(S[:, None, :3, 3] + np.einsum("nij,nmj->nmi", S[:, :3, :3], points))
+
+    def _loads(self, data: Positions) -> JointLoads:
+        return joint_loads(self.weighed, data, assumed=self.sag is not None)
 
     def tool_of(self, robot: Robot, payload: Payload | None = None) -> Callable[..., FloatArray]:
         """Return the function that gives the tool's position of the same arm without process force.
@@ -213,8 +229,7 @@ class GeometryModel:
         weight = Payload() if payload is None else payload
 
         def stands(q: FloatArray) -> FloatArray:
-            loads = joint_loads(own, Positions.unloaded(q, weight))
-            T = frames(own, q, loads, errors).T_base_tcp
+            T = frames(own, q, self._loads(Positions.unloaded(q, weight)), errors).T_base_tcp
             return np.asarray((T @ T_tcp_tool)[:, :3, 3])
 
         return stands
@@ -374,6 +389,7 @@ def read_geometry(path: Path) -> GeometryModel:
             (joints, max(len(MOTION), sum(found.motion.shape[1:2]) // 2 * 2 + 1)),
         ),
         **({} if found.bend is None else {"bend": (found.bend, (joints, len(BENDS)))}),
+        **({} if found.sag is None else {"sag": (found.sag, (joints,))}),
         "markers": (found.markers, (*found.markers.shape[:1], 3)),
         **{f"stations.{name}": (T, (4, 4)) for name, T in found.stations.items()},
     }

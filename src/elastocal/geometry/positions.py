@@ -86,10 +86,19 @@ class Positions:
         return Positions(**{name: value[chosen] for name, value in own.items()}, lines=lines)
 
 
-def joint_loads(robot: Robot, data: Positions) -> JointLoads:
+def joint_loads(robot: Robot, data: Positions, *, assumed: bool = False) -> JointLoads:
     """Return what weight, payload and process force ask of each joint.
 
     About the nominal axes: the errors of an arm of some millimetres change it by a thousandth.
+
+    Parameters
+    ----------
+    robot : Robot
+        The nominal arm.
+    data : Positions
+        Joints and loads.
+    assumed : bool
+        Whether the arm's masses are assumed, so that its own weight is told apart.
 
     Raises
     ------
@@ -100,21 +109,28 @@ def joint_loads(robot: Robot, data: Positions) -> JointLoads:
     if not np.isfinite(q).all():
         raise GeometryError("joints must be finite numbers")
     at = frames(robot, q, JointLoads.none(q), ArmErrors.none(len(joints)))
-    T = at.T_base_tcp
-    centre = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], data.payload_centre)
-    gravity = np.asarray(robot.gravity, dtype=float)
-    # Mass and first moment of all that hangs on a joint, from the tool back to the base.
-    mass, first = data.payload, data.payload[:, None] * centre
-    force, moment = np.zeros((2, len(joints), len(q), 3))
+    T, gravity = at.T_base_tcp, np.asarray(robot.gravity, dtype=float)
+    # Mass and first moment of all links that hang on a joint, from the tip back to the base.
+    mass, first = 0.0, np.zeros((len(q), 3))
+    hung, turning = np.zeros((2, len(joints), len(q), 3))
     for k in reversed(range(len(joints))):
-        mass = mass + joints[k].mass
+        mass += joints[k].mass
         first = first + joints[k].mass * _centre(joints[k], q[:, k], at.rotation[k], at.origin[k])
-        force[k] = mass[:, None] * gravity + data.force
-        moment[k] = np.cross(first - mass[:, None] * at.origin[k], gravity)
-        moment[k] += np.cross(T[:, :3, 3] - at.origin[k], data.force)
+        hung[k], turning[k] = mass * gravity, np.cross(first - mass * at.origin[k], gravity)
+    centre = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], data.payload_centre)
+    pull = data.payload[:, None] * gravity
+    force = np.broadcast_to(pull + data.force, hung.shape)
+    moment = np.cross(centre - at.origin, pull) + np.cross(T[:, :3, 3] - at.origin, data.force)
     revolute = np.array([joint.revolute for joint in joints])[:, None, None]
-    asked = np.einsum("jni,jni->nj", at.axis, np.where(revolute, moment, force))
-    return JointLoads(asked, np.einsum("jnki,jnk->nji", at.rotation, moment))
+
+    def along(force: FloatArray, moment: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("jni,jni->nj", at.axis, np.where(revolute, moment, force)))
+
+    others, weight = along(force, moment), along(hung, turning)
+    local = np.einsum("jnki,jnk->nji", at.rotation, moment + turning)
+    if assumed:
+        return JointLoads(others, local, weight)
+    return JointLoads(others + weight, local, np.zeros_like(weight))
 
 
 def _centre(joint: ChainJoint, q: FloatArray, R: FloatArray, origin: FloatArray) -> FloatArray:

@@ -21,6 +21,7 @@ from elastocal.geometry.arm import (
     motion_terms,
     point_motions,
 )
+from elastocal.geometry.assumed_masses import DENSITY, with_assumed_masses
 from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.positions import Positions, joint_loads
 from elastocal.results import brief_repr
@@ -52,9 +53,6 @@ _YIELD = {True: 3e-3, False: 1e-3}
 210's main axes 1 to 2 mrad, a UR10's 8, an iiwa's with torque sensors 6 to 14."""
 _BEARING = 0.5
 """Compliance of a bearing across its joint's axis, as part of that of the joint about it."""
-_MASS = 15.0
-"""Least mass of an arm, whatever its description has, in kg over the square of its length in m: a
-UR10 has 13, a KR 210 100."""
 _LEAST_ARM = 0.1
 """Part of the arm's length that the load of a wrist's joints acts on at least."""
 _OF_ANY_JOINT = ("offset", "scale", "compliance")
@@ -114,7 +112,10 @@ class GeometryProblem:
 
     def __init__(self, robot: Robot, data: Positions) -> None:
         self.robot, self.data = robot, data
-        self.loads = joint_loads(robot, data)
+        self.assumed = not robot.has_masses
+        """Whether the arm has assumed masses, which its description lacks."""
+        heavy = with_assumed_masses(robot) if self.assumed else robot
+        self.loads = joint_loads(heavy, data, assumed=self.assumed)
         self._terms = motion_terms(data.q, self.loads.torque)
         self.row, self.marker = np.nonzero(data.seen)
         index = {name: n for n, name in enumerate(data.stations)}
@@ -132,11 +133,13 @@ class GeometryProblem:
         # Joint and kind of each error of pose and of motion, in the order of their columns.
         self._placed = tuple(np.array(_placed(joints), dtype=np.intp).reshape(-1, 2).T)
         self._bent = tuple(np.array(_bent(joints), dtype=np.intp).T)
+        self._sagging = np.arange(len(joints) if self.assumed else 0)
         low = np.array(_moving(joints), dtype=np.intp).T
         # The same of all, counted as `point_motions` does.
         parts = (
             (*self._placed,),
             (self._bent[0], _BENT + self._bent[1]),
+            (self._sagging, np.full_like(self._sagging, _BENT + len(BENDS))),
             (low[0], len(KINDS) + low[1]),
         )
         self._errors = np.concatenate(parts, axis=1)
@@ -179,8 +182,7 @@ class GeometryProblem:
             J[each, :, 6 * self.station + 3 + axis] = np.cross(unit, points)
             J[each, :, 6 * stations + 3 * self.marker + axis] = tool[:, :3, axis]
         joint, kind = self._errors
-        at_all = self.robot, arm, self._terms, self.loads.moment
-        motions = point_motions(*at_all, points, self.row)
+        motions = point_motions(self.robot, arm, self._terms, self.loads, points, self.row)
         for number, motion in enumerate(motions):
             own = np.flatnonzero(joint == number)
             J[:, :, start + own] = motion[:, :, kind[own]]
@@ -205,19 +207,19 @@ class GeometryProblem:
         shift = step[start : start + 3 * markers].reshape(-1, 3)
         arm = step[start + 3 * markers :]
         errors = at.errors.up_to(ORDERS)
-        ends = np.cumsum([len(self._placed[0]), len(self._bent[0])])
-        placed, bent, moving = np.split(arm, ends)
+        counts = len(self._placed[0]), len(self._bent[0]), len(self._sagging)
+        placed, bent, sag, moving = np.split(arm, np.cumsum(counts))
         errors.place[self._placed] += placed
         errors.bend[self._bent] += bent
+        errors.sag[self._sagging] += sag
         errors.motion[self._moving] += moving
         return State(T, at.markers + shift, errors)
 
     def values(self, at: State) -> FloatArray:
         """Return the value of each unknown, shape (unknown,); frames and markers count as 0."""
         errors = at.errors.up_to(ORDERS)
-        arm = np.concatenate(
-            [errors.place[self._placed], errors.bend[self._bent], errors.motion[self._moving]]
-        )
+        bent, sag = errors.bend[self._bent], errors.sag[self._sagging]
+        arm = np.concatenate([errors.place[self._placed], bent, sag, errors.motion[self._moving]])
         return np.concatenate([np.zeros(len(self.unknowns) - len(arm)), arm])
 
 
@@ -276,6 +278,9 @@ def unknowns(robot: Robot, data: Positions) -> tuple[Unknown, ...]:
     for joint, axis in _bent(joints):
         size, name = _BEARING * float(yields[joint]), f"{joints[joint].name}.{BENDS[axis]}"
         found.append(Unknown(name, "rad/(N*m)", "bearings", size))
+    for own, compliance in zip(() if robot.has_masses else joints, yields.tolist(), strict=False):
+        unit = "rad/(N*m)" if own.revolute else "m/N"
+        found.append(Unknown(f"{own.name}.sag", unit, "weight", compliance))
     for joint, kind in _moving(joints):
         found.append(_motion_unknown(joints[joint], MOTION[kind], float(yields[joint])))
     names, sizes = motion_names(ORDERS)[_FIRST:-1], np.repeat(wave_sizes(), 2).tolist()
@@ -304,7 +309,7 @@ def compliance_sizes(robot: Robot) -> FloatArray:
     behind = np.cumsum(steps[::-1])[::-1]
     length = max(float(behind[robot.external_axes]), _LEAST_ARM)
     masses = sum(each.mass for each in joints[robot.external_axes :])
-    weight = float(np.linalg.norm(GRAVITY)) * max(masses, _MASS * length**2)
+    weight = float(np.linalg.norm(GRAVITY)) * max(masses, DENSITY * length**2)
     torque = 0.25 * weight * np.maximum(behind, _LEAST_ARM * length)
     turns = np.array([each.revolute for each in joints])
     return np.where(turns, _YIELD[True] / torque, _YIELD[False] / weight)

@@ -239,8 +239,9 @@ class ArmAsBuilt:
         found, payload = known
         errors, tools = found.errors, found.tools(robot)
         return BuiltArm(
-            found.robot,
+            found.weighed,
             *(errors.place, errors.motion, errors.bend),
+            None if found.sag is None else errors.sag,
             *tools,
             *(payload.mass, payload.centre),
         )

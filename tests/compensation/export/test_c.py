@@ -222,8 +222,11 @@ def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
 
 
-@pytest.mark.parametrize(("orders", "payload"), some_by_day([(40, 30.0), (2, 0.0)]))
-def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, payload):
+@pytest.mark.parametrize(
+    ("orders", "payload", "assumed"),
+    some_by_day([(40, 30.0, False), (2, 0.0, False), (2, 30.0, True)]),
+)
+def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, payload, assumed):
     """Places, zeros, functions of the joints, weight and payload on joints and bearings, a tool."""
     model = compensated.arm("on a rail")
     robot, rng = model.model.robot, np.random.default_rng(orders)
@@ -233,18 +236,19 @@ def test_the_error_of_the_arm_as_built_is_that_of_python(tmp_path, orders, paylo
     # The compiler takes its time: one joint has all orders.
     motion[2:, 14:-1] = 0.0
     bend = 1e-7 * rng.normal(size=(joints, 3))
-    errors = ArmErrors(1e-3 * place, 1e-4 * motion, bend)
+    sag = 1e-7 * assumed * rng.normal(size=joints)
+    errors = ArmErrors(1e-3 * place, 1e-4 * motion, bend, sag)
     errors.motion[:, -1] *= 1e-3
     T_drawn, T_built = np.eye(4), np.eye(4)
     T_drawn[:3, 3], T_built[:3, 3] = (0.1, 0.0, 0.2), (0.1, 1e-3, 0.2)
-    of_arm = errors.place, errors.motion, errors.bend
+    of_arm = errors.place, errors.motion, errors.bend, sag if assumed else None
     arm = BuiltArm(robot, *of_arm, T_drawn, T_built, payload, (0.0, 0.1, 0.2))
     numbers = design(model, compensated.settings(), compensated.load(), built=arm)
     executable = build(written(tmp_path, numbers), "-O1", *SANITIZED)
     assert executable.selftest() == 0
     q = rng.uniform(-3.0, 3.0, (200, joints))
     data = Positions.unloaded(q, Payload(payload, (0.0, 0.1, 0.2)))
-    real = frames(robot, q, joint_loads(robot, data), errors).T_base_tcp @ T_built
+    real = frames(robot, q, joint_loads(robot, data, assumed=assumed), errors).T_base_tcp @ T_built
     expected = (real - robot.forward(q) @ T_drawn)[:, :3, 3]
     assert np.abs(expected).max() > 1e-3
     np.testing.assert_allclose(executable.numbers("arm", q), expected, rtol=0.0, atol=1e-12)

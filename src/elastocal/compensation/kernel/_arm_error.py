@@ -49,6 +49,9 @@ class BuiltArm:
     order, compliance."""
     bend: FloatArray
     """Compliances of their bearings about x, y and z of their frames, shape (joint, 3)."""
+    sag: FloatArray | None
+    """Compliances to the own weight, shape (joint,), which joints otherwise yield to as to
+    payloads."""
     T_tcp_drawn: FloatArray
     """The tool in that tcp as its controller knows it, shape (4, 4), in m."""
     T_tcp_built: FloatArray
@@ -66,7 +69,7 @@ def arm_error(arm: BuiltArm) -> Routine:
     """
     program = Program()
     drawn = write_chain(program, arm.drawn.chain)
-    loads = _loads(program, arm, drawn)
+    loads = _Loads(program, arm, drawn)
     here = Frame(IDENTITY, NOTHING)
     for k, joint in enumerate(arm.drawn.chain.joints, start=1):
         program.remark(f"joint {k} as built")
@@ -75,9 +78,8 @@ def arm_error(arm: BuiltArm) -> Routine:
         error[:3, 3] = arm.place[k - 1, :3]
         place = constant_frame(program, f"built{k}", joint.placement @ error)
         proximal = behind(program, here, place, (f"pb{k}", f"ob{k}"))
-        torque, about = loads[k - 1]
-        proximal = _bent(program, k, proximal, arm.bend[k - 1], about, joint)
-        moved = _moved(program, k, arm.motion[k - 1], torque, turns=joint.revolute)
+        proximal = _bent(program, k, proximal, joint, arm.bend[k - 1], loads)
+        moved = _moved(program, k, arm, loads, turns=joint.revolute)
         here = turned(program, proximal, joint, f"b{k}", moved)
     program.remark("tool")
     T_last_tip = arm.drawn.chain.T_last_tip
@@ -90,8 +92,59 @@ def arm_error(arm: BuiltArm) -> Routine:
     return routine(program, off).prefixed(_PREFIX)
 
 
-def _moved(program: Program, k: int, motion: FloatArray, torque: Value, *, turns: bool) -> Value:
+class _Loads:
+    """Statements of what weight and payload ask of each joint, counted from 0."""
+
+    def __init__(self, program: Program, arm: BuiltArm, drawn: ChainFrames) -> None:
+        self._program, self._drawn, robot = program, drawn, arm.drawn
+        self._joints = robot.chain.joints
+        asked = (arm.motion[:, -1], arm.bend, () if arm.sag is None else arm.sag)
+        heavy = robot.has_masses and any(np.any(each) for each in asked)
+        self._weights = write_weights(program, robot, drawn) if heavy else None
+        self._pull = program.constant_vector("payload", arm.payload * np.asarray(robot.gravity))
+        centre = program.constant_vector("payload_centre", arm.payload_centre)
+        self._at = program.transformed("hung", drawn.tcp.rotation, centre, drawn.tcp.origin)
+
+    def torque(self, k: int, *, payload: bool, weight: bool) -> Value:
+        """Write the torque of payload, of the arm's weight, or of both along a joint's axis."""
+        joint, program = self._joints[k], self._program
+        along = program.constant_vector(f"along{k + 1}", joint.axis)
+        rotation = self._drawn.joints[k].proximal.rotation
+        axis = program.transformed(f"axis_y{k + 1}", rotation, along, NOTHING)
+        label = f"y{k + 1}{'p' * payload}{'w' * weight}"
+        if joint.revolute:
+            load = self._moment(k, label, payload, weight)
+        else:
+            parts = [(ONE, self._pull)] if payload else []
+            if weight and self._weights is not None:
+                parts.append((ONE, self._weights.force(label, k)))
+            load = program.weighted_sum(f"force_{label}", parts)
+        return program.dot(f"torque_{label}", axis, load)
+
+    def about(self, k: int) -> Vector:
+        """Write the moments of both about the axes of a joint's frame."""
+        whole = self._moment(k, f"b{k + 1}", payload=True, weight=True)
+        rotation = self._drawn.joints[k].proximal.rotation
+        x, y, z = (
+            self._program.dot(f"about{k + 1}_{name}", (a, b, c), whole)
+            for name, a, b, c in zip("xyz", *rotation, strict=True)
+        )
+        return x, y, z
+
+    def _moment(self, k: int, label: str, payload: bool, weight: bool) -> Vector:
+        program, origin = self._program, self._drawn.joints[k].proximal.origin
+        parts: list[tuple[Value, Vector]] = []
+        if payload:
+            lever = program.weighted_sum(f"to_{label}", [(ONE, self._at), (-ONE, origin)])
+            parts.append((ONE, program.cross(f"of_{label}", lever, self._pull)))
+        if weight and self._weights is not None:
+            parts.append((ONE, self._weights.moment(label, k, origin)))
+        return program.weighted_sum(f"moment_{label}", parts)
+
+
+def _moved(program: Program, k: int, arm: BuiltArm, loads: _Loads, *, turns: bool) -> Value:
     """Write how far a joint really moves when its controller says ``q``."""
+    motion, sag = arm.motion[k - 1], 0.0 if arm.sag is None else float(arm.sag[k - 1])
     q, (offset, scale), compliance = Value(1, f"q{k}"), motion[:2].tolist(), float(motion[-1])
     terms: list[tuple[Value, ...]] = [(q,)]
     if offset:
@@ -101,7 +154,11 @@ def _moved(program: Program, k: int, motion: FloatArray, torque: Value, *, turns
     if turns:
         terms.append((_series(program, k, motion[2:-1].reshape(-1, 2)),))
     if compliance:
+        torque = loads.torque(k - 1, payload=True, weight=arm.sag is None)
         terms.append((program.quantity(f"yield{k}", compliance), torque))
+    if sag:
+        own = loads.torque(k - 1, payload=False, weight=True)
+        terms.append((program.quantity(f"sag{k}", sag), own))
     return program.total(f"moved{k}", terms)
 
 
@@ -121,55 +178,13 @@ def _series(program: Program, k: int, terms: FloatArray) -> Value:
     return x
 
 
-def _loads(program: Program, arm: BuiltArm, drawn: ChainFrames) -> list[tuple[Value, Vector]]:
-    """Write the torque of weight and payload along each joint that yields, in N·m (N).
-
-    And, where a bearing bends, their moments about the axes of its frame, in N·m.
-    """
-    robot, yields, bends = arm.drawn, arm.motion[:, -1] != 0.0, arm.bend != 0.0
-    heavy = robot.has_masses and bool(yields.any() or bends.any())
-    weights = write_weights(program, robot, drawn) if heavy else None
-    pull = program.constant_vector("payload", arm.payload * np.asarray(robot.gravity))
-    centre = program.constant_vector("payload_centre", arm.payload_centre)
-    at = program.transformed("hung", drawn.tcp.rotation, centre, drawn.tcp.origin)
-
-    def moment(k: int, proximal: Frame) -> Vector:
-        label = f"y{k + 1}"
-        lever = program.weighted_sum(f"to_{label}", [(ONE, at), (-ONE, proximal.origin)])
-        load = program.cross(f"of_{label}", lever, pull)
-        if weights is None:
-            return load
-        own = weights.moment(label, k, proximal.origin)
-        return program.weighted_sum(f"moment_{label}", [(ONE, load), (ONE, own)])
-
-    found = []
-    for k, (joint, frames) in enumerate(zip(robot.chain.joints, drawn.joints, strict=True)):
-        torque, about, rotation = ZERO, NOTHING, frames.proximal.rotation
-        if (yields[k] and joint.revolute) or bends[k].any():
-            whole = moment(k, frames.proximal)
-            x, y, z = (
-                program.dot(f"about{k + 1}_{name}", (a, b, c), whole)
-                for name, a, b, c in zip("xyz", *rotation, strict=True)
-            )
-            about = x, y, z
-        if yields[k]:
-            along = program.constant_vector(f"along{k + 1}", joint.axis)
-            if joint.revolute:
-                torque = program.dot(f"torque{k + 1}", along, about)
-            else:
-                axis = program.transformed(f"axis_y{k + 1}", rotation, along, NOTHING)
-                terms = list(zip(axis, pull, strict=True))
-                if weights is not None:
-                    terms += zip(axis, weights.force(f"y{k + 1}", k), strict=True)
-                torque = program.total(f"torque{k + 1}", terms)
-        found.append((torque, about))
-    return found
-
-
 def _bent(
-    program: Program, k: int, proximal: Frame, bend: FloatArray, about: Vector, joint: ChainJoint
+    program: Program, k: int, proximal: Frame, joint: ChainJoint, bend: FloatArray, loads: _Loads
 ) -> Frame:
     """Write the frame of a joint behind the turns of its bearing, one axis after the other."""
+    if not bend.any():
+        return proximal
+    about = loads.about(k - 1)
     for axis, name in enumerate("xyz"):
         # Weight has no moment about an upright axis.
         if bend[axis] and about[axis] != ZERO:
