@@ -90,6 +90,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "posture": ("programmed", "stiffest"),
     "target": ("linux",),
     "purpose": ("elasticity", "geometry", "both"),
+    "import purpose": ("elasticity", "geometry"),
     "warmth": ("cold", "warm"),
 }  # fmt: skip
 """Choices that help lists without importing their modules; tests/contracts/test_commands.py checks

@@ -161,6 +161,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "target": EXPORT_TARGETS,
         "page language": tuple(LANGUAGES),
         "purpose": ("elasticity", "geometry", "both"),
+        "import purpose": ("elasticity", "geometry"),
         "warmth": get_args(Warmth),
     } == CHOICES
 

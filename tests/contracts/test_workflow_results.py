@@ -33,6 +33,7 @@ CLASSES = {
     if name.endswith("Result") and issubclass(getattr(workflows, name), Result)
 }
 WITHOUT = {
+    "ImportPositionsResult",
     "CheckResult",
     "GuessMapResult",
     "DryRunResult",
@@ -85,6 +86,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
         workflows.geometry(positions, robot="KR 210 R2700-2", tcp="flange", draws=40),
         workflows.guess_map(logs),
         workflows.import_logs(logs, map=log_map),
+        workflows.import_positions(logs, map=log_map),
         workflows.init(out / "new"),
         workflows.krc_config(kuka_bench.write_cell(out), out=out / "krc"),
         workflows.NewResult(out / "cell.yaml", "UR20", ("an open mesh",)),

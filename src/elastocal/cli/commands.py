@@ -6,7 +6,7 @@ is defined here.
 
 import sys
 import webbrowser
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -232,6 +232,15 @@ def _studio(given: Given) -> None:
     workflows.studio(**given.settings, while_open=show)
 
 
+def _purpose(here: Mapping[str, Any], choices: str) -> str:
+    """Return what a command is for, one of its choices."""
+    given: str = here["purpose"]
+    if given not in CHOICES[choices]:
+        known = ", ".join(CHOICES[choices])
+        raise typer.BadParameter(f"{given!r} is not one of {known}.", param_hint="--for")
+    return given
+
+
 @dataclass(frozen=True)
 class _Plan:
     purpose: Annotated[str, Option("--for", choices="purpose")] = "elasticity"
@@ -248,10 +257,7 @@ def _plan(given: Given) -> None:
     from elastocal.errors import PlanningError
 
     asked, here = given.settings, given.here
-    purpose, free_poses = here["purpose"], asked.pop("free_poses", None)
-    if purpose not in CHOICES["purpose"]:
-        known = ", ".join(CHOICES["purpose"])
-        raise typer.BadParameter(f"{purpose!r} is not one of {known}.", param_hint="--for")
+    purpose, free_poses = _purpose(here, "purpose"), asked.pop("free_poses", None)
     if free_poses is not None and purpose != "both":
         raise PlanningError("--positions is for --for both")
     if purpose == "geometry":
@@ -398,11 +404,14 @@ class _Import:
     map: Annotated[Path, Option("--map")]
     """Map of the columns (.yaml); --guess writes one."""
     out: Path | None = None
-    """Dataset (.nc or .csv) to write."""
+    """Dataset (.nc or .csv), or table of positions (.csv), to write."""
     guess: bool = False
     """Write a first map to --map, and show it."""
     cell: Path | None = None
     """With --guess: cell file that says robot, tool, sensor."""
+    purpose: Annotated[str, Option("--for", choices="import purpose")] = "elasticity"
+    """What is written: a dataset of deflections, or positions of the unloaded arm (.csv), for which
+    no log needs to hold a force."""
 
 
 @command(
@@ -428,7 +437,16 @@ def _import(given: Given) -> None:
     if here["cell"] is not None:
         raise typer.BadParameter("is for --guess: the map names the cell", param_hint="--cell")
     if here["out"] is None:
-        raise typer.BadParameter("is missing: the dataset to write", param_hint="--out")
+        raise typer.BadParameter("is missing: the file to write", param_hint="--out")
+    if _purpose(here, "import purpose") == "geometry":
+        positions = workflows.ImportPositionsSettings(
+            asked["logs"], map=here["map"], out=here["out"], force=asked["force"]
+        )
+        if asked.get("picture") is not None:
+            raise typer.BadParameter("is of a dataset", param_hint="--picture")
+        table = workflows.import_positions(positions)
+        _show(given, table.figures, table.show(), f"wrote {table.figures.table}")
+        return
     result = _worked(workflows.import_logs, given, map=here["map"], out=here["out"])
     wrote = f"wrote {result.figures.dataset}, look at {result.figures.picture}"
     _show(given, result.figures, result.show(), wrote)

@@ -21,3 +21,7 @@ from .merge import (
 from .plateaus import (
     Plateau as Plateau,
 )
+from .positions import (
+    ImportedPositions as ImportedPositions,
+    import_positions as import_positions,
+)

@@ -388,6 +388,11 @@ def import_streams(
         If a file cannot be read.
     """
     progress("logs", 0, 4)
+    if not any(each.force for each in log_map.logs):
+        raise LogError(
+            "no log holds force: readings are deflections under a force; for positions of the"
+            " unloaded arm import --for geometry"
+        )
     logs = read_streams_of(log_map, files, site.robot)
     progress("clocks", 1, 4)
     still = tuple(still_columns(logs, site.robot))
@@ -395,16 +400,16 @@ def import_streams(
         logs, clocks = align(logs, site.marker)
     except LogError as error:
         raise LogError(f"{still[0]} ({error})") if still else error from error
-    streams = _merged(logs, site)
+    streams = merged(logs, site)
     progress("plateaus", 2, 4)
     by_word = next((log for log in logs if log.arm is not None and log.handshake), None)
-    standing = _standing(streams, site, by_word)
-    poses = [each.pose for each in standing.bare]
-    postures = postures_at_rest(standing.readings, poses, site)
+    at_rest = standing(streams, site, by_word)
+    poses = [each.pose for each in at_rest.bare]
+    postures = postures_at_rest(at_rest.readings, poses, site)
     # The sensor's clock follows from the weight, which turns with the joints; the marker is not
     # needed.
     alone = replace(streams, wrench=stream_rows(streams.wrench, slice(0)))
-    spans = [(each.start, each.end) for each in standing.bare]
+    spans = [(each.start, each.end) for each in at_rest.bare]
     if by_word is None:
         spans = [averaged_part(*each) for each in standing_spans(alone, site.marker)]
     # What is named first explains what comes after: joints that are mistaken turn the weight, too.
@@ -414,7 +419,7 @@ def import_streams(
     doubts = (*still, *astray, *sensor, *stream_doubts(logs, clocks, site.marker))
     try:
         judge = not (still or sensor)
-        found = _imported(streams, standing, log_map, site, files, postures, judge, progress)
+        found = _imported(streams, at_rest, log_map, site, files, postures, judge, progress)
     except LogError as error:
         why = next(iter(doubts), None if judged is None else sensor_misfit(judged, site))
         if why is None:
@@ -425,7 +430,7 @@ def import_streams(
 
 def _imported(
     streams: Streams,
-    standing: "_Standing",
+    at_rest: "Standing",
     log_map: LogMap,
     site: Site,
     files: Sequence[Path],
@@ -434,11 +439,11 @@ def _imported(
     progress: Progress,
 ) -> ImportedLogs:
     """Return the dataset of the plateaus."""
-    states = [each.tool for each in standing.readings]
-    named = name_loads(standing.bare, states, site.sensor, log_map.load_cases)
+    states = [each.tool for each in at_rest.readings]
+    named = name_loads(at_rest.bare, states, site.sensor, log_map.load_cases)
     plateaus = _with_references(named)
     progress("readings", 3, 4)
-    poses = _readings(streams, plateaus, standing.least)
+    poses = _readings(streams, plateaus, at_rest.least)
     seen = marker_readings(poses, site.robot, site.sensor.gravity, site.marker)
     registration = register(seen, site.marker)
     seen_at_all = len(streams.points.time) > 0
@@ -466,17 +471,23 @@ def log_sha256(path: Path) -> str:
     return sha256("".join(names))
 
 
-def _merged(logs: Sequence[LogStreams], site: Site) -> Streams:
+def merged(logs: Sequence[LogStreams], site: Site) -> Streams:
     """Return the streams of all logs by one clock, forces in the sensor's frame."""
     arm = next(log.arm for log in logs if log.arm is not None)
     known = np.isfinite(arm.q).all(axis=1) & np.isfinite(arm.T_base_tcp).all(axis=(1, 2))
     if not known.all():  # else a copy of what may be half a gigabyte
         arm = stream_rows(arm, np.asarray(known))
     wrenches = [_in_sensor(log, arm, site) for log in logs if log.wrench is not None]
+    silent = np.empty((0, 3))
+    unfelt = WrenchStream(np.empty(0), silent, silent, np.empty(0), np.empty(0, dtype=bool))
     points = [log.points for log in logs if log.points is not None]
     none = PointStream(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=np.str_))
     return Streams(
-        site.robot.joint_names, arm, _chained(wrenches), _chained(points) if points else none, ()
+        site.robot.joint_names,
+        arm,
+        _chained(wrenches) if wrenches else unfelt,
+        _chained(points) if points else none,
+        (),
     )
 
 
@@ -504,8 +515,9 @@ def _in_sensor(log: LogStreams, arm: ArmStream, site: Site) -> WrenchStream:
     return replace(wrench, force=force, moment=moment - np.cross(T[:3, :3].T @ T[:3, 3], force))
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
-class _Standing:
+class Standing:
     """Plateaus, before their loads are known."""
 
     bare: list[Plateau]
@@ -515,7 +527,7 @@ class _Standing:
     """Samples that a mean needs."""
 
 
-def _standing(streams: Streams, site: Site, by_word: LogStreams | None) -> _Standing:
+def standing(streams: Streams, site: Site, by_word: LogStreams | None) -> Standing:
     """Return all plateaus, with their poses."""
     if by_word is not None:
         spans = list(handshake_spans(by_word).values())
@@ -531,7 +543,7 @@ def _standing(streams: Streams, site: Site, by_word: LogStreams | None) -> _Stan
     numbers = number_poses(spans, streams)
     least = LEAST_SAMPLES if by_word is None else 1
     bare = [Plateau(*part, pose) for part, pose in zip(parts, numbers, strict=True)]
-    return _Standing(bare, [_reading(each, streams, least) for each in bare], least)
+    return Standing(bare, [_reading(each, streams, least) for each in bare], least)
 
 
 def _with_references(plateaus: Sequence[Plateau]) -> list[Plateau]:

@@ -46,6 +46,9 @@ class LogStreams:
     arm: ArmStream | None
     wrench: WrenchStream | None
     points: PointStream | None
+    """The marker, of several on one body its centre."""
+    markers: FloatArray | None = None
+    """Each marker, shape (row, marker, 3), in m; NaN where hidden."""
 
     def at(self, time: FloatArray) -> "LogStreams":
         """Return the same with other times, shape (row,)."""
@@ -174,7 +177,7 @@ def _stream(entry: LogEntry, table: LogTable, robot: Robot) -> LogStreams:
         words,
         _arm(entry, table, time, robot) if entry.joints else None,
         _wrench(entry, table, time) if entry.force else None,
-        _points(entry, table, time) if entry.markers else None,
+        *(_points(entry, table, time) if entry.markers else (None, None)),
     )
 
 
@@ -196,7 +199,12 @@ def _joined(parts: Sequence[LogStreams]) -> LogStreams:
         chain(part.arm for part in parts),
         chain(part.wrench for part in parts),
         chain(part.points for part in parts),
+        None if first.markers is None else _chained_markers(parts),
     )
+
+
+def _chained_markers(parts: Sequence[LogStreams]) -> FloatArray:
+    return np.concatenate([present(part.markers, "markers") for part in parts])
 
 
 def joined_streams(streams: Sequence[Stream]) -> Stream:
@@ -299,14 +307,14 @@ def _wrench(entry: LogEntry, table: LogTable, time: FloatArray) -> WrenchStream:
     return WrenchStream(time, force, moment, np.full(len(time), np.nan), ok)
 
 
-def _points(entry: LogEntry, table: LogTable, time: FloatArray) -> PointStream:
-    """Return the marker of a log; of several on one body its centre."""
+def _points(entry: LogEntry, table: LogTable, time: FloatArray) -> tuple[PointStream, FloatArray]:
+    """Return the marker of a log, of several on one body its centre, and each of them."""
     position = np.stack([vectors(table, each, "length") for each in entry.markers], axis=1)
     sigma = np.stack([_marker_sigma(table, each) for each in entry.markers], axis=1)
     centre = position[:, 0] if len(entry.markers) == 1 else body_centre(position, table.name)
     with np.errstate(invalid="ignore"):
         mean = np.sqrt((sigma**2).mean(axis=1) / sigma.shape[1])
-    return PointStream(time, centre, mean, np.full(len(time), entry.station))
+    return PointStream(time, centre, mean, np.full(len(time), entry.station)), position
 
 
 def _marker_sigma(table: LogTable, marker: MarkerColumns) -> FloatArray:

@@ -10,6 +10,7 @@ __all__ = [
     "geometry",
     "guess_map",
     "import_logs",
+    "import_positions",
     "init",
     "krc_config",
     "live",
@@ -89,8 +90,11 @@ from .import_logs import (
     GuessMapSettings as GuessMapSettings,
     ImportLogsResult as ImportLogsResult,
     ImportLogsSettings as ImportLogsSettings,
+    ImportPositionsResult as ImportPositionsResult,
+    ImportPositionsSettings as ImportPositionsSettings,
     guess_map as guess_map,
     import_logs as import_logs,
+    import_positions as import_positions,
 )
 from .init import (
     InitResult as InitResult,

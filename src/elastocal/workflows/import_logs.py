@@ -1,4 +1,4 @@
-"""``import``: from foreign logs to a dataset, and a first map of their columns."""
+"""``import``: from foreign logs to a dataset, or positions, and a first map of their columns."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from elastocal.cell import load_cell
 from elastocal.dataset import MADE_FROM, Dataset, write
 from elastocal.errors import FileAccessError, LogError
 from elastocal.files import write_text
-from elastocal.logs import ClockFit, GuessedLog, ImportedLogs, log_sha256
+from elastocal.logs import ClockFit, GuessedLog, ImportedLogs, ImportedPositions, log_sha256
 from elastocal.options import Option
 from elastocal.outputs import FIGURE_MARKS
 from elastocal.progress import Progress
@@ -159,6 +159,103 @@ def _stating(dataset: Dataset, out: Path, files: Sequence[Path]) -> Dataset:
     }
     attributes = {**dataset.attributes, MADE_FROM: json.dumps(made_from)}
     return replace(dataset, attributes=attributes)
+
+
+@brief_repr
+@dataclass(frozen=True)
+class ImportPositionsSettings:
+    """Settings of an import of positions: logs, map, and table."""
+
+    logs: Annotated[Sequence[str | PathLike[str]], Option(argument=True)]
+    """As for `import_logs`; none needs to hold a force."""
+    map: Path
+    """Map of their columns."""
+    out: Path | None = None
+    """Table to write (.csv); none: it is only returned."""
+    force: bool = False
+    """Replace a file that is no former output of this command."""
+
+
+@brief_repr
+@record()
+class PositionFigures:
+    """The figures of ``import --for geometry --json``."""
+
+    table: str | None
+    rows: int
+    poses: int
+    markers: int
+    stations: tuple[str, ...]
+    plateaus: int
+    """All that were found, loaded ones included."""
+    clocks: tuple[ClockFit, ...]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportPositionsResult(Result):
+    """The positions of some logs, and how they came about."""
+
+    found: ImportedPositions
+    figures: PositionFigures
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return the main facts, a label and a text each."""
+        figures = self.figures
+        return (
+            (
+                "found",
+                f"{counted(figures.rows, 'row')} of {counted(figures.markers, 'marker')} at"
+                f" {counted(figures.poses, 'pose')} in {counted(figures.plateaus, 'plateau')}",
+            ),
+            ("stations", ", ".join(figures.stations)),
+            *(("clock", each.sentence) for each in figures.clocks),
+            *(("warning", text) for text in figures.warnings),
+        )
+
+
+@workflow(ImportPositionsSettings)
+def import_positions(
+    settings: ImportPositionsSettings, progress: Progress
+) -> ImportPositionsResult:
+    """Merge the logs of controller and tracker; find where the arm stood; write positions.
+
+    The table is that of `geometry`. Where the logs hold forces, plateaus under load do not count.
+
+    Parameters
+    ----------
+    settings : ImportPositionsSettings
+        Or its ``logs``, and the other fields by name.
+    progress : Progress, optional
+        Called with stage, done and total.
+
+    Raises
+    ------
+    LogError
+        If a log cannot be read as the map says, or there are too few poses.
+    SchemaError
+        If the map does not fit.
+    FileAccessError
+        If a file cannot be read or written, or its name says another kind.
+    """
+    files, path = _files(settings.logs), Path(settings.map)
+    if settings.out is not None and settings.out.suffix.lower() != ".csv":
+        raise FileAccessError(f"--out {settings.out}: positions are a table (.csv)")
+    log_map = foreign.read_map(path)
+    found = foreign.import_positions(log_map, foreign.site(path, log_map), files, progress)
+    if settings.out is not None:
+        found.write(settings.out)
+    figures = PositionFigures(
+        table=None if settings.out is None else str(settings.out),
+        rows=len(found),
+        poses=len(np.unique(found.pose)),
+        markers=found.markers.shape[1],
+        stations=tuple(dict.fromkeys(found.station.tolist())),
+        plateaus=found.plateaus,
+        clocks=found.clocks,
+        warnings=found.warnings,
+    )
+    return ImportPositionsResult(found, figures)
 
 
 @brief_repr

@@ -1,0 +1,120 @@
+"""Logs of arm and tracker become positions for `geometry`, with a force in them or without."""
+
+import json
+
+import numpy as np
+import pytest
+
+import elastocal as ec
+from elastocal.errors import FileAccessError, LogError
+from elastocal.geometry import read_positions
+from support import reported
+from support.cli import elastocal
+from support.foreign_logs import rows_of, write_logs, write_map
+from support.measured_arms import MARKERS, kuka, measure
+
+MAP = """\
+schema: elastocal.log-map/1
+robot: {model: KR 210 R2700-2}
+marker: ["100 mm", "70 mm", "300 mm"]
+logs:
+  - log: arm.csv
+    time: {column: t, unit: s}
+    joints: [{columns: [A1, A2, A3, A4, A5, A6], unit: deg}]
+  - log: tracker.csv
+    time: {column: time, unit: s}
+    markers:
+      - {columns: [X1, Y1, Z1], unit: mm}
+      - {columns: [X2, Y2, Z2], unit: mm}
+"""
+_REST, _MOVE = 1.5, 2.0
+"""Time at a pose, and on the way to the next, in s."""
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """Return a folder with logs of thirty poses, and what they were made from."""
+    folder, rng = tmp_path_factory.mktemp("positions"), np.random.default_rng(4)
+    measured = measure(kuka(), 30, markers=2, stations=1, noise=0.0, error=3e-4)
+    q = measured.data.q
+    knots = np.arange(len(q)) * (_REST + _MOVE)
+    time = np.arange(0.0, knots[-1] + _REST, 0.02)
+    pose = np.minimum(np.searchsorted(knots, time, side="right") - 1, len(q) - 2)
+    part = np.clip((time - knots[pose] - _REST) / _MOVE, 0.0, 1.0)
+    joints = q[pose] + part[:, None] * (q[pose + 1] - q[pose])
+    T = measured.truth.forward(joints)
+    points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], MARKERS[:2])
+    S = measured.T_station_base[0]
+    seen = S[:3, 3] + points @ S[:3, :3].T + rng.normal(0.0, 2e-5, points.shape)
+    write(folder / "arm.csv", "t,A1,A2,A3,A4,A5,A6", time, np.degrees(joints))
+    write(folder / "tracker.csv", "time,X1,Y1,Z1,X2,Y2,Z2", time + 7.0, 1e3 * seen)
+    (folder / "map.yaml").write_text(MAP, encoding="utf-8")
+    return folder, measured
+
+
+def write(path, head, time, values):
+    rows = np.column_stack([time, values.reshape(len(values), -1)])
+    np.savetxt(path, rows, "%.5f", delimiter=",", header=head, comments="")
+
+
+def logs(folder):
+    return [folder / "arm.csv", folder / "tracker.csv"]
+
+
+def test_every_pose_is_found_without_a_force(campaign, tmp_path):
+    folder, measured = campaign
+    out = tmp_path / "positions.csv"
+    found = ec.import_positions(logs(folder), map=folder / "map.yaml", out=out)
+    assert found.figures.poses == found.figures.rows == 30
+    assert found.figures.warnings == ()
+    assert np.abs(found.found.q - measured.data.q).max() < 1e-6
+    assert np.abs(found.found.markers - measured.data.markers).max() < 3e-5
+    read = read_positions(out, measured.robot)
+    assert np.allclose(read.markers, found.found.markers, rtol=0.0, atol=1e-8)
+    assert read.stations == ("tracker",)
+
+
+def test_geometry_is_calibrated_from_them(campaign, tmp_path):
+    folder, _ = campaign
+    out = tmp_path / "positions.csv"
+    told = elastocal(
+        "import", *logs(folder), "--map", folder / "map.yaml", "--for", "geometry", "--out", out,
+        "--json",
+    )  # fmt: skip
+    assert json.loads(told.out)["markers"] == 2
+    model = ec.geometry(out, robot="KR 210 R2700-2", draws=40).model
+    assert model.held_out.chosen.mean < 2e-5 < 1e-4 < model.held_out.registration.mean
+
+
+def test_plateaus_under_load_do_not_count(tmp_path):
+    run = reported.finished() / "run"
+    files = write_logs(rows_of(run), tmp_path)
+    path = write_map(tmp_path, reported.finished() / "cell" / "cell.yaml")
+    found = ec.import_positions(files, map=path)
+    data = ec.read_dataset(run / "dataset.nc")
+    # Where the tool waits before the surface, and on the surface before and after its presses.
+    assert len(data.poses) <= found.figures.poses <= 2 * len(data.poses)
+    loaded = len(data.poses) * len(data.load_cases)
+    assert found.figures.rows == found.figures.plateaus - loaded
+
+
+def test_a_dataset_needs_a_force_and_says_what_does_not(campaign):
+    folder, _ = campaign
+    with pytest.raises(LogError, match=r"no log holds force: .* import --for geometry"):
+        ec.import_logs(logs(folder), map=folder / "map.yaml")
+
+
+def test_what_cannot_be_positions_is_refused(campaign, tmp_path):
+    folder, _ = campaign
+    path = folder / "map.yaml"
+    with pytest.raises(FileAccessError, match=r"positions are a table \(.csv\)"):
+        ec.import_positions(logs(folder), map=path, out=tmp_path / "a.nc")
+    few = tmp_path / "arm.csv"
+    rows = (folder / "arm.csv").read_text(encoding="utf-8").splitlines()
+    few.write_text("\n".join(rows[: 1 + int(3 * (_REST + _MOVE) / 0.02)]) + "\n", encoding="utf-8")
+    with pytest.raises(LogError, match="markers were seen at 3 poses at rest and unloaded"):
+        ec.import_positions([few, folder / "tracker.csv"], map=path)
+    alone = tmp_path / "alone.yaml"
+    alone.write_text(MAP[: MAP.index("  - log: tracker")], encoding="utf-8")
+    with pytest.raises(LogError, match="no log holds markers"):
+        ec.import_positions(logs(folder)[:1], map=alone)
