@@ -86,6 +86,58 @@ def test_a_calibration_of_it_agrees_with_that_of_the_run(imported):
     assert np.allclose(logs.calibrated.compliance, run.calibrated.compliance, rtol=0.02, atol=1e-9)
 
 
+@pytest.fixture
+def with_encoders(rows, tmp_path):
+    """Logs in which each arm joint has an encoder behind its gear, and reads 5 mdeg more."""
+    files, path = (
+        write_logs(rows, tmp_path),
+        write_map(tmp_path, reported.finished() / "cell" / "cell.yaml"),
+    )
+    head, *lines = files[0].read_text(encoding="utf-8").splitlines()
+    read = (
+        ";".join(f"{float(axis.replace(',', '.')) + 0.005:.4f}" for axis in line.split(";")[2:8])
+        for line in lines
+    )
+    head += "".join(f";L{n}" for n in range(1, 7))
+    text = [head, *(f"{a};{b.replace('.', ',')}" for a, b in zip(lines, read, strict=True))]
+    files[0].write_text("\n".join(text) + "\n", encoding="utf-8")
+    names = ", ".join(f"joint_a{n}" for n in range(1, 7))
+    more = (
+        f"    link_joints: [{{columns: [L1, L2, L3, L4, L5, L6], unit: deg, names: [{names}]}}]\n"
+    )
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("    pose:", f"{more}    pose:"), encoding="utf-8")
+    return files, path
+
+
+def test_secondary_encoders_are_imported_with_their_reference(with_encoders):
+    files, path = with_encoders
+    data = ec.import_logs(files, map=path).dataset
+    names = data.joint_names
+    own = [names.index(f"joint_a{n}") for n in range(1, 7)]
+    for link, motor in (
+        (data.link_joint_position, data.joint_position),
+        (data.reference_link_joint_position, data.reference_joint_position),
+    ):
+        assert np.allclose((link - motor)[..., own], np.radians(0.005), rtol=0.0, atol=2e-7)
+        assert np.isnan(link[..., names.index("rail")]).all()
+
+
+def test_a_log_of_the_arm_may_come_in_parts(with_encoders, tmp_path):
+    files, path = with_encoders
+    whole = ec.import_logs(files, map=path).dataset
+    head, *lines = files[0].read_text(encoding="utf-8").splitlines()
+    half = len(lines) // 2
+    parts = [tmp_path / f"controller_{n}.csv" for n in (1, 2)]
+    for part, some in zip(parts, (lines[:half], lines[half:]), strict=True):
+        part.write_text("\n".join([head, *some]) + "\n", encoding="utf-8")
+    text = path.read_text(encoding="utf-8").replace("controller.csv", "controller_*.csv")
+    for removed in ("", next(line for line in text.splitlines(True) if "link_joints" in line)):
+        path.write_text(text.replace(removed, "") if removed else text, encoding="utf-8")
+        data = ec.import_logs([*parts, *files[1:]], map=path).dataset
+        assert np.array_equal(data.joint_position, whole.joint_position, equal_nan=True)
+
+
 def test_the_picture_of_the_time_lines_stands_beside_the_dataset(imported):
     assert Path(imported.figures.picture).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert imported.plot().get_size_inches()[0] > 5.0

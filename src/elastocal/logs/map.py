@@ -164,6 +164,8 @@ class LogEntry(StrictModel):
     handshake: _ColumnName | None = None
     """Column with the same word in all logs during a reading; 0 or nothing in between."""
     joints: tuple[Joints, ...] = ()
+    link_joints: tuple[Joints, ...] = ()
+    """Secondary encoders, which read the joints behind their gears."""
     pose: ToolPose | None = None
     force: Vector | None = None
     moment: Vector | None = None
@@ -189,6 +191,8 @@ class LogEntry(StrictModel):
             raise ValueError("one of joints, force, markers must say what the log holds")
         if self.moment is not None and self.force is None:
             raise ValueError("a moment needs its force")
+        if self.link_joints and not self.joints:
+            raise ValueError("link_joints stand beside the joints of their log")
         if self.time is None and self.handshake is None:
             raise ValueError("it needs a time or a handshake")
         return self

@@ -209,7 +209,7 @@ def _chained_markers(parts: Sequence[LogStreams]) -> FloatArray:
 
 def joined_streams(streams: Sequence[Stream]) -> Stream:
     """Return the samples of several streams of one kind, one stream after the other."""
-    names = vars(streams[0])
+    names = [name for name, values in vars(streams[0]).items() if values is not None]
     joined = {name: np.concatenate([getattr(each, name) for each in streams]) for name in names}
     return replace(streams[0], **joined)
 
@@ -221,8 +221,32 @@ def stream_rows(stream: Stream, rows: slice | IndexArray | BoolArray) -> Stream:
 
 
 def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> ArmStream:
+    q = _positions(entry.joints, table, robot)
+    missing = [
+        n for n, values in zip(robot.joint_names, q.T, strict=True) if np.isnan(values).all()
+    ]
+    if missing:
+        raise LogError(f"{table.name}: no column is mapped to joint {', '.join(missing)}")
+    link = _positions(entry.link_joints, table, robot) if entry.link_joints else None
+    if entry.pose is not None:
+        return ArmStream(time, q, stated_poses(entry, table, q, robot), link)
+    T: FloatArray = np.empty((len(q), 4, 4))
+    for start in range(0, len(q), ROWS_AT_A_TIME):
+        rows = slice(start, start + ROWS_AT_A_TIME)
+        T[rows] = robot.forward(q[rows])
+    return ArmStream(time, q, T, link)
+
+
+def _positions(blocks: Sequence[Joints], table: LogTable, robot: Robot) -> FloatArray:
+    """Return positions of joints, shape (row, joint), in rad or m; NaN where no column is mapped.
+
+    Raises
+    ------
+    LogError
+        If a unit is not the joint's, or a position is far outside its limits.
+    """
     q = np.full((len(table), len(robot.joint_names)), np.nan)
-    for block in entry.joints:
+    for block in blocks:
         for column, joint, sign, offset in _placed(block, table, robot):
             dimension = "angle" if robot.revolute[joint] else "length"
             try:
@@ -232,19 +256,8 @@ def _arm(entry: LogEntry, table: LogTable, time: FloatArray, robot: Robot) -> Ar
                     f"{table.name}: column {column!r} is joint {robot.joint_names[joint]}: {error}"
                 ) from error
             q[:, joint] = sign * scale * table.numbers(column) + offset
-    missing = [
-        n for n, values in zip(robot.joint_names, q.T, strict=True) if np.isnan(values).all()
-    ]
-    if missing:
-        raise LogError(f"{table.name}: no column is mapped to joint {', '.join(missing)}")
     _require_within_limits(table.name, q, robot)
-    if entry.pose is not None:
-        return ArmStream(time, q, stated_poses(entry, table, q, robot))
-    T: FloatArray = np.empty((len(q), 4, 4))
-    for start in range(0, len(q), ROWS_AT_A_TIME):
-        rows = slice(start, start + ROWS_AT_A_TIME)
-        T[rows] = robot.forward(q[rows])
-    return ArmStream(time, q, T)
+    return q
 
 
 def _placed(
