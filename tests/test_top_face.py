@@ -24,6 +24,25 @@ def test_every_command_is_a_function_of_the_top_face():
     assert missing == []
 
 
+WITHOUT_EXAMPLE = {
+    *("demo", "guess_map", "import_logs", "import_positions", "krc_config", "live"),
+    *("measure_delay", "read_dataset", "read_plan", "release", "report", "simulate"),
+    *("simulate_process", "studio", "study", "tool", "touch", "watch"),
+}
+"""They need a device, a person, or the files of a long chain. No other joins them."""
+
+
+def test_functions_of_the_top_face_show_an_example_that_runs():
+    # Packages that bear the name of a command have a description of their own.
+    found = {name: getattr(ec.workflows, name, getattr(ec, name)) for name in ec.__all__}
+    without = {
+        name
+        for name, each in found.items()
+        if inspect.isfunction(each) and "Examples" not in (each.__doc__ or "")
+    }
+    assert without == WITHOUT_EXAMPLE
+
+
 def test_a_package_that_bears_the_name_of_a_command_does_not_hide_it():
     from elastocal.codec import CodecOptions
     from elastocal.report import write_plan_page

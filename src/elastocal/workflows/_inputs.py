@@ -7,6 +7,7 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
-from elastocal.dataset import Dataset, require_joint_names
+from elastocal.dataset import Dataset, read, require_joint_names
 from elastocal.errors import (
     CompensationError,
     ElastocalError,
@@ -136,6 +137,37 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
             f" {quantity(gap.distance, 'mm', '.3g')} apart in the model and in cell {name}:"
             " another tool centre point, base or robot"
         )
+
+
+DatasetSource = str | PathLike[str] | Dataset | Sequence[str | PathLike[str] | Dataset]
+"""A dataset, or the file that holds it, or several of either."""
+
+
+def dataset_files(source: DatasetSource) -> tuple[Path, ...]:
+    """Return those datasets that are files."""
+    return tuple(Path(each) for each in _each(source) if not isinstance(each, Dataset))
+
+
+def read_datasets(source: DatasetSource) -> list[tuple[Path, Dataset]]:
+    """Return datasets with their files; one that is given has the name of its place.
+
+    Raises
+    ------
+    DatasetError, SchemaError
+        If a file holds no dataset.
+    FileAccessError
+        If it cannot be read.
+    """
+    return [
+        (Path(f"dataset {number}"), each)
+        if isinstance(each, Dataset)
+        else (Path(each), read(Path(each)))
+        for number, each in enumerate(_each(source), start=1)
+    ]
+
+
+def _each(source: DatasetSource) -> tuple[str | PathLike[str] | Dataset, ...]:
+    return (source,) if isinstance(source, str | PathLike | Dataset) else tuple(source)
 
 
 @dataclass(frozen=True, kw_only=True)

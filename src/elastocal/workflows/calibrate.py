@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from elastocal import identification
 from elastocal.cell import ProcessFile, ProductionPath, read_production
-from elastocal.dataset import Dataset, Readings, content_sha256, merge_files, read, without
+from elastocal.dataset import Dataset, Readings, content_sha256, merge_files, without
 from elastocal.elastic import ElasticModel, KnownSpring, Spring, known_springs
 from elastocal.errors import ElastocalError, IdentificationError, present
 from elastocal.findings import Finding, Kind
@@ -39,7 +38,12 @@ from elastocal.records import read_json, write_json
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, of_one_arm, same_joints, tool_gap
 from elastocal.robot.inverse import nearest_zero_posture
-from elastocal.workflows._inputs import find_robot
+from elastocal.workflows._inputs import (
+    DatasetSource,
+    dataset_files,
+    find_robot,
+    read_datasets,
+)
 from elastocal.workflows._workflow import workflow
 
 if TYPE_CHECKING:
@@ -57,10 +61,7 @@ _SAME_MARKER = 0.03
 class CalibrateSettings(FitSettings):
     """Settings of a calibration: readings, springs and fit."""
 
-    data: Annotated[
-        str | PathLike[str] | Dataset | Sequence[str | PathLike[str] | Dataset],
-        Option(argument=True),
-    ]
+    data: Annotated[DatasetSource, Option(argument=True)]
     """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are renumbered. In
     Python also a `Dataset`."""
     # Wider than what a model file keeps of it; see `fit`.
@@ -102,28 +103,13 @@ class CalibrateSettings(FitSettings):
     @property
     def files(self) -> tuple[Path, ...]:
         """The datasets that are files."""
-        return tuple(Path(each) for each in self._sources if not isinstance(each, Dataset))
+        return dataset_files(self.data)
 
     def __post_init__(self) -> None:
         """Keep the springs that an iterator gives."""
         super().__post_init__()
         if not isinstance(self.springs, str):
             object.__setattr__(self, "springs", tuple(self.springs))
-
-    def read(self) -> list[tuple[Path, Dataset]]:
-        """Return the datasets with their files; one that is given has the name of its place."""
-        return [
-            (Path(f"dataset {number}"), each)
-            if isinstance(each, Dataset)
-            else (Path(each), read(Path(each)))
-            for number, each in enumerate(self._sources, start=1)
-        ]
-
-    @property
-    def _sources(self) -> tuple[str | PathLike[str] | Dataset, ...]:
-        if isinstance(self.data, str | PathLike | Dataset):
-            return (self.data,)
-        return tuple(self.data)
 
     @property
     def fit(self) -> FitSettings:
@@ -166,7 +152,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     if settings.update is not None:
         return _updated(settings, settings.update)
     settings = _with_contact_file(settings)
-    found = settings.read()
+    found = read_datasets(settings.data)
     made_from = {str(path): content_sha256(each) for path, each in found}
     measured, source = merge_files(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
@@ -247,7 +233,7 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
             flag = each.name.replace("_", "-")
             raise IdentificationError(f"--{flag} goes with a calibration, not with --update")
     before = read_json(file, CalibrateResult)
-    found = settings.read()
+    found = read_datasets(settings.data)
     made_from = {str(path): content_sha256(each) for path, each in found}
     _require_new(made_from, before, file)
     measured, source = merge_files(found)

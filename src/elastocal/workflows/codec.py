@@ -1,8 +1,7 @@
 """``codec``: were there enough poses, and which technique is better (paper Algorithm 1)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
-from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,14 +25,14 @@ from elastocal.codec import (
     write_codec_summary,
     write_index_table,
 )
-from elastocal.dataset import content_sha256, merge_files, read, without
+from elastocal.dataset import content_sha256, merge_files, without
 from elastocal.files import filling
 from elastocal.findings import group_alike
 from elastocal.options import Exclude, Marker, Option, ToolFrame
 from elastocal.parallel import one_blas_thread
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._inputs import find_robot
+from elastocal.workflows._inputs import DatasetSource, find_robot, read_datasets
 from elastocal.workflows._workflow import workflow
 
 
@@ -42,8 +41,9 @@ from elastocal.workflows._workflow import workflow
 class CodecSettings(CodecOptions):
     """The readings that are cross-validated, what is compared, and where the files go."""
 
-    data: Annotated[str | PathLike[str] | Sequence[str | PathLike[str]], Option(argument=True)]
-    """Dataset, ``.nc`` or ``.csv``; several are campaigns, as for a calibration."""
+    data: Annotated[DatasetSource, Option(argument=True)]
+    """Dataset, ``.nc`` or ``.csv``; several are campaigns, as for a calibration. In Python also a
+    `Dataset`."""
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder to write the codec into."""
     compare: Annotated[
@@ -140,11 +140,17 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
         If the readings, the robot or a value do not fit; see `cross_validate`.
     FileAccessError
         If a file cannot be read or written, or the folder holds files.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> readings = ec.datasets.fanuc_r2000ic()
+    >>> found = ec.codec(readings, out="codec", compare="springs=actuated,bearing", splits=2)
+    >>> found.files
+    ('codec.nc', 'codec.json', 'codec.svg', 'compliances.svg', 'codec.html')
     """
     variants = make_variants(read_comparisons(settings.compare))
-    given = settings.data
-    paths = [Path(given)] if isinstance(given, str | PathLike) else list(map(Path, given))
-    found = [(path, read(path)) for path in paths]
+    found = read_datasets(settings.data)
     measured, source = merge_files(found)
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)

@@ -155,6 +155,23 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
         If a file cannot be read or written, or its name says another kind.
     ReportError
         If the report knows no such language.
+
+    Examples
+    --------
+    A UR20 whose second joint turns 0.2 deg farther than its controller says.
+
+    >>> import numpy as np
+    >>> import elastocal as ec
+    >>> robot = ec.robot.catalogue.load("UR20")
+    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (30, 6))
+    >>> T_base_tcp = robot.forward(q + np.radians([0.0, 0.2, 0.0, 0.0, 0.0, 0.0]))
+    >>> seen = 1e3 * (T_base_tcp[:, :3, 3] + 0.1 * T_base_tcp[:, :3, 2])
+    >>> heads = [f"{name}[rad]" for name in robot.joint_names]
+    >>> heads = ",".join([*heads, "marker_x[mm]", "marker_y[mm]", "marker_z[mm]"])
+    >>> np.savetxt("seen.csv", np.hstack([q, seen]), delimiter=",", header=heads, comments="")
+    >>> found = ec.geometry("seen.csv", robot="UR20", draws=40)
+    >>> round(float(np.degrees(found.model.parameters[0].value)), 3)
+    0.2
     """
     _check_suffixes(settings)
     language = language_of(settings.language)
