@@ -18,8 +18,8 @@ _MOST_NAMED = 8
 
 NO_MASSES = Kind(
     "geometry.no-masses",
-    "the description of {name} has no masses: its links are taken for bars, and what joints yield"
-    " to their weight (sag) is no more certain than that",
+    "the description of {name} has no masses: its links are taken for bars; what joints and"
+    " bearings yield is no more certain than that",
 )
 SWAPPED = Kind(
     "geometry.markers-swapped",

@@ -40,6 +40,7 @@ _GROUPS = (
     ("turn", 1e3, phrase("turns of joints in mrad")),
     ("offset", 1e3, phrase("zeros of joints in mrad (mm)")),
     ("compliance", 1e6, phrase("yielding of joints in µrad/(N·m) (µm/N)")),
+    ("sag", 1e6, phrase("yielding to assumed masses in µrad/(N·m) (µm/N)")),
     ("bend", 1e6, phrase("bending of bearings in µrad/(N·m)")),
     ("scale", 1e3, phrase("transmission in per mille")),
     ("gear", 1e3, phrase("gears once and twice a turn in mrad")),
