@@ -161,6 +161,10 @@ def test_angles_that_no_function_was_measured_at_are_named_by_every_command(tmp_
         assert note.startswith("2 rows of 3 have a joint where no position was measured within 4.5")
         assert f"({joint} at -57 to -52 deg)" in note
         out.unlink()
+    foreign = tmp_path / "foreign.json"
+    write_model(foreign, calibrated(catalogue.load("UR20")))
+    refused = elastocal("predict", foreign, rows, "--out", out, "--geometry", geometry)
+    assert "the geometry is of an arm with the joints" in refused.reason
     told = elastocal("export", model, "--c", tmp_path / "c", "--geometry", geometry, "--json")
     assert any(f"{joint} -29 to 29 deg" in note for note in json.loads(told.out)["notes"])
 

@@ -9,12 +9,14 @@ its offset ``o``, transmission ``s``, errors of its gear and encoder ``k`` times
 rotation by its compliance under the torque ``tau`` of weight, payload and process force. The
 moments ``m`` of these loads across the joint's axis bend its bearing and the link before it, by the
 compliances ``b``: three turns by ``b m`` about the axes of the frame, one after the other, follow
-``R(r)``, as the virtual joints of `elastocal.elastic` do. A rotation of the placement about the
-joint's own axis is its offset and is not counted twice. The poses of the base and of the markers
-are further unknowns (`elastocal.geometry.problem`). This is the product of
-exponentials about the nominal frames (R. He et al., IEEE Transactions on Robotics 26(3), 2010): it
-needs no case for parallel axes, as Denavit and Hartenberg's parameters do; numbers that the
-positions do not determine are found from the derivatives themselves.
+``R(r)``, as the virtual joints of `elastocal.elastic` do. Where a description has no masses, the
+torque of bars in their place turns a joint by a compliance of its own
+(`elastocal.geometry.assumed_masses`). A rotation of the placement about the joint's own axis is its
+offset and is not counted twice. The poses of the base and of the markers are further unknowns
+(`elastocal.geometry.problem`). This is the product of exponentials about the nominal frames (R. He
+et al., IEEE Transactions on Robotics 26(3), 2010): it needs no case for parallel axes, as Denavit
+and Hartenberg's parameters do; numbers that the positions do not determine are found from the
+derivatives themselves.
 """
 
 from collections.abc import Iterator

@@ -252,8 +252,9 @@ class ArmAsBuilt:
         from elastocal.geometry import AngleCheck
 
         found, payload = known
-        check = AngleCheck(found.functions, robot.joint_names)
-        return UnloadedArm(found.as_drawn(robot), found.tool_of(robot, payload), check)
+        # Refuses another arm first.
+        drawn, tool = found.as_drawn(robot), found.tool_of(robot, payload)
+        return UnloadedArm(drawn, tool, AngleCheck(found.functions, robot.joint_names))
 
     def built(self, robot: Robot) -> "BuiltArm | None":
         """Return the arm as it was built, for a program of its errors; None: it is unknown.
