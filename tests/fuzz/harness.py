@@ -252,7 +252,7 @@ def run_cases(
 
 def _in_child(batch: list[Case], seeds: Path) -> Iterator[Verdict]:
     """Yield verdicts up to the first case that hangs or ends the child."""
-    with tempfile.TemporaryDirectory(prefix="fuzz-", dir=_quick_place(seeds)) as place:
+    with tempfile.TemporaryDirectory(prefix="fuzz-", dir=quick_place(seeds)) as place:
         reading, writing = os.pipe()
         child = os.fork()
         if not child:
@@ -295,9 +295,10 @@ def _processor_time(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def _quick_place(seeds: Path) -> Path:
+def quick_place(seeds: Path) -> Path:
     """Return a folder on the disk of the seeds: they are linked, not copied."""
-    place = seeds.parent / "cases"
+    # Beside the folder of the seeds: what it holds is hashed by the next test that asks for it.
+    place = seeds.parent.with_name(f"{seeds.parent.name}-cases")
     place.mkdir(exist_ok=True)
     return place
 

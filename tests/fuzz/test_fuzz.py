@@ -10,7 +10,7 @@ import pytest
 
 from elastocal.cli.commands import COMMANDS
 from fuzz import harness
-from fuzz.harness import PLAIN, Case, drawn_cases, run_cases
+from fuzz.harness import PLAIN, Case, drawn_cases, quick_place, run_cases
 from fuzz.seeds import KINDS, make_seeds
 from support.by_day import some_by_day
 from support.kept import kept
@@ -39,6 +39,11 @@ def fallen(verdicts) -> list[str]:
         for each in verdicts
         if each.word != "ok"
     ]
+
+
+def test_cases_have_a_place_of_their_own(seeds):
+    """In the folder of the seeds they made another process make these again, under the first."""
+    assert not quick_place(seeds).is_relative_to(seeds.parent)
 
 
 def test_every_command_reads_the_files_as_they_are(seeds):

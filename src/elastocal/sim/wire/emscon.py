@@ -7,7 +7,7 @@ answered "busy".
 """
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -27,6 +27,8 @@ _UNITS = (1.0, 1e3, 1e6, 1.0 / 0.3048, 1.0 / 0.9144, 1.0 / 0.0254)
 _MILLIMETRE = 1
 _REFLECTORS = ((1, "CCR-1.5in"), (2, "CCR-0.5in"), (7, "T-Mac"))
 _STATIONARY, _CONTINUOUS, _PROBE = 0, 1, 7
+_MOST_POINTS = 100
+"""Points of a packet."""
 _STATIONARY_TIME = 0.5
 """Averaging time of a stationary point, in s."""
 _SIZES = {
@@ -201,14 +203,15 @@ class EmsconServer(TcpServer):
         if not len(block):
             return []
         if self.mode != _STATIONARY:
-            return [self._points(block)]
+            return list(self._points(block))
         self._still.extend(block.position)
         if now - self._since < _STATIONARY_TIME:
             return []
         self._measures = False
         return [_status_change(_FOUND), self._single(np.array(self._still), block.sigma[-1])]
 
-    def _points(self, block: PointBlock) -> bytes:
+    def _points(self, block: PointBlock) -> Iterator[bytes]:
+        """Yield packets of points; a clock that leaps brings more than one holds."""
         scale, probe = _UNITS[self._unit], self.mode == _PROBE
         position, rotation = block.position, b""
         if probe:
@@ -228,11 +231,13 @@ class EmsconServer(TcpServer):
                 values += struct.pack("<7d", *sigma, total, 0.0, 0.0, 0.0)
             between = struct.pack("<ii", 0, 1) if probe else b""
             rows.append(struct.pack("<i", self.quality) + between + stamp + values + rotation)
-        head = struct.pack("<iiii", 0, len(rows), self.mode, 0)
-        if probe:
-            head += struct.pack("<5i", 7, 0, 0, 0, 0)
         kind = 5 if probe else 10 if self._extended else 3
-        return _packet(kind, head + struct.pack("<3d", *self.weather) + b"".join(rows))
+        for first in range(0, len(rows), _MOST_POINTS):
+            some = rows[first : first + _MOST_POINTS]
+            head = struct.pack("<iiii", 0, len(some), self.mode, 0)
+            if probe:
+                head += struct.pack("<5i", 7, 0, 0, 0, 0)
+            yield _packet(kind, head + struct.pack("<3d", *self.weather) + b"".join(some))
 
     def _single(self, positions: FloatArray, sigma: FloatArray) -> bytes:
         """Return a stationary point, the mean of some."""
