@@ -123,7 +123,11 @@ def test_a_function_can_be_kept_to_one_thread_too():
 @pytest.mark.parametrize(
     ("module", "first", "run"),
     [
-        ("elastocal.workflows.codec", "read", lambda module: module.codec("a.nc", out="a")),
+        (
+            "elastocal.workflows.codec",
+            "read_datasets",
+            lambda module: module.codec("a.nc", out="a"),
+        ),
         ("elastocal.planning.plan", "require_possible_search", lambda module: module.make_plan(0)),
     ],
 )

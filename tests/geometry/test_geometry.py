@@ -26,6 +26,7 @@ from elastocal.progress import silent
 from elastocal.records import read_json
 from elastocal.robot import GRAVITY, Robot, catalogue, with_joint_origins
 from elastocal.units import split_column
+from support.by_day import some_by_day
 from support.cli import elastocal
 from support.measured_arms import (
     ARMS,
@@ -154,7 +155,8 @@ def test_loads_are_those_of_an_arm_whose_bearings_are_joints(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "payload", "bearings"), [("KR 210 R2700-2", 40.0, 1.5e-7), ("UR20", 10.0, 1e-6)]
+    ("name", "payload", "bearings"),
+    some_by_day([("KR 210 R2700-2", 40.0, 1.5e-7), ("UR20", 10.0, 1e-6)]),
 )
 def test_bearings_that_bend_under_weight_and_payload_are_found(name, payload, bearings):
     planted = {"payloads": (0.0, payload), "compliance": 2.0 * bearings, "bearings": bearings}
@@ -176,7 +178,7 @@ def test_bearings_that_bend_under_weight_and_payload_are_found(name, payload, be
 
 @pytest.mark.parametrize(
     ("name", "payload", "planted", "most"),
-    [("KR 210 R2700-2", 120.0, 6e-7, 2.5), ("UR20", 10.0, 4e-6, 1.2)],
+    some_by_day([("KR 210 R2700-2", 120.0, 6e-7, 2.5), ("UR20", 10.0, 4e-6, 1.2)]),
 )
 def test_an_arm_without_masses_sags_as_bars_do(name, payload, planted, most):
     """The truth has the masses of the catalogue, which the fit does not get."""
