@@ -439,12 +439,9 @@ def _import(given: Given) -> None:
     if here["out"] is None:
         raise typer.BadParameter("is missing: the file to write", param_hint="--out")
     if _purpose(here, "import purpose") == "geometry":
-        positions = workflows.ImportPositionsSettings(
-            asked["logs"], map=here["map"], out=here["out"], force=asked["force"]
-        )
-        if asked.get("picture") is not None:
+        if asked.pop("picture", None) is not None:
             raise typer.BadParameter("is of a dataset", param_hint="--picture")
-        table = workflows.import_positions(positions)
+        table = _worked(workflows.import_positions, given, map=here["map"], out=here["out"])
         _show(given, table.figures, table.show(), f"wrote {table.figures.table}")
         return
     result = _worked(workflows.import_logs, given, map=here["map"], out=here["out"])

@@ -196,13 +196,12 @@ class GeometryModel:
         data : Positions
             Joints, loads and stations; its markers are not used.
         """
-        T = frames(self.robot, data.q, self._loads(data), self.errors).T_base_tcp
+        robot = self.weighed
+        loads = joint_loads(robot, data, assumed=self.sag is not None)
+        T = frames(robot, data.q, loads, self.errors).T_base_tcp
         points = T[:, None, :3, 3] + np.einsum("nij,mj->nmi", T[:, :3, :3], self.markers)
         S = np.stack([self.stations[name] for name in data.station.tolist()])
         return np.asarray(S[:, None, :3, 3] + np.einsum("nij,nmj->nmi", S[:, :3, :3], points))
-
-    def _loads(self, data: Positions) -> JointLoads:
-        return joint_loads(self.weighed, data, assumed=self.sag is not None)
 
     def tool_of(self, robot: Robot, payload: Payload | None = None) -> Callable[..., FloatArray]:
         """Return the function that gives the tool's position of the same arm without process force.
@@ -225,11 +224,13 @@ class GeometryModel:
         GeometryError
             If it is another arm.
         """
-        own, errors, T_tcp_tool = self.robot, self.errors, self.tools(robot)[1]
+        own, errors, T_tcp_tool = self.weighed, self.errors, self.tools(robot)[1]
+        assumed = self.sag is not None
         weight = Payload() if payload is None else payload
 
         def stands(q: FloatArray) -> FloatArray:
-            T = frames(own, q, self._loads(Positions.unloaded(q, weight)), errors).T_base_tcp
+            loads = joint_loads(own, Positions.unloaded(q, weight), assumed=assumed)
+            T = frames(own, q, loads, errors).T_base_tcp
             return np.asarray((T @ T_tcp_tool)[:, :3, 3])
 
         return stands

@@ -123,18 +123,14 @@ def import_positions(
     streams = merged(logs, site)
     by_word = next((log for log in logs if log.arm is not None and log.handshake), None)
     at_rest = standing(streams, site, by_word)
-    free = at_rest.bare
+    named = at_rest.bare
     if len(streams.wrench.time):
         states = [each.tool for each in at_rest.readings]
-        free = name_loads(free, states, site.sensor, log_map.load_cases)
-    spans = [(each.start, each.end) for each in free if each.pose >= 0 and each.load is None]
+        named = name_loads(named, states, site.sensor, log_map.load_cases)
+    free = [each for each in named if each.pose >= 0 and each.load is None]
+    spans = [(each.start, each.end) for each in free]
     astray = () if still else tuple(marker_contradictions(streams, spans, site))
-    seen = [
-        each
-        for plateau in free
-        if plateau.pose >= 0 and plateau.load is None
-        for each in _rows(plateau, streams, logs, at_rest.least)
-    ]
+    seen = [each for plateau in free for each in _rows(plateau, streams, logs, at_rest.least)]
     if len({pose for *_, pose in seen}) < _LEAST:
         poses = counted(len({pose for *_, pose in seen}), "pose")
         raise LogError(

@@ -26,6 +26,7 @@ from elastocal.workflows._inputs import (
     ArmAsBuilt,
     NewTool,
     TouchedArm,
+    UnloadedArm,
     coverage_notes,
     growth_notes,
     require_model_of_arm,
@@ -158,12 +159,13 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
     load = read_sensor_load(settings.tool, calibrated.model.robot)
     state = settings.growth(calibrated.model.robot)
     built = settings.built(calibrated.model.robot)
+    arm = settings.unloaded(calibrated.model.robot)
     try:
         numbers = design(calibrated, chosen, load, state, built)
     except CompensationError as error:
         raise CompensationError(f"{name}: {error}") from error
     if numbers.arm_error is not None:
-        _require_agreement(settings, calibrated.model.robot, numbers.arm_error)
+        _require_agreement(arm, numbers.arm_error)
     on_production = calibrated.on_production
     beside = {} if around is None else linux_files(numbers, around[0])
     files = write_c(settings.out, numbers, settings.force, beside)
@@ -183,25 +185,23 @@ def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noq
             *((_NO_TOOL,) if settings.tool is None else ()),
             *growth_notes(state),
             *((_ARM_ERROR,) if built is not None else ()),
-            *_measured_angles(settings, calibrated.model.robot),
+            *_measured_angles(arm),
         ),
         on_production=on_production,
     )
 
 
-def _measured_angles(settings: ExportSettings, robot: Robot) -> tuple[str, ...]:
+def _measured_angles(arm: UnloadedArm) -> tuple[str, ...]:
     """Return where the statements hold, if functions of joints are among them."""
-    angles = settings.unloaded(robot).angles
-    ranges = "" if angles is None else angles.ranges
+    ranges = "" if arm.angles is None else arm.angles.ranges
     return (_MEASURED_ANGLES.format(ranges=ranges),) if ranges else ()
 
 
-def _require_agreement(settings: ExportSettings, robot: Robot, error: Routine) -> None:
+def _require_agreement(arm: UnloadedArm, error: Routine) -> None:
     """Refuse statements that give something else than the geometry, before C is made of them."""
-    arm = settings.unloaded(robot)
     q = probe_configurations(arm.controller)
     known = present(arm.tool, "geometry")(q) - arm.controller.forward(q)[:, :3, 3]
-    of = compiled(error, len(robot.joint_names), loaded=False)
+    of = compiled(error, len(arm.controller.joint_names), loaded=False)
     off = float(np.abs(np.array([of(each) for each in q.tolist()]) - known).max())
     if not off <= _AGREEMENT:
         raise CompensationError(

@@ -104,6 +104,7 @@ class _Loads:
         self._pull = program.constant_vector("payload", arm.payload * np.asarray(robot.gravity))
         centre = program.constant_vector("payload_centre", arm.payload_centre)
         self._at = program.transformed("hung", drawn.tcp.rotation, centre, drawn.tcp.origin)
+        self._moments: dict[str, Vector] = {}
 
     def torque(self, k: int, *, payload: bool, weight: bool) -> Value:
         """Write the torque of payload, of the arm's weight, or of both along a joint's axis."""
@@ -113,7 +114,7 @@ class _Loads:
         axis = program.transformed(f"axis_y{k + 1}", rotation, along, NOTHING)
         label = f"y{k + 1}{'p' * payload}{'w' * weight}"
         if joint.revolute:
-            load = self._moment(k, label, payload, weight)
+            load = self._moment(k, label, payload=payload, weight=weight)
         else:
             parts = [(ONE, self._pull)] if payload else []
             if weight and self._weights is not None:
@@ -123,7 +124,7 @@ class _Loads:
 
     def about(self, k: int) -> Vector:
         """Write the moments of both about the axes of a joint's frame."""
-        whole = self._moment(k, f"b{k + 1}", payload=True, weight=True)
+        whole = self._moment(k, f"y{k + 1}pw", payload=True, weight=True)
         rotation = self._drawn.joints[k].proximal.rotation
         x, y, z = (
             self._program.dot(f"about{k + 1}_{name}", (a, b, c), whole)
@@ -131,7 +132,10 @@ class _Loads:
         )
         return x, y, z
 
-    def _moment(self, k: int, label: str, payload: bool, weight: bool) -> Vector:
+    def _moment(self, k: int, label: str, *, payload: bool, weight: bool) -> Vector:
+        """Write a moment about a joint's origin, once for its torque and its bearing."""
+        if label in self._moments:
+            return self._moments[label]
         program, origin = self._program, self._drawn.joints[k].proximal.origin
         parts: list[tuple[Value, Vector]] = []
         if payload:
@@ -139,7 +143,8 @@ class _Loads:
             parts.append((ONE, program.cross(f"of_{label}", lever, self._pull)))
         if weight and self._weights is not None:
             parts.append((ONE, self._weights.moment(label, k, origin)))
-        return program.weighted_sum(f"moment_{label}", parts)
+        self._moments[label] = program.weighted_sum(f"moment_{label}", parts)
+        return self._moments[label]
 
 
 def _moved(program: Program, k: int, arm: BuiltArm, loads: _Loads, *, turns: bool) -> Value:
