@@ -18,22 +18,25 @@ tests units end-to-end browser slow: export OMP_NUM_THREADS := 1
 # start as they do for users.
 tests units end-to-end browser: export LOKY_MAX_CPU_COUNT := 1
 
-.PHONY: demo test checks lint tests units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
+.PHONY: demo test style types lint tests units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
 
-test: checks tests
+# What a second finds comes first. All else shares the processors, so that none of them waits while a
+# test waits for a socket or a browser.
+test: $(VENV)/installed-fuzz style
+	$(MAKE) --no-print-directory -j4 tests types docs-strict fuzz-lines
 
-# Type checker and site keep one processor busy each; what fuzzes has its time beside them.
-checks: $(VENV)/installed-fuzz
-	$(MAKE) --no-print-directory -j3 lint docs-strict fuzz-lines
+lint: style types
 
-lint: $(VENV)/installed-dev
+style: $(VENV)/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+types: $(VENV)/installed-dev
+	$(BIN)/mypy
 
 # All at once: every process collects the suite once, and where a browser is waited for others work.
 tests: $(VENV)/installed-dev
