@@ -16,6 +16,8 @@ from elastocal import dataset
 from elastocal.cli import main
 from elastocal.cli.commands import COMMANDS
 from elastocal.identification import write_model
+from elastocal.procedure import RunFolder
+from support import reported
 from support.cells import Cell, linear_truth, robot, unseen, urdf
 from support.cli import elastocal
 from support.geared import geared
@@ -378,3 +380,30 @@ def test_every_number_of_repetitions_has_a_bound():
     }
     assert len(counts) > 12
     assert [name for name, most in counts.items() if most is None] == []
+
+
+def test_the_folder_of_a_run_stands_for_its_dataset(tmp_path):
+    run = reported.finished() / "run"
+    made = [
+        elastocal("calibrate", source, "--springs", "actuated", "--draws", 40, "--out", out)
+        for source, out in ((run, tmp_path / "a.json"), (run / "dataset.nc", tmp_path / "b.json"))
+    ]
+    assert [each.code for each in made] == [0, 0]
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("journal", "message"),
+    [
+        (None, "the folder is no run: allowed are a dataset (.nc, .csv) and the folder of a run"),
+        ("", "the run has no dataset: `elastocal derive {folder}` makes it of its record"),
+    ],
+)
+def test_a_folder_without_a_dataset_is_refused(tmp_path, journal, message):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    if journal is not None:
+        RunFolder(folder).journal.write_text(journal)
+    done = elastocal("calibrate", folder, "--out", tmp_path / "model.json")
+    assert done.code == 1
+    assert done.err.strip() == f"elastocal: {folder}: {message.format(folder=folder)}"

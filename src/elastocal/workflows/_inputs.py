@@ -18,6 +18,7 @@ from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset, read, require_joint_names
 from elastocal.errors import (
     CompensationError,
+    DatasetError,
     ElastocalError,
     GeometryError,
     RobotError,
@@ -140,12 +141,12 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
 
 
 DatasetSource = str | PathLike[str] | Dataset | Sequence[str | PathLike[str] | Dataset]
-"""A dataset, or the file that holds it, or several of either."""
+"""A dataset, the file that holds it, the folder of a run, or several of them."""
 
 
 def dataset_files(source: DatasetSource) -> tuple[Path, ...]:
-    """Return those datasets that are files."""
-    return tuple(Path(each) for each in _each(source) if not isinstance(each, Dataset))
+    """Return the files of those datasets that are in files."""
+    return tuple(_file(Path(each)) for each in _each(source) if not isinstance(each, Dataset))
 
 
 def read_datasets(source: DatasetSource) -> list[tuple[Path, Dataset]]:
@@ -154,16 +155,35 @@ def read_datasets(source: DatasetSource) -> list[tuple[Path, Dataset]]:
     Raises
     ------
     DatasetError, SchemaError
-        If a file holds no dataset.
+        If a file holds no dataset, or a folder is no run that has one.
     FileAccessError
         If it cannot be read.
     """
     return [
         (Path(f"dataset {number}"), each)
         if isinstance(each, Dataset)
-        else (Path(each), read(Path(each)))
+        else (file := _file(Path(each)), read(file))
         for number, each in enumerate(_each(source), start=1)
     ]
+
+
+def _file(path: Path) -> Path:
+    """Return the file of a dataset: that of a run, where its folder is given."""
+    if not path.is_dir():
+        return path
+    from elastocal.procedure import RunFolder  # its import takes longer than a calibration
+
+    run = RunFolder(path)
+    if not run.journal.is_file():
+        raise DatasetError(
+            f"{path}: the folder is no run: allowed are a dataset (.nc, .csv) and the folder of a"
+            " run"
+        )
+    if not run.dataset.is_file():
+        raise DatasetError(
+            f"{path}: the run has no dataset: `elastocal derive {path}` makes it of its record"
+        )
+    return run.dataset
 
 
 def _each(source: DatasetSource) -> tuple[str | PathLike[str] | Dataset, ...]:

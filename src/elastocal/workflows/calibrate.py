@@ -62,8 +62,8 @@ class CalibrateSettings(FitSettings):
     """Settings of a calibration: readings, springs and fit."""
 
     data: Annotated[DatasetSource, Option(argument=True)]
-    """Dataset, ``.nc`` or ``.csv``; several are campaigns, whose poses are renumbered. In
-    Python also a `Dataset`."""
+    """Dataset, ``.nc`` or ``.csv``, or the folder of a run; several are campaigns, whose poses are
+    renumbered. In Python also a `Dataset`."""
     # Wider than what a model file keeps of it; see `fit`.
     springs: Annotated[str | Iterable[Spring], Option(choices="springs", file=True)] = field(
         default="auto", kw_only=True

@@ -42,8 +42,8 @@ class CodecSettings(CodecOptions):
     """The readings that are cross-validated, what is compared, and where the files go."""
 
     data: Annotated[DatasetSource, Option(argument=True)]
-    """Dataset, ``.nc`` or ``.csv``; several are campaigns, as for a calibration. In Python also a
-    `Dataset`."""
+    """Dataset, ``.nc`` or ``.csv``, or the folder of a run; several are campaigns, as for a
+    calibration. In Python also a `Dataset`."""
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder to write the codec into."""
     compare: Annotated[
