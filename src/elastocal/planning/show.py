@@ -29,7 +29,7 @@ def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
         (phrase("Poses"), str(len(plan.poses))),
         (phrase("Covering radius"), radius),
         (phrase("Total time"), duration(plan.total_time)),
-        (phrase("of it on the way"), duration(plan.travel_time)),
+        (phrase("travel between poses"), duration(plan.travel_time)),
         (
             phrase("Points with a posture"),
             phrase("{rank} of {all}", rank=pool.valid, all=pool.sampled),

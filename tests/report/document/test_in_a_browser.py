@@ -4,6 +4,7 @@ Screenshots go to the folder that the environment names in ``ELASTOCAL_ARTEFACTS
 """
 
 import base64
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -333,3 +334,14 @@ def test_the_certificate_alone_is_one_sheet_in_every_language_whatever_it_has_to
 
 SIZES = """(({ scrollHeight, clientHeight }) => [scrollHeight, clientHeight])(
   document.querySelector(".certificate"))"""
+
+
+def test_the_head_of_a_first_column_stands_over_it(browser, plan):
+    heads = """JSON.stringify([...document.querySelectorAll("table")].map((table) =>
+      [table.tHead.rows[0].cells[0], table.tBodies[0].rows[0].cells[0]]
+        .map((each) => getComputedStyle(each).textAlign)))"""
+    with open_tab(browser) as tab:
+        tab.open(plan)
+        sides = json.loads(tab.evaluate(heads))
+    assert sides
+    assert all(head == body for head, body in sides)
