@@ -591,8 +591,16 @@ class Dataset(Result):
 
     @classmethod
     def from_xarray(cls, data: "xr.Dataset") -> "Dataset":
-        """Return the dataset of an `xarray.Dataset`; see `from_labelled`."""
-        return cls.from_labelled(labelled_from_xarray(data))
+        """Return the dataset of an `xarray.Dataset`, as plausible as one of a file.
+
+        Raises
+        ------
+        DatasetError, SchemaError
+            As `from_labelled` and `require_plausible`.
+        """
+        dataset = cls.from_labelled(labelled_from_xarray(data))
+        dataset.require_plausible()
+        return dataset
 
     def to_labelled(self) -> LabelledArrays:
         """Return the arrays with their labels, units and meanings, as the NetCDF file has them."""

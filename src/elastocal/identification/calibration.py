@@ -108,7 +108,7 @@ WORSE_THAN_NONE = replace(
 OTHER_CONTACT = Kind(
     "calibration.other-contact",
     "the readings have the {name} compliance of the contact at {found} nm/N, where the contact"
-    " file states {stated} nm/N: does it describe this tip or disk?",
+    " file states {stated} nm/N: does it describe this tip or disk, and are the forces in N?",
     shown={"found": as_number(".3g", 1e9), "stated": as_number(".3g", 1e9)},
 )
 SILENT_ENCODERS = Kind(
@@ -408,7 +408,8 @@ def _fitted_mistakes(
     if options.free_frame != "none" or any(each.grade is Grade.REFUSAL for each in seen):
         return []
     # Other readings of a marker's columns can be tried where there is a marker throughout.
-    found = () if options.contact else find_undone(model.robot, readings, marker_offset)
+    held = readings.contacts is not None and bool(np.any(readings.contacts > 0))
+    found = () if held else find_undone(model.robot, readings, marker_offset)
     if not (seen or found):
         found = tuple(find_wrong_units(model.robot, readings, marker_offset))
     return _stated(found, options)

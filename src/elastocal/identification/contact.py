@@ -138,8 +138,15 @@ class Contact:
         Raises
         ------
         IdentificationError
-            If a stiffness, a share or a length is not above 0, or beyond that of any contact.
+            If a stiffness, a share or a length is no number, not above 0, or beyond that of any
+            contact.
         """
+        for name in (NORMAL, LATERAL, "uncertainty", "spread", "stop", "slip"):
+            if isinstance(value := getattr(self, name), str):
+                raise IdentificationError(
+                    f"contact.{name} is {value!r}: in Python a number in SI units, in a contact"
+                    " file a quantity with its unit"
+                )
         for name in (NORMAL, LATERAL):
             value = getattr(self, name)
             if value is not None and not _SOFTEST <= value <= _STIFFEST:
@@ -263,6 +270,42 @@ def require_metrology(readings: Readings) -> None:
         " leave them out (--exclude), or give what is known of the contact that holds the tool"
         " there (calibrate --contact CONTACT.yaml)"
     )
+
+
+def require_pressed(robot: Robot, readings: Readings) -> None:
+    """Refuse readings of which none is by contact, or that no contact can have made.
+
+    A tooling pushes the tool away and cannot pull it: under the reference as under a load, the
+    force on the robot points out of the surface, against the z axis of the tcp.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the first pose that is pulled, or the column that leaves nothing to the contact.
+    """
+    held = np.zeros(len(readings), dtype=bool) if readings.contacts is None else readings.contacts > 0
+    if not held.any():
+        raise IdentificationError(
+            "a contact is stated, and marker_displacement has a number at every reading: the"
+            " contact holds the tool only where no tracker measured; leave the contact out, or"
+            " the column (an empty cell is no 0)"
+        )
+    z = robot.forward(readings.joint_position)[:, :3, 2]
+    forces = {"force": readings.force, "reference_force": readings.reference_force}
+    for name, force in forces.items():
+        if force is None:
+            continue
+        pull = np.einsum("ri,ri->r", z, force)
+        pulled = held & (pull > _SIDEWAYS * np.linalg.norm(readings.force, axis=1))
+        if pulled.any():
+            row = int(np.flatnonzero(pulled)[0])
+            poses = len(np.unique(readings.pose[pulled]))
+            raise IdentificationError(
+                f"{name} of pose {readings.pose[row]}, load case {str(readings.load_case[row])!r},"
+                f" pulls the tool into the surface by {pull[row]:.0f} N ({poses} such poses), and a"
+                " contact only pushes it away: is its sign turned, is it in another frame than"
+                " base, or of another pose?"
+            )
 
 
 @brief_repr

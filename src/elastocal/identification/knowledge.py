@@ -26,6 +26,7 @@ from elastocal.identification.contact import (
     Contact,
     guessed,
     is_doubled,
+    require_pressed,
     with_doubled,
 )
 from elastocal.identification.observability import find_hidden, likely_sizes, observability
@@ -213,10 +214,12 @@ def weigh_contact(
     Raises
     ------
     IdentificationError
-        If bearing springs too imitate a compliance of the contact that is free.
+        If no reading is by contact, one is pulled, or bearing springs too imitate a compliance of
+        the contact that is free.
     """
     if options.contact is None:
         return options
+    require_pressed(robot, readings)
     plain = replace(options, prior=None)
     if is_doubled(readings):
         # The arm's part in the differences needs a fit, of any springs that fit at all.

@@ -121,8 +121,8 @@ def normalised_residuals(
     error = problem.own_errors(problem.residuals(compliance), problem.weight)
     norms = np.linalg.norm(error, axis=1) / shrinkage
     sigma = np.median(norms) / MEDIAN_NORM
-    # Exact data have a median residual of zero.
-    smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
+    # Exact data have a median residual of zero, and no deflection is none to divide by.
+    smallest = np.finfo(float).eps * float(np.abs(problem.d).max()) or 1.0
     return np.asarray(norms / max(sigma, smallest))
 
 

@@ -631,7 +631,7 @@ class _Found:
 def _plainest(possible: Sequence[_Ranked]) -> tuple[OtherReading, Sequence[str]]:
     """Return the plainest of the readings that explain about as much as the best, and another."""
     least, _, first = possible[0]
-    near = [each for each in possible if each[0] < (_EQUAL if each[2].certain else _ALIKE) * least]
+    near = [each for each in possible if each[0] <= (_EQUAL if each[2].certain else _ALIKE) * least]
     if first.certain:
         near = sorted((each for each in near if each[2].certain), key=lambda each: each[1])
     return near[0][2], [each.message for _, _, each in near[1:2]]
