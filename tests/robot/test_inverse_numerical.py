@@ -115,13 +115,7 @@ class TestNumericalInverse:
 class TestNearOpwInverse:
     """An arm that is OPW but for the digits of its file."""
 
-    urdf = opw_arm_urdf(**KR_LIKE)
-    tilted = Robot.from_urdf(
-        urdf.replace('rpy="0 0 0"', 'rpy="4e-6 0 3e-6"').replace(
-            'rpy="0.0 0.0 0.0"', 'rpy="4e-6 0 3e-6"'
-        ),
-        "tcp",
-    )
+    tilted = Robot.from_urdf(opw_arm_urdf(**KR_LIKE, skew=4e-6), "tcp")
 
     def test_digits_of_the_file_do_not_cost_the_closed_form(self):
         assert type(inverse_for(self.tilted)) is NearOpwInverse

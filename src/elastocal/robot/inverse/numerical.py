@@ -389,7 +389,7 @@ class NearOpwInverse(OpwInverse):
 
     The descents of `NumericalInverse` start at the branches of the nearest OPW arm, so that
     eight of them do what takes 96 random ones. Within the arm's deviation of a singular pose a
-    branch may be lost.
+    branch may be lost; where all are, the random starts are tried.
 
     Raises
     ------
@@ -408,6 +408,10 @@ class NearOpwInverse(OpwInverse):
         descent = NumericalInverse(self.robot)
         q = descent.descend(q, T_base_tcp[pose], characteristic_length(self.robot))
         arm[pose, branch] = q[:, self.robot.external_axes :]
+        reached = np.zeros(len(arm), dtype=bool)
+        reached[pose[reaches(self.robot, q, T_base_tcp[pose])]] = True
+        lost = np.setdiff1d(pose, np.nonzero(reached)[0])
+        arm[lost] = descent.candidates(T_base_tcp[lost], external[lost])[:, : self.branches]
         return arm
 
 
