@@ -8,7 +8,7 @@ import pytest
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
 from elastocal.robot.inverse import OpwInverse, pose_error
-from elastocal.robot.inverse.numerical import NumericalInverse
+from elastocal.robot.inverse.numerical import NearOpwInverse, NumericalInverse, inverse_for
 from elastocal.robot.inverse.solver import InverseKinematics, distinct
 from support.urdfs import KR_LIKE, offset_wrist_urdf, opw_arm_urdf, planar_arm_urdf
 
@@ -110,3 +110,28 @@ class TestNumericalInverse:
     def test_no_work_is_refused(self, name):
         with pytest.raises(RobotError, match=f"{name} = 0: must be at least 1"):
             NumericalInverse(ARM, **{name: 0})
+
+
+class TestNearOpwInverse:
+    """An arm that is OPW but for the digits of its file."""
+
+    tilted = Robot.from_urdf(opw_arm_urdf(**KR_LIKE, skew=4e-6), "tcp")
+
+    def test_digits_of_the_file_do_not_cost_the_closed_form(self):
+        assert type(inverse_for(self.tilted)) is NearOpwInverse
+        assert type(inverse_for(ARM)) is OpwInverse
+
+    def test_it_returns_as_many_branches_as_the_arm_without_them(self):
+        q = np.random.default_rng(3).uniform(-2.5, 2.5, (50, 6))
+        found = inverse_for(self.tilted).solve_many(self.tilted.forward(q))
+        exact = inverse_for(ARM).solve_many(ARM.forward(q))
+        np.testing.assert_array_equal(found.exists.sum(axis=1), exact.exists.sum(axis=1))
+        gap = np.abs(found.q - q[:, None])
+        gap = np.abs(np.angle(np.exp(1j * gap))).max(axis=-1)
+        assert np.nanmin(gap, axis=1).max() < 1e-6
+
+    @pytest.mark.parametrize("bend", [0.0, 1e-5, 1e-3])
+    def test_a_straight_wrist_is_reached(self, bend):
+        q = np.random.default_rng(4).uniform(-1.0, 1.0, (50, 6))
+        q[:, 4] = bend
+        assert inverse_for(self.tilted).solve_many(self.tilted.forward(q)).reachable.all()

@@ -81,7 +81,7 @@ class ReportSettings:
     force: bool = False
     """Replace a report that is there."""
     sign: Annotated[Path | None, Option(metavar="KEY")] = None
-    """Private key that signs the report; see `elastocal.verdict.make_key`."""
+    """Private key that signs the report; made by `elastocal verify --new-key`."""
     language: Annotated[str, Option(choices="page language")] = "en"
     """Language of the report."""
     xlsx: bool = False

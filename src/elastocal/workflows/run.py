@@ -103,7 +103,7 @@ class RunSettings:
     """Seed of simulated devices; by default the cell's."""
     operator: Operator = field(default_factory=Unattended)
     sign: Annotated[Path | None, Option(metavar="KEY")] = None
-    """Private key that signs the journal at the end; see `elastocal.verdict.make_key`."""
+    """Private key that signs the journal at the end; made by `elastocal verify --new-key`."""
     state: Statements = field(default_factory=dict)
     """Statements for the certificate, in addition to the cell file's: see
     `elastocal.cell.read_statements`."""

@@ -18,7 +18,7 @@ from elastocal.errors import RobotError
 from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.robot.inverse.arm import AxisLines, arm_axes, arm_base, arm_joints, nearest_zero
-from elastocal.robot.inverse.opw import NotOrthoParallelError, OpwInverse
+from elastocal.robot.inverse.opw import NotOrthoParallelError, OpwInverse, derive_opw
 from elastocal.robot.inverse.solver import InverseKinematics, distinct, pose_error, reaches
 from elastocal.robot.robot import Robot
 from elastocal.robot.singularity import characteristic_length
@@ -225,6 +225,11 @@ _SAME = 1e-4
 """Two ends of a descent nearer than this (rad, m) are one solution, found twice."""
 _CONVERGED = 1e-11
 _LARGEST_STEP = 1.0
+_NEAR = 1e-4
+"""Largest deviation (m, rad) from OPW of an arm that is OPW but for the digits of its file.
+
+`1.5708` for a quarter turn is off by 4e-6 rad.
+"""
 
 
 def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
@@ -239,7 +244,7 @@ def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
 
     Returns
     -------
-    OpwInverse, ParallelInverse or NumericalInverse
+    OpwInverse, ParallelInverse, NearOpwInverse or NumericalInverse
         The last one's ``reason`` says what the closed forms failed on.
     """
     try:
@@ -249,7 +254,11 @@ def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
     try:
         return ParallelInverse(robot)
     except NotParallelError as error:
-        return NumericalInverse(robot, seed=seed, reason=f"{reason}; {error}")
+        reason = f"{reason}; {error}"
+    try:
+        return NearOpwInverse(robot)
+    except NotOrthoParallelError:
+        return NumericalInverse(robot, seed=seed, reason=reason)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -299,7 +308,7 @@ class NumericalInverse(InverseKinematics):
         for slots, T, fixed in zip(found, T_base_tcp, external, strict=True):
             q = np.hstack([np.tile(fixed, (len(arm_starts), 1)), arm_starts])
             poses = np.broadcast_to(T, (len(q), 4, 4))
-            q = self._descend(q, poses, length)
+            q = self.descend(q, poses, length)
             arm = q[reaches(self.robot, q, poses)][:, self.robot.external_axes :]
             arm = nearest_zero(self.robot, arm)
             arm = arm[np.isfinite(arm).all(axis=-1)]
@@ -324,7 +333,7 @@ class NumericalInverse(InverseKinematics):
             NaN if the descent ends elsewhere, or outside the limits.
         """
         pose = T_base_tcp[None]
-        found = self._descend(q[None], pose, characteristic_length(self.robot))
+        found = self.descend(q[None], pose, characteristic_length(self.robot))
         inside = self.robot.limits.margin(found).min() >= 0.0
         return (
             found[0] if inside and reaches(self.robot, found, pose)[0] else np.full(len(q), np.nan)
@@ -342,8 +351,18 @@ class NumericalInverse(InverseKinematics):
         rng = np.random.default_rng(self.seed)
         return rng.uniform(lower, np.maximum(lower, upper), (self.starts, len(lower)))
 
-    def _descend(self, q: FloatArray, T_base_tcp: FloatArray, length: float) -> FloatArray:
-        """Return ``q`` after damped Gauss-Newton steps on the pose error, each row its own."""
+    def descend(self, q: FloatArray, T_base_tcp: FloatArray, length: float) -> FloatArray:
+        """Return ``q`` after damped Gauss-Newton steps on the pose error, each row its own.
+
+        Parameters
+        ----------
+        q : ndarray, shape (row, joint)
+            Starts, in rad or m; external axes stay there.
+        T_base_tcp : ndarray, shape (row, 4, 4)
+            Pose that each row descends to, in m.
+        length : float
+            Distance in m that counts as much as a radian.
+        """
         scale = np.repeat([1.0 / length, 1.0], 3)
         fixed = self.robot.external_axes
         q = q.copy()
@@ -362,6 +381,38 @@ class NumericalInverse(InverseKinematics):
             q[going[better]], error[going[better]] = trial[better], after[better]
             damping[going] = np.maximum(damping[going] * np.where(better, 0.2, 5.0), 1e-12)
         return q
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NearOpwInverse(OpwInverse):
+    """The branches of an arm that misses OPW by the digits of its file.
+
+    The descents of `NumericalInverse` start at the branches of the nearest OPW arm, so that
+    eight of them do what takes 96 random ones. Within the arm's deviation of a singular pose a
+    branch may be lost; where all are, the random starts are tried.
+
+    Raises
+    ------
+    NotOrthoParallelError
+        If the arm is farther from OPW than 1e-4 m or rad.
+    """
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "geometry", derive_opw(self.robot, _NEAR))
+
+    def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
+        """Return the branches after their descent; see `InverseKinematics.candidates`."""
+        arm = super().candidates(T_base_tcp, external)
+        pose, branch = np.nonzero(np.isfinite(arm).all(axis=-1))
+        q = np.hstack([external[pose], arm[pose, branch]])
+        descent = NumericalInverse(self.robot)
+        q = descent.descend(q, T_base_tcp[pose], characteristic_length(self.robot))
+        arm[pose, branch] = q[:, self.robot.external_axes :]
+        reached = np.zeros(len(arm), dtype=bool)
+        reached[pose[reaches(self.robot, q, T_base_tcp[pose])]] = True
+        lost = np.setdiff1d(pose, np.nonzero(reached)[0])
+        arm[lost] = descent.candidates(T_base_tcp[lost], external[lost])[:, : self.branches]
+        return arm
 
 
 def _damped_step(J: FloatArray, error: FloatArray, damping: FloatArray) -> FloatArray:

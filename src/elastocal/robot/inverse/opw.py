@@ -229,7 +229,7 @@ def _wrist(R: FloatArray, wrist: int, rest: float) -> FloatArray:
     return np.stack([theta4, theta5, theta6], axis=-1)
 
 
-def derive_opw(robot: Robot) -> OpwGeometry:
+def derive_opw(robot: Robot, tolerance: float = _EXACT) -> OpwGeometry:
     """Return the OPW geometry of a robot's arm, certified against its forward kinematics.
 
     Only the lines of the joint axes at q = 0 count: not the frames, their names, how the arm
@@ -239,6 +239,8 @@ def derive_opw(robot: Robot) -> OpwGeometry:
     ----------
     robot : Robot
         A robot whose last six joints are the arm.
+    tolerance : float
+        Largest deviation of an axis and of the forward kinematics, in m and rad.
 
     Raises
     ------
@@ -250,31 +252,31 @@ def derive_opw(robot: Robot) -> OpwGeometry:
         kinds = ", ".join("revolute" if joint.revolute else "prismatic" for joint in joints)
         raise NotOrthoParallelError(f"{robot.name}: the arm must be six revolute joints: {kinds}")
     axes = arm_axes(robot)
-    centre = _wrist_centre(robot, axes)
+    centre = _wrist_centre(robot, axes, tolerance)
     T_arm_opw = _opw_base(axes)
     parameters = _parameters(axes, centre, T_arm_opw)
     T_arm_flange = T_arm_opw @ parameters.forward(np.array(parameters.offsets))
     T_flange_tcp = inverse_transform(T_arm_flange) @ axes.T_arm_tcp
     deviation = _deviation(robot, parameters, T_arm_opw, T_flange_tcp)
-    if not deviation <= _EXACT:
+    if not deviation <= tolerance:
         raise NotOrthoParallelError(
             f"{robot.name}: its OPW model differs from the robot by {deviation:.3g} m or rad"
-            f" (allowed {_EXACT:g})"
+            f" (allowed {tolerance:g})"
         )
     return OpwGeometry(parameters, T_arm_opw, T_flange_tcp, deviation)
 
 
-def _wrist_centre(robot: Robot, axes: AxisLines) -> FloatArray:
+def _wrist_centre(robot: Robot, axes: AxisLines, tolerance: float) -> FloatArray:
     """Check every geometric condition of an OPW arm and return its wrist centre."""
     p, d = axes.point, axes.direction
     names = [joint.name for joint in arm_joints(robot)]
 
     def require(off: float, condition: str, *which: int) -> None:
-        if not off <= _EXACT:
+        if not off <= tolerance:
             axes_named = ", ".join(names[index - 1] for index in which)
             raise NotOrthoParallelError(
                 f"{robot.name}: the axes of {axes_named} must {condition}: off by {off:.3g} m or"
-                f" rad (allowed {_EXACT:g})"
+                f" rad (allowed {tolerance:g})"
             )
 
     require(float(np.linalg.norm(np.cross(d[1], d[2]))), "be parallel", 2, 3)
@@ -285,7 +287,7 @@ def _wrist_centre(robot: Robot, axes: AxisLines) -> FloatArray:
     off = max(_distance(centre, p[4], d[4]), _distance(centre, p[5], d[5]))
     require(off, "meet in one point (spherical wrist)", 4, 5, 6)
     for i, what in ((1, p[2]), (2, centre)):
-        if not _distance(what, p[i], d[i]) > _EXACT:
+        if not _distance(what, p[i], d[i]) > tolerance:
             ends = f"{names[i]} and {names[i + 1]}" if i == 1 else f"{names[i]} and the wrist"
             raise NotOrthoParallelError(f"{robot.name}: the link between {ends} has no length")
     return centre
