@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 
 from elastocal.dataset import Dataset, read, write
+from elastocal.dataset._labelled import labelled_from_xarray
 from elastocal.errors import DatasetError, FileAccessError, SchemaError
 from support.datasets import dataset, datasets
 
@@ -58,7 +59,9 @@ def test_a_refusal_names_the_file(tmp_path, name):
     good = read(path).to_xarray()
     bad = good.assign(force=good["force"] * 0.0)
     bad["force"].attrs = good["force"].attrs
-    write(Dataset.from_xarray(bad), path)
+    with pytest.raises(DatasetError, match="^force is zero"):
+        Dataset.from_xarray(bad)
+    write(Dataset.from_labelled(labelled_from_xarray(bad)), path)
     with pytest.raises(DatasetError) as caught:
         read(path)
     assert str(caught.value) == f"{path}: force is zero in all 6 usable readings: nothing to fit"

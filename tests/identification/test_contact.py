@@ -188,4 +188,33 @@ def test_a_contact_file_of_another_tip_is_warned_of(files):
     path = files / "other.yaml"
     path.write_text('contact: {normal: "300 N/um", lateral: "3 N/um"}\n')
     found = ec.calibrate(files / "data.nc", contact=path, springs="actuated", draws=40)
-    assert "does it describe this tip or disk?" in " ".join(found.calibration.warnings)
+    assert "does it describe this tip or disk, and are the forces in N?" in " ".join(
+        found.calibration.warnings
+    )
+
+
+def test_a_contact_is_refused_where_a_tracker_measured_every_reading():
+    blank = held_by_contact().to_xarray()
+    blank["marker_displacement"] = 0.0 * blank["controller_displacement"]
+    with pytest.raises(IdentificationError, match="an empty cell is no 0"):
+        ec.calibrate(ec.Dataset.from_xarray(blank), contact=Contact(5e6, 3e6), springs="actuated")
+
+
+@pytest.mark.parametrize("name", ["force", "reference_force"])
+def test_a_surface_that_pulls_is_refused(name):
+    turned = held_by_contact().to_xarray()
+    turned[name] = -turned[name]
+    with pytest.raises(IdentificationError, match=f"^{name} of pose 0, .* pulls the tool"):
+        ec.calibrate(ec.Dataset.from_xarray(turned), contact=Contact(5e6, 3e6), springs="actuated")
+
+
+def test_a_marker_of_zeros_ends_in_a_sentence_and_not_in_a_traceback():
+    blank = held_by_contact(Held(noise=5e-6, doubled=8)).to_xarray()
+    blank["marker_displacement"] = 0.0 * blank["controller_displacement"]
+    found = ec.calibrate(ec.Dataset.from_xarray(blank), springs="actuated")
+    assert any("marker_displacement_x is dead" in each for each in found.calibration.warnings)
+
+
+def test_a_stiffness_with_a_unit_is_refused_in_python():
+    with pytest.raises(IdentificationError, match=r"^contact.normal is '50 N/um': in Python"):
+        Contact(normal="50 N/um")

@@ -48,6 +48,8 @@ _SIZE = 1e-7
 """A sensible compliance of a contact, in m/N: 10 N/um."""
 _SIDEWAYS = 0.05
 """Part of a force below which it has no lateral load: noise, and a normal that is a little off."""
+_PULL = 0.02
+"""Part of a press by which a light contact may seem to pull: noise and drift of the sensor."""
 LEAST_OUTSIDE = 0.05
 """Part of the column of a free compliance that must lie outside those of the springs."""
 _SOFTEST, _STIFFEST = 1e3, 1e10
@@ -283,7 +285,9 @@ def require_pressed(robot: Robot, readings: Readings) -> None:
     IdentificationError
         Naming the first pose that is pulled, or the column that leaves nothing to the contact.
     """
-    held = np.zeros(len(readings), dtype=bool) if readings.contacts is None else readings.contacts > 0
+    held = (
+        np.zeros(len(readings), dtype=bool) if readings.contacts is None else readings.contacts > 0
+    )
     if not held.any():
         raise IdentificationError(
             "a contact is stated, and marker_displacement has a number at every reading: the"
@@ -296,7 +300,7 @@ def require_pressed(robot: Robot, readings: Readings) -> None:
         if force is None:
             continue
         pull = np.einsum("ri,ri->r", z, force)
-        pulled = held & (pull > _SIDEWAYS * np.linalg.norm(readings.force, axis=1))
+        pulled = held & (pull > _PULL * np.linalg.norm(readings.force, axis=1))
         if pulled.any():
             row = int(np.flatnonzero(pulled)[0])
             poses = len(np.unique(readings.pose[pulled]))

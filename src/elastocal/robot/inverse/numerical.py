@@ -21,7 +21,7 @@ from elastocal.robot.inverse.arm import AxisLines, arm_axes, arm_base, arm_joint
 from elastocal.robot.inverse.opw import NotOrthoParallelError, OpwInverse, derive_opw
 from elastocal.robot.inverse.solver import InverseKinematics, distinct, pose_error, reaches
 from elastocal.robot.robot import Robot
-from elastocal.robot.singularity import characteristic_length
+from elastocal.robot.singularity import characteristic_length, wrist_angle
 
 _EXACT = 1e-8
 """Largest deviation of an axis from the geometry of the kind, in m or rad."""
@@ -230,6 +230,8 @@ _NEAR = 1e-4
 
 `1.5708` for a quarter turn is off by 4e-6 rad.
 """
+_STRAIGHT = 1e-3
+"""Angle (rad) between axes 4 and 6 below which such an arm loses branches."""
 
 
 def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
@@ -388,8 +390,8 @@ class NearOpwInverse(OpwInverse):
     """The branches of an arm that misses OPW by the digits of its file.
 
     The descents of `NumericalInverse` start at the branches of the nearest OPW arm, so that
-    eight of them do what takes 96 random ones. Within the arm's deviation of a singular pose a
-    branch may be lost; where all are, the random starts are tried.
+    eight of them do what takes 96 random ones. At a straight wrist, within the arm's deviation of
+    it, a branch may be lost; where none within the limits is left, the random starts are tried.
 
     Raises
     ------
@@ -408,9 +410,12 @@ class NearOpwInverse(OpwInverse):
         descent = NumericalInverse(self.robot)
         q = descent.descend(q, T_base_tcp[pose], characteristic_length(self.robot))
         arm[pose, branch] = q[:, self.robot.external_axes :]
-        reached = np.zeros(len(arm), dtype=bool)
-        reached[pose[reaches(self.robot, q, T_base_tcp[pose])]] = True
-        lost = np.setdiff1d(pose, np.nonzero(reached)[0])
+        arrived = reaches(self.robot, q, T_base_tcp[pose])
+        inside = np.isfinite(nearest_zero(self.robot, arm[pose, branch])).all(axis=-1)
+        straight = wrist_angle(self.robot, q) < _STRAIGHT
+        # Only a straight wrist loses branches that are within the limits.
+        left = np.setdiff1d(pose[straight], pose[arrived & inside])
+        lost = np.union1d(np.setdiff1d(pose, pose[arrived]), left)
         arm[lost] = descent.candidates(T_base_tcp[lost], external[lost])[:, : self.branches]
         return arm
 
