@@ -53,6 +53,9 @@ _ROUNDS = 3
 """Fits after which the noise of a row no longer changes."""
 _LEAST_NOISE = 1e-7
 """Least noise of a row in m, of readings without any."""
+_ALIKE = 0.1
+"""Standard deviation of the springs of two arms of one type from one another, over the compliance
+of the drive of the joint."""
 _LEAST_SPREAD = 1e-3
 """Least standard deviation of a known direction, over the largest of its arm."""
 
@@ -251,7 +254,27 @@ def prior_rows(
         least = _LEAST_SPREAD**2 * max(float(values.max()), np.finfo(float).tiny)
         whitening = (vectors / np.sqrt(np.maximum(values, least))).T / scale
         rows[own, own], rows[own, -1] = whitening, whitening @ before.compliance
-    return rows
+    first, second = (model.columns(arm) for arm in (0, 1))
+    if known or not of_one_type(model):
+        return rows
+    alike = np.zeros((len(sizes[first]), rows.shape[1]))
+    apart = 1.0 / (_ALIKE * np.minimum(sizes[first], sizes[second]))
+    alike[:, first], alike[:, second] = np.diag(apart), -np.diag(apart)
+    return np.concatenate([rows, alike])
+
+
+def of_one_type(model: PairModel) -> bool:
+    """Return whether both arms are of one type: the same springs, and the same lengths."""
+    first, second = (each.robot for each in model.models)
+    # Knees of gears follow from the loads of each, so that their parameters differ in name.
+    springs = [[(s.name, len(s.parameters)) for s in each.springs] for each in model.models]
+    if springs[0] != springs[1]:
+        return False
+    joints = zip(first.chain.joints, second.chain.joints, strict=True)
+    return all(
+        np.allclose(one.placement, other.placement) and np.allclose(one.axis, other.axis)
+        for one, other in joints
+    )
 
 
 def _fit(
