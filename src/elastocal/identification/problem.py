@@ -374,9 +374,7 @@ def contact_visibility(problem: Problem, model: ElasticModel) -> tuple[ContactVi
     return contact_visibility_of(problem, model.parameter_names)
 
 
-def contact_visibility_of(
-    problem: Problem, names: Sequence[str]
-) -> tuple[ContactVisibility, ...]:
+def contact_visibility_of(problem: Problem, names: Sequence[str]) -> tuple[ContactVisibility, ...]:
     """Return how far springs imitate each compliance of the contact, by their parameters' names."""
     rows = problem.weighted().reshape(-1, problem.columns + 1)
     others, own = rows[:, : problem.contact_columns.start], rows[:, problem.contact_columns]

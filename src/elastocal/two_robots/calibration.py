@@ -112,7 +112,7 @@ class _Fit:
 
 
 @one_blas_thread()
-def calibrate_pair(
+def identify_pair(
     pair: PairReadings,
     rng: Generator,
     contact: Contact | None = None,

@@ -34,8 +34,8 @@ from elastocal.errors import ElastocalError, SchemaError
 from elastocal.files import read_text
 from elastocal.identification import Contact, ContactEntry
 from elastocal.records import StrictModel, from_data, parse_yaml
-from elastocal.robot import GRAVITY, Robot
 from elastocal.results import brief_repr
+from elastocal.robot import GRAVITY, Robot
 
 SCHEMA = "elastocal.cell/1"
 _LEAST_APART = 0.2

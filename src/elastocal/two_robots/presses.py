@@ -23,6 +23,7 @@ arms: the torque of the force about that line is the same but for its sign, and 
 the sum of the two is seen, however many presses are made.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,9 +95,7 @@ class PairReadings:
         own, other = self.first, self.second
         if self.tracked:
             return np.asarray(own.deflection - other.deflection @ self.R.T)
-        return np.asarray(
-            other.controller_displacement @ self.R.T - own.controller_displacement
-        )
+        return np.asarray(other.controller_displacement @ self.R.T - own.controller_displacement)
 
 
 def pair_readings(
@@ -149,7 +148,8 @@ def pair_readings(
     unmatched = sum(map(len, keys)) - 2 * len(common)
     found = PairReadings(names, robots, first, second, T_first_second, unmatched)
     _require_meeting(found)
-    _require_opposed(found)
+    labels = [f"pose {pose}" for pose in first.pose.tolist()]
+    require_opposed(names, first.force, second.force @ found.R.T, labels)
     return found
 
 
@@ -185,23 +185,41 @@ def _require_meeting(pair: PairReadings) -> None:
         )
 
 
-def _require_opposed(pair: PairReadings) -> None:
-    """Refuse forces that are not opposite, by what they would be with the other sign."""
-    f_1, f_2 = pair.first.force, pair.second.force @ pair.R.T
-    size = np.linalg.norm(f_1, axis=1)
+def require_opposed(
+    names: tuple[str, str], first: FloatArray, second: FloatArray, labels: Sequence[str]
+) -> None:
+    """Refuse forces that are not opposite, by what they would be with the other sign.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the arms.
+    first, second : ndarray, shape (row, 3)
+        Force on each robot, both in the first base, in N.
+    labels : sequence of str
+        Names of the rows.
+
+    Raises
+    ------
+    ConventionError
+        If their median sum is more than a tenth of either.
+    DatasetError
+        If a row has no force.
+    """
+    size = np.linalg.norm(first, axis=1)
     if not np.all(size > 0.0):
-        raise DatasetError(f"pose {pair.first.pose[int(np.argmin(size))]} has a press without force")
-    opposed = float(np.median(np.linalg.norm(f_1 + f_2, axis=1) / size))
-    equal = float(np.median(np.linalg.norm(f_1 - f_2, axis=1) / size))
+        raise DatasetError(f"{labels[int(np.argmin(size))]}: the force on {names[0]!r} is zero")
+    opposed = float(np.median(np.linalg.norm(first + second, axis=1) / size))
+    equal = float(np.median(np.linalg.norm(first - second, axis=1) / size))
     if opposed <= _OPPOSED:
         return
     if equal <= _EQUAL:
         raise ConventionError(
-            f"the forces on {pair.names[0]!r} and {pair.names[1]!r} have equal sign: each must be"
-            " the force on its own robot, so that they are opposite"
+            f"the forces on {names[0]!r} and {names[1]!r} have equal sign: each must be the force"
+            " on its own robot, so that they are opposite"
         )
     raise ConventionError(
-        f"the forces on {pair.names[0]!r} and {pair.names[1]!r} are not opposite: their sum is"
+        f"the forces on {names[0]!r} and {names[1]!r} are not opposite: their sum is"
         f" {opposed:.0%} of either, and {_OPPOSED:.0%} is the most; is each in the base of its own"
         " robot, without the weight of the tool?"
     )

@@ -8,7 +8,9 @@ point of the line, by
 
 which depends on the tool and the force alone, not on which arm it is: adding to the tilt of one arm
 what is taken off that of the other changes no press. This holds for any springs that can express
-the tilt, which is found by trying.
+the tilt, which is found by trying. Springs that lie across the line express it only together with
+terms that no such spring has, so that they seem to tell the two arms apart: by an assumption about
+their axes, not by what was measured.
 """
 
 from collections.abc import Sequence
@@ -39,14 +41,27 @@ TILT_KNOWN = Kind(
     " {known}: the presses see only the sum of both",
     grade=Grade.NOTE,
 )
+TILT_BY_AXES = Kind(
+    "two-robots.tilt-by-axes",
+    "how much each base tilts about the line that joins both bases is told apart only because the"
+    " springs of {first} and {second} lie along the axes of their bases, and not along that line",
+    advice="Where the axes of bearings are not those of the robot's description, calibrate one arm"
+    " alone, by a tracker or on a plate, and name its model in the cell file (robots: model).",
+    grade=Grade.NOTE,
+)
 ALIKE = Kind(
     "two-robots.alike",
-    "not seen, since it moves both tools alike: {combination}",
+    "not seen, since they move both tools alike: {combinations}",
     grade=Grade.NOTE,
 )
 OF_ONE_ARM = Kind(
     "two-robots.of-one-arm",
-    "not told apart by forces and positions, of {arm} alone: {combination}",
+    "not told apart by forces and positions, of {arm} alone: {combinations}",
+    grade=Grade.NOTE,
+)
+UNLOADED = Kind(
+    "two-robots.unloaded",
+    "no press loads these springs: {springs}",
     grade=Grade.NOTE,
 )
 
@@ -94,13 +109,29 @@ def expresses_tilt(model: ElasticModel, line: FloatArray) -> bool:
     return bool(np.linalg.norm(left) <= _EXPRESSED * np.linalg.norm(wanted))
 
 
-def has_shared_tilt(model: PairModel, T_first_second: FloatArray) -> bool:
-    """Return whether both arms can tilt about the line that joins their bases."""
+def tilt_finding(
+    model: PairModel, T_first_second: FloatArray, known: Sequence[str] = ()
+) -> Finding | None:
+    """Return what the presses say of tilts about the line that joins both bases.
+
+    None where the springs hold no tilt of the bases.
+
+    Parameters
+    ----------
+    model : PairModel
+        Springs of both arms.
+    T_first_second : ndarray, shape (4, 4)
+        Base of the second robot in that of the first.
+    known : sequence of str
+        Arms whose model was known before.
+    """
+    first, second = model.names
     line = T_first_second[:3, 3] / np.linalg.norm(T_first_second[:3, 3])
     lines = line, T_first_second[:3, :3].T @ line
-    return all(
-        expresses_tilt(arm, own) for arm, own in zip(model.models, lines, strict=True)
-    )
+    if all(expresses_tilt(arm, own) for arm, own in zip(model.models, lines, strict=True)):
+        return TILT_KNOWN(known=known[0]) if known else TILT(first=first, second=second)
+    tilts = [any(expresses_tilt(arm, axis) for axis in np.eye(3)[:2]) for arm in model.models]
+    return TILT_BY_AXES(first=first, second=second) if all(tilts) else None
 
 
 def unseen_findings(
@@ -113,25 +144,26 @@ def unseen_findings(
 
     Parameters
     ----------
-    model : PairModel
-        Springs of both arms.
-    T_first_second : ndarray, shape (4, 4)
-        Base of the second robot in that of the first.
+    model, T_first_second, known
+        As for `tilt_finding`.
     seen : Observability
         Of the presses alone, without any prior.
-    known : sequence of str
-        Arms whose model was known before.
     """
-    first, second = model.names
-    found = list[Finding]()
-    if has_shared_tilt(model, T_first_second):
-        found.append(
-            TILT_KNOWN(known=known[0]) if known else TILT(first=first, second=second)
-        )
+    tilt = tilt_finding(model, T_first_second, known)
+    found = [] if tilt is None else [tilt]
+    groups = {name: list[str]() for name in ("", *model.names)}
+    unloaded = list[str]()
     for group in seen.unobservable:
-        arms = {term.spring.partition(":")[0] for term in group}
-        if len(arms) == 1:
-            found.append(OF_ONE_ARM(arm=arms.pop(), combination=describe_briefly(group)))
+        arms = sorted({term.spring.partition(":")[0] for term in group})
+        if len(group) == 1:
+            unloaded.append(group[0].spring)
         else:
-            found.append(ALIKE(combination=describe_briefly(group)))
+            groups[arms[0] if len(arms) == 1 else ""].append(describe_briefly(group))
+    if groups[""]:
+        found.append(ALIKE(combinations="; ".join(groups[""])))
+    for arm in model.names:
+        if groups[arm]:
+            found.append(OF_ONE_ARM(arm=arm, combinations="; ".join(groups[arm])))
+    if unloaded:
+        found.append(UNLOADED(springs=", ".join(unloaded)))
     return tuple(found)
