@@ -328,7 +328,7 @@ def _certified(
     if pair.unmatched:
         findings.append(UNMATCHED(count=pair.unmatched))
     first, second = (
-        _model_of(arm, pair, fit, known, (drawn, plain, unexplained)) for arm in (0, 1)
+        _model_of(arm, pair, fit, known, (drawn, plain, unexplained, sizes)) for arm in (0, 1)
     )
     return PairCalibration(
         pair=pair,
@@ -357,16 +357,17 @@ def _model_of(
     pair: PairReadings,
     fit: _Fit,
     known: Mapping[str, CalibratedModel],
-    found: tuple[FloatArray, Problem, float],
+    found: tuple[FloatArray, Problem, float, FloatArray],
 ) -> CalibratedModel:
     """Return the model of one arm, as any calibration has it."""
-    draws, plain, unexplained = found
+    draws, plain, unexplained, sizes = found
     own, model = fit.model.columns(arm), fit.model.models[arm]
     c = fit.solution.compliance[own]
     readings = (pair.first, pair.second)[arm]
     other = pair.names[1 - arm]
     alone = _alone(plain, own, other in known)
     seen = observability(factor(alone.without_prior()), model.springs, alone, c)
+    seen = find_hidden(seen, alone, c, model.parameters, sizes[own], held=True)
     return CalibratedModel(
         model,
         c,

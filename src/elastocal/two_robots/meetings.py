@@ -328,7 +328,7 @@ def _moved(axis: FloatArray, revolute: bool, position: FloatArray) -> FloatArray
     if not revolute:
         T[:, :3, 3] = position[:, None] * axis
         return T
-    K = np.cross(np.eye(3), axis).T
+    K = np.cross(axis, np.eye(3)).T
     s, c = np.sin(position)[:, None, None], np.cos(position)[:, None, None]
     T[:, :3, :3] = np.eye(3) + s * K + (1.0 - c) * (K @ K)
     return T
