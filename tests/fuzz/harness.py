@@ -190,6 +190,8 @@ _SLOW = (
     "study",
     "import",
     "derive",
+    "plan-pair",
+    "calibrate-pair",
 )
 """Commands that take a second or more: drawn seldom."""
 PLAIN = {

@@ -134,13 +134,13 @@ def test_paths_that_do_not_belong_together_are_refused(done, tmp_path):
     short = tmp_path / "short.csv"
     short.write_text("\n".join(text[:-1]) + "\n", encoding="utf-8")
     given = {"models": done / "models", "out": tmp_path / "out"}
-    with pytest.raises(CompensationError, match="15 rows and .*short.csv 14"):
+    with pytest.raises(CompensationError, match=r"15 rows and .*short\.csv 14"):
         ec.compensate_pair(done / "cell.yaml", first=first, second=short, **given)
     with pytest.raises(CompensationError, match="3 weights: two are needed"):
         ec.compensate_pair(
             done / "cell.yaml", first=first, second=short, weights=(1.0, 1.0, 1.0), **given
         )
-    with pytest.raises(ConventionError, match="equal sign|not opposite"):
+    with pytest.raises(ConventionError, match=r"equal sign|not opposite"):
         ec.compensate_pair(done / "cell.yaml", first=first, second=first, **given)
 
 
@@ -183,7 +183,7 @@ def test_the_terminal_says_what_is_not_seen(done, tmp_path):
     found = elastocal(*words, "--draws", 40, "-o", tmp_path / "again", "--json")
     data = json.loads(found.out)
     assert data["arms"][0]["name"] == "left"
-    assert any(each["kind"] == "two-robots.tilt" for each in data["findings"])
+    assert "the line that joins both bases is not seen" in str(data["findings"])
 
 
 def test_a_refusal_is_one_line(done, tmp_path):

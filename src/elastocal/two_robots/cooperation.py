@@ -78,31 +78,32 @@ class CooperationSummary(Result):
     limited: int
     """Rows at which a limit leaves a part of the deviation."""
 
-    def show(self) -> Iterable[Block]:
+    def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the deviation before and after, and how it was shared."""
-        first, second = self.arms
-        yield Facts(
-            (
-                (phrase("Rows"), self.rows),
-                (phrase("Relative deviation before, mean"), mm(self.before)),
-                (phrase("Relative deviation before, largest"), mm(self.before_max)),
-                (phrase("Relative deviation after, mean (predicted)"), mm(self.after)),
-                (phrase("Relative deviation after, largest (predicted)"), mm(self.after_max)),
-                (phrase("95 % interval of the deviation, mean"), f"±{mm(self.uncertainty)}"),
+        own = zip(self.arms, self.largest, self.weights, strict=True)
+        return (
+            (phrase("Rows"), str(self.rows)),
+            (phrase("Relative deviation before, mean"), mm(self.before)),
+            (phrase("Relative deviation before, largest"), mm(self.before_max)),
+            (phrase("Relative deviation after, mean (predicted)"), mm(self.after)),
+            (phrase("Relative deviation after, largest (predicted)"), mm(self.after_max)),
+            (phrase("95 % interval of the deviation, mean"), f"±{mm(self.uncertainty)}"),
+            *(
                 (
-                    phrase("Largest correction of {arm}", arm=first),
-                    f"{mm(self.largest[0])} ({self.weights[0]:.0%})",
-                ),
-                (
-                    phrase("Largest correction of {arm}", arm=second),
-                    f"{mm(self.largest[1])} ({self.weights[1]:.0%})",
-                ),
-            )
+                    phrase("Largest correction of {arm}", arm=arm),
+                    phrase("{largest}, for a part of {part}", largest=mm(most), part=f"{part:.0%}"),
+                )
+                for arm, most, part in own
+            ),
         )
+
+    def show(self) -> Iterable[Block]:
+        """Return the deviation before and after, and what limits leave."""
+        yield Facts(self.facts())
         if self.limited:
             yield Paragraph(
                 phrase(
-                    "At {rows} rows the limits of both arms leave a part of the deviation.",
+                    "Rows at which the limits of both arms leave a part of the deviation: {rows}.",
                     rows=self.limited,
                 ),
                 "sentence",

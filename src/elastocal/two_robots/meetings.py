@@ -74,18 +74,20 @@ class PairPlan(Result):
         first = np.array([each.first for each in self.meetings])
         return first, np.array([each.second for each in self.meetings])
 
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return what was tried, and what was chosen."""
+        return (
+            (phrase("Cell"), self.cell),
+            (phrase("Arms"), ", ".join(self.arms)),
+            (phrase("Places tried"), str(self.tried)),
+            (phrase("Places that both arms reach"), str(self.passed)),
+            (phrase("Meetings chosen"), str(len(self.meetings))),
+            (phrase("Search technique"), self.technique),
+        )
+
     def show(self) -> Iterable[Block]:
         """Return what was tried, and each meeting."""
-        yield Facts(
-            (
-                (phrase("Cell"), self.cell),
-                (phrase("Arms"), ", ".join(self.arms)),
-                (phrase("Places tried"), self.tried),
-                (phrase("Places that both arms reach"), self.passed),
-                (phrase("Meetings chosen"), len(self.meetings)),
-                (phrase("Search technique"), self.technique),
-            )
-        )
+        yield Facts(self.facts())
         if self.refused:
             yield Table(
                 phrase("Places refused, by the first check that refused them"),

@@ -94,7 +94,7 @@ class PairResult(Result):
             )
         )
         yield Paragraph(measured, "sentence")
-        yield Facts(tuple(self._figures()))
+        yield Facts(self.facts())
         yield Table(
             phrase("Arms"),
             phrases("Arm", "Robot", "Model", "Parameters", "Known alone"),
@@ -118,17 +118,25 @@ class PairResult(Result):
             )
         yield from self._findings()
 
-    def _figures(self) -> Iterable[tuple[str, str | int]]:
-        yield phrase("Presses"), f"{self.readings}"
-        yield phrase("Poses"), self.poses
-        yield phrase("Springs"), self.springs
-        yield phrase("Relative displacement, mean"), mm(self.deflection)
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return the presses, and the error at left-out poses."""
         share = self.held_out / self.deflection
-        yield (
-            phrase("Error at left-out poses, mean"),
-            f"{mm(self.held_out)} ({share:.1%})",
+        return (
+            (phrase("Presses"), str(self.readings)),
+            (phrase("Poses"), str(self.poses)),
+            (phrase("Springs"), self.springs),
+            (phrase("Relative displacement, mean"), mm(self.deflection)),
+            (
+                phrase("Error at left-out poses, mean"),
+                phrase(
+                    "{error} ({share}), {folds} refits",
+                    error=mm(self.held_out),
+                    share=f"{share:.1%}",
+                    folds=self.folds,
+                ),
+            ),
+            (phrase("Error at left-out poses, largest"), mm(self.held_out_max)),
         )
-        yield phrase("Error at left-out poses, largest"), mm(self.held_out_max)
 
     def _findings(self) -> Iterable[Block]:
         grave = [each for each in self.findings if _grade(each) is not Grade.NOTE]

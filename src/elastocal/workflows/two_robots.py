@@ -1,6 +1,5 @@
 """``plan-pair``, ``simulate-pair``, ``calibrate-pair``, ``compensate-pair``: two robots."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +8,6 @@ import numpy as np
 
 from elastocal import dataset
 from elastocal.arrays import FloatArray
-from elastocal.blocks import Block, Facts
 from elastocal.dataset import (
     Dataset,
     PathRows,
@@ -132,16 +130,14 @@ class SimulatePairResult(Result):
     largest_force: float
     """In N."""
 
-    def show(self) -> Iterable[Block]:
+    def facts(self) -> tuple[tuple[str, str], ...]:
         """Return what was pressed, and the files."""
-        yield Facts(
-            (
-                (phrase("Arms"), ", ".join(self.arms)),
-                (phrase("Poses"), self.poses),
-                (phrase("Load cases"), ", ".join(self.load_cases)),
-                (phrase("Largest force"), f"{self.largest_force:.0f} N"),
-                (phrase("Datasets"), ", ".join(self.files)),
-            )
+        return (
+            (phrase("Arms"), ", ".join(self.arms)),
+            (phrase("Poses"), str(self.poses)),
+            (phrase("Load cases"), ", ".join(self.load_cases)),
+            (phrase("Largest force"), f"{self.largest_force:.0f} N"),
+            (phrase("Datasets"), ", ".join(self.files)),
         )
 
 
@@ -232,7 +228,7 @@ class CalibratePairSettings:
     """Dataset of the second robot: the same poses and load cases."""
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder for the model of each arm, ``ARM.json``, and ``pair.json``."""
-    springs: str = "auto"
+    springs: Annotated[str, Option(choices="springs", file=True)] = "auto"
     """Springs of both arms: ``auto``, a layout, or ``gears``."""
     draws: Annotated[int, Option(least=40)] = 200
     """Bootstrap draws."""
