@@ -1,5 +1,6 @@
 """A cell of two robots, taken through plan, simulated campaign and calibration."""
 
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -10,24 +11,7 @@ from elastocal.two_robots import PairCell, load_pair_cell
 from elastocal.two_robots.meetings import meeting_pool
 from support import kept
 
-CELL = """\
-schema: elastocal.cell/1
-name: two arms
-robots:
-  - name: left
-    robot: {model: KR 210 R2700-2}
-    tcp: {xyz: ["0 mm", "0 mm", "300 mm"]}
-    tool_mass: "20 kg"
-  - name: right
-    robot: {model: KR 210 R2700-2}
-    tcp: {xyz: ["0 mm", "0 mm", "300 mm"]}
-    tool_mass: "20 kg"
-base_transform: {xyz: ["3600 mm", "0 mm", "0 mm"], abc: ["180 deg", "0 deg", "0 deg"]}
-contact: {normal: "45 N/um", lateral: "40 N/um", uncertainty: "30 %"}
-presses: {force: "1 kN", lateral: "300 N", light: "50 N"}
-volume: {centre: ["1800 mm", "0 mm", "1200 mm"], size: ["800 mm", "1600 mm", "1200 mm"]}
-search: {poses: 25, candidates: 300}
-"""
+CELL = (files("elastocal.two_robots") / "example.yaml").read_text(encoding="utf-8")
 
 
 def cell(folder: Path, text: str = CELL, name: str = "cell.yaml") -> PairCell:

@@ -83,14 +83,12 @@ from .observability import (
     Observability as Observability,
     attainable_rank as attainable_rank,
     find_hidden as find_hidden,
-    likely_sizes as likely_sizes,
     observability as observability,
     unseen_groups as unseen_groups,
 )
 from .options import (
     LOSSES as LOSSES,
     MEDIAN_NORM as MEDIAN_NORM,
-    MINIMUM_DRAWS as MINIMUM_DRAWS,
     FitOptions as FitOptions,
     FitSettings as FitSettings,
     Prior as Prior,

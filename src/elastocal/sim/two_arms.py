@@ -18,15 +18,16 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Dataset
 from elastocal.errors import SpringError, UnreachableError
-from elastocal.sim.arm.elastic_arm import (
+from elastocal.sim.arm import (
     AXIAL_STIFFNESS,
     LINK_BENDING,
     ElasticArm,
+    Linkage,
     bearing_truth,
+    solve_inverse,
     with_link_bending,
     with_stiffening_gears,
 )
-from elastocal.sim.arm.linkage import Linkage, solve_inverse
 
 _ROUNDS = 4
 """Iterations in which the joints follow the deflection; each gains three digits."""

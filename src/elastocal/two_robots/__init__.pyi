@@ -1,5 +1,4 @@
 from .calibration import (
-    PairCalibration as PairCalibration,
     identify_pair as identify_pair,
 )
 from .cell import (
@@ -7,6 +6,7 @@ from .cell import (
     PairCell as PairCell,
     is_pair_cell as is_pair_cell,
     load_pair_cell as load_pair_cell,
+    write_pair_example as write_pair_example,
 )
 from .cooperation import (
     CooperationSummary as CooperationSummary,

@@ -6,6 +6,8 @@ first robot's base is the frame of all that belongs to both.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from importlib.resources import files
+from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
@@ -31,7 +33,7 @@ from elastocal.cell import (
     mounted_robot,
 )
 from elastocal.errors import ElastocalError, SchemaError
-from elastocal.files import read_text
+from elastocal.files import read_text, write_text
 from elastocal.identification import Contact, ContactEntry
 from elastocal.records import StrictModel, from_data, parse_yaml
 from elastocal.results import brief_repr
@@ -265,6 +267,19 @@ def load_pair_cell(path: Path) -> PairCell:
         if entry.model is not None and not (path.parent / entry.model).is_file():
             raise SchemaError(f"{path}: robots {name!r}: there is no model {entry.model!r}")
     return PairCell(path, file, (first, second))
+
+
+def write_pair_example(path: str | PathLike[str]) -> Path:
+    """Write the cell file of two KR 210 that face each other, and return its place.
+
+    Raises
+    ------
+    FileAccessError
+        If it cannot be written.
+    """
+    text = (files(__package__) / "example.yaml").read_text(encoding="utf-8")
+    write_text(Path(path), text)
+    return Path(path)
 
 
 def _robot(path: Path, number: int, entry: ArmEntry) -> Robot:

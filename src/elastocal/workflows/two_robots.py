@@ -25,7 +25,7 @@ from elastocal.progress import Progress
 from elastocal.records import read_json, schema_of, write_json
 from elastocal.results import Result
 from elastocal.robot import Robot
-from elastocal.sim.two_arms import Tips, press_together, true_arm
+from elastocal.sim import Tips, press_together, true_arm
 from elastocal.two_robots import (
     CooperationSummary,
     PairCell,
@@ -94,6 +94,15 @@ def plan_pair(settings: PlanPairSettings, progress: Progress) -> PairPlan:  # no
         If the arms meet at too few places.
     FileAccessError
         If a file cannot be read or written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> from elastocal.two_robots import write_pair_example
+    >>> cell = write_pair_example("cell.yaml")
+    >>> plan = ec.plan_pair(cell, out="plan.json")
+    >>> len(plan.meetings)
+    25
     """
     found = plan_meetings(load_pair_cell(settings.cell))
     write_json(settings.out, found)
@@ -164,6 +173,16 @@ def simulate_pair(settings: SimulatePairSettings, progress: Progress) -> Simulat
         If an arm has not six joints.
     FileAccessError
         If a file cannot be read or written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> from elastocal.two_robots import write_pair_example
+    >>> cell = write_pair_example("cell.yaml")
+    >>> _ = ec.plan_pair(cell, out="plan.json")
+    >>> made = ec.simulate_pair(cell, plan="plan.json", out="run")
+    >>> made.files
+    ('left.nc', 'right.nc')
     """
     cell = load_pair_cell(settings.cell)
     plan = _plan_of(settings.plan, cell)
@@ -261,6 +280,21 @@ def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairR
         If there are too few poses, or the springs imitate a contact of which nothing is known.
     FileAccessError
         If a file cannot be read or written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> from elastocal.two_robots import write_pair_example
+    >>> cell = write_pair_example("cell.yaml")
+    >>> _ = ec.plan_pair(cell, out="plan.json")
+    >>> _ = ec.simulate_pair(cell, plan="plan.json", out="run")
+    >>> found = ec.calibrate_pair(
+    ...     cell, first="run/left.nc", second="run/right.nc", out="models", draws=40
+    ... )
+    >>> found.held_out < 0.02 * found.deflection
+    True
+    >>> [each.name for each in found.arms]
+    ['left', 'right']
     """
     cell = load_pair_cell(settings.cell)
     own = tuple(
@@ -317,7 +351,7 @@ class CompensatePairSettings:
 
 @workflow(CompensatePairSettings)
 def compensate_pair(settings: CompensatePairSettings, progress: Progress) -> CooperationSummary:  # noqa: ARG001 - seconds
-    """Correct the paths of two robots that work on each other, shared by weights and limits.
+    r"""Correct the paths of two robots that work on each other, shared by weights and limits.
 
     Parameters
     ----------
@@ -334,6 +368,30 @@ def compensate_pair(settings: CompensatePairSettings, progress: Progress) -> Coo
         If the paths do not belong together, or a corrected pose is out of reach.
     FileAccessError
         If a file cannot be read or written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> from elastocal.two_robots import write_pair_example
+    >>> cell = write_pair_example("cell.yaml")
+    >>> plan = ec.plan_pair(cell, out="plan.json")
+    >>> _ = ec.simulate_pair(cell, plan="plan.json", out="run")
+    >>> _ = ec.calibrate_pair(
+    ...     cell, first="run/left.nc", second="run/right.nc", out="models", draws=40
+    ... )
+    >>> from pathlib import Path
+    >>> R = plan.base_transform[:3, :3]
+    >>> for arm, names, q, f in zip(
+    ...     plan.arms, plan.joints, plan.q(), ([0, 0, 500], [0, 0, -500] @ R), strict=True
+    ... ):
+    ...     heads = [*(f"{name}[rad]" for name in names), "force_x[N]", "force_y[N]", "force_z[N]"]
+    ...     rows = [",".join(map(repr, [*q[0].tolist(), *map(float, f)]))]
+    ...     _ = Path(f"{arm}.csv").write_text("\n".join([",".join(heads), *rows]) + "\n")
+    >>> found = ec.compensate_pair(
+    ...     cell, models="models", first="left.csv", second="right.csv", out="corrected"
+    ... )
+    >>> found.after < 0.01 * found.before
+    True
     """
     cell = load_pair_cell(settings.cell)
     weights = _weights(settings.weights, cell)
