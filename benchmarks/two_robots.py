@@ -1,6 +1,6 @@
 """Two robots by presses on each other: error at unseen meetings, for docs/decisions/0127.
 
-``python benchmarks/two_robots.py [VARIANT …]``; half a minute a variant. The truth is the simulator's:
+``python benchmarks/two_robots.py [VARIANT …]``; half a minute a variant. The truth is simulated:
 bending links, stiffening gears, arms that differ by 20 %, meetings of unequal stiffness.
 """
 

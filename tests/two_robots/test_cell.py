@@ -1,10 +1,13 @@
 """The cell file of two robots: what it refuses, by name."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from elastocal.cell import load_cell
 from elastocal.errors import SchemaError
+from elastocal.two_robots import load_pair_cell, write_pair_example
 from support import two_arms
 from support.two_arms import CELL
 
@@ -65,3 +68,10 @@ def test_clamped_tools_pull_as_well(tmp_path):
     cases = made.file.presses.cases
     assert np.array_equal(cases["pull"], -cases["normal"])
     assert "pull" not in two_arms.cell(tmp_path).file.presses.cases
+
+
+def test_the_guide_shows_the_example_that_is_written(tmp_path):
+    path = write_pair_example(tmp_path / "cell.yaml")
+    guide = Path(__file__).parents[2] / "docs/how-to/calibrate-two-robots.md"
+    assert path.read_text(encoding="utf-8") in guide.read_text(encoding="utf-8")
+    assert load_pair_cell(path).arms == ("left", "right")
