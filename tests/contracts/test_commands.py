@@ -196,7 +196,7 @@ class TestCompletion:
         return done.stdout.splitlines()
 
     def test_commands_choices_and_robots(self):
-        assert self.asked("cal") == ["calibrate"]
+        assert self.asked("cal") == ["calibrate", "calibrate-pair"]
         assert self.asked("calibrate", "--springs", "bear") == [
             "bearing", "bearing-joint", "bearing-ends",
         ]  # fmt: skip
