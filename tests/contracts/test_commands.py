@@ -32,7 +32,7 @@ from elastocal.testing import CommandSuite
 from elastocal.workflows import SimulateResult, StudioResult
 from elastocal.workflows.export import EXPORT_TARGETS
 from elastocal.workflows.simulate_process import PROGRAMMED, STIFFEST
-from support import foreign_logs, kuka_bench, measured_arms, reported
+from support import foreign_logs, kuka_bench, measured_arms, reported, two_arms
 from support.cli import elastocal
 
 GROUP = typer.main.get_command(app)
@@ -106,6 +106,9 @@ def lines(tmp_path_factory) -> dict[str, tuple[object, ...]]:
     assert elastocal("calibrate", data, "-o", out / "other.json", *fit).code == 0
     geometry = ("--robot", "KR 210 R2700-2", "--tcp", "flange", "--draws", 40)
     few = ("--spins", 4, "--stands", 3, "--stations", 5)
+    arms = two_arms.finished()
+    both, own = arms / "cell.yaml", (arms / "run" / "left.nc", arms / "run" / "right.nc")
+    paths = arms / "left_path.csv", arms / "right_path.csv"
     return {
         "robots": (),
         "init": (out / "new",),
@@ -127,6 +130,10 @@ def lines(tmp_path_factory) -> dict[str, tuple[object, ...]]:
         "report": (run, "-o", out / "report.html"),
         "compare": (model, out / "other.json"),
         "verify": (run,),
+        "plan-pair": (both, "-o", out / "pair_plan.json"),
+        "simulate-pair": (both, "--plan", arms / "plan.json", "-o", out / "pair", "--force"),
+        "calibrate-pair": (both, *own, "-o", out / "pair_models", "--draws", 40, "--force"),
+        "compensate-pair": (both, arms / "models", *paths, "-o", out / "pair_paths", "--force"),
         "watch": (cell, "--for", "0.5 s"),
     }
 
@@ -189,7 +196,7 @@ class TestCompletion:
         return done.stdout.splitlines()
 
     def test_commands_choices_and_robots(self):
-        assert self.asked("cal") == ["calibrate"]
+        assert self.asked("cal") == ["calibrate", "calibrate-pair"]
         assert self.asked("calibrate", "--springs", "bear") == [
             "bearing", "bearing-joint", "bearing-ends",
         ]  # fmt: skip

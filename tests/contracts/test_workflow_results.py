@@ -25,6 +25,7 @@ from support import (
     reported,
     shown,
     studies,
+    two_arms,
 )
 
 CLASSES = {
@@ -43,8 +44,10 @@ WITHOUT = {
     "LiveResult",
     "MeasureDelayResult",
     "NewResult",
+    "PairResult",
     "ReleaseResult",
     "ReportResult",
+    "SimulatePairResult",
     "SimulateResult",
     "StudioResult",
     "ToolResult",
@@ -73,7 +76,11 @@ def results(tmp_path_factory) -> dict[str, Result]:
         str(run), "done", "at HOME", "", 7, 7, (), {"ok": 14}, 0, 60.0, "dataset.nc", (), None
     )
     settings = workflows.RunSettings(cell, plan=done / "plan", out=out / "dry")
+    arms = two_arms.finished()
+    both, own = arms / "cell.yaml", (arms / "run" / "left.nc", arms / "run" / "right.nc")
     made = (
+        workflows.calibrate_pair(both, *own, out=out / "pair_models", draws=40),
+        workflows.simulate_pair(both, plan=arms / "plan.json", out=out / "pair"),
         workflows.calibrate(run / "dataset.nc", springs="actuated", out=out / "other.json"),
         workflows.check(run),
         workflows.codec(run / "dataset.nc", out=out / "codec_again"),

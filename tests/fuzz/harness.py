@@ -190,6 +190,8 @@ _SLOW = (
     "study",
     "import",
     "derive",
+    "plan-pair",
+    "calibrate-pair",
 )
 """Commands that take a second or more: drawn seldom."""
 PLAIN = {
@@ -223,6 +225,11 @@ PLAIN = {
     "studio": "studio {s}/cell.yaml --no-browser",
     "new": "new --out {o}.yaml --mesh {s}/dome.stl --no-browser --no-ask",
     "study": "study {s}/cell.yaml --out {o} --samples 1 --verification 5",
+    "plan-pair": "plan-pair {s}/pair.yaml --out {o}.json",
+    "simulate-pair": "simulate-pair {s}/pair.yaml --plan {s}/pair_plan.json --out {o}",
+    "calibrate-pair": "calibrate-pair {s}/pair.yaml {s}/left.nc {s}/right.nc --draws 40 --out {o}",
+    "compensate-pair": "compensate-pair {s}/pair.yaml {s}/pair_models {s}/left_path.csv"
+    " {s}/right_path.csv --out {o}",
 }
 """Commands that work, to which absurd options are added; an option that stands twice: the last.
 

@@ -29,7 +29,7 @@ from elastocal.records import write_json
 from elastocal.robot import catalogue, xyzabc_from_T
 from elastocal.verdict import OF_RUN, make_key, read_private_key, sign, write_signature
 from elastocal.workflows.simulate import Ports
-from support import foreign_logs, kuka_bench, live_bench, reported, studies
+from support import foreign_logs, kuka_bench, live_bench, reported, studies, two_arms
 from support.cli import elastocal
 from support.compensated import calibrated
 from support.foreign_bags import write_bag
@@ -429,11 +429,28 @@ def make_seeds(folder: Path) -> None:
     _write_geometry(folder)
     _write_study(folder / "study")
     _write_keys(folder)
+    _write_pair(folder)
     shutil.copy(folder / "model.json", folder / "old.json")
     edit(folder / "old.json", _soften)
     _done(
         "compare", folder / "old.json", folder / "model.json", "--out", folder / "comparison.json"
     )
+
+
+def _write_pair(folder: Path) -> None:
+    """Write what belongs to two robots: cell, plan, readings, models, paths."""
+    made = two_arms.finished()
+    shutil.copytree(made / "models", folder / "pair_models")
+    for name, own in (
+        ("pair.yaml", "cell.yaml"),
+        ("pair_plan.json", "plan.json"),
+        ("pair.json", "models/pair.json"),
+        ("left.nc", "run/left.nc"),
+        ("right.nc", "run/right.nc"),
+        ("left_path.csv", "left_path.csv"),
+        ("right_path.csv", "right_path.csv"),
+    ):
+        shutil.copy(made / own, folder / name)
 
 
 def _soften(model: dict) -> None:

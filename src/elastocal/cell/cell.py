@@ -351,7 +351,13 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     """
     path = Path(path)
     text = read_text(path)
-    file = from_data(cell_file_model(), parse_yaml(text, path), str(path), SCHEMA)
+    data = parse_yaml(text, path)
+    if isinstance(data, dict) and "robots" in data:
+        raise SchemaError(
+            f"{path} is a cell of two robots (key 'robots'): plan-pair, simulate-pair,"
+            " calibrate-pair and compensate-pair read it"
+        )
+    file = from_data(cell_file_model(), data, str(path), SCHEMA)
     robot = _at(f"{path}: robot", lambda: mounted_robot(path, file.robot, file.tcp))
     margins = _at(str(path), lambda: joint_margins(robot, file.limits))
     positions = _at(f"{path}: robot", lambda: external_positions(robot, file.robot, margins))

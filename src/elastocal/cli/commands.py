@@ -571,6 +571,34 @@ def _export(given: Given) -> None:
     _show(given, result, result.show())
 
 
+_PAIR = f"{workflows.__name__}.two_robots"
+"""Module of the commands for two robots."""
+
+
+@command("Two robots", module=_PAIR, settings="PlanPairSettings")
+def _plan_pair(given: Given) -> None:
+    result = workflows.plan_pair(**given.settings)
+    _show(given, _as_file(result), result.show())
+
+
+@command("Two robots", module=_PAIR, settings="SimulatePairSettings")
+def _simulate_pair(given: Given) -> None:
+    result = workflows.simulate_pair(**given.settings)
+    _show(given, result, result.show())
+
+
+@command("Two robots", module=_PAIR, settings="CalibratePairSettings")
+def _calibrate_pair(given: Given) -> None:
+    result = workflows.calibrate_pair(**given.settings)
+    _show(given, _as_file(result), result.show())
+
+
+@command("Two robots", module=_PAIR, settings="CompensatePairSettings")
+def _compensate_pair(given: Given) -> None:
+    result = workflows.compensate_pair(**given.settings)
+    _show(given, _as_file(result), result.show())
+
+
 @command("Judge and hand over")
 def _report(given: Given) -> None:
     result = workflows.report(**given.settings)

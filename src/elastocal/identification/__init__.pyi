@@ -20,14 +20,19 @@ from .calibration import (
 )
 from .contact import (
     Contact as Contact,
+    ContactEntry as ContactEntry,
     at_tcp as at_tcp,
+    contact_columns as contact_columns,
+    is_pressed_sideways as is_pressed_sideways,
     read_contact as read_contact,
+    require_seen as require_seen,
 )
 from .conventions import (
     check_conventions as check_conventions,
     check_joints as check_joints,
 )
 from .displacement import (
+    displacement_blocks as displacement_blocks,
     reference_joints as reference_joints,
 )
 from .domain import (
@@ -77,11 +82,13 @@ from .model_file import (
 from .observability import (
     Observability as Observability,
     attainable_rank as attainable_rank,
+    find_hidden as find_hidden,
     observability as observability,
     unseen_groups as unseen_groups,
 )
 from .options import (
     LOSSES as LOSSES,
+    MEDIAN_NORM as MEDIAN_NORM,
     FitOptions as FitOptions,
     FitSettings as FitSettings,
     Prior as Prior,
@@ -103,7 +110,9 @@ from .problem import (
     MINIMUM_BLOCKS as MINIMUM_BLOCKS,
     Problem as Problem,
     build as build,
+    contact_visibility_of as contact_visibility_of,
     pose_blocks as pose_blocks,
+    relative_sizes as relative_sizes,
     same_configuration as same_configuration,
     unit_columns as unit_columns,
 )
@@ -147,6 +156,7 @@ from .show import (
     suspicious_table as suspicious_table,
 )
 from .solve import (
+    PoseGrams as PoseGrams,
     PoseTriangles as PoseTriangles,
     Solution as Solution,
     factor as factor,
@@ -164,8 +174,11 @@ from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_UNEXPLAINED as MOST_UNEXPLAINED,
     HeldOut as HeldOut,
+    bootstrap as bootstrap,
     interval as interval,
     leave_poses_out as leave_poses_out,
+    widen_draws as widen_draws,
+    widening_factor as widening_factor,
 )
 from .update import (
     draws_factor as draws_factor,

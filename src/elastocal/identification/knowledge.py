@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
-from elastocal.elastic import ElasticModel, KnownSpring, Parameter, actuated, bearing
+from elastocal.elastic import ElasticModel, KnownSpring, Parameter, Spring, actuated, bearing
 from elastocal.errors import IdentificationError, present
 from elastocal.identification.contact import (
     LATERAL,
@@ -77,26 +77,53 @@ class DriveCompliances:
         """
         model = ElasticModel(robot, actuated(robot))
         problem = build(model, readings, replace(options, prior=None), marker_offset)
+        return cls.of_problem(robot.joint_names, robot.revolute, problem, model.springs)
+
+    @classmethod
+    def of_problem(
+        cls,
+        joints: Sequence[str],
+        revolute: Sequence[bool],
+        problem: Problem,
+        springs: Sequence[Spring],
+    ) -> "DriveCompliances":
+        """Return those estimated by a problem with one axial spring at each joint.
+
+        Parameters
+        ----------
+        joints, revolute : sequence of str and of bool
+            Names of the joints, and whether they turn.
+        problem : Problem
+            Without a prior.
+        springs : sequence of Spring
+            One a joint, in their order.
+        """
         c = solve(problem).compliance[problem.springs]
         left = leave_poses_out(problem).compliance[:, problem.springs]
         folds = len(left)
         error = np.sqrt((folds - 1) / folds * np.sum(np.square(left - c), axis=0))
-        scale = np.array([parameter.scale for parameter in model.parameters])
+        parameters = [parameter for spring in springs for parameter in spring.parameters]
+        scale = np.array([parameter.scale for parameter in parameters])
         plain = problem.of_springs()
-        usual = likely_sizes(plain, model.parameters)
-        seen = observability(factor(plain), model.springs, plain, c)
-        seen = find_hidden(seen, plain, c, model.parameters, usual)
+        usual = likely_sizes(plain, parameters)
+        seen = observability(factor(plain), springs, plain, c)
+        seen = find_hidden(seen, plain, c, parameters, usual)
         known = (c > _SURE * error) & np.array(seen.observable)
-        own = known & np.array(robot.revolute)
+        own = known & np.array(revolute)
         softest = max([_WRIST * float(usual[0] / scale[0]), *(c / scale)[known].tolist()])
-        return cls(tuple(robot.joint_names), np.where(own, c / scale, softest))
+        return cls(tuple(joints), np.where(own, c / scale, softest))
+
+    def sizes(self, parameters: Sequence[Parameter]) -> FloatArray:
+        """Return the largest likely size of parameters, shape (parameter,), in their units."""
+        softness = dict(zip(self.joints, self.softness.tolist(), strict=True))
+        return np.array([softness[each.joint] * each.scale for each in parameters])
 
     def known_springs(self, model: ElasticModel) -> tuple[KnownSpring, ...]:
         """Return the prior knowledge of every parameter of a model of the arm."""
-        softness = dict(zip(self.joints, self.softness.tolist(), strict=True))
+        sizes = self.sizes(model.parameters).tolist()
         return tuple(
-            KnownSpring(each.name, compliance=0.0, sigma=softness[each.joint] * each.scale)
-            for each in model.parameters
+            KnownSpring(each.name, compliance=0.0, sigma=size)
+            for each, size in zip(model.parameters, sizes, strict=True)
         )
 
 

@@ -175,6 +175,27 @@ class Problem:
         O = np.concatenate([blocks, behind], axis=2)  # noqa: E741 - the paper's name
         return replace(self, O=O, d=self.d if d is None else d, encoders=None)
 
+    def with_contact(self, contact: ContactColumns, scale: float) -> "Problem":
+        """Return the problem with the columns of a contact last, and the errors that rows share.
+
+        Parameters
+        ----------
+        contact : ContactColumns
+            Its columns, and what is known of them.
+        scale : float
+            Sensible size of the first parameter, in its unit.
+        """
+        count = len(contact.names)
+        limits = np.zeros(count), np.full(count, np.inf)
+        wider = _with_columns_behind(
+            self, contact.columns, limits, contact.size / scale, contact.prior
+        )
+        error = np.zeros(len(wider.prior_rows))
+        if self.prior_error is not None:
+            error[: len(self.prior_error)] = self.prior_error
+        error[len(self.prior_rows) :] = contact.prior_error
+        return replace(wider, contact=contact.names, shared=contact.shared, prior_error=error)
+
     def of_springs(self) -> "Problem":
         """Return the problem of the springs in what neither a frame nor the contact can explain.
 
@@ -341,7 +362,7 @@ def build(
     if options.contact is None or readings.contacts is None:
         return problem
     contact = contact_columns(model.robot, readings, problem.block, options.contact)
-    problem = _with_contact(problem, contact, scale)
+    problem = problem.with_contact(contact, scale)
     sideways = is_pressed_sideways(model.robot, readings)
     seen = contact_visibility(problem, model)
     require_seen(options.contact, seen, sideways, is_doubled(readings))
@@ -350,9 +371,14 @@ def build(
 
 def contact_visibility(problem: Problem, model: ElasticModel) -> tuple[ContactVisibility, ...]:
     """Return how far the springs of a model imitate each compliance of the contact."""
+    return contact_visibility_of(problem, model.parameter_names)
+
+
+def contact_visibility_of(problem: Problem, names: Sequence[str]) -> tuple[ContactVisibility, ...]:
+    """Return how far springs imitate each compliance of the contact, by their parameters' names."""
     rows = problem.weighted().reshape(-1, problem.columns + 1)
     others, own = rows[:, : problem.contact_columns.start], rows[:, problem.contact_columns]
-    return visibility(problem.contact, own, model.parameter_names, others)
+    return visibility(problem.contact, own, names, others)
 
 
 def _with_frames(problem: Problem, frames: FrameColumns, scale: float) -> Problem:
@@ -361,20 +387,6 @@ def _with_frames(problem: Problem, frames: FrameColumns, scale: float) -> Proble
     prior = np.column_stack([frames.prior, np.zeros(len(frames))])
     wider = _with_columns_behind(problem, frames.columns, (-free, free), frames.size / scale, prior)
     return replace(wider, frames=frames.names)
-
-
-def _with_contact(problem: Problem, contact: ContactColumns, scale: float) -> Problem:
-    """Return a problem with the columns of the contact last, and the errors that rows share."""
-    count = len(contact.names)
-    limits = np.zeros(count), np.full(count, np.inf)
-    wider = _with_columns_behind(
-        problem, contact.columns, limits, contact.size / scale, contact.prior
-    )
-    error = np.zeros(len(wider.prior_rows))
-    if problem.prior_error is not None:
-        error[: len(problem.prior_error)] = problem.prior_error
-    error[len(problem.prior_rows) :] = contact.prior_error
-    return replace(wider, contact=contact.names, shared=contact.shared, prior_error=error)
 
 
 def _with_columns_behind(

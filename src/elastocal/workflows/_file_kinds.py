@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal import logs, planning, procedure
+from elastocal import logs, planning, procedure, two_robots
 from elastocal.cell import load_cell
 from elastocal.codec import (
     ARRAYS_SCHEMA,
@@ -29,12 +29,26 @@ from elastocal.geometry import PositionPlan, read_geometry, read_position_map
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
-from elastocal.records import read_json, schema_of
+from elastocal.records import read_json, read_yaml_data, schema_of
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._table_kinds import dataset_file
 
 FileDescription = tuple[str, dict[str, object]]
 """The kind of a file, and what it holds: figures by name, JSON-ready."""
+
+
+def _pair_cell(path: Path) -> FileDescription:
+    """Describe a cell file of two robots."""
+    cell = two_robots.load_pair_cell(path)
+    return "cell file of two robots", {
+        "schema": two_robots.SCHEMA,
+        "name": cell.name,
+        "robots": [robot.name for robot in cell.robots],
+        "arms": list(cell.arms),
+        "load_cases": list(cell.file.presses.cases),
+        "technique": cell.file.search.technique,
+        "known": list(cell.models()),
+    }
 
 
 def cell_file(path: Path) -> FileDescription:
@@ -49,6 +63,8 @@ def cell_file(path: Path) -> FileDescription:
         If the cell cannot be planned for whatever the candidates: its file, a file that it names,
         the search technique, the place of the surface, or a collision at HOME.
     """
+    if two_robots.is_pair_cell(read_yaml_data(path)):
+        return _pair_cell(path)
     cell = load_cell(path)
     doors = rig_of(cell).warnings
     search = cell.file.search

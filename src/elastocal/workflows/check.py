@@ -131,6 +131,19 @@ _JSON_KINDS: dict[str, _Describe] = {
     ),
     "elastocal.geometry": kinds.geometry_file,
     "elastocal.position-plan": kinds.position_plan_file,
+    "elastocal.pair-plan": kinds.record_file(
+        "plan of two robots", lambda: workflows.PairPlan, "cell", "arms", "technique", "passed"
+    ),
+    "elastocal.two-robots": kinds.record_file(
+        "calibration of two robots",
+        lambda: workflows.PairResult,
+        *("cell", "springs", "poses", "readings", "deflection", "held_out"),
+    ),
+    "elastocal.cooperation": kinds.record_file(
+        "corrected cooperative process",
+        lambda: workflows.CooperationSummary,
+        *("arms", "rows", "before", "after", "weights", "largest", "limited"),
+    ),
 }
 """JSON files by the schema that they state, without its version."""
 _NETCDF_KINDS: dict[str, _Describe] = {
@@ -150,11 +163,15 @@ _YAML_KINDS: dict[str, _Describe] = {
 """YAML files by their schema."""
 
 _UNITS = {
+    "after": "m",
+    "before": "m",
     "correction": "m",
     "covering_radius": "m",
     "cycle": "s",
+    "deflection": "m",
     "delay": "s",
     "filter_delay": "s",
+    "held_out": "m",
     "held_out_mean_m": "m",
     "limit": "m",
     "mass": "kg",

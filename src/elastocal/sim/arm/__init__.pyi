@@ -1,6 +1,7 @@
 from .elastic_arm import (
     AXIAL_STIFFNESS as AXIAL_STIFFNESS,
     LINK_BENDING as LINK_BENDING,
+    ElasticArm as ElasticArm,
     bearing_truth as bearing_truth,
     with_link_bending as with_link_bending,
     with_stiffening_gears as with_stiffening_gears,

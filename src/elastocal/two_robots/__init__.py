@@ -1,0 +1,5 @@
+"""Two robots that press on each other: cell, plan, calibration of both, shared correction."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
