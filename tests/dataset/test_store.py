@@ -59,7 +59,7 @@ def test_a_refusal_names_the_file(tmp_path, name):
     good = read(path).to_xarray()
     bad = good.assign(force=good["force"] * 0.0)
     bad["force"].attrs = good["force"].attrs
-    with pytest.raises(DatasetError, match="^force is zero"):
+    with pytest.raises(DatasetError, match=r"^force is zero"):
         Dataset.from_xarray(bad)
     write(Dataset.from_labelled(labelled_from_xarray(bad)), path)
     with pytest.raises(DatasetError) as caught:
