@@ -58,6 +58,7 @@ from .devices import (
     SensorStatus as SensorStatus,
     WrenchBlock as WrenchBlock,
     require_duration as require_duration,
+    stack_nothing as stack_nothing,
 )
 from .examples import (
     PROCESS_FILE as PROCESS_FILE,
@@ -137,4 +138,9 @@ from .visit import (
     load_case_time as load_case_time,
     straight_time as straight_time,
     visit_steps as visit_steps,
+)
+from .untracked import (
+    TRACKER as TRACKER,
+    NoMetrology as NoMetrology,
+    without_tracker as without_tracker,
 )

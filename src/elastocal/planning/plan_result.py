@@ -105,6 +105,13 @@ class PoseRecord:
     margins: dict[str, float]
     """Margin of each check, in its unit; positive is allowed. A check that cannot refuse (the edge
     of a surface that has none) is left out."""
+    doubles: int | None = None
+    """Pose that is pressed once more here, on two stacked disks; None: it is one by itself."""
+
+    @property
+    def disks(self) -> int:
+        """Number of disks that are stacked at the press."""
+        return 1 if self.doubles is None else 2
 
     @property
     def T_base_tcp(self) -> FloatArray:
@@ -226,6 +233,8 @@ class PlanResult(Result):
     """Notes and warnings for the user; sentences alone in files of version 1."""
     production: ProductionRecord | None = None
     """None in a cell that names no process."""
+    without: tuple[str, ...] = ()
+    """Instruments that a run does without: ``tracker``; see `elastocal.cell.without_tracker`."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the plan in a few words, for a console or a notebook."""
@@ -286,6 +295,11 @@ def _content_hash(plan: PlanResult, schema: str = _SCHEMA) -> str:
         del data["production"]
     elif not plan.production.coverage.first:
         del data["production"]["coverage"]["first"]
+    if not plan.without:
+        del data["without"]
+    for pose, kept in zip(plan.poses, data["poses"], strict=True):
+        if pose.doubles is None:
+            del kept["doubles"]
     return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
 
 
@@ -371,8 +385,21 @@ def _pose_problems(plan: PlanResult) -> Iterator[str]:
         for key in pose.margins:
             if key not in names:
                 yield f"poses.{number}.margins: {key!r} is no check (known: {', '.join(names)})"
-    if len({pose.candidate for pose in plan.poses}) < len(plan.poses):
+    if len({(pose.candidate, pose.disks) for pose in plan.poses}) < len(plan.poses):
         yield "poses: a candidate stands twice"
+    yield from _doubled_problems(plan)
+
+
+def _doubled_problems(plan: PlanResult) -> Iterator[str]:
+    """Yield presses on two disks that repeat none on one, or come before one of those."""
+    single = [pose.id for pose in plan.poses if pose.doubles is None]
+    for pose in plan.poses:
+        if pose.doubles is None:
+            continue
+        if pose.doubles not in single:
+            yield f"poses.{pose.id}.doubles: {pose.doubles} is no pose on one disk"
+        elif pose.id < single[-1]:
+            yield f"poses.{pose.id}.doubles: pose {single[-1]} on one disk comes after it"
 
 
 def _move_problems(plan: PlanResult) -> Iterator[str]:
