@@ -379,7 +379,7 @@ def close_nothing() -> None:
     """Close nothing: the default for devices that hold neither line nor thread."""
 
 
-def stack_nothing(disks: int) -> None:  # noqa: ARG001 - a person stacks them
+def stack_nothing(disks: int) -> None:
     """Do nothing: the default of devices that are real."""
 
 

@@ -55,9 +55,7 @@ NORMAL_ALONE = Kind(
 )
 
 
-def turned_pool(
-    cell: Cell, surface: Surface, sampled: SampledPool, rng: Generator
-) -> SampledPool:
+def turned_pool(cell: Cell, surface: Surface, sampled: SampledPool, rng: Generator) -> SampledPool:
     """Return a pool whose tools are turned about the normal, each by a draw within `TURN`.
 
     A posture that fails a check with its draw is tried turned the other way, and else stays.
@@ -83,9 +81,7 @@ def _turned(cell: Cell, postures: Postures, spin: FloatArray) -> Postures:
     return _reached(cell, inverse_for(cell.robot), T, postures)
 
 
-def _reached(
-    cell: Cell, inverse: InverseKinematics, T: FloatArray, near: Postures
-) -> Postures:
+def _reached(cell: Cell, inverse: InverseKinematics, T: FloatArray, near: Postures) -> Postures:
     """Return the postures at frames (pose, 4, 4) that are nearest to others; NaN where none is."""
     external = near.q[:, : cell.robot.external_axes]
     off = T.copy()
@@ -123,9 +119,7 @@ def _replaced(pool: Pool, at: IndexArray, postures: Postures, margins: Margins) 
         values[at] = getattr(postures, name)
         merged[name] = values
     margin[:, at] = margins.margin
-    return replace(
-        pool, postures=Postures(**merged), margins=replace(pool.margins, margin=margin)
-    )
+    return replace(pool, postures=Postures(**merged), margins=replace(pool.margins, margin=margin))
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +172,7 @@ def doubled_places(
     T[:, :3, 3] += thickness * single.normal
     raised = _reached(cell, inverse_for(cell.robot), T, single)
     # Where the disk stands on the surface is judged with one disk already.
-    reached = np.isfinite(raised.q).all(axis=1)
+    reached: BoolArray = np.asarray(np.isfinite(raised.q).all(axis=1))
     good, _ = _passed(cell, surface, sampled, _where_reached(raised, single, reached))
     left = np.flatnonzero(good & reached)
     left = left[clear_retreats(cell, mover, raised.take(left))] if len(left) else left
@@ -200,9 +194,7 @@ def _where_reached(raised: Postures, single: Postures, reached: BoolArray) -> Po
     return Postures(raised.T_base_tcp, raised.normal, q, q_approach, raised.point)
 
 
-def doubled_findings(
-    cell: Cell, found: DoubledPlaces | None, wanted: int
-) -> tuple[Finding, ...]:
+def doubled_findings(cell: Cell, found: DoubledPlaces | None, wanted: int) -> tuple[Finding, ...]:
     """Return remarks on what a plan without a tracker lacks."""
     lateral = np.abs(cell.file.load_cases.force_tcp[:, :2]).max() > 0.0
     notes = () if lateral else (NORMAL_ALONE(),)

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from elastocal.arrays import IndexArray
 from elastocal.cell import CONDITIONING
-from elastocal.dataset import StatusArray
 from elastocal.planning import PlanResult
 from elastocal.procedure.derive.readings import PoseReadings, Reading
 
@@ -45,14 +45,14 @@ def _renamed(reading: Reading) -> Reading:
 
 def stacked_contacts(
     poses: Sequence[PoseReadings], labels: Sequence[int], load_cases: Sequence[str]
-) -> StatusArray | None:
+) -> IndexArray | None:
     """Return the number of stacked disks, shape (pose, load_case); None: one everywhere."""
     doubled = [each for each in poses if each.doubles is not None]
     if not doubled:
         return None
-    contacts = np.ones((len(labels), len(load_cases)), dtype=np.int8)
+    contacts: IndexArray = np.ones((len(labels), len(load_cases)), dtype=np.intp)
     for each in doubled:
-        names = [load.window.load_case for load in each.loads]
+        names = [str(load.window.load_case) for load in each.loads]
         if each.pose in labels:
             contacts[labels.index(each.pose), np.isin(load_cases, names)] = 2
     return contacts
