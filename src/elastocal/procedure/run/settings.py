@@ -114,9 +114,7 @@ def run_settings(cell: Cell, plan: PlanResult, *, touches: bool = False) -> RunS
     unseen = [pose.id for pose in plan.poses if pose.seen_by is None]
     tracked = TRACKER not in plan.without
     if touches and not tracked:
-        raise ProcedureError(
-            f"{cell.path}: a tracker measures touches, and the plan has none"
-        )
+        raise ProcedureError(f"{cell.path}: a tracker measures touches, and the plan has none")
     if unseen and tracked:
         raise ProcedureError(
             f"{cell.path}: pose {unseen[0]} is seen by no tracker: a run measures the marker"
