@@ -58,7 +58,6 @@ from .devices import (
     SensorStatus as SensorStatus,
     WrenchBlock as WrenchBlock,
     require_duration as require_duration,
-    stack_nothing as stack_nothing,
 )
 from .examples import (
     PROCESS_FILE as PROCESS_FILE,

@@ -60,7 +60,7 @@ from elastocal.planning.scene import (
     collision_scene,
     surface_findings,
 )
-from elastocal.planning.search import Cover, CoverSelection, Selection, technique
+from elastocal.planning.search import Cover, CoverSelection, SearchTechnique, Selection, technique
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import (
     OF_WRONG_MESHES,
@@ -300,45 +300,46 @@ def make_plan(
     wanted, doubled = 0, None
     if untracked is not None:
         wanted = require_doubled(cell, untracked.doubled, len(selection))
-        order = selection.order
-        doubled = doubled_places(cell, surface, sampled, order, mover, progress, wanted)
+        doubled = doubled_places(cell, surface, sampled, selection.order, mover, progress, wanted)
     chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route, doubled)
-    search = _search(chosen)
     progress(_SEARCH, 1, 1)
     # Of poses that only add to others it says nothing by itself.
     production = None if added_to else search_pool.production(cell, selection.order)
-    compared = None
-    if other is not None:
-        everyone = search_pool.preferred(cell, np.arange(len(search_pool.candidates)))
-        taken = search_pool.take(other, everyone, len(selection), for_search).order
-        spread = search_pool.spread(taken)
-        compared = ComparisonRecord(
-            name=other.name, candidates=tuple(taken.tolist()), spread=spread
-        )
-    poses = _poses(chosen)
+    compared = None if other is None else _compared(cell, search_pool, other, selection, for_search)
+    notes = [*_notes(chosen), *([] if added_to else production_findings(cell, production))]
+    if untracked is not None:
+        notes += doubled_findings(cell, doubled, wanted)
     plan = PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
         robot=robot_record(cell),
         contact=_contact(cell),
-        poses=poses,
+        poses=_poses(chosen),
         moves=_moves(chosen),
-        search=search,
+        search=_search(chosen),
         comparison=compared,
         pool=_pool(sampled.pool),
-        findings=(
-            *findings,
-            *_notes(cell, sampled.pool, search),
-            *_shortages(poses),
-            *unseen_bumps([pose.seen_by for pose in poses]),
-            *([] if added_to else production_findings(cell, production)),
-            *(() if untracked is None else doubled_findings(cell, doubled, wanted)),
-        ),
+        findings=(*findings, *notes),
         production=production,
         without=() if untracked is None else (TRACKER,),
     )
     share = float(selection.trace[SHARE][-1]) if added_to else 1.0
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface, share)
+
+
+def _compared(
+    cell: Cell,
+    pool: SearchPool,
+    other: SearchTechnique,
+    selection: Selection,
+    rng: Generator,
+) -> ComparisonRecord:
+    """Return the choice of another technique from the same pool, as many poses."""
+    everyone = pool.preferred(cell, np.arange(len(pool.candidates)))
+    taken = pool.take(other, everyone, len(selection), rng).order
+    return ComparisonRecord(
+        name=other.name, candidates=tuple(taken.tolist()), spread=pool.spread(taken)
+    )
 
 
 def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:
@@ -410,9 +411,10 @@ MOVE_STATION = Kind(
 )
 
 
-def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[Finding, ...]:
+def _notes(choice: _Choice) -> tuple[Finding, ...]:
     """Return remarks on how the poses were found, a line each."""
     notes: list[Finding] = []
+    cell, pool, search, poses = choice.cell, choice.pool, _search(choice), _poses(choice)
     wanted = cell.file.search.pool
     if len(pool.postures) < wanted:
         notes.append(
@@ -432,6 +434,8 @@ def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[Finding, ...]:
         notes.append(NO_D_MAX(name=search.name))
     notes.extend(_assumptions(cell))
     notes.extend(unjudged_limits(cell))
+    notes.extend(_shortages(poses))
+    notes.extend(unseen_bumps([pose.seen_by for pose in poses]))
     return tuple(notes)
 
 

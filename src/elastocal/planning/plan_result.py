@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import field, fields
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -282,24 +283,30 @@ class _WrittenPlan(PlanResult):
     """See `_content_hash`."""
 
 
+def _written(plan: PlanResult) -> dict[str, Any]:
+    """Return the data of a plan's file: without what only plans without a tracker have."""
+    data: dict[str, Any] = to_data(plan, stored=True)
+    if not plan.without:
+        del data["without"]
+    for pose, kept in zip(plan.poses, data["poses"], strict=True):
+        if pose.doubles is None:
+            del kept["doubles"]
+    return data
+
+
 def _content_hash(plan: PlanResult, schema: str = _SCHEMA) -> str:
     """Return a SHA-256 over the contents of a plan, which reveals changes by hand.
 
     It is computed from the parsed numbers: line breaks and number formats do not count, the order
     of load cases does. A key that earlier versions did not write counts only where it has a value.
     """
-    data = to_data(plan, stored=True) | {"schema": schema}
+    data = _written(plan) | {"schema": schema}
     if plan.contact.straight_time is None:
         del data["contact"]["straight_time"]
     if plan.production is None:
         del data["production"]
     elif not plan.production.coverage.first:
         del data["production"]["coverage"]["first"]
-    if not plan.without:
-        del data["without"]
-    for pose, kept in zip(plan.poses, data["poses"], strict=True):
-        if pose.doubles is None:
-            del kept["doubles"]
     return sha256(json.dumps(data, separators=(",", ":"), allow_nan=False))
 
 
@@ -315,7 +322,7 @@ def write_plan(folder: Path, plan: PlanResult) -> Path:
     """
     path = Path(folder) / PLAN
     check_plan(plan, str(path))
-    data = to_data(plan, stored=True)
+    data = _written(plan)
     write_json(path, {"schema": data.pop("schema"), "sha256": _content_hash(plan), **data})
     return path
 
