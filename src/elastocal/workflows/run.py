@@ -470,8 +470,8 @@ def _carry_out(
             show,
             supervision.interrupted,
             lambda fault: tell_at_once(operator, fault),
-            stack,
             watch or (lambda _: ""),
+            stack,
         )
         return procedure.Runner(session, devices, journal, hooks).run()
 

@@ -75,12 +75,12 @@ class SessionHooks:
     """Whether the run was asked to stop."""
     fault: Callable[[str], None] = lambda _: None
     """Called at once when a fault is seen; what follows may take long. It must not wait."""
-    stack: Callable[[int], str] = lambda _: ""
-    """Has a person stack so many disks between tool and tooling, the arm at HOME and disarmed;
-    returns why nobody did, or nothing."""
     enough: Callable[[PoseLog], str] = lambda _: ""
     """Called after each pose is committed, while the arm stands still off the surface; returns why
     the run has enough poses, or nothing."""
+    stack: Callable[[int], str] = lambda _: ""
+    """Has a person stack so many disks between tool and tooling, the arm at HOME and disarmed;
+    returns why nobody did, or nothing."""
 
 
 class RunEnd(Enum):
