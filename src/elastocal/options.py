@@ -75,6 +75,7 @@ _TECHNIQUES = (
     "exchange-o2", "exchange-o3", "exchange-o4", "exchange-o5",
 )  # fmt: skip
 CHOICES: dict[str, tuple[str, ...]] = {
+    "instrument": ("tracker",),
     "technique": _TECHNIQUES,
     "technique or none": (*_TECHNIQUES, "none"),
     "springs": (

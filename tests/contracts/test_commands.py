@@ -12,6 +12,7 @@ from unittest import mock
 import pytest
 import typer
 
+from elastocal.cell import TRACKER
 from elastocal.cell.examples import EXAMPLES
 from elastocal.cli.commands import COMMANDS
 from elastocal.cli.main import app, run
@@ -170,6 +171,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
         "purpose": ("elasticity", "geometry", "both"),
         "import purpose": ("elasticity", "geometry"),
         "warmth": get_args(Warmth),
+        "instrument": (TRACKER,),
     } == CHOICES
 
 

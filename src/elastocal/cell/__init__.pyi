@@ -132,6 +132,11 @@ from .sensor import (
     SensorLoad as SensorLoad,
     weight_response as weight_response,
 )
+from .untracked import (
+    TRACKER as TRACKER,
+    NoMetrology as NoMetrology,
+    without_tracker as without_tracker,
+)
 from .visit import (
     contact_time as contact_time,
     load_case_time as load_case_time,

@@ -379,6 +379,10 @@ def close_nothing() -> None:
     """Close nothing: the default for devices that hold neither line nor thread."""
 
 
+def stack_nothing(disks: int) -> None:
+    """Do nothing: the default of devices that are real."""
+
+
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class Devices:
@@ -392,3 +396,5 @@ class Devices:
     """Gives lines and threads back, at the end of a run, whatever happened."""
     lines: Callable[[], tuple[LineCounts, ...]] = no_lines
     """Function that returns the counts of the lines so far; never raises."""
+    stack: Callable[[int], None] = stack_nothing
+    """Takes note of the number of disks between tool and tooling: simulated cells stack them."""

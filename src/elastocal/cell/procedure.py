@@ -158,6 +158,9 @@ class Engagement(StrictModel):
     """Distance from the surface at which the unloaded readings are taken, in m."""
     approach_distance: PositiveLength = 0.1
     """Distance of the approach pose A_i from the surface, along the normal, in m."""
+    disk_thickness: Annotated[PositiveLength, Field(le=0.1)] | None = None
+    """Thickness of a disk of which two can be stacked, in m; by default there is none. A plan
+    without a tracker presses on two at some places."""
 
     @field_validator("approach_distance")
     @classmethod

@@ -31,6 +31,7 @@ from elastocal.cell.devices import (
     SensorStatus,
     close_nothing,
     require_duration,
+    stack_nothing,
 )
 from elastocal.cell.line_counts import LineCounts, no_lines
 from elastocal.cell.reading import DeviceReading
@@ -251,6 +252,8 @@ class DeviceSet:
     """Gives lines and threads back; called once."""
     lines: Callable[[], tuple[LineCounts, ...]] = no_lines
     """Function that returns the counts of its lines until `close`; never raises."""
+    stack: Callable[[int], None] = stack_nothing
+    """See `elastocal.cell.Devices.stack`."""
     readings: Callable[[], tuple[DeviceReading, ...]] | None = None
     """Function that returns the state of the devices if `RigContext.watches`; after a `DeviceError`
     they may be closed and reconnected. None: arm, sensor and metrology are polled."""

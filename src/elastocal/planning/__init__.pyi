@@ -5,6 +5,7 @@ from .more import (
 )
 from .plan import (
     PlanAndPool as PlanAndPool,
+    Untracked as Untracked,
     make_plan as make_plan,
     move_records as move_records,
     require_loads_possible_anywhere as require_loads_possible_anywhere,
@@ -58,3 +59,4 @@ from .show import (
     key_figures as key_figures,
     spreads as spreads,
 )
+from .untracked import as_planned as as_planned

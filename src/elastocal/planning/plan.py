@@ -5,7 +5,7 @@ requirements on a single pose are left to the checks of the pool.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import Cell, contact_time, fingerprint, straight_time
+from elastocal.cell import TRACKER, Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
 from elastocal.findings import Finding, Kind, as_number
 from elastocal.parallel import one_blas_thread
@@ -53,13 +53,14 @@ from elastocal.planning.plan_result import (
 )
 from elastocal.planning.pool import REACH_ADVICE, Pool, SampledPool, sample_pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
+from elastocal.planning.postures import Postures
 from elastocal.planning.production import production_findings
 from elastocal.planning.scene import (
     cell_surface,
     collision_scene,
     surface_findings,
 )
-from elastocal.planning.search import Cover, CoverSelection, Selection, technique
+from elastocal.planning.search import Cover, CoverSelection, SearchTechnique, Selection, technique
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import (
     OF_WRONG_MESHES,
@@ -67,6 +68,14 @@ from elastocal.planning.surface import (
     arm_reach,
     sample_uniform,
     tiny_finding,
+)
+from elastocal.planning.untracked import (
+    DoubledPlaces,
+    doubled_findings,
+    doubled_places,
+    joined_moves,
+    require_doubled,
+    turned_pool,
 )
 from elastocal.progress import Progress, silent
 from elastocal.robot import has_wrist
@@ -214,11 +223,25 @@ class _Choice:
     """Numbers in the pool, in search order."""
     route: Route
     """Numbers in the selection, in visiting order."""
+    doubled: DoubledPlaces | None = None
+    """Those that are visited once more, on two disks."""
 
     @property
     def place(self) -> IndexArray:
         """Place of each chosen pose in the visiting order, shape (pose,), in search order."""
         return np.argsort(self.route.order)
+
+
+_TURNS = 1
+"""What the turns of tools are drawn for, beside the seed: other plans draw as they did."""
+
+
+@dataclass(frozen=True)
+class Untracked:
+    """A plan whose readings no tracker takes."""
+
+    doubled: int | None = None
+    """Places that are pressed on two disks as well; None: as many as suffice."""
 
 
 @one_blas_thread()
@@ -228,6 +251,7 @@ def make_plan(
     jobs: int | None = None,
     progress: Progress = silent,
     added_to: AddedTo | None = None,
+    untracked: Untracked | None = None,
 ) -> PlanAndPool:
     """Return the calibration poses of a cell, checked and in visiting order.
 
@@ -245,6 +269,8 @@ def make_plan(
         of it and how much there is.
     added_to : AddedTo, optional
         Measured poses, to which those are chosen that add most.
+    untracked : Untracked, optional
+        Plan for readings that no tracker takes; ``cell`` is `elastocal.cell.without_tracker`'s.
 
     Raises
     ------
@@ -265,44 +291,55 @@ def make_plan(
     progress(_SURFACE, 1, 1)
     sampled = sample_pool(cell, surface, for_points, jobs, progress)
     _require_enough(cell, sampled, findings)
+    if untracked is not None:
+        for_turns = np.random.default_rng([cell.file.search.seed, _TURNS])
+        sampled = turned_pool(cell, surface, sampled, for_turns)
     progress(_SEARCH, 0, 1)
     search_pool = SearchPool.of(cell, surface, sampled)
     selection, route = _choose(cell, search_pool, sampled, mover, for_search, progress, added_to)
-    chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route)
-    search = _search(chosen)
+    wanted, doubled = 0, None
+    if untracked is not None:
+        wanted = require_doubled(cell, untracked.doubled, len(selection))
+        doubled = doubled_places(cell, surface, sampled, selection.order, mover, progress, wanted)
+    chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route, doubled)
     progress(_SEARCH, 1, 1)
     # Of poses that only add to others it says nothing by itself.
     production = None if added_to else search_pool.production(cell, selection.order)
-    compared = None
-    if other is not None:
-        everyone = search_pool.preferred(cell, np.arange(len(search_pool.candidates)))
-        taken = search_pool.take(other, everyone, len(selection), for_search).order
-        spread = search_pool.spread(taken)
-        compared = ComparisonRecord(
-            name=other.name, candidates=tuple(taken.tolist()), spread=spread
-        )
-    poses = _poses(chosen)
+    compared = None if other is None else _compared(cell, search_pool, other, selection, for_search)
+    notes = [*_notes(chosen), *([] if added_to else production_findings(cell, production))]
+    if untracked is not None:
+        notes += doubled_findings(cell, doubled, wanted)
     plan = PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
         robot=robot_record(cell),
         contact=_contact(cell),
-        poses=poses,
-        moves=move_records(route),
-        search=search,
+        poses=_poses(chosen),
+        moves=_moves(chosen),
+        search=_search(chosen),
         comparison=compared,
         pool=_pool(sampled.pool),
-        findings=(
-            *findings,
-            *_notes(cell, sampled.pool, search),
-            *_shortages(poses),
-            *unseen_bumps([pose.seen_by for pose in poses]),
-            *([] if added_to else production_findings(cell, production)),
-        ),
+        findings=(*findings, *notes),
         production=production,
+        without=() if untracked is None else (TRACKER,),
     )
     share = float(selection.trace[SHARE][-1]) if added_to else 1.0
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface, share)
+
+
+def _compared(
+    cell: Cell,
+    pool: SearchPool,
+    other: SearchTechnique,
+    selection: Selection,
+    rng: Generator,
+) -> ComparisonRecord:
+    """Return the choice of another technique from the same pool, as many poses."""
+    everyone = pool.preferred(cell, np.arange(len(pool.candidates)))
+    taken = pool.take(other, everyone, len(selection), rng).order
+    return ComparisonRecord(
+        name=other.name, candidates=tuple(taken.tolist()), spread=pool.spread(taken)
+    )
 
 
 def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, ...]) -> None:
@@ -374,9 +411,10 @@ MOVE_STATION = Kind(
 )
 
 
-def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[Finding, ...]:
+def _notes(choice: _Choice) -> tuple[Finding, ...]:
     """Return remarks on how the poses were found, a line each."""
     notes: list[Finding] = []
+    cell, pool, search, poses = choice.cell, choice.pool, _search(choice), _poses(choice)
     wanted = cell.file.search.pool
     if len(pool.postures) < wanted:
         notes.append(
@@ -396,6 +434,8 @@ def _notes(cell: Cell, pool: Pool, search: SearchRecord) -> tuple[Finding, ...]:
         notes.append(NO_D_MAX(name=search.name))
     notes.extend(_assumptions(cell))
     notes.extend(unjudged_limits(cell))
+    notes.extend(_shortages(poses))
+    notes.extend(unseen_bumps([pose.seen_by for pose in poses]))
     return tuple(notes)
 
 
@@ -440,33 +480,69 @@ def _contact(cell: Cell) -> ContactRecord:
 
 
 def _poses(choice: _Choice) -> tuple[PoseRecord, ...]:
-    pool, robot = choice.pool, choice.cell.robot
+    pool = choice.pool
     order = choice.selection.order[choice.route.order]
     check = SightCheck.of(choice.cell, choice.surface)
     seen_by = check.assigned(pool.postures.take(order)) if check else [None] * len(order)
-    poses = []
-    for number, candidate in enumerate(order.tolist()):
-        posture = pool.postures.take([candidate])
-        # From the joints and not from the frame wanted: what the robot will do.
-        T = robot.forward(posture.q[0])
-        margins = dict(zip(pool.margins.names, pool.margins.margin[:, candidate], strict=True))
-        x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
-        poses.append(
-            PoseRecord(
-                id=number,
-                candidate=candidate,
-                joints=tuple(posture.q[0].tolist()),
-                approach_joints=tuple(posture.q_approach[0].tolist()),
-                tcp_position=_vector(T[:3, 3]),
-                tcp_quaternion=(float(x), float(y), float(z), float(w)),
-                normal=_vector(posture.normal[0]),
-                seen_by=seen_by[number],
-                contact_time=contact_time(choice.cell),
-                # JSON has no infinity: a check that cannot refuse is left out.
-                margins={name: float(m) for name, m in margins.items() if np.isfinite(m)},
+    single = pool.postures.take(order)
+    poses = [
+        _pose(choice, number, int(order[number]), single.take([number]), seen_by[number])
+        for number in range(len(order))
+    ]
+    if choice.doubled is not None:
+        again = choice.doubled
+        for number in again.route.order.tolist():
+            place = int(again.chosen[number])
+            pose = _pose(
+                choice,
+                len(poses),
+                int(choice.selection.order[place]),
+                again.postures.take([number]),
+                None,
             )
-        )
+            poses.append(replace(pose, doubles=int(choice.place[place])))
     return tuple(poses)
+
+
+def _pose(
+    choice: _Choice, number: int, candidate: int, posture: Postures, seen_by: str | None
+) -> PoseRecord:
+    """Return the record of one posture."""
+    margins = choice.pool.margins
+    # From the joints and not from the frame wanted: what the robot will do.
+    T = choice.cell.robot.forward(posture.q[0])
+    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
+    named = zip(margins.names, margins.margin[:, candidate], strict=True)
+    return PoseRecord(
+        id=number,
+        candidate=candidate,
+        joints=tuple(posture.q[0].tolist()),
+        approach_joints=tuple(posture.q_approach[0].tolist()),
+        tcp_position=_vector(T[:3, 3]),
+        tcp_quaternion=(float(x), float(y), float(z), float(w)),
+        normal=_vector(posture.normal[0]),
+        seen_by=seen_by,
+        contact_time=contact_time(choice.cell),
+        # JSON has no infinity: a check that cannot refuse is left out.
+        margins={name: float(m) for name, m in named if np.isfinite(m)},
+    )
+
+
+def _moves(choice: _Choice) -> tuple[MoveRecord, ...]:
+    """Return the moves of the round, and of that with two disks after it."""
+    moves = move_records(choice.route)
+    if choice.doubled is None:
+        return moves
+    first = len(choice.selection)
+    again = tuple(
+        replace(
+            each,
+            start=None if each.start is None else first + each.start,
+            end=None if each.end is None else first + each.end,
+        )
+        for each in move_records(choice.doubled.route)
+    )
+    return joined_moves(moves, again, tuple(choice.cell.home.tolist()))
 
 
 def move_records(route: Route) -> tuple[MoveRecord, ...]:
@@ -487,6 +563,8 @@ def _search(choice: _Choice) -> SearchRecord:
     search, selection, pool = choice.cell.file.search, choice.selection, choice.search_pool
     spread = pool.spread(selection.order)
     has_process = choice.cell.process is not None
+    count = len(selection)
+    again = 0 if choice.doubled is None else len(choice.doubled.chosen)
     return SearchRecord(
         name=selection.name,
         metric=search.metric,
@@ -496,7 +574,7 @@ def _search(choice: _Choice) -> SearchRecord:
         covering_radius=spread.covering_radius,
         lower_bound=selection.lower_bound if isinstance(selection, CoverSelection) else None,
         covered=None if search.d_max is None else spread.covering_radius <= search.d_max,
-        order=tuple(choice.place.tolist()),
+        order=(*choice.place.tolist(), *range(count, count + again)),
         spread=spread,
         process_unseen=pool.information.process_unseen if has_process else None,
     )

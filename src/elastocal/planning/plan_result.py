@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import field, fields
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -105,6 +106,13 @@ class PoseRecord:
     margins: dict[str, float]
     """Margin of each check, in its unit; positive is allowed. A check that cannot refuse (the edge
     of a surface that has none) is left out."""
+    doubles: int | None = None
+    """Pose that is pressed once more here, on two stacked disks; None: it is one by itself."""
+
+    @property
+    def disks(self) -> int:
+        """Number of disks that are stacked at the press."""
+        return 1 if self.doubles is None else 2
 
     @property
     def T_base_tcp(self) -> FloatArray:
@@ -226,6 +234,8 @@ class PlanResult(Result):
     """Notes and warnings for the user; sentences alone in files of version 1."""
     production: ProductionRecord | None = None
     """None in a cell that names no process."""
+    without: tuple[str, ...] = ()
+    """Instruments that a run does without: ``tracker``; see `elastocal.cell.without_tracker`."""
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the plan in a few words, for a console or a notebook."""
@@ -273,13 +283,24 @@ class _WrittenPlan(PlanResult):
     """See `_content_hash`."""
 
 
+def _written(plan: PlanResult) -> dict[str, Any]:
+    """Return the data of a plan's file: without what only plans without a tracker have."""
+    data: dict[str, Any] = to_data(plan, stored=True)
+    if not plan.without:
+        del data["without"]
+    for pose, kept in zip(plan.poses, data["poses"], strict=True):
+        if pose.doubles is None:
+            del kept["doubles"]
+    return data
+
+
 def _content_hash(plan: PlanResult, schema: str = _SCHEMA) -> str:
     """Return a SHA-256 over the contents of a plan, which reveals changes by hand.
 
     It is computed from the parsed numbers: line breaks and number formats do not count, the order
     of load cases does. A key that earlier versions did not write counts only where it has a value.
     """
-    data = to_data(plan, stored=True) | {"schema": schema}
+    data = _written(plan) | {"schema": schema}
     if plan.contact.straight_time is None:
         del data["contact"]["straight_time"]
     if plan.production is None:
@@ -301,7 +322,7 @@ def write_plan(folder: Path, plan: PlanResult) -> Path:
     """
     path = Path(folder) / PLAN
     check_plan(plan, str(path))
-    data = to_data(plan, stored=True)
+    data = _written(plan)
     write_json(path, {"schema": data.pop("schema"), "sha256": _content_hash(plan), **data})
     return path
 
@@ -371,8 +392,21 @@ def _pose_problems(plan: PlanResult) -> Iterator[str]:
         for key in pose.margins:
             if key not in names:
                 yield f"poses.{number}.margins: {key!r} is no check (known: {', '.join(names)})"
-    if len({pose.candidate for pose in plan.poses}) < len(plan.poses):
+    if len({(pose.candidate, pose.disks) for pose in plan.poses}) < len(plan.poses):
         yield "poses: a candidate stands twice"
+    yield from _doubled_problems(plan)
+
+
+def _doubled_problems(plan: PlanResult) -> Iterator[str]:
+    """Yield presses on two disks that repeat none on one, or come before one of those."""
+    single = [pose.id for pose in plan.poses if pose.doubles is None]
+    for pose in plan.poses:
+        if pose.doubles is None:
+            continue
+        if pose.doubles not in single:
+            yield f"poses.{pose.id}.doubles: {pose.doubles} is no pose on one disk"
+        elif pose.id < single[-1]:
+            yield f"poses.{pose.id}.doubles: pose {single[-1]} on one disk comes after it"
 
 
 def _move_problems(plan: PlanResult) -> Iterator[str]:

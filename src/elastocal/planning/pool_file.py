@@ -159,17 +159,19 @@ def check_pool_of(plan: PlanResult, data: PoolData, what: str = POOL) -> None:
     SchemaError
         If the joints, the number of candidates or points, or a pose's posture differ.
     """
+    # A place that is pressed on two disks as well is one candidate.
+    single = [pose for pose in plan.poses if pose.doubles is None]
     for quantity, ours, wanted in (
         ("joints", data.joint_names, plan.robot.joints),
         ("candidates", len(data), plan.pool.valid),
         ("sampled points", len(data.sampled), plan.pool.sampled),
-        ("chosen candidates", int((data.pose_id != NOT_CHOSEN).sum()), len(plan.poses)),
+        ("chosen candidates", int((data.pose_id != NOT_CHOSEN).sum()), len(single)),
     ):
         if ours != wanted:
             raise SchemaError(
                 f"{what} belongs to another plan: {quantity} {ours}, in the plan {wanted}"
             )
-    for pose in plan.poses:
+    for pose in single:
         row = pose.candidate
         same = data.pose_id[row] == pose.id and tuple(data.q[row].tolist()) == pose.joints
         if not (same and np.allclose(data.contact[row], pose.tcp_position, rtol=0.0, atol=1e-6)):

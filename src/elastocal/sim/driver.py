@@ -27,10 +27,11 @@ class SimulatedDriver:
         If all devices are simulated, time passes only while a caller sleeps, and results are
         reproducible to the last bit. Beside real devices the cell follows the clock of the rig.
         """
-        if wanted.keys() == self.kinds:
+        if wanted.keys() == self.kinds - (set() if cell.file.trackers else {"metrology"}):
             all_of_it = simulated_devices(cell, context.seed, context.start)
             arm, sensor, metrology = all_of_it.arm, all_of_it.sensor, all_of_it.metrology
-            return DeviceSet(arm, sensor, metrology, clock=all_of_it.clock)
+            clock, stack = all_of_it.clock, all_of_it.stack
+            return DeviceSet(arm, sensor, metrology, clock=clock, stack=stack)
         live = LiveCell(cell, context.seed, context.clock)
         return DeviceSet(
             arm=live.arm() if "arm" in wanted else None,

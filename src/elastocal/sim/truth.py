@@ -378,6 +378,9 @@ class ContactTruth(StrictModel):
     """Normal stiffness of the urethane disk, in N/m: 0.3 mm at 1.1 kN."""
     shear_stiffness: TranslationalStiffness = 1.5e6
     """Shear stiffness of the disk before it slips, in N/m: 0.2 mm at 280 N."""
+    spread: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = 0.0
+    """Standard deviation of the compliance of a place over the mean of all, along the normal and
+    across it: seat of the disk, ribs behind the surface."""
     friction: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
     """True coefficient of friction; by default that of the load cases."""
     micro_slip: Distance = 8e-6

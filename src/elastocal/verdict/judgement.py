@@ -352,7 +352,8 @@ def _noise(evidence: Evidence, unseen: UnseenErrors) -> Iterator[str]:
     if evidence.summary is None:
         return
     sigma = evidence.summary.noise.marker_sigma_median
-    scatter = evidence.summary.registration.scatter
+    registration = evidence.summary.registration
+    scatter = None if registration is None else registration.scatter
     # The scatter of the unloaded readings also holds where the arm stops: without the tracker's
     # own figure it is the most that the tracker can scatter by.
     noise = scatter if sigma is None else sigma

@@ -22,6 +22,7 @@ from elastocal.cell import (
     Driver,
     LineCounts,
     LocalPort,
+    NoMetrology,
     PathDriver,
     RealArm,
     RigContext,
@@ -199,7 +200,9 @@ class ReservedRig:
                 raise DeviceError(
                     f"{self.rig.cell.path}: devices: a driver with a clock of its own"
                 )
-            arm, sensor, metrology = (self._only(kind, made) for kind in KINDS)
+            arm, sensor = (self._only(kind, made) for kind in ("arm", "sensor"))
+            tracked = bool(self.rig.cell.file.trackers)
+            metrology = self._only("metrology", made) if tracked else NoMetrology()
         except BaseException:
             _refusals_to_close(made)
             raise
@@ -208,7 +211,11 @@ class ReservedRig:
         def lines() -> tuple[LineCounts, ...]:
             return tuple(counts for each in made for counts in each.lines())
 
-        return Devices(arm, sensor, metrology, running, lambda: _close(made), lines)
+        def stack(disks: int) -> None:
+            for each in made:
+                each.stack(disks)
+
+        return Devices(arm, sensor, metrology, running, lambda: _close(made), lines, stack)
 
     def connect_sensor(self, context: RigContext) -> DeviceSet:
         """Return the force sensor alone, with its feed; the caller closes it.
@@ -334,7 +341,7 @@ def rig_of(cell: Cell) -> Rig:
     found: dict[str, Driver] = {}
     wanted: dict[str, dict[str, DeviceSettings]] = {}
     # What may give a feed comes before what may need one.
-    for kind in ("sensor", "metrology", "arm"):
+    for kind in _kinds_of(cell):
         choice, place = choices.by_kind[kind], f"{cell.path}: devices.{kind}"
         try:
             driver = found.get(choice.driver) or DRIVERS.named(choice.driver)
@@ -350,6 +357,12 @@ def rig_of(cell: Cell) -> Rig:
     rig = Rig(cell, {name: found[name] for name in order}, wanted)
     _require_real_time(rig)
     return rig
+
+
+def _kinds_of(cell: Cell) -> tuple[str, ...]:
+    """Return the kinds of devices of a cell: metrology only where there is a tracker to look."""
+    trackers = ("metrology",) if cell.file.trackers else ()
+    return ("sensor", *trackers, "arm")
 
 
 def _require_real_time(rig: Rig) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from elastocal import planning
-from elastocal.cell import Cell, fingerprint, load_cell
+from elastocal.cell import TRACKER, Cell, fingerprint, load_cell, without_tracker
 from elastocal.compensation.programs import (
     PTP_PERCENT,
     AxisMove,
@@ -85,6 +85,12 @@ class PlanSettings:
     the best next one, or why no number of poses does. `calibrate` takes both datasets."""
     page_language: Annotated[str, Option(choices="page language")] = "en"
     """Language of ``plan.html``."""
+    without: Annotated[str | None, Option(choices="instrument")] = None
+    """Instrument that the run does without: ``tracker``. No line of sight is needed, tools are
+    turned about the normal, and some places are pressed on two stacked disks as well."""
+    doubled: Annotated[int | None, Option(least=0, most=1000)] = None
+    """Places that are pressed on two stacked disks as well, without a tracker; by default 8 where
+    the cell file gives ``engagement.disk_thickness``."""
 
 
 @record()
@@ -164,6 +170,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     >>> dict(found.facts())["poses"]
     '4 by i_optimal from 3000 candidates'
     """
+    _require_instrument(settings)
     cell = _wanted_cell(settings)
     added = None
     if settings.more is not None:
@@ -185,7 +192,7 @@ def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
         return _planned(cell, other, settings, progress, added).plan
     with filling(Path(settings.out), PLAN, settings.force) as folder:
         planned = _planned(cell, other, settings, progress, added)
-        if settings.poses is not None or added is not None:
+        if settings.poses is not None or added is not None or settings.without is not None:
             # A plan belongs to the cell file, whatever number of poses an option requests.
             own = fingerprint(load_cell(Path(settings.cell)))
             record = replace(planned.plan.cell, fingerprint=own)
@@ -207,12 +214,32 @@ def _planned(
     added: MeasuredRun | None,
 ) -> planning.PlanAndPool:
     """Return a plan of its own, or one of poses that add to a run, with what they bring."""
+    if settings.without is not None:
+        untracked = planning.Untracked(settings.doubled)
+        bare = without_tracker(cell)
+        return planning.make_plan(bare, other, settings.jobs, progress, untracked=untracked)
     if added is None:
         return planning.make_plan(cell, other, settings.jobs, progress)
     to = planning.AddedTo(added.joint_position, added.beside)
     made = planning.make_plan(cell, other, settings.jobs, progress, to)
     findings = (*added.findings, *added.gain(made.share), *made.plan.findings)
     return replace(made, plan=replace(made.plan, findings=findings))
+
+
+def _require_instrument(settings: PlanSettings) -> None:
+    """Refuse an instrument that no plan does without, and options that need it."""
+    if settings.without is None:
+        if settings.doubled is not None:
+            raise PlanningError("--doubled goes with --without tracker")
+        return
+    if settings.without != TRACKER:
+        raise PlanningError(
+            f"--without {settings.without!r} is no instrument that a run can do without"
+            f" (allowed: {TRACKER})"
+        )
+    for value, option in ((settings.free_poses, "--positions"), (settings.more, "--more")):
+        if value is not None:
+            raise PlanningError(f"{option} is for a tracker: leave --without tracker out")
 
 
 def _require_free_poses(settings: PlanSettings) -> None:

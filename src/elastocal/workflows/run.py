@@ -8,9 +8,10 @@ import contextlib
 import os
 import threading
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -32,7 +33,7 @@ from elastocal.files import read_text
 from elastocal.findings import group_alike
 from elastocal.identification import FEWEST, RISK
 from elastocal.options import CHOICES, Option, Statements
-from elastocal.planning import PLAN, POOL, PlanResult, read_plan, read_pool
+from elastocal.planning import PLAN, POOL, PlanResult, as_planned, read_plan, read_pool
 from elastocal.planning.export import pose_lines
 from elastocal.procedure import (
     Event,
@@ -207,8 +208,13 @@ class RunResult(Result):
         if found.dataset:
             yield Paragraph(
                 f"wrote {found.dataset} and summary.json:"
-                f" `elastocal calibrate {found.dataset} --out model.json`"
+                f" `elastocal calibrate {found.dataset}{self._contact()} --out model.json`"
             )
+
+    def _contact(self) -> str:
+        """Return the option by which readings are calibrated that no tracker took."""
+        tracked = self.summary is None or self.summary.registration is not None
+        return "" if tracked else " --contact CONTACT.yaml"
 
     def _lost(self) -> Iterator[tuple[str, str]]:
         """Yield the first readings that are not ok, with why."""
@@ -341,7 +347,9 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
                     journal.write(devices.clock.now(), Event.START, run=record)
                 else:
                     journal.write(devices.clock.now(), Event.RESUME)
-                result = _carry_out(session, devices, journal, settings.operator, progress, watch)
+                stack = partial(_stack, job, settings.operator)
+                told = settings.operator, progress, watch, stack
+                result = _carry_out(session, devices, journal, *told)
     if job.key is not None:
         vouched = verdict.sign(job.key, verdict.OF_RUN, procedure.file_sha256(journal_file), _now())
         verdict.write_signature(job.folder.signature, vouched)
@@ -390,22 +398,25 @@ def _prepare(settings: RunSettings) -> _Job:
         stated=dict(settings.state),
     ).model_copy(update={"touch": settings.touch})
     certificate_of(loaded.file.certificate, stated.stated)
-    procedure.check_compatible(read, loaded)
+    used = as_planned(loaded, read)
+    procedure.check_compatible(read, used)
     touches, place = settings.touch is not None, RunFolder(Path(settings.out))
-    carried_out = procedure.run_settings(loaded, read, touches=touches)
-    procedure.rehearse_derivation(loaded, read, place, stated)
+    carried_out = procedure.run_settings(used, read, touches=touches)
+    procedure.rehearse_derivation(used, read, place, stated)
     if settings.until is None and settings.risk != RISK:
         raise ProcedureError(f"--risk {settings.risk} goes with --until only")
     if settings.until is not None:
         if touches:
             raise ProcedureError("--until is for load cases, not for --touch")
+        if not carried_out.tracked:
+            raise ProcedureError("--until judges readings of a tracker, and the plan has none")
         AccuracyWatch(loaded, read, place, settings.until, settings.risk, settings.operator.warn)
     return _Job(
         loaded,
         read,
         folder,
         carried_out,
-        rig_of(_as_warm(loaded, settings.touch)),
+        rig_of(_as_warm(used, settings.touch)),
         stated,
         place,
         procedure.registration_warnings(read),
@@ -445,6 +456,7 @@ def _carry_out(
     operator: Operator,
     progress: Progress,
     watch: AccuracyWatch | None,
+    stack: Callable[[int], str],
 ) -> procedure.SessionResult:
     count = len(session.plan.poses)
     with operator.supervise(count) as supervision:
@@ -459,8 +471,22 @@ def _carry_out(
             supervision.interrupted,
             lambda fault: tell_at_once(operator, fault),
             watch or (lambda _: ""),
+            stack,
         )
         return procedure.Runner(session, devices, journal, hooks).run()
+
+
+def _stack(job: _Job, operator: Operator, disks: int) -> str:
+    """Have a person stack disks; return why nobody did, or nothing. A simulated cell does it."""
+    if not job.rig.real:
+        return ""
+    what = "put the second disk on the first" if disks > 1 else "leave one disk alone on the tool"
+    operator.warn([f"the arm is at HOME and disarmed: {what}, and leave the cell"])
+    try:
+        operator.confirm()
+    except ProcedureError as error:
+        return str(error)
+    return ""
 
 
 def _accuracy_watch(

@@ -249,7 +249,7 @@ class CalibratePairSettings:
     """Folder for the model of each arm, ``ARM.json``, and ``pair.json``."""
     springs: Annotated[str, Option(choices="springs", file=True)] = "auto"
     """Springs of both arms: ``auto``, a layout, or ``gears``."""
-    draws: Annotated[int, Option(least=40)] = 200
+    draws: Annotated[int, Option(least=40, most=100_000)] = 200
     """Bootstrap draws."""
     seed: Annotated[int, Option(least=0)] = 0
     """Seed of the bootstrap."""

@@ -226,7 +226,11 @@ def unloaded_references(
     found = {
         pose.pose: (pose.zero.tool, pose.reference.tool)
         for pose in poses
-        if pose.zero and pose.zero.tool and pose.reference and pose.reference.tool
+        if pose.doubles is None
+        and pose.zero
+        and pose.zero.tool
+        and pose.reference
+        and pose.reference.tool
     }
     joints = max((len(zero.q) for zero, _ in found.values()), default=0)
     q, force, tcp, link = (

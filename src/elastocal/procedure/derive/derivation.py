@@ -35,6 +35,7 @@ from elastocal.cell import (
     CONDITIONING,
     LIGHT_CONTACT,
     SENSOR_CORRECTED,
+    TRACKER,
     Cell,
     LineCounts,
     SensorLoad,
@@ -42,7 +43,7 @@ from elastocal.cell import (
 from elastocal.dataset import MADE_FROM, STATUSES, Dataset, write
 from elastocal.errors import DatasetError, FileAccessError, ProcedureError, SchemaError
 from elastocal.findings import Finding, Kind, as_number
-from elastocal.planning import PlanResult
+from elastocal.planning import PlanResult, as_planned
 from elastocal.procedure.derive import summary
 from elastocal.procedure.derive._rows import (
     LoadRow,
@@ -50,6 +51,11 @@ from elastocal.procedure.derive._rows import (
     load_rows,
     seen_markers,
     unloaded_references,
+)
+from elastocal.procedure.derive.doubled import (
+    doubled_case,
+    label_doubled,
+    stacked_contacts,
 )
 from elastocal.procedure.derive.readings import (
     PoseReadings,
@@ -78,7 +84,7 @@ from elastocal.procedure.record import (
     read_streams,
     signs_of_a_cut,
 )
-from elastocal.procedure.registration import Registration, StationFit, register
+from elastocal.procedure.registration import NO_REGISTRATION, Registration, StationFit, register
 from elastocal.records import write_json
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -202,21 +208,22 @@ class RunFindings:
 
 def summarise(found: RunFindings) -> summary.RunSummary:
     """Return the summary of a run."""
-    committed, weighed = [pose.pose for pose in found.poses], weighed_poses(found.poses)
+    committed, weighed = [pose.log.pose for pose in found.poses], weighed_poses(found.poses)
     planned = [pose.id for pose in found.plan.poses]
     cases = [case for case in found.plan.contact.load_cases if case != LIGHT_CONTACT]
-    registration, tool, estimate = found.registration, found.tool, found.estimate
+    tool, estimate = found.tool, found.estimate
+    registration = None if found.registration is NO_REGISTRATION else found.registration
     missing = tuple(pose for pose in planned if pose not in committed)
     warnings = run_warnings(found.rows, registration, tool, estimate, cases, weighed)
     return summary.RunSummary(
         elastocal=__version__,
         poses=summary.PoseCounts(len(planned), len(committed), missing),
         readings=_readings(found.rows),
-        registration=_registration(registration, found.dataset),
+        registration=None if registration is None else _registration(registration, found.dataset),
         tool=_tool(tool, estimate, weighed),
         drift=_drift(found.poses),
         contact_moment=_moments(found.rows),
-        noise=_noise(found.rows),
+        noise=_noise(found.rows, tracked=registration is not None),
         attempts=_attempts(found.poses, found.entries),
         lines=_lines(found.entries),
         times=_times(found.poses, found.entries),
@@ -315,10 +322,11 @@ def _moments(rows: Sequence[LoadRow]) -> summary.MomentSummary:
     return summary.MomentSummary(len(sizes), _median(sizes), max(sizes, default=None))
 
 
-def _noise(rows: Sequence[LoadRow]) -> summary.NoiseSummary:
+def _noise(rows: Sequence[LoadRow], *, tracked: bool) -> summary.NoiseSummary:
     good = _good(rows)
     forces, markers = ([getattr(each, name) for each in good] for name in _SIGMAS)
-    return summary.NoiseSummary(len(good), _median(forces), _median(markers))
+    marker = _median(markers) if tracked else None
+    return summary.NoiseSummary(len(good), _median(forces), marker)
 
 
 def _lines(entries: Sequence[Entry]) -> tuple[LineCounts, ...]:
@@ -333,7 +341,7 @@ def _lines(entries: Sequence[Entry]) -> tuple[LineCounts, ...]:
 def _attempts(poses: Sequence[PoseReadings], entries: Sequence[Entry]) -> summary.AttemptSummary:
     faults = (e for e in entries if e.event is Event.FAULT)
     return summary.AttemptSummary(
-        retried={str(p.pose): p.log.attempt for p in poses if p.log.attempt > 1},
+        retried={str(p.log.pose): p.log.attempt for p in poses if p.log.attempt > 1},
         given_up=tuple(entry.pose for entry in entries if entry.event is Event.GIVEN_UP),
         resumed=sum(entry.event is Event.RESUME for entry in entries),
         faults=tuple(summary.FaultSummary(e.pose, e.attempt, e.step, e.text) for e in faults),
@@ -380,7 +388,7 @@ def _number(value: float) -> summary.Number:
 
 def run_warnings(
     rows: Sequence[LoadRow],
-    registration: Registration,
+    registration: Registration | None,
     tool: SensorLoad,
     estimate: ToolEstimate,
     load_cases: Sequence[str],
@@ -392,8 +400,8 @@ def run_warnings(
     ----------
     rows : sequence of LoadRow
         Readings of all poses.
-    registration : Registration
-        Stations and marker.
+    registration : Registration, optional
+        Stations and marker; None: no tracker measured.
     tool, estimate : SensorLoad, ToolEstimate
         The tool by the cell file and by the unloaded references.
     load_cases : sequence of str
@@ -402,21 +410,23 @@ def run_warnings(
         Poses of the unloaded references that the tool was estimated from.
     """
     return [
-        *_about_readings(rows, load_cases),
-        *_about_stations(registration),
-        *_about_lever(registration),
+        *_about_readings(rows, load_cases, _SIGMAS if registration else _SIGMAS[:1]),
+        *(() if registration is None else _about_stations(registration)),
+        *(() if registration is None else _about_lever(registration)),
         *_about_tool(tool, estimate, weighed),
     ]
 
 
-def _about_readings(rows: Sequence[LoadRow], load_cases: Sequence[str]) -> Iterator[Finding]:
+def _about_readings(
+    rows: Sequence[LoadRow], load_cases: Sequence[str], sigmas: Sequence[str]
+) -> Iterator[Finding]:
     had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
     for case in load_cases:
         if case not in had:
             yield NO_READING_OF_CASE(case=case)
     if lost := len(_not_ok(rows)):
         yield NOT_OK(lost=lost, rows=len(rows))
-    for name in _SIGMAS:
+    for name in sigmas:
         if any(not np.all(getattr(numbers, name) > 0) for numbers in _good(rows)):
             yield NO_SCATTER(name=name)
 
@@ -552,6 +562,7 @@ def read_run(run: Path) -> CommittedRun:
         )
     record = entries[0].run
     cell, plan = read_copies(folder, record)
+    cell = as_planned(cell, plan)
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
     for log in logs:
         check_stream(folder.streams / log.streams, known[log.streams])
@@ -649,16 +660,21 @@ def derive_poses(
     DatasetError
         If no reading is usable.
     """
-    tool, lever = sensor or sensor_load(cell), marker_in_tcp(cell)
-    seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
-    registration = register(seen, lever)
+    poses = label_doubled(poses, plan)
+    tool, tracked = sensor or sensor_load(cell), TRACKER not in plan.without
+    registration = NO_REGISTRATION
+    if tracked:
+        lever = marker_in_tcp(cell)
+        seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
+        registration = register(seen, lever)
     conditioned = cell.file.procedure.conditioning
-    rows = load_rows(poses, registration, tool, conditioned=conditioned)
+    rows = load_rows(poses, registration, tool, conditioned=conditioned, metrology=tracked)
     had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
     if not had:
         raise DatasetError(f"no usable reading among {len(rows)}: {_reasons(rows, registration)}")
     # The press before the reference stays, usable or not: the others' friction begins with it.
-    cases = [case for case in plan.contact.load_cases if case in had or case == CONDITIONING]
+    planned = (*plan.contact.load_cases, *map(doubled_case, plan.contact.load_cases))
+    cases = [case for case in planned if case in had or case == CONDITIONING]
     arm = measured_arm(cell)
     dataset = dataset_of(poses, rows, cases, arm, registration, tool, provenance)
     ranges = None if cell.file.sensor is None else cell.file.sensor.ranges
@@ -837,7 +853,8 @@ def dataset_of(
         robot_name=robot.name,
         robot_urdf=arm.urdf,
         tcp_frame=robot.tip,
-        marker=tuple(registration.lever_arm.tolist()),
+        marker=None if is_unseen else tuple(registration.lever_arm.tolist()),
+        contacts=stacked_contacts(poses, labels, load_cases),
         gravity=arm.gravity,
         conditioned=arm.conditioned,
         check=[case for case in load_cases if case == arm.check],

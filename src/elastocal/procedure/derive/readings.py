@@ -198,11 +198,13 @@ class PoseReadings:
     """A later unloaded window, after the loads; None if there is none."""
     light: Reading | None = None
     """The reference in light contact; None: the reference is the unloaded one."""
+    doubles: int | None = None
+    """Pose whose place was pressed on two disks; None: it is one by itself."""
 
     @property
     def pose(self) -> int:
-        """Id in the plan."""
-        return self.log.pose
+        """Pose of the dataset: the id in the plan, or the pose that it doubles."""
+        return self.log.pose if self.doubles is None else self.doubles
 
     @property
     def zero(self) -> Reading | None:
@@ -265,8 +267,13 @@ def places_in_time(
     """Return the place in time of each load among those of its pose; -1 where it was not tried."""
     sequence = np.full((len(labels), len(load_cases)), -1)
     for pose in poses:
-        for place, load in enumerate(pose.loads):
-            sequence[labels.index(pose.pose), np.array(load_cases) == load.window.load_case] = place
+        if pose.pose not in labels:
+            continue
+        row = sequence[labels.index(pose.pose)]
+        # A place that is visited again goes on counting.
+        first = 0 if pose.doubles is None else len(load_cases)
+        for place, load in enumerate(pose.loads, start=first):
+            row[np.array(load_cases) == load.window.load_case] = place
     return sequence
 
 

@@ -10,14 +10,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import LIGHT_CONTACT, Cell
+from elastocal.cell import LIGHT_CONTACT, TRACKER, Cell
 from elastocal.planning import PlanResult, PoseRecord
 from elastocal.procedure.derive._rows import LoadRow, LoadValues
 from elastocal.procedure.derive.derivation import dataset_of, measured_arm, run_provenance
+from elastocal.procedure.derive.doubled import doubled_case, label_doubled
 from elastocal.procedure.derive.readings import Mean, PoseReadings, Reading, ToolState
 from elastocal.procedure.derive.tool import sensor_load
 from elastocal.procedure.record import PoseLog, ReadingStatus, RunFolder, RunRecord, Window
-from elastocal.procedure.registration import Registration, StationFit
+from elastocal.procedure.registration import NO_REGISTRATION, Registration, StationFit
 from elastocal.records import netcdf_image
 
 _COMPLIANCE = 1e-6
@@ -45,7 +46,8 @@ def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record:
     ProcedureError
         If the cell has no sensor.
     """
-    poses = [_readings(pose, list(plan.contact.load_cases)) for pose in plan.poses]
+    every = [_readings(pose, list(plan.contact.load_cases)) for pose in plan.poses]
+    poses = label_doubled(every, plan)
     rows = [row for pose in plan.poses for row in _rows(pose, plan)]
     marker = cell.file.marker
     dataset = dataset_of(
@@ -63,6 +65,8 @@ def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record:
 
 def _registration(plan: PlanResult, lever: FloatArray) -> Registration:
     """Return stations that stand at the base and saw what the plan has them see."""
+    if TRACKER in plan.without:
+        return NO_REGISTRATION
     none, stations = np.zeros(3), dict[str, list[int]]()
     for pose in plan.poses:
         stations.setdefault(str(pose.seen_by), []).append(pose.id)
@@ -90,20 +94,23 @@ def _readings(pose: PoseRecord, load_cases: list[str]) -> PoseReadings:
 
 def _rows(pose: PoseRecord, plan: PlanResult) -> Iterator[LoadRow]:
     """Yield every load of a pose, as a soft arm takes it."""
-    sigma = np.full(3, _SIGMA)
+    sigma, nan = np.full(3, _SIGMA), np.full(3, np.nan)
+    place = pose.id if pose.doubles is None else pose.doubles
+    unseen = TRACKER in plan.without
     for name, force_tcp in plan.contact.load_cases.items():
         if name != LIGHT_CONTACT:
             force = pose.T_base_tcp[:3, :3] @ np.array(force_tcp)
             values = LoadValues(
                 q=np.array(pose.joints),
                 controller_displacement=np.zeros(3),
-                marker_displacement=_COMPLIANCE * force,
+                marker_displacement=nan if unseen else _COMPLIANCE * force,
                 marker_sigma=sigma,
                 force=force,
                 moment=np.zeros(3),
                 force_sigma=sigma,
             )
-            yield LoadRow(pose.id, name, ReadingStatus.OK, "", values)
+            case = name if pose.doubles is None else doubled_case(name)
+            yield LoadRow(place, case, ReadingStatus.OK, "", values)
 
 
 def _mean() -> Mean:

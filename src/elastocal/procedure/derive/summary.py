@@ -222,7 +222,8 @@ class RunSummary(Result):
     """Version that derived it."""
     poses: PoseCounts
     readings: ReadingCounts
-    registration: RegistrationSummary
+    registration: RegistrationSummary | None
+    """None of a run without tracker."""
     tool: ToolSummary
     drift: DriftSummary
     contact_moment: MomentSummary
@@ -237,13 +238,18 @@ class RunSummary(Result):
     dataset_sha256: str = ""
     """SHA-256 of the file ``dataset.nc`` that it was written with; empty before it was."""
 
+    @property
+    def stations(self) -> tuple[StationSummary, ...]:
+        """Registered stations; none of a run without tracker."""
+        return () if self.registration is None else self.registration.stations
+
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
         counts = ", ".join(f"{n} {status}" for status, n in self.readings.counts.items() if n)
         return (
             ("poses", f"{self.poses.committed} of {self.poses.planned} committed"),
             ("readings", counts),
-            ("stations", ", ".join(each.station for each in self.registration.stations)),
+            ("stations", ", ".join(each.station for each in self.stations) or "none: no tracker"),
             *(("line", each.sentence()) for each in self.lines),
             *(("warning", warning) for warning in self.warnings),
         )
@@ -260,7 +266,7 @@ def read_summary(path: Path) -> RunSummary:
         If it cannot be read.
     """
     found = read_json(path, RunSummary)
-    for each in found.registration.stations:
+    for each in found.stations:
         if len(each.residual) != len(each.poses):
             raise SchemaError(
                 f"{path}: station {each.station!r} has {len(each.residual)} residuals for"

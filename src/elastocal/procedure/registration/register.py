@@ -235,6 +235,11 @@ class Registration:
         return next(stood, None)
 
 
+_NONE = np.zeros(3)
+_NONE.setflags(write=False)
+NO_REGISTRATION = Registration((), _NONE, _NONE, _NONE, (), np.nan, np.nan, (), (), {})
+"""What there is without a tracker: the tcp stands for the marker."""
+
 _JUMPS = (0.2e-3, 0.3e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3)
 """Simulated jumps that show which ones would have been found, in m."""
 _MOST_FINDINGS = 0.2

@@ -132,7 +132,7 @@ class Attempt:
                 load_case=load_case,
                 start=start,
                 end=end,
-                station=self.station,
+                station=self.station or None,
                 status=status,
                 note=note,
             )

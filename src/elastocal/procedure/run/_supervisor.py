@@ -17,6 +17,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import (
     ArmState,
     AskedMetrology,
+    BeamState,
     Devices,
     PointBlock,
     SensorStatus,
@@ -147,7 +148,8 @@ class Supervisor:
     def aim(self, station: str) -> None:
         """Let a tracker station search the marker."""
         self.station = self.watchdog.station = station
-        self.devices.metrology.look(station)
+        if self.settings.tracked:
+            self.devices.metrology.look(station)
         self.watchdog.expect_points(self.now)
 
     def ask(self, what: str) -> bool:
@@ -180,7 +182,7 @@ class Supervisor:
             raise
         if self._observers.interrupted():
             raise FaultError(Fault.INTERRUPTED)
-        if marker_lost and self.station is not None:
+        if marker_lost and self.station is not None and self.settings.tracked:
             self.devices.metrology.look(self.station)
         return seen
 
@@ -238,6 +240,8 @@ class Supervisor:
         return block
 
     def _read_metrology(self) -> PointBlock:
+        if not self.settings.tracked:
+            return _tool_point(self.arm)
         block = self.devices.metrology.read()
         check_points(block)
         if self.recorder is not None:
@@ -295,3 +299,15 @@ class Supervisor:
             raise FaultError(Fault.CLOCK, f"it stands at {before:.3f} s")
         if not 0.0 <= passed <= longest:
             raise FaultError(Fault.CLOCK, f"{passed:.2f} s passed in a cycle")
+
+
+def _tool_point(arm: ArmState | None) -> PointBlock:
+    """Return the tool point as the controller has it, in base, where no tracker measures.
+
+    It is not recorded: the arm's stream has it.
+    """
+    if arm is None:
+        none = np.empty((0, 3))
+        return PointBlock(np.empty(0), none, none, BeamState.BROKEN, "", "no tracker")
+    point, unknown = arm.T_base_tcp[None, :3, 3], np.full((1, 3), np.nan)
+    return PointBlock(np.array([arm.time]), point, unknown, BeamState.LOCKED, "", arm.source)

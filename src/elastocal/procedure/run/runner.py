@@ -29,7 +29,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import CONDITIONING, LIGHT_CONTACT, ArmState, Devices, Motion
 from elastocal.errors import ProcedureError, present
-from elastocal.planning import Joints, PoseRecord
+from elastocal.planning import Joints, PlanResult, PoseRecord
 from elastocal.procedure.record import (
     Action,
     Event,
@@ -188,12 +188,15 @@ def load(a: Attempt) -> StepResult:
     # Set before the command, not after: if the command fails midway, the force is released.
     a.in_force_control = True
     reference = present(a.slip_reference, "slip reference")
-    a.slide = SlideDetector(reference)
-    a.jump = SlideDetector(reference, along=True)
+    if s.settings.tracked:
+        # Without a tracker: the controller travels under load by what the arm deflects.
+        a.slide = SlideDetector(reference)
+        a.jump = SlideDetector(reference, along=True)
     with s.actuation(Action.HOLD, name):
         s.devices.arm.hold(force, ramp)
         for seen in s.stay(a.guard(), float(np.linalg.norm(change)) / ramp):
-            a.slide.see(seen.points.position)
+            if a.slide is not None:
+                a.slide.see(seen.points.position)
     return StepResult.GOOD
 
 
@@ -340,13 +343,17 @@ def _why_slipped(a: Attempt, positions: FloatArray, force: FloatArray) -> str:
     """Return how the marker slipped during or before a window; empty: it did not."""
     reference, slide, jump, procedure = a.slip_reference, a.slide, a.jump, a.settings.procedure
     reference = present(reference, "reference")
-    slide = present(slide, "slide")
-    jump = present(jump, "jump")
+    limit = procedure.slip_limit
+    if slide is None or jump is None:
+        # No tracker: a tip that slips takes the controller along while the force is held.
+        length = reference.during(positions)
+        text = f"tool slid {length * 1e3:.2f} mm during the window, limit {limit * 1e3:.2f} mm"
+        return "" if length <= limit else text
     a.slip = reference.so_far(positions)
     if a.load[0] == LIGHT_CONTACT:
         # The zero is read here: displacements count from the marker's present position.
         a.slip_origin = a.slip
-    moved, limit = abs(a.slip - a.slip_origin), procedure.slip_limit
+    moved = abs(a.slip - a.slip_origin)
     expected = procedure.contact_compliance * float(np.linalg.norm(force))
     for length, most, what in (
         (slide.largest, limit, "slid {} at once"),
@@ -658,6 +665,8 @@ class Runner:
         self._failed, self._cycles, self._pose_start = 0, 0, 0.0
         self._location, self._stop = ArmLocation.BETWEEN_POSES, HOME_AT_START
         self._watched = True
+        # A session that goes on does not know what an earlier one has left.
+        self._disks: int | None = None if session.resumes and _stacks(session.plan) else 1
 
     def run(self) -> SessionResult:
         """Visit all poses that are not committed and return how it went.
@@ -768,6 +777,8 @@ class Runner:
     def _visit(self, pose: PoseRecord) -> AttemptFailedError | None:
         """Commit a pose, or return why it was given up."""
         legs, failure = route(self._plan, self._stop, pose.id), None
+        if pose.disks != self._disks:
+            legs = self._stack(pose.disks, legs)
         for _ in range(1 + self._settings.procedure.retries):
             failure = self._try(pose, legs)
             self._stop, legs = pose.id, (pose.approach_joints,)
@@ -776,6 +787,36 @@ class Runner:
         self._given_up.append(pose.id)
         self._log.write(Event.GIVEN_UP, text=str(failure))
         return failure
+
+    def _stack(self, disks: int, legs: tuple[Joints, ...]) -> tuple[Joints, ...]:
+        """Have a person stack disks, the arm at HOME and disarmed; return the legs that are left.
+
+        Raises
+        ------
+        FaultError
+            If nobody says that it is done.
+        """
+        home = self._plan.robot.home
+        before = max((at for at, leg in enumerate(legs) if leg == home), default=-1) + 1
+        if self._stop == HOME_AT_START:
+            # The arm is at HOME, whichever end of the round the legs begin at.
+            legs, before = legs[before:], 0
+        else:
+            to_home = legs[:before] or route(
+                self._plan, self._stop, home_stop(self._plan, self._stop)
+            )
+            self._enable()
+            drive(self._supervisor, to_home, Guard(self._free_limit, free=True))
+        self._location = ArmLocation.HOME
+        disarm(self._supervisor)
+        refused = self._hooks.stack(disks)
+        if refused:
+            raise FaultError(Fault.INTERRUPTED, f": {refused}")
+        self._devices.stack(disks)
+        self._disks = disks
+        self._supervisor.start()
+        self._location = ArmLocation.BETWEEN_POSES
+        return legs[before:]
 
     def _try(self, pose: PoseRecord, legs: tuple[Joints, ...]) -> AttemptFailedError | None:
         """Make one attempt; return its failure if it is one that may be tried again."""
@@ -905,8 +946,14 @@ class Runner:
             slip=0.0 if a is None else a.slip,
             left=max(float(left), 0.0),
             q=tuple(seen.arm.q.tolist()),
-            marker=tuple(seen.points.position[-1].tolist()) if len(seen.points) else None,
+            marker=self._marker(seen),
         )
+
+    def _marker(self, seen: Snapshot) -> tuple[float, float, float] | None:
+        if not (self._settings.tracked and len(seen.points)):
+            return None
+        x, y, z = seen.points.position[-1].tolist()
+        return x, y, z
 
     def _given_up_message(self) -> str:
         if not self._given_up:
@@ -929,6 +976,11 @@ class Runner:
         text = f"{text}: {result.message}" if result.message else text
         with contextlib.suppress(*EXPECTED_ERRORS):
             self._log.write(Event.FINISH, text=text, lines=self._devices.lines())
+
+
+def _stacks(plan: PlanResult) -> bool:
+    """Return whether a plan presses on two disks at any pose."""
+    return any(pose.disks > 1 for pose in plan.poses)
 
 
 def _save(recorder: StreamRecorder, path: Path) -> str | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import LIGHT_CONTACT, Cell, CollisionWatch, ProcedureSettings
+from elastocal.cell import LIGHT_CONTACT, TRACKER, Cell, CollisionWatch, ProcedureSettings
 from elastocal.errors import ProcedureError, present
 from elastocal.findings import Finding
 from elastocal.planning import PlanResult
@@ -63,6 +63,9 @@ class RunSettings:
     """Distance from the surface at the approach pose, in m."""
     loads: tuple[tuple[str, FloatArray], ...]
     """Name of each press and force on the robot in the tcp frame, shape (3,), in N, in order."""
+    tracked: bool = True
+    """Whether a tracker measures the marker. Without one the controller's tool point stands for the
+    marker where the arm must be at rest."""
 
     @property
     def tool_weight(self) -> float:
@@ -109,9 +112,13 @@ def run_settings(cell: Cell, plan: PlanResult, *, touches: bool = False) -> RunS
     if T_sensor_tcp is None:
         raise ProcedureError(f"{cell.path}: sensor is missing: a run measures the force")
     unseen = [pose.id for pose in plan.poses if pose.seen_by is None]
-    if unseen:
+    tracked = TRACKER not in plan.without
+    if touches and not tracked:
+        raise ProcedureError(f"{cell.path}: a tracker measures touches, and the plan has none")
+    if unseen and tracked:
         raise ProcedureError(
             f"{cell.path}: pose {unseen[0]} is seen by no tracker: a run measures the marker"
+            " (without a tracker: `elastocal plan --without tracker`)"
         )
     loads = tuple((name, np.array(force)) for name, force in plan.contact.load_cases.items())
     _check_contact_force(cell, loads)
@@ -128,6 +135,7 @@ def run_settings(cell: Cell, plan: PlanResult, *, touches: bool = False) -> RunS
         near_contact=plan.contact.near_contact,
         approach_distance=plan.contact.approach_distance,
         loads=_touching(cell) if touches else loads,
+        tracked=tracked,
     )
 
 

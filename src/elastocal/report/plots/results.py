@@ -255,7 +255,7 @@ def _run(summary: RunSummary) -> Figure:
     """Return the quality of the registration of a run's tracker stations."""
     stations = [
         StationResiduals(each.station, each.poses, np.array(each.residual, dtype=float))
-        for each in summary.registration.stations
+        for each in summary.stations
     ]
     if not stations:
         raise ReportError("there is no picture of a run without a registered station")

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import DeviceError
+from elastocal.errors import DeviceError, present
 from elastocal.sim.wire.live_cell import LiveCell
 from elastocal.sim.workcell import SimulatedCell
 
@@ -155,7 +155,8 @@ def probe_orientation(live: LiveCell, station: str) -> FloatArray:
     """Return the orientation in a station's frame of a probe turned as the tool, shape (3, 3)."""
 
     def seen(sim: SimulatedCell) -> FloatArray:
-        R_base_station = sim.tracker.T_base_station(station)[:3, :3]
+        tracker = present(sim.tracker, "tracker of the simulated cell")
+        R_base_station = tracker.T_base_station(station)[:3, :3]
         R: FloatArray = R_base_station.T @ sim.arm.state().T_base_tcp[:3, :3]
         return R
 

@@ -69,7 +69,7 @@ class LiveCell:
         behind = self.clock.now() - sim_clock.now()
         if behind > 0.0:
             sim_clock.sleep(behind)
-        wrenches, points = self.sim.sensor.read(), self.sim.tracker.read()
+        wrenches, points = self.sim.sensor.read(), self.sim.devices.metrology.read()
         if len(wrenches):
             last = (wrenches.force[-1], wrenches.moment[-1], wrenches.status)
             self._newest = WrenchSample(float(wrenches.time[-1]), *last)
@@ -181,14 +181,14 @@ class _LiveTracker(_Tap[PointBlock]):
 
     @property
     def stations(self) -> tuple[str, ...]:
-        return self._live.sim.tracker.stations
+        return self._live.sim.devices.metrology.stations
 
     @property
     def rate(self) -> float:
-        return self._live.sim.tracker.rate
+        return self._live.sim.devices.metrology.rate
 
     def look(self, station: str) -> None:
-        self._live.apart(lambda sim: sim.tracker.look(station))
+        self._live.apart(lambda sim: sim.devices.metrology.look(station))
 
     def read(self) -> PointBlock:
         blocks = self.take()

@@ -29,11 +29,50 @@ from elastocal.cell import Cell
 from elastocal.errors import SchemaError
 from elastocal.meshes import load_triangles
 from elastocal.sim.truth import truth_of
+from elastocal.sim.workcell._timeline import generator
 
 LIMIT = 0.999
 """Part of the friction limit that a sliding contact keeps up: its shear is finite."""
 _GRAZING = 1e-12
 """A ray less steep to a triangle passes it by (product of its edges and the ray, in m²)."""
+
+
+_CORRELATED = 0.05
+"""Distance within which places of a tooling are alike, in m. An assumption."""
+_WAVES = 64
+_SOFTEST = 0.3
+"""Compliance of a place over the mean, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceSpread:
+    """Compliances of places over their mean: a smooth random function of the place.
+
+    Source: A. Rahimi, B. Recht, "Random features for large-scale kernel machines", NIPS 2007: a sum
+    of waves of random length and phase is a Gaussian process.
+    """
+
+    spread: float
+    """Standard deviation."""
+    waves: FloatArray
+    """Wave vectors of both directions, shape (2, wave, 3), in rad/m."""
+    phases: FloatArray
+    """Shape (2, wave), in rad."""
+
+    @classmethod
+    def of(cls, spread: float, seed: int) -> "PlaceSpread | None":
+        """Return the spread of a cell; None where all places are alike."""
+        if spread == 0.0:
+            return None
+        rng = generator(seed, "places")
+        waves = rng.standard_normal((2, _WAVES, 3)) / _CORRELATED
+        return cls(spread, waves, rng.uniform(0.0, 2.0 * np.pi, (2, _WAVES)))
+
+    def at(self, point: FloatArray) -> FloatArray:
+        """Return the normal and the lateral compliance over the mean at a point, shape (2,)."""
+        summed = np.cos(self.waves @ point + self.phases).sum(axis=1)
+        grown: FloatArray = 1.0 + self.spread * np.sqrt(2.0 / _WAVES) * summed
+        return np.maximum(grown, _SOFTEST)
 
 
 @dataclass(frozen=True)
@@ -56,6 +95,8 @@ class ContactLaw:
     """Standard deviation of a along each axis, in rad."""
     wander: float = 0.0
     """Standard deviation of the point of attack along each axis, in m."""
+    places: "PlaceSpread | None" = None
+    """How places differ; None: all are alike."""
 
     @classmethod
     def of(cls, cell: Cell) -> "ContactLaw":
@@ -71,6 +112,20 @@ class ContactLaw:
             cell.file.engagement.disk_radius,
             entry.tilt,
             entry.wander,
+            PlaceSpread.of(entry.spread, truth_of(cell).seed),
+        )
+
+    def at(self, point: FloatArray, disks: int) -> "ContactLaw":
+        """Return the law of stacked disks at a point, in base, shape (3,), in m.
+
+        Disks under one force are springs in series.
+        """
+        softer = np.ones(2) if self.places is None else self.places.at(point)
+        normal, lateral = (disks * softer).tolist()
+        return replace(
+            self,
+            normal_stiffness=self.normal_stiffness / normal,
+            shear_stiffness=self.shear_stiffness / lateral,
         )
 
     def attack(self, force_tcp: FloatArray, chance: FloatArray) -> FloatArray | None:

@@ -253,12 +253,13 @@ def _touch(
     hit = plant.surface.hit(tool, direction, distance + _BEYOND)
     if hit is None:
         return None
-    point = tool + hit.distance * direction
+    point = tool + (hit.distance - plant.stacked) * direction
     touch = touching_state(statics, start, point, error)
     if _advance(plant, start, touch, direction) > distance:
         return None
     place = (point, statics.robot.forward(start.q)[:3, :3], hit.normal, touch.q)
-    return Contact(plant.contact_law, *place, plant.chance.load(0)), touch
+    law = plant.contact_law_at(tool + hit.distance * direction)
+    return Contact(law, *place, plant.chance.load(0)), touch
 
 
 def _moved(plant: Plant, start: RobotState, shift: FloatArray, error: FloatArray) -> RobotState:

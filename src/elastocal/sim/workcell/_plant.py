@@ -172,6 +172,7 @@ class Plant:
         self.contact_law = ContactLaw.of(cell)
         self.schedule = FaultSchedule(cell)
         self.contact: Contact | None = None
+        self.disks = 1
         self.instruments: list[Instrument] = []
         self._pressing = _unit_wrench(self.statics.robot)
         self.visit = -1
@@ -233,6 +234,20 @@ class Plant:
         for instrument in self.instruments:
             instrument.catch_up(self.now)
             instrument.restart(self.now, f"{what} {self.key}")
+
+    def stack(self, disks: int) -> None:
+        """Let so many disks be stacked between tool and tooling, from the next contact on."""
+        self.disks = disks
+
+    @property
+    def stacked(self) -> float:
+        """Height of the disks beyond the first, in m."""
+        thickness = self.cell.file.engagement.disk_thickness or 0.0
+        return (self.disks - 1) * thickness
+
+    def contact_law_at(self, point: FloatArray) -> ContactLaw:
+        """Return the law of the disks at a point of the tooling, shape (3,), in base, in m."""
+        return self.contact_law.at(point, self.disks)
 
     def stop_error(self) -> FloatArray:
         """Return the error of the next stop, shape (3,), in m."""

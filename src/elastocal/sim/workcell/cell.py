@@ -31,7 +31,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import ArmState, Cell, CommandChecks, Devices, Motion
+from elastocal.cell import ArmState, Cell, CommandChecks, Devices, Motion, NoMetrology
 from elastocal.errors import DeviceError, present
 from elastocal.results import brief_repr
 from elastocal.sim.arm import Reaction
@@ -289,7 +289,8 @@ class SimulatedCell:
     plant: Plant
     arm: SimulatedArm
     sensor: SimulatedForceSensor
-    tracker: SimulatedTracker
+    tracker: SimulatedTracker | None
+    """None in a cell without tracker."""
 
     @classmethod
     def of(cls, cell: Cell, seed: int, start: float = 0.0) -> "SimulatedCell":
@@ -298,9 +299,12 @@ class SimulatedCell:
         clock = SimClock(start)
         plant = Plant(cell, seed, clock)
         arm = SimulatedArm(plant, ForceControl(plant, force_gain(cell, seed)))
-        sensor, tracker = SimulatedForceSensor(plant), SimulatedTracker(plant)
-        plant.instruments = [sensor, tracker]
-        return cls(Devices(arm, sensor, tracker, clock), plant, arm, sensor, tracker)
+        sensor = SimulatedForceSensor(plant)
+        tracker = SimulatedTracker(plant) if cell.file.trackers else None
+        plant.instruments = [sensor] if tracker is None else [sensor, tracker]
+        metrology = NoMetrology() if tracker is None else tracker
+        devices = Devices(arm, sensor, metrology, clock, stack=plant.stack)
+        return cls(devices, plant, arm, sensor, tracker)
 
 
 def simulated_devices(cell: Cell, seed: int, start: float = 0.0) -> Devices:
@@ -544,7 +548,8 @@ class ProcessCell:
         return self._knots(statics, state)[..., :3] - believed
 
     def _marker_noise(self, state: RobotState, time: float, noise: "_Noise") -> FloatArray:
-        scatter = self._tracker.scatter(self._statics.robot.forward(state.q)[..., :3, 3], time)
+        tracker = present(self._tracker, "tracker of the simulated cell")
+        scatter = tracker.scatter(self._statics.robot.forward(state.q)[..., :3, 3], time)
         return scatter[..., None] * noise.each(lambda rng: rng.standard_normal(3))
 
     def _seen(self, state: RobotState) -> FloatArray:

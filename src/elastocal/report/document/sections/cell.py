@@ -175,6 +175,12 @@ def _limits(cell: Cell) -> Iterator[tuple[str, str]]:
 CELL = Section("cell", phrase("The cell"), phrase("What was measured with what?"), 10, _cell)
 
 
+_UNTRACKED = phrase(
+    "No tracker measured. The tooling held the tool: displacements are the controller's, and count"
+    " from a light contact at each place."
+)
+
+
 def _stations_sensor_tool(evidence: Evidence) -> Iterator[blocks.Block]:
     summary = evidence.summary
     if summary is None:
@@ -182,7 +188,10 @@ def _stations_sensor_tool(evidence: Evidence) -> Iterator[blocks.Block]:
         yield blocks.Paragraph(text)
         yield _tool_file(evidence.tool, evidence.cell)
         return
-    yield from _stations(summary.registration)
+    if summary.registration is None:
+        yield blocks.Paragraph(_UNTRACKED)
+    else:
+        yield from _stations(summary.registration)
     yield _noise(summary)
     yield from _tool(summary.tool)
     yield _tool_file(evidence.tool, evidence.cell)
