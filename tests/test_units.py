@@ -143,3 +143,11 @@ def test_what_only_python_takes_for_a_number_is_none(text):
 
 def test_a_number_may_stand_between_spaces_of_any_kind():
     assert parse_number("\u00a0-1.5e3 ") == -1500.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "dimension", "si"),
+    [("kgf", "force", 9.80665), ("kgf*m", "moment", 9.80665), ("kgf*cm", "moment", 0.0980665)],
+)
+def test_kilograms_force_are_read_as_newtons(unit, dimension, si):
+    assert parse_quantity(f"1 {unit}", dimension) == pytest.approx(si)

@@ -16,8 +16,17 @@ if TYPE_CHECKING:
 _FACTORS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "angle": {"rad": 1.0, "deg": math.pi / 180.0},
-    "force": {"N": 1.0, "kN": 1e3},
-    "moment": {"N*m": 1.0, "Nm": 1.0, "N·m": 1.0, "kN*m": 1e3, "N*mm": 1e-3},
+    # The kilogram-force is exact by definition; Japanese sensors still log in it.
+    "force": {"N": 1.0, "kN": 1e3, "kgf": 9.80665},
+    "moment": {
+        "N*m": 1.0,
+        "Nm": 1.0,
+        "N·m": 1.0,
+        "kN*m": 1e3,
+        "N*mm": 1e-3,
+        "kgf*m": 9.80665,
+        "kgf*cm": 9.80665e-2,
+    },
     "mass": {"kg": 1.0, "t": 1e3},
     "speed": {"m/s": 1.0, "mm/s": 1e-3},
     "angular speed": {"rad/s": 1.0, "deg/s": math.pi / 180.0},

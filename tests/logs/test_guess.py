@@ -25,6 +25,7 @@ MAKERS = {
     "kawasaki": ("JT1;JT2;JT3;JT4;JT5;JT6", "deg"),
     "staubli": ("jnt1[rad];jnt2[rad];jnt3[rad];jnt4[rad];jnt5[rad];jnt6[rad]", "rad"),
     "denso": ("J1 position;J2 position;J3 position;J4 position;J5 position;J6 position", "deg"),
+    "doosan": (";".join(f"actual_joint_position_{n}" for n in range(6)), "deg"),
     "ur": (";".join(f"actual_q_{n}" for n in range(6)), "deg"),
 }  # fmt: skip
 

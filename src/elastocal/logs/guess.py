@@ -24,10 +24,11 @@ _TIME = re.compile(
 _DATE = re.compile(r"(?i)(date|datum|created)")
 """A date counts where no column is named after a time."""
 _AXIS = re.compile(
-    r"(?i)((?:.*[._ ])?(?:joint|jnt|achse|axis|r?ax|jt|a|j|q|theta)[_ ]?a?)(\d)"
+    r"(?i)((?:.*[._ ])?(?:joint(?:_position)?|jnt|achse|axis|r?ax|jt|a|j|q|theta)[_ ]?a?)(\d)"
     r"(?:[_ ](?:angle|pos|position|act|actual))?"
 )
-"""Numbered: KUKA A1; FANUC, Staubli, Denso, Nachi J1; Kawasaki JT1; ABB rax_1; UR actual_q_0."""
+"""Numbered: KUKA A1; FANUC, Staubli, Denso, Nachi J1; Kawasaki JT1; ABB rax_1; UR actual_q_0;
+Doosan actual_joint_position_0."""
 _LETTERED = {
     "Yaskawa": ("s", "l", "u", "r", "b", "t"),
     "Hyundai or Nachi": ("s", "h", "v", "r2", "b", "r1"),
@@ -37,7 +38,7 @@ _LETTER = re.compile(r"(?i)((?:.*[._ ])?)(r[12]|[slurbthv])(?:[-_ ]?(?:axis|ax))
 _EXTERNAL = re.compile(r"(?i)(?:.*[._ ])?(?:e1|eax_a|rail|linear|track)")
 _MADE_UP = 8e9
 """ABB writes 9E+09 for an external axis that is not there."""
-_TURNS_OF = {"FANUC": ("r", "p", "w"), "Yaskawa": ("rz", "ry", "rx")}
+_TURNS_OF = {"FANUC": ("r", "p", "w"), "Denso or Yaskawa": ("rz", "ry", "rx")}
 """Angles about z, y and x, in the order of the map's a, b, c, as makers name them."""
 _TURN = re.compile(r"(?i)(.*?)(r[xyz]|[wpr])")
 _NO_TIMES = ("deg", "rad", "mm", "m", "N", "kN", "N*m", "N*mm")
