@@ -88,7 +88,7 @@ def test_a_known_arm_makes_the_other_better(done, unseen, tmp_path):
     """A model of the truth's own deflections, exact but for its springs, known for one arm."""
     run = done / "run"
     tracked = tmp_path / "tracked"
-    ec.simulate_pair(done / "cell.yaml", plan=done / "plan.json", out=tracked, tracker=True)
+    ec.simulate_pair(done / "cell.yaml", plan=done / "plan.json", out=tracked, tracked=True)
     urdf = load_pair_cell(done / "cell.yaml").robots[0].urdf
     (tmp_path / "left.urdf").write_text(urdf, encoding="utf-8")
     ec.calibrate(tracked / "left.nc", springs="gears", draws=60, out=tmp_path / "left.json")
@@ -123,7 +123,7 @@ def test_a_process_is_corrected_by_both_arms(done, tmp_path):
     assert lines[0].endswith("shift_z[m],deviation_x[m],deviation_y[m],deviation_z[m]")
     one = ec.compensate_pair(
         done / "cell.yaml", models=done / "models", first=paths[0], second=paths[1],
-        out=tmp_path / "one", weights=(0.0, 1.0),
+        out=tmp_path / "one", shares=(0.0, 1.0),
     )  # fmt: skip
     assert one.largest[0] == pytest.approx(max(0.0, found.before_max - 3e-3), abs=2e-5)
 
@@ -136,9 +136,9 @@ def test_paths_that_do_not_belong_together_are_refused(done, tmp_path):
     given = {"models": done / "models", "out": tmp_path / "out"}
     with pytest.raises(CompensationError, match=r"15 rows and .*short\.csv 14"):
         ec.compensate_pair(done / "cell.yaml", first=first, second=short, **given)
-    with pytest.raises(CompensationError, match="3 weights: two are needed"):
+    with pytest.raises(CompensationError, match="3 shares: two are needed"):
         ec.compensate_pair(
-            done / "cell.yaml", first=first, second=short, weights=(1.0, 1.0, 1.0), **given
+            done / "cell.yaml", first=first, second=short, shares=(1.0, 1.0, 1.0), **given
         )
     with pytest.raises(ConventionError, match=r"equal sign|not opposite"):
         ec.compensate_pair(done / "cell.yaml", first=first, second=first, **given)

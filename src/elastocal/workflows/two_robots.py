@@ -119,7 +119,7 @@ class SimulatePairSettings:
     """Plan from `plan-pair`."""
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder for the dataset of each arm, ``ARM.nc``."""
-    tracker: bool = False
+    tracked: bool = False
     """A tracker measures both tools; else they hold each other."""
     seed: Annotated[int | None, Option(least=0)] = None
     """Seed of the errors; by default the cell's."""
@@ -200,7 +200,7 @@ def simulate_pair(settings: SimulatePairSettings, progress: Progress) -> Simulat
         stop=truth.stop,
         slip=0.0 if presses.clamped else truth.slip,
         force_noise=truth.force_noise,
-        marker=_TRACKER if settings.tracker else None,
+        marker=_TRACKER if settings.tracked else None,
     )
     T = cell.T_first_second.copy()
     T[0, 3] += truth.base_error
@@ -329,6 +329,7 @@ def _readings(path: Path, robot: Robot) -> Readings:
         raise DatasetError(f"{path}: {error}") from error
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CompensatePairSettings:
     """Settings of ``compensate-pair``: cell, calibration, and the path of each robot."""
@@ -343,7 +344,7 @@ class CompensatePairSettings:
     """Path of the second robot, row by row at the same times."""
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder for the corrected paths, ``ARM.csv``."""
-    weights: tuple[float, ...] = ()
+    shares: tuple[float, ...] = ()
     """Parts of the deviation that each arm corrects, such as 1 and 0; by default the cell's."""
     force: bool = False
     """Replace what is in the folder."""
@@ -394,7 +395,7 @@ def compensate_pair(settings: CompensatePairSettings, progress: Progress) -> Coo
     True
     """
     cell = load_pair_cell(settings.cell)
-    weights = _weights(settings.weights, cell)
+    weights = _weights(settings.shares, cell)
     models = _models(settings.models, cell)
     limits = cell.file.share.limits
     paths = tuple(
@@ -447,7 +448,7 @@ def _weights(given: tuple[float, ...], cell: PairCell) -> tuple[float, float]:
     if not given:
         return cell.file.share.weights
     if len(given) != 2:
-        raise CompensationError(f"{len(given)} weights: two are needed, one for each arm")
+        raise CompensationError(f"{len(given)} shares: two are needed, one for each arm")
     return given[0], given[1]
 
 
