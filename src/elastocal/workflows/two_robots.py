@@ -23,7 +23,7 @@ from elastocal.identification import CalibratedModel, CalibrateResult, read_mode
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import read_json, schema_of, write_json
-from elastocal.results import Result
+from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.sim import Tips, press_together, true_arm
 from elastocal.two_robots import (
