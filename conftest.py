@@ -11,9 +11,11 @@ def _in_an_empty_folder(request, monkeypatch, tmp_path_factory):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Leave to the night what plans for an example cell first: ten seconds of processor each."""
+    """Leave to the night what plans for an example cell first: seconds of processor each."""
     for item in items:
         if isinstance(item, pytest.DoctestItem) and any(
-            "ec.plan(" in example.source for example in item.dtest.examples
+            name in example.source
+            for example in item.dtest.examples
+            for name in ("ec.plan(", "ec.plan_pair(")
         ):
             item.add_marker(pytest.mark.slow)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from elastocal.planning import read_plan
 from elastocal.planning.untracked import TURN, doubled_findings, joined_moves, require_doubled
 from elastocal.sim.workcell._contact import ContactLaw, PlaceSpread
 from support.cli import elastocal
+from support.kept import kept
 
 _NORMAL = 4e6
 _TRUTH = """simulation:
@@ -40,12 +42,17 @@ def written_cell(folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def story(tmp_path_factory):
-    """Return a folder with a cell, its plan, and a run that was derived."""
-    folder = tmp_path_factory.mktemp("untracked")
-    cell = written_cell(folder / "cell")
+    """Return a folder with a cell, its plan, a run that was derived, and its model."""
+    folder = tmp_path_factory.mktemp("untracked") / "story"
+    return shutil.copytree(kept("untracked", _make), folder)
+
+
+def _make(folder: Path) -> None:
+    cell, contact, run = written_cell(folder / "cell"), folder / "contact.yaml", folder / "run"
     ec.plan(cell, out=folder / "plan", poses=6, doubled=4, without="tracker", compare="none")
-    ec.run(cell, plan=folder / "plan", out=folder / "run")
-    return folder
+    ec.run(cell, plan=folder / "plan", out=run)
+    contact.write_text('contact: {spread: "5 %"}\n')
+    ec.calibrate(run, contact=contact, out=run / "model.json", springs="actuated", draws=40)
 
 
 def test_the_cell_of_the_story_has_no_station(story):
@@ -90,15 +97,7 @@ def test_the_dataset_has_contacts_and_no_marker(story):
 
 
 def test_the_springs_and_the_disk_are_found(story):
-    contact = story / "contact.yaml"
-    contact.write_text('contact: {spread: "5 %"}\n')
-    model = story / "run" / "model.json"
-    said = elastocal(
-        "calibrate", story / "run" / "dataset.nc", "--contact", contact, "--out", model,
-        "--springs", "actuated", "--draws", "40",
-    )  # fmt: skip
-    assert said.code == 0, said.err
-    found = json.loads(model.read_text())["calibration"]["contact"]
+    found = json.loads((story / "run" / "model.json").read_text())["calibration"]["contact"]
     assert (found["poses"], found["tracked"], found["doubled"]) == (6, 0, 4)
     normal = found["figures"][0]
     assert 1.0 / normal["doubled"] == pytest.approx(_NORMAL, rel=0.1)
@@ -155,11 +154,11 @@ def test_tools_are_turned_by_up_to_a_radian(story, tmp_path):
     cell = story / "cell" / "cell.yaml"
     ec.plan(cell, out=tmp_path / "plan", poses=6, compare="none")
     # Untracked, points are those of the same draw: the tool differs by its turn alone.
-    kept = {each.candidate: each for each in read_plan(tmp_path / "plan").poses}
+    taken = {each.candidate: each for each in read_plan(tmp_path / "plan").poses}
     shared = [
-        (each, kept[each.candidate])
+        (each, taken[each.candidate])
         for each in read_plan(story / "plan").poses
-        if each.candidate in kept and each.doubles is None
+        if each.candidate in taken and each.doubles is None
     ]
     assert shared
     for turned, other in shared:

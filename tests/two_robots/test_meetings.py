@@ -52,7 +52,10 @@ def test_the_counts_of_a_plan_add_up(plan):
 
 def test_a_plan_is_the_same_when_it_is_made_again(plan, cell):
     again = plan_meetings(cell)
-    assert again.meetings == plan.meetings
+    for made, other in zip(again.meetings, plan.meetings, strict=True):
+        # To a rounding: some processors add up in another order in another place of memory.
+        np.testing.assert_allclose(made.first, other.first, atol=1e-9)
+        np.testing.assert_allclose(made.second, other.second, atol=1e-9)
 
 
 def test_chosen_meetings_tell_more_than_the_first_of_the_pool(plan, cell):

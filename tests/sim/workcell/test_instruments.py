@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from elastocal.cell import NoMetrology
 from elastocal.cell.devices import SensorStatus
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell import SimulatedCell, simulated_devices
@@ -138,10 +139,14 @@ def test_what_was_seen_from_another_station_is_not_mixed_in():
     assert len(session.devices.metrology.read()) == 10
 
 
-@pytest.mark.parametrize(("section", "empty"), [("sensor", None), ("trackers", [])])
-def test_a_cell_without_an_instrument_is_refused_by_name(section, empty):
-    with pytest.raises(DeviceError, match=f"key '{section}'"):
-        simulated_devices(example_cell(**{section: empty}), 0)
+def test_a_cell_without_a_sensor_is_refused_by_name():
+    with pytest.raises(DeviceError, match="key 'sensor'"):
+        simulated_devices(example_cell(sensor=None), 0)
+
+
+def test_a_cell_without_a_tracker_has_devices_that_measure_nothing():
+    devices = simulated_devices(example_cell(trackers=[]), 0)
+    assert isinstance(devices.metrology, NoMetrology)
 
 
 def test_a_noise_stream_is_the_same_however_it_is_asked():

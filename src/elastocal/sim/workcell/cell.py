@@ -322,7 +322,7 @@ def simulated_devices(cell: Cell, seed: int, start: float = 0.0) -> Devices:
     Raises
     ------
     DeviceError
-        If the cell has no sensor or no tracker, or its robot fewer than six joints.
+        If the cell has no sensor, or its robot fewer than six joints.
     FileAccessError
         If the mesh of the surface cannot be read.
     """
@@ -380,6 +380,8 @@ class ProcessCell:
             If the cell has no sensor or no tracker, or its robot fewer than six joints.
         """
         run, simulation = SimulatedCell.of(cell, seed), truth_of(cell)
+        if run.tracker is None:
+            raise DeviceError(f"cell {cell.name} has no tracker to simulate (key 'trackers')")
         self._statics, self._sensor, self._seed = run.plant.statics, run.sensor, seed
         self._law, self._chance = run.plant.contact_law, run.plant.chance
         self._repeatability = simulation.controller.repeatability
