@@ -50,7 +50,6 @@ from elastocal.errors import ElastocalError, FileAccessError, SchemaError
 from elastocal.files import read_text, sha256
 from elastocal.records import StrictModel, from_data, parse_yaml
 from elastocal.robot import (
-    GRAVITY,
     Rail,
     Robot,
     catalogue,
@@ -277,8 +276,7 @@ class Cell:
     @property
     def gravity_base(self) -> FloatArray:
         """Acceleration of gravity in base, shape (3,), in m/s²."""
-        gravity: FloatArray = self.T_world_base[:3, :3].T @ np.array(GRAVITY)
-        return gravity
+        return self.file.robot.gravity_base
 
     @property
     def T_base_surface(self) -> FloatArray:
@@ -305,8 +303,7 @@ class Cell:
     @property
     def gravity_of_mounting(self) -> tuple[float, float, float] | None:
         """Acceleration of gravity in base, in m/s²; None where the base stands upright."""
-        x, y, z = self.gravity_base.tolist()
-        return None if np.allclose((x, y, z), GRAVITY, rtol=0.0, atol=1e-9) else (x, y, z)
+        return self.file.robot.tilted_gravity
 
     @property
     def T_sensor_tcp(self) -> FloatArray | None:

@@ -28,6 +28,7 @@ from elastocal.cell._quantities import (
 )
 from elastocal.errors import present
 from elastocal.records import StrictModel
+from elastocal.robot import GRAVITY
 from elastocal.units import factor
 
 
@@ -225,6 +226,18 @@ class RobotEntry(StrictModel):
     def _one_source(self) -> Self:
         check_exactly_one(model=self.model, urdf=self.urdf)
         return self
+
+    @property
+    def gravity_base(self) -> FloatArray:
+        """Acceleration of gravity in base, shape (3,), in m/s²."""
+        gravity: FloatArray = self.mounting.T[:3, :3].T @ np.array(GRAVITY)
+        return gravity
+
+    @property
+    def tilted_gravity(self) -> tuple[float, float, float] | None:
+        """Acceleration of gravity in base, in m/s²; None where the base stands upright."""
+        x, y, z = self.gravity_base.tolist()
+        return None if np.allclose((x, y, z), GRAVITY, rtol=0.0, atol=1e-9) else (x, y, z)
 
 
 class Tool(StrictModel):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from elastocal.arrays import BoolArray
 from elastocal.dataset._layout import (
     FloatArray,
     IntArray,
@@ -139,6 +140,16 @@ class Readings:
 
     def __len__(self) -> int:
         return len(self.pose)
+
+    @property
+    def disks(self) -> StatusArray:
+        """Disks between tool and tooling, shape (reading,); 0 where a tracker measured."""
+        return np.zeros(len(self), dtype=np.int8) if self.contacts is None else self.contacts
+
+    @property
+    def by_contact(self) -> BoolArray:
+        """Whether the tooling held the tool and no tracker measured, shape (reading,)."""
+        return np.asarray(self.disks > 0)
 
     @property
     def encoders(self) -> tuple[int, ...]:

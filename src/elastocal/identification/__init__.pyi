@@ -21,6 +21,7 @@ from .calibration import (
 from .contact import (
     Contact as Contact,
     ContactEntry as ContactEntry,
+    as_fitted as as_fitted,
     at_tcp as at_tcp,
     contact_columns as contact_columns,
     is_pressed_sideways as is_pressed_sideways,
@@ -59,7 +60,9 @@ from .frames import (
 )
 from .knowledge import (
     DriveCompliances as DriveCompliances,
+    robust_fit as robust_fit,
     weigh_contact as weigh_contact,
+    weighed_contact as weighed_contact,
     with_knowledge as with_knowledge,
 )
 from .ladder import (
@@ -88,7 +91,6 @@ from .observability import (
 )
 from .options import (
     LOSSES as LOSSES,
-    MEDIAN_NORM as MEDIAN_NORM,
     FitOptions as FitOptions,
     FitSettings as FitSettings,
     Prior as Prior,

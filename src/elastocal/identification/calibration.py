@@ -389,9 +389,9 @@ def _implausible(
     model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None
 ) -> tuple[Finding, ...]:
     """Return the mistakes that readings show; those by contact are of the tcp, not of a marker."""
-    if readings.contacts is None:
+    held = readings.by_contact
+    if not held.any():
         return find_implausible(model.robot, readings, marker_offset)
-    held = readings.contacts > 0
     parts = ((readings.take(~held), marker_offset), (readings.take(held), None))
     found = [find_implausible(model.robot, own, at) for own, at in parts if len(own)]
     return tuple(dict.fromkeys(each for part in found for each in part))
@@ -408,7 +408,7 @@ def _fitted_mistakes(
     if options.free_frame != "none" or any(each.grade is Grade.REFUSAL for each in seen):
         return []
     # Other readings of a marker's columns can be tried where there is a marker throughout.
-    held = readings.contacts is not None and bool(np.any(readings.contacts > 0))
+    held = readings.by_contact.any()
     found = () if held else find_undone(model.robot, readings, marker_offset)
     if not (seen or found):
         found = tuple(find_wrong_units(model.robot, readings, marker_offset))

@@ -101,6 +101,11 @@ class ContactEntry(StrictModel):
     stop: _Length = 10e-6
     slip: _Length = 2e-6
 
+    @property
+    def contact(self) -> "Contact":
+        """What it says is known."""
+        return Contact(**{name: getattr(self, name) for name in ContactEntry.model_fields})
+
 
 class ContactFile(StrictModel):
     """A contact file."""
@@ -234,6 +239,18 @@ def guessed(contact: Contact) -> Contact:
     )
 
 
+def as_fitted(contact: Contact) -> Contact:
+    """Return a contact whose free compliances are stated as a first fit has them (`Contact.size`).
+
+    One that the fit has at zero is as stiff as contacts are at most.
+    """
+    normal, lateral = (
+        float(np.clip(1.0 / max(each, 1.0 / _STIFFEST), _SOFTEST, _STIFFEST))
+        for each in contact.size or (0.0, 0.0)
+    )
+    return replace(contact, normal=contact.normal or normal, lateral=contact.lateral or lateral)
+
+
 def read_contact(path: Path) -> Contact:
     """Return what a contact file knows.
 
@@ -246,8 +263,7 @@ def read_contact(path: Path) -> Contact:
     if isinstance(data, dict):
         # A file of one line need not state it.
         data = {"schema": _SCHEMA} | data
-    entry = from_data(ContactFile, data, str(path), _SCHEMA).contact
-    return Contact(**{name: getattr(entry, name) for name in ContactEntry.model_fields})
+    return from_data(ContactFile, data, str(path), _SCHEMA).contact.contact
 
 
 def require_metrology(readings: Readings) -> None:
@@ -258,7 +274,8 @@ def require_metrology(readings: Readings) -> None:
     IdentificationError
         Naming the first pose.
     """
-    if readings.contacts is None or not np.any(held := readings.contacts > 0):
+    held = readings.by_contact
+    if not held.any():
         return
     if held.all():
         raise IdentificationError(
@@ -285,9 +302,7 @@ def require_pressed(robot: Robot, readings: Readings) -> None:
     IdentificationError
         Naming the first pose that is pulled, or the column that leaves nothing to the contact.
     """
-    held = (
-        np.zeros(len(readings), dtype=bool) if readings.contacts is None else readings.contacts > 0
-    )
+    held = readings.by_contact
     if not held.any():
         raise IdentificationError(
             "a contact is stated, and marker_displacement has a number at every reading: the"
@@ -368,12 +383,11 @@ def contact_columns(
 
 def _columns(R: FloatArray, readings: Readings) -> FloatArray:
     """Return the columns of both compliances, shape (reading, 3, 2), in m per m/N."""
-    stack = np.zeros(len(readings)) if readings.contacts is None else readings.contacts
     df = readings.force.copy()
     if readings.reference_force is not None:
         df -= readings.reference_force
     along = np.einsum("ri,ri->r", R[:, :, 2], df)[:, None] * R[:, :, 2]
-    return np.asarray(np.stack([along, df - along], axis=2) * stack[:, None, None])
+    return np.asarray(np.stack([along, df - along], axis=2) * readings.disks[:, None, None])
 
 
 def with_doubled(contact: Contact, robot: Robot, readings: Readings, arm: FloatArray) -> Contact:
@@ -438,9 +452,9 @@ def _mean_with_error(values: Sequence[float]) -> tuple[float, float] | None:
 
 def is_pressed_sideways(robot: Robot, readings: Readings) -> bool:
     """Return whether any reading that no tracker measured has a lateral load."""
-    if readings.contacts is None:
+    held = readings.by_contact
+    if not held.any():
         return False
-    held = readings.contacts > 0
     R = robot.forward(readings.joint_position[held])[:, :3, :3]
     own = np.einsum("rji,rj->ri", R, readings.force[held])
     lateral = np.linalg.norm(own[:, :2], axis=1)
@@ -455,8 +469,7 @@ def _shared_errors(
     Of each light contact its place, and the slip from each press to the next; of each block what
     its place is stiffer by than others.
     """
-    stack = np.zeros(len(readings), dtype=int) if readings.contacts is None else readings.contacts
-    held = stack > 0
+    stack, held = readings.disks, readings.by_contact
     order = np.arange(len(readings)) if readings.sequence is None else readings.sequence
     # A light contact is made once a pose, and anew for each number of stacked disks.
     _, touch = np.unique(np.column_stack([readings.pose, stack]), axis=0, return_inverse=True)
@@ -697,9 +710,8 @@ def contact_summary(
     zero : float
         `ContactSummary.zero`.
     """
-    stack = np.zeros(len(readings)) if readings.contacts is None else readings.contacts
-    held = stack > 0
-    pairs = np.unique(np.column_stack([readings.pose, stack])[held], axis=0)
+    held = readings.by_contact
+    pairs = np.unique(np.column_stack([readings.pose, readings.disks])[held], axis=0)
     poses, stacks = np.unique(pairs[:, 0], return_counts=True)
     names = [each.name for each in seen]
     numbers = zip(seen, *(each.tolist() for each in fitted), strict=True)
@@ -745,9 +757,7 @@ def at_tcp(robot: Robot, readings: Readings, marker_offset: ArrayLike | None) ->
 
 def _counts_from_recorded(readings: Readings) -> BoolArray:
     """Return whether each reading by contact counts from the recorded joints of the reference."""
-    if readings.contacts is None:
-        return np.zeros(len(readings), dtype=bool)
-    return np.asarray((readings.contacts > 0) & ~counts_from_other_stack(readings))
+    return np.asarray(readings.by_contact & ~counts_from_other_stack(readings))
 
 
 def counts_from_other_stack(readings: Readings) -> BoolArray:

@@ -53,7 +53,7 @@ def displacement_blocks(
     if readings.contacts is None or marker_offset is None:
         return between.of_point(marker_offset)
     # What the tooling holds is the tcp, not the marker.
-    held = (readings.contacts > 0)[:, None, None]
+    held = readings.by_contact[:, None, None]
     return np.where(held, between.of_point(None), between.of_point(marker_offset))
 
 

@@ -180,12 +180,31 @@ def with_knowledge(
     if not np.isfinite(sigma).any():
         return bounded
     problem = build(model, readings, bounded, marker_offset)
-    found = solve(problem, "huber").compliance
-    residual = np.linalg.norm(problem.own_errors(problem.residuals(found)), axis=1)
     # Readings without any noise reduce the weight of a prior, but not to zero.
     smallest = np.finfo(float).eps * float(np.abs(problem.d).max())
-    noise = max(float(np.median(residual)) / MEDIAN_NORM, smallest)
+    _, noise = robust_fit(problem, smallest)
     return replace(bounded, prior=Prior(mean, sigma, noise, rows))
+
+
+def robust_fit(problem: Problem, least: float = _LEAST_NOISE) -> tuple[FloatArray, float]:
+    """Return the compliances of a robust fit, and the noise of one component of a row.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is fitted.
+    least : float
+        Least noise, of readings without any, in m.
+
+    Returns
+    -------
+    compliance : ndarray, shape (column,)
+    noise : float
+        Robust standard deviation of the residuals, in m.
+    """
+    found = solve(problem, "huber").compliance
+    residual = np.linalg.norm(problem.own_errors(problem.residuals(found)), axis=1)
+    return found, max(float(np.median(residual)) / MEDIAN_NORM, least)
 
 
 def expected_sizes(
@@ -274,16 +293,19 @@ def _weighed(
     contact = present(options.contact, "contact")
     for _ in range(_ROUNDS):
         problem = build(model, readings, replace(options, contact=contact), marker_offset)
-        found = solve(problem, "huber").compliance
-        residual = np.linalg.norm(problem.own_errors(problem.residuals(found)), axis=1)
-        size = dict(zip(problem.contact, found[problem.contact_columns].tolist(), strict=True))
-        contact = replace(
-            contact,
-            noise=max(float(np.median(residual)) / MEDIAN_NORM, _LEAST_NOISE),
-            size=(size.get(NORMAL, 0.0), size.get(LATERAL, 0.0)),
-        )
+        found, noise = robust_fit(problem)
+        contact = weighed_contact(contact, problem, found, noise)
         contact = with_doubled(contact, model.robot, readings, _of_arm(problem, found))
     return contact
+
+
+def weighed_contact(
+    contact: Contact, problem: Problem, compliance: FloatArray, noise: float
+) -> Contact:
+    """Return a contact with the noise of a row and the compliances of a first fit."""
+    found = compliance[problem.contact_columns].tolist()
+    size = dict(zip(problem.contact, found, strict=True))
+    return replace(contact, noise=noise, size=(size.get(NORMAL, 0.0), size.get(LATERAL, 0.0)))
 
 
 def _of_arm(problem: Problem, compliance: FloatArray) -> FloatArray:

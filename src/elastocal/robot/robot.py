@@ -219,6 +219,28 @@ class Robot:
             pose[:] = pin.updateFramePlacement(model, data, self._rigid.tip_frame).homogeneous
         return poses.reshape(*q.shape[:-1], 4, 4)
 
+    def joint_points(self, q: ArrayLike) -> FloatArray:
+        """Return the origin of each joint's frame in base.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., joint)
+            Joint positions in rad or m.
+
+        Returns
+        -------
+        ndarray, shape (..., joint, 3)
+            In m; that of a joint that slides moves with it.
+        """
+        q = self.check_positions(q)
+        model, data = self._rigid.model, self._rigid.model.createData()
+        flat = q.reshape(-1, q.shape[-1])
+        points = np.empty((*flat.shape, 3))
+        for own, configuration in zip(points, flat, strict=True):
+            pin.forwardKinematics(model, data, configuration)
+            own[:] = [placement.translation for placement in data.oMi[1:]]
+        return points.reshape(*q.shape, 3)
+
     def jacobian(self, q: ArrayLike) -> Jacobian:
         """Return the geometric Jacobian of the tool centre point (paper Eq. 1-2).
 

@@ -7,7 +7,7 @@ tilt of both bases, the prior shares it out.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
@@ -17,7 +17,6 @@ from elastocal.elastic import ElasticModel, actuated
 from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification import (
-    MEDIAN_NORM,
     MOST_UNEXPLAINED,
     RANK_TOLERANCE,
     CalibratedModel,
@@ -30,14 +29,18 @@ from elastocal.identification import (
     PoseGrams,
     Problem,
     Solution,
+    as_fitted,
     bootstrap,
     factor,
     find_hidden,
+    interval,
     judge_models,
     leave_poses_out,
     observability,
+    robust_fit,
     rung_of,
     solve,
+    weighed_contact,
     widen_draws,
     widening_factor,
 )
@@ -51,8 +54,6 @@ TRIED = ("actuated", "bearing", "links", "gears")
 """Springs that `auto` chooses from, by the error at left-out poses; the simplest first."""
 _ROUNDS = 3
 """Fits after which the noise of a row no longer changes."""
-_LEAST_NOISE = 1e-7
-"""Least noise of a row in m, of readings without any."""
 _ALIKE = 0.1
 """Standard deviation of the springs of two arms of one type from one another, over the compliance
 of the drive of the joint."""
@@ -181,30 +182,22 @@ def _weighed(pair: PairReadings, contact: Contact | None) -> tuple[Contact | Non
 
     By first fits of gears; of springs at bearings where gears imitate a compliance that is free.
     """
-    for name in ("gears", "bearing"):
-        try:
-            return _weighed_by(_model(pair, name, {}), pair, contact)
-        except IdentificationError:
-            if name == "bearing":
-                raise
-    raise AssertionError("unreachable")
+    try:
+        return _weighed_by(_model(pair, "gears", {}), pair, contact)
+    except IdentificationError:
+        return _weighed_by(_model(pair, "bearing", {}), pair, contact)
 
 
 def _weighed_by(
     model: PairModel, pair: PairReadings, contact: Contact | None
 ) -> tuple[Contact | None, float]:
-    noise = _LEAST_NOISE
+    if contact is None:
+        return None, robust_fit(build_pair(model, pair))[1]
     for _ in range(_ROUNDS):
         problem = build_pair(model, pair, contact)
-        c = solve(problem, "huber").compliance
-        own = np.linalg.norm(problem.own_errors(problem.residuals(c)), axis=1)
-        noise = max(float(np.median(own)) / MEDIAN_NORM, _LEAST_NOISE)
-        if contact is None:
-            break
-        sizes = dict(zip(problem.contact, c[problem.contact_columns].tolist(), strict=True))
-        size = sizes.get("normal", 0.0), sizes.get("lateral", 0.0)
-        contact = replace(contact, noise=noise, size=size)
-    return contact, noise
+        c, noise = robust_fit(problem)
+        contact = weighed_contact(contact, problem, c, noise)
+    return contact, contact.row_noise
 
 
 def _drives(pair: PairReadings, contact: Contact | None) -> DriveCompliances:
@@ -213,22 +206,9 @@ def _drives(pair: PairReadings, contact: Contact | None) -> DriveCompliances:
     model = PairModel(pair.names, (first, second))
     joints = [each.joint for each in model.springs]
     revolute = [each for robot in pair.robots for each in robot.revolute]
-    known = contact
-    if contact is not None:
-        # Drives alone imitate the contact: it is taken as a first fit has it.
-        normal, lateral = contact.size or (0.0, 0.0)
-        known = replace(
-            contact,
-            normal=contact.normal or _stiffness(normal),
-            lateral=contact.lateral or _stiffness(lateral),
-        )
-    problem = build_pair(model, pair, known)
+    # Drives alone imitate the contact: it is taken as a first fit has it.
+    problem = build_pair(model, pair, None if contact is None else as_fitted(contact))
     return DriveCompliances.of_problem(joints, revolute, problem, model.springs)
-
-
-def _stiffness(compliance: float) -> float:
-    """Return the stiffness of a contact, as stiff as contacts are at most where it has none."""
-    return float(np.clip(1.0 / max(compliance, 1e-10), 1e3, 1e10))
 
 
 def prior_rows(
@@ -317,9 +297,8 @@ def _certified(
     drawn = widen_draws(problem, c, drawn, by)
     plain = problem.of_springs()
     springs = c[problem.springs]
-    seen = observability(factor(plain.without_prior()), fit.model.springs, plain, springs)
     sizes = drives.sizes(fit.model.parameters)
-    seen = find_hidden(seen, plain, springs, fit.model.parameters, sizes, held=True)
+    seen = _seen(plain, fit.model, springs, sizes)
     names = tuple(name for name in pair.names if name in known)
     findings = list(unseen_findings(fit.model, pair.T_first_second, seen, names))
     unexplained = fit.held_out.mean / float(np.linalg.norm(problem.d, axis=1).mean())
@@ -343,11 +322,19 @@ def _certified(
     )
 
 
+def _seen(
+    problem: Problem, model: PairModel | ElasticModel, c: FloatArray, sizes: FloatArray
+) -> Observability:
+    """Return what presses tell of each spring, without the prior."""
+    found = observability(factor(problem.without_prior()), model.springs, problem, c)
+    return find_hidden(found, problem, c, model.parameters, sizes, held=True)
+
+
 def _contact_figures(
     problem: Problem, c: FloatArray, draws: FloatArray
 ) -> tuple[tuple[str, float, float, float], ...]:
     own = problem.contact_columns
-    low, high = np.percentile(draws[:, own], [2.5, 97.5], axis=0)
+    low, high = interval(draws[:, own])
     numbers = zip(c[own].tolist(), low.tolist(), high.tolist(), strict=True)
     return tuple((name, *each) for name, each in zip(problem.contact, numbers, strict=True))
 
@@ -366,13 +353,11 @@ def _model_of(
     readings = (pair.first, pair.second)[arm]
     other = pair.names[1 - arm]
     alone = _alone(plain, own, other in known)
-    seen = observability(factor(alone.without_prior()), model.springs, alone, c)
-    seen = find_hidden(seen, alone, c, model.parameters, sizes[own], held=True)
     return CalibratedModel(
         model,
         c,
         draws[:, own],
-        seen,
+        _seen(alone, model, c, sizes[own]),
         f"presses of {pair.names[0]} and {pair.names[1]} on each other",
         fit.held_out.misfit,
         unexplained=unexplained,

@@ -37,7 +37,7 @@ from elastocal.files import read_text, write_text
 from elastocal.identification import Contact, ContactEntry
 from elastocal.records import StrictModel, from_data, parse_yaml
 from elastocal.results import brief_repr
-from elastocal.robot import GRAVITY, Robot
+from elastocal.robot import Robot
 
 SCHEMA = "elastocal.cell/1"
 _LEAST_APART = 0.2
@@ -134,7 +134,7 @@ class ShareEntry(StrictModel):
 
 
 class PairSimulation(StrictModel):
-    """Simulated arms, for `run-pair`; no estimate reads it."""
+    """Simulated arms, for `simulate-pair`; no estimate reads it."""
 
     seed: Annotated[int, Field(ge=0)] = 0
     softness: tuple[
@@ -228,8 +228,7 @@ class PairCell:
     @property
     def contact(self) -> Contact:
         """What is known of the contact of the two tips."""
-        entry = self.file.contact
-        return Contact(**{name: getattr(entry, name) for name in ContactEntry.model_fields})
+        return self.file.contact.contact
 
     def models(self) -> Mapping[str, Path]:
         """Return the model files of arms that are calibrated already, by the arm's name."""
@@ -288,6 +287,5 @@ def _robot(path: Path, number: int, entry: ArmEntry) -> Robot:
         robot = mounted_robot(path, entry.robot, entry.tcp)
     except ElastocalError as error:
         raise SchemaError(f"{path}: robots.{number}: {error}") from error
-    x, y, z = (entry.robot.mounting.T[:3, :3].T @ np.array(GRAVITY)).tolist()
-    upright = np.allclose((x, y, z), GRAVITY, rtol=0.0, atol=1e-9)
-    return robot if upright else replace(robot, gravity=(x, y, z))
+    gravity = entry.robot.tilted_gravity
+    return robot if gravity is None else replace(robot, gravity=gravity)

@@ -23,6 +23,7 @@ from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.robot.inverse import inverse_for, joints_along_path
+from elastocal.two_robots.presses import relative_blocks
 from elastocal.wording import mm, phrase
 
 _ROUNDS = 3
@@ -129,13 +130,11 @@ def relative_deviation(
     force : ndarray, shape (row, 3)
         Force on the first robot in its base, in N.
     """
-    R = T_first_second[:3, :3]
-    first = models[0].model.observation_blocks(q[0], force)
-    second = models[1].model.observation_blocks(q[1], -force @ R)
-    second = np.einsum("ij,rjn->rin", R, second)
-    e = first @ models[0].compliance - second @ models[1].compliance
-    count = min(len(models[0].draws), len(models[1].draws))
-    drawn = first @ models[0].draws[:count].T - second @ models[1].draws[:count].T
+    first, second = models
+    O = relative_blocks((first.model, second.model), T_first_second[:3, :3], q, force)  # noqa: E741
+    e = O @ np.concatenate([first.compliance, second.compliance])
+    count = min(len(first.draws), len(second.draws))
+    drawn = O @ np.concatenate([first.draws[:count], second.draws[:count]], axis=1).T
     low, high = interval(np.moveaxis(drawn, -1, 0))
     return Deviation(np.asarray(e), np.minimum(low, e), np.maximum(high, e))
 

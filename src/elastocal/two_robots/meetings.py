@@ -25,6 +25,7 @@ from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot, inverse_transform, smallest_singular_value
 from elastocal.robot.inverse import inverse_for
 from elastocal.two_robots.cell import PairCell, PairLimits
+from elastocal.two_robots.presses import relative_blocks
 from elastocal.wording import phrase, phrases
 
 _SAMPLES = 8
@@ -314,26 +315,10 @@ def skeleton(robot: Robot, q: FloatArray) -> FloatArray:
 
     In the robot's base: from the base to the origin of the last joint but one.
     """
-    T = np.tile(np.eye(4), (len(q), 1, 1))
-    origins = [T[:, :3, 3]]
-    for number, joint in enumerate(robot.chain.joints[:-1]):
-        T = T @ joint.placement @ _moved(joint.axis, joint.revolute, q[:, number])
-        origins.append(T[:, :3, 3])
+    origins = [np.zeros((len(q), 3)), *robot.joint_points(q).swapaxes(0, 1)[:-1]]
     along = np.linspace(0.0, 1.0, _SAMPLES)[None, :, None]
     lines = itertools.pairwise(origins)
     return np.concatenate([a[:, None] + along * (b - a)[:, None] for a, b in lines], axis=1)
-
-
-def _moved(axis: FloatArray, revolute: bool, position: FloatArray) -> FloatArray:
-    """Return the motion of a joint, shape (posture, 4, 4)."""
-    T = np.tile(np.eye(4), (len(position), 1, 1))
-    if not revolute:
-        T[:, :3, 3] = position[:, None] * axis
-        return T
-    K = np.cross(axis, np.eye(3)).T
-    s, c = np.sin(position)[:, None, None], np.cos(position)[:, None, None]
-    T[:, :3, :3] = np.eye(3) + s * K + (1.0 - c) * (K @ K)
-    return T
 
 
 def observation_rows(cell: PairCell, pool: Pool) -> FloatArray:
@@ -341,12 +326,8 @@ def observation_rows(cell: PairCell, pool: Pool) -> FloatArray:
 
     With springs at the bearings of both arms.
     """
-    R = cell.T_first_second[:3, :3]
-    rows = []
-    for load in cell.file.presses.cases.values():
-        force = pool.T[:, :3, :3] @ load
-        models = [ElasticModel(robot, bearing(robot)) for robot in cell.robots]
-        first = models[0].observation_blocks(pool.q[0], force)
-        second = models[1].observation_blocks(pool.q[1], -force @ R)
-        rows.append(np.concatenate([first, -np.einsum("ij,pjn->pin", R, second)], axis=2))
+    first, second = (ElasticModel(robot, bearing(robot)) for robot in cell.robots)
+    R, axes = cell.T_first_second[:3, :3], pool.T[:, :3, :3]
+    loads = cell.file.presses.cases.values()
+    rows = [relative_blocks((first, second), R, pool.q, axes @ load) for load in loads]
     return np.concatenate(rows, axis=1)

@@ -253,8 +253,37 @@ class PairModel:
         return slice(0, count) if arm == 0 else slice(count, len(self.parameters))
 
 
+def relative_blocks(
+    models: tuple[ElasticModel, ElasticModel],
+    R: FloatArray,
+    q: tuple[FloatArray, FloatArray],
+    force: FloatArray,
+) -> FloatArray:
+    """Return ``[O_1(q_1, f), -R O_2(q_2, -R' f)]`` against the unloaded arms at the same joints.
+
+    Parameters
+    ----------
+    models : tuple of ElasticModel
+        Of both arms.
+    R : ndarray, shape (3, 3)
+        Turn of the second base in the first.
+    q : tuple of ndarray, shape (row, joint)
+        Joints of each arm, in rad or m.
+    force : ndarray, shape (row, 3)
+        Force on the first robot in its base, in N.
+
+    Returns
+    -------
+    ndarray, shape (row, 3, parameter)
+        Those of the first arm come first.
+    """
+    first = models[0].observation_blocks(q[0], force)
+    second = models[1].observation_blocks(q[1], -force @ R)
+    return np.concatenate([first, -np.einsum("ij,rjn->rin", R, second)], axis=2)
+
+
 def pair_blocks(model: PairModel, pair: PairReadings) -> FloatArray:
-    """Return ``[O_1(q_1, f), -R O_2(q_2, -R' f)]``, shape (press, 3, parameter)."""
+    """Return the rows of presses against the light contact, shape (press, 3, parameter)."""
     first = displacement_blocks(model.models[0], pair.first)
     second = np.einsum("ij,rjn->rin", pair.R, displacement_blocks(model.models[1], pair.second))
     return np.concatenate([first, -second], axis=2)

@@ -242,7 +242,7 @@ def _zero_loads(readings: Readings) -> Iterator[Finding]:
 
 def _dead_markers(readings: Readings) -> Iterator[Finding]:
     """Yield axes along which the tracker sees next to nothing of what the controller moves."""
-    if readings.contacts is not None and np.all(readings.contacts > 0):
+    if readings.by_contact.all():
         return
     told = np.median(np.abs(readings.controller_displacement), axis=0)
     seen = np.median(np.abs(readings.marker_displacement), axis=0)
