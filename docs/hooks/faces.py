@@ -9,6 +9,7 @@ the names of these modules, and the comment without modules the rest.
 import ast
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 from mkdocs.structure.pages import Page
@@ -34,6 +35,7 @@ def exported(package: str) -> dict[str, str]:
     }
 
 
+@cache
 def defined(package: str, home: str) -> set[str]:
     """Return the names that a module of a package defines; none of a package's own face."""
     path = SOURCE.joinpath(*package.split("."), *home.split(".")).with_suffix(".py")

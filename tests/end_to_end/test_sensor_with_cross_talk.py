@@ -121,14 +121,17 @@ def test_a_path_is_not_worse_with_the_tool_file_than_without(left):
     assert np.all(left["file", False] <= 1.2 * left["no file", False])
 
 
+@pytest.mark.slow
 def test_with_a_model_calibrated_by_the_same_sensor_the_noise_of_the_postures_is_left(left):
     assert left["file", True].max() < 10e-6
 
 
+@pytest.mark.slow
 def test_the_matrix_takes_most_of_the_cross_talk_away_from_a_true_model(left):
     assert left["matrix", False].mean() < 0.5 * left["no file", False].mean()
 
 
+@pytest.mark.slow
 def test_the_matrix_is_not_for_a_model_calibrated_without_it(left):
     """Why `--matrix` is asked for, and the run derived anew with it."""
     assert left["matrix", True].mean() > 3.0 * left["file", True].mean()

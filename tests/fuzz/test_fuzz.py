@@ -17,7 +17,7 @@ from support.kept import kept
 
 CORPUS = json.loads((Path(__file__).parent / "corpus.json").read_text(encoding="utf-8"))
 REPORTS = ("report ", '["report"')
-PARTS = 20
+PARTS = 40
 """Tests that share the cases: the first runs by day, the others at night."""
 CASES = 2_000
 NIGHTLY = 100_000
@@ -98,7 +98,8 @@ def filled(*_: object) -> None:
     ("fault", "word"), [(crash, "traceback"), (busy, "hang"), (filled, "memory")]
 )
 def test_the_harness_sees_a_fault(seeds, monkeypatch, fault, word):
-    monkeypatch.setattr(harness, "LONGEST", 1.0)
+    if fault is busy:  # others may take longer: the first case of a process imports
+        monkeypatch.setattr(harness, "LONGEST", 1.0)
     monkeypatch.setattr(import_module("elastocal.workflows.check"), "describe_file", fault)
     (found,) = run_cases([Case("tool", "check {f}")], seeds)
     assert found.word == word
