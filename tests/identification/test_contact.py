@@ -20,9 +20,9 @@ from elastocal.identification import (
     solve,
     weigh_contact,
 )
-from elastocal.identification.contact import ContactFigure, whitened
+from elastocal.identification.contact import ContactFigure, untold_stacks, whitened
 from support.cli import elastocal
-from support.held import STIFFNESS, Held, held_by_contact, robot
+from support.held import PRESS, STIFFNESS, Held, held_by_contact, robot
 
 SOFT = Held()
 STATED = Contact(normal=SOFT.normal, lateral=SOFT.lateral)
@@ -191,6 +191,37 @@ def test_a_contact_file_of_another_tip_is_warned_of(files):
     assert "does it describe this tip or disk, and are the forces in N?" in " ".join(
         found.calibration.warnings
     )
+
+
+def sound_and(**changes):
+    """Return readings of presses on one and two disks by a controller that scatters, changed."""
+    return replace(readings(Held(doubled=8, noise=5e-6)), **changes)
+
+
+def test_a_lost_column_of_stacks_is_seen_by_presses_that_repeat_a_load():
+    assert untold_stacks(arm(), sound_and()) is None
+    apart, poses = untold_stacks(arm(), sound_and(contacts=np.ones(len(sound_and()))))
+    assert poses == 8
+    assert apart == pytest.approx(0.95 * PRESS / SOFT.normal, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("lost", "kinds"),
+    [
+        ([], set()),
+        (
+            ["contacts", "reference_force"],
+            {"calibration.untold-stacks", "calibration.no-light-force"},
+        ),
+    ],
+)
+def test_columns_that_are_lost_are_warned_of(lost, kinds):
+    """And nothing is said of sound ones: presses on two stacks may read one force."""
+    data = held_by_contact(Held(doubled=8, noise=5e-6)).to_xarray().drop_vars(lost)
+    found = ec.calibrate(ec.Dataset.from_xarray(data), contact=STATED, springs="actuated", draws=40)
+    said = {each.kind for each in found.calibration.warnings}
+    assert {each for each in said if "stacks" in each or "light" in each} == kinds
+    assert "mistakes.repeated-readings" not in said
 
 
 def test_a_contact_is_refused_where_a_tracker_measured_every_reading():

@@ -17,7 +17,7 @@ from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import ConventionError, IdentificationError, present
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.calibrated import CalibratedModel
-from elastocal.identification.contact import ContactSummary, contact_summary
+from elastocal.identification.contact import ContactSummary, contact_summary, untold_stacks
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.encoders import (
@@ -110,6 +110,17 @@ OTHER_CONTACT = Kind(
     "the readings have the {name} compliance of the contact at {found} nm/N, where the contact"
     " file states {stated} nm/N: does it describe this tip or disk, and are the forces in N?",
     shown={"found": as_number(".3g", 1e9), "stated": as_number(".3g", 1e9)},
+)
+UNTOLD_STACKS = Kind(
+    "calibration.untold-stacks",
+    "presses under one load at one pose travel {apart} mm apart, at {count} poses: were some of"
+    " them on two disks? The dataset's contacts tells the number of disks of each press",
+    shown={"apart": as_number(".3f", 1e3)},
+)
+NO_LIGHT_FORCE = Kind(
+    "calibration.no-light-force",
+    "reference_force is zero: a light contact without any force holds no tool, and displacements"
+    " count from there",
 )
 SILENT_ENCODERS = Kind(
     "calibration.silent-encoders",
@@ -373,6 +384,7 @@ def _data_warnings(
     ]
     if gap := model.robot.chain.weight_gap:
         warnings.append(WEIGHT_GAP(name=model.robot.name, gap=gap))
+    warnings += _held_oddities(model, readings)
     warnings += _fitted_mistakes(model, readings, options, marker_offset, seen)
     try:
         left = check_conventions(model, readings, marker_offset, options)
@@ -383,6 +395,19 @@ def _data_warnings(
     if left > POOR_FIT:
         warnings.append(POORLY_FITTED(left=left))
     return warnings
+
+
+def _held_oddities(model: ElasticModel, readings: Readings) -> list[Finding]:
+    """Return a finding for each oddity of readings that no tracker measured."""
+    held = readings.by_contact
+    if not held.any():
+        return []
+    found = []
+    if (untold := untold_stacks(model.robot, readings)) is not None:
+        found.append(UNTOLD_STACKS(apart=untold[0], count=untold[1]))
+    if readings.reference_force is None or not np.any(readings.reference_force[held]):
+        found.append(NO_LIGHT_FORCE())
+    return found
 
 
 def _implausible(

@@ -56,6 +56,11 @@ _SOFTEST, _STIFFEST = 1e3, 1e10
 """Stiffnesses of contacts in N/m: softer than any foam, and stiffer than a machine's bed."""
 _ASIDE, _ASIDE_SPREAD = 2.0, 1.0
 """Lateral compliance of a contact over its normal one, and its standard deviation."""
+_REPEATED = 0.03
+"""Part of a load within which another press at the same pose repeats it."""
+_OTHER_STACK, _OTHER_STACK_SIGMAS, _OTHER_STACK_POSES = 0.05, 4.0, 3
+"""Part of its travel by which a repeated press of another stack travels further, that difference
+over its standard error, and poses where it is seen."""
 _CUT = 0.1
 """Part of its standard deviation by which a compliance that is cut is weighed."""
 _LEAST_PLACES = 4
@@ -325,6 +330,37 @@ def require_pressed(robot: Robot, readings: Readings) -> None:
                 " contact only pushes it away: is its sign turned, is it in another frame than"
                 " base, or of another pose?"
             )
+
+
+def untold_stacks(robot: Robot, readings: Readings) -> tuple[float, int] | None:
+    """Return what shows that presses were made on other stacks than the readings say.
+
+    A press that repeats the load of another at its pose, on as many disks, travels as far. One on
+    another disk travels further by what that disk gives way, at every pose.
+
+    Returns
+    -------
+    tuple of float and int, optional
+        By how much more the later ones of such presses travel along the normal, in m, and the
+        number of poses that have any; None: no more than they scatter.
+    """
+    z = robot.forward(readings.joint_position)[:, :3, 2]
+    travel = np.einsum("ri,ri->r", z, readings.controller_displacement)
+    disks, load = readings.disks, np.linalg.norm(readings.force, axis=1)
+    apart, whole = [], []
+    for pose in np.unique(readings.pose[readings.by_contact]).tolist():
+        rows = np.flatnonzero((readings.pose == pose) & readings.by_contact)
+        first, second = rows[np.array(np.triu_indices(len(rows), 1))]
+        change = np.linalg.norm(readings.force[second] - readings.force[first], axis=1)
+        repeated = (disks[first] == disks[second]) & (change <= _REPEATED * load[first])
+        if repeated.any():
+            apart.append(float(np.median((travel[second] - travel[first])[repeated])))
+            whole.append(float(np.abs(travel[first[repeated]]).mean()))
+    if len(apart) < _OTHER_STACK_POSES:
+        return None
+    mean, error = float(np.mean(apart)), float(np.std(apart, ddof=1)) / np.sqrt(len(apart))
+    is_other = abs(mean) > max(_OTHER_STACK * np.mean(whole), _OTHER_STACK_SIGMAS * error)
+    return (abs(mean), len(apart)) if is_other else None
 
 
 @brief_repr

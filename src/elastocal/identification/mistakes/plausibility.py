@@ -254,7 +254,10 @@ def _dead_markers(readings: Readings) -> Iterator[Finding]:
 
 def _repeated(readings: Readings) -> Iterator[Finding]:
     """Yield poses at which several load cases read exactly the same."""
-    rows = np.column_stack([readings.force, readings.marker_displacement])
+    # Presses on one and on two disks may read one force, and where no tracker measured no marker.
+    held = readings.by_contact[:, None]
+    seen = np.where(held, readings.controller_displacement, readings.marker_displacement)
+    rows = np.column_stack([readings.force, seen])
     poses = [
         int(pose)
         for pose in np.unique(readings.pose)
