@@ -57,7 +57,8 @@ _SOFTEST, _STIFFEST = 1e3, 1e10
 _ASIDE, _ASIDE_SPREAD = 2.0, 1.0
 """Lateral compliance of a contact over its normal one, and its standard deviation."""
 _REPEATED = 0.03
-"""Part of a load within which another press at the same pose repeats it."""
+"""Part of a load within which another press at the same pose repeats it. Narrower than
+`_SAME_LOAD`: nothing takes away by what more load travels further."""
 _OTHER_STACK, _OTHER_STACK_SIGMAS, _OTHER_STACK_POSES = 0.05, 4.0, 3
 """Part of its travel by which a repeated press of another stack travels further, that difference
 over its standard error, and poses where it is seen."""
@@ -358,7 +359,7 @@ def untold_stacks(robot: Robot, readings: Readings) -> tuple[float, int] | None:
             whole.append(float(np.abs(travel[first[repeated]]).mean()))
     if len(apart) < _OTHER_STACK_POSES:
         return None
-    mean, error = float(np.mean(apart)), float(np.std(apart, ddof=1)) / np.sqrt(len(apart))
+    mean, error = _mean_and_error(apart)
     is_other = abs(mean) > max(_OTHER_STACK * np.mean(whole), _OTHER_STACK_SIGMAS * error)
     return (abs(mean), len(apart)) if is_other else None
 
@@ -462,7 +463,7 @@ def with_doubled(contact: Contact, robot: Robot, readings: Readings, arm: FloatA
                 sides.append(own[press] - own[near])
         for number, value in _of_place(np.array(rows), np.array(sides)):
             found[number].append(value)
-    normal, lateral = (_mean_with_error(values) for values in found)
+    normal, lateral = (_compliance_with_error(values) for values in found)
     return replace(contact, doubled=(normal, lateral))
 
 
@@ -477,11 +478,16 @@ def _of_place(rows: FloatArray, sides: FloatArray) -> list[tuple[int, float]]:
     return list(zip(loaded.tolist(), values.tolist(), strict=True))
 
 
-def _mean_with_error(values: Sequence[float]) -> tuple[float, float] | None:
-    """Return a mean with its standard error; None of too few places."""
+def _mean_and_error(values: Sequence[float]) -> tuple[float, float]:
+    """Return a mean and its standard error."""
+    return float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def _compliance_with_error(values: Sequence[float]) -> tuple[float, float] | None:
+    """Return the compliance of several places with its standard error; None of too few."""
     if len(values) < _LEAST_PLACES:
         return None
-    mean, error = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    mean, error = _mean_and_error(values)
     # A contact that is too stiff for the positions of a controller is as soft as they allow.
     return max(mean, error), max(error, _LEAST_ERROR * mean)
 
