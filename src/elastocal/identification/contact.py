@@ -360,7 +360,7 @@ def untold_stacks(robot: Robot, readings: Readings) -> tuple[float, int] | None:
     if len(apart) < _OTHER_STACK_POSES:
         return None
     mean, error = _mean_and_error(apart)
-    is_other = abs(mean) > max(_OTHER_STACK * np.mean(whole), _OTHER_STACK_SIGMAS * error)
+    is_other = abs(mean) > max(_OTHER_STACK * float(np.mean(whole)), _OTHER_STACK_SIGMAS * error)
     return (abs(mean), len(apart)) if is_other else None
 
 
