@@ -133,6 +133,19 @@ def test_a_system_of_zeros_is_refused():
         minimise(np.zeros(2), np.eye(2), np.zeros(2), np.zeros(2), np.ones(2))
 
 
+@pytest.mark.parametrize("deficient", [False, True])
+def test_a_stack_is_solved_as_each_of_its_systems(deficient):
+    rng = np.random.default_rng(7)
+    systems = [system(rng, 6, deficient)[2] for _ in range(20)]
+    stack = [np.array(each) for each in zip(*systems, strict=True)]
+    lower, upper = rng.normal(size=6) - 0.5, np.array(3 * [np.inf, 1.0])
+    upper = np.maximum(lower, upper)
+    found = minimise(*stack, lower, upper)
+    for row, each in zip(found, systems, strict=True):
+        np.testing.assert_allclose(row, minimise(*each, lower, upper), rtol=1e-12, atol=1e-15)
+    assert kkt_violation(*stack, found, lower, upper).shape == (20,)
+
+
 def test_arguments_are_not_changed():
     s, y = np.array([1.0, 0.0]), np.array([1.0, 1.0])
     minimise(s, np.eye(2), y, np.zeros(2), np.ones(2))

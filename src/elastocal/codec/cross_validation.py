@@ -36,7 +36,7 @@ from elastocal.codec.variants import Variant, check_different
 from elastocal.dataset import Readings
 from elastocal.errors import CodecError, IdentificationError
 from elastocal.findings import Finding, Kind
-from elastocal.identification import MINIMUM_BLOCKS, Problem, rung_summary, solve
+from elastocal.identification import MINIMUM_BLOCKS, Problem, rung_summary, solve, with_references
 from elastocal.parallel import map_in_processes, one_blas_thread, process_count
 from elastocal.planning.search import Candidates, growing_choices, technique
 from elastocal.progress import Progress, silent
@@ -111,7 +111,7 @@ def cross_validate(
         sign or frame read otherwise.
     """
     options = options or CodecOptions()
-    measured, readings = readings, drawn_poses(readings, options)
+    measured, readings = readings, with_references(robot, drawn_poses(readings, options))
     ladder = climbed_ladder(robot, readings, variants, options, marker_offset)
     taken = [taken_springs(ladder, each.springs) for each in variants]
     models = {each.name: each.model for each in ladder.ladder}

@@ -35,6 +35,7 @@ from .conventions import (
 from .displacement import (
     displacement_blocks as displacement_blocks,
     reference_joints as reference_joints,
+    with_references as with_references,
 )
 from .domain import (
     LEVEL_REACH as LEVEL_REACH,

@@ -25,7 +25,7 @@ from scipy.special import chdtri
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Gear, Spring
-from elastocal.identification.displacement import reference_joints
+from elastocal.identification.displacement import reference_joints, with_references
 from elastocal.identification.options import FitOptions
 from elastocal.identification.paired import Overlap, corrected_mean
 from elastocal.identification.problem import Problem, build
@@ -157,9 +157,7 @@ def error_budget(
         If there are too few poses.
     """
     options = _for_any_model(options or FitOptions())
-    # Searched once, not for every model.
-    sought = reference_joints(model.robot, readings)
-    readings = replace(readings, reference_joint_position=sought)
+    readings = with_references(model.robot, readings)
     problem = build(model, readings, options, marker_offset)
     if options.set_blunders_aside:
         readings = readings.set_aside(screen(problem).blunder)

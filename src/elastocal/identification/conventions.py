@@ -21,7 +21,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.findings import Finding, Kind, as_number
-from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.displacement import displacement_blocks, with_references
 from elastocal.identification.mistakes import name_joint_mistake, still
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
@@ -80,6 +80,7 @@ def check_conventions(
         If most deflections are zero.
     """
     stated_by = options or FitOptions()
+    readings = with_references(model.robot, readings)
     plain = FitOptions(free_frame=stated_by.free_frame, contact=stated_by.contact, encoders=False)
     problem = build(model, readings, plain, marker_offset)
     if not np.median(np.linalg.norm(problem.d, axis=1)) > 0.0:
@@ -88,9 +89,7 @@ def check_conventions(
     stated = _unexplained(problem.reweighted(robust.reading_weight))
     found = []
     for mistake in _mistakes_of(model.robot):
-        # A mistake in the joints also affects those of the reference, which are therefore solved
-        # again.
-        undone = mistake.undo(model.robot, replace(readings, reference_joint_position=None))
+        undone = mistake.undo(model.robot, readings)
         blocks = displacement_blocks(model, undone, marker_offset)
         # The weights of the stated reading keep a blunder out of every other one, too.
         other = problem.with_springs(blocks, undone.deflection).reweighted(robust.reading_weight)
@@ -155,7 +154,9 @@ def _rotated(readings: Readings, R: FloatArray) -> Readings:
 
 def _reading_joints(reading: JointReading) -> _Undo:
     def undo(robot: Robot, readings: Readings) -> Readings:
-        return replace(readings, joint_position=reading.read(robot, readings.joint_position))
+        # Those of the reference are affected, too, and sought again.
+        q = reading.read(robot, readings.joint_position)
+        return replace(readings, joint_position=q, reference_joint_position=None)
 
     return undo
 

@@ -12,7 +12,7 @@ starting from the state that a free motion leaves.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -130,6 +130,11 @@ def reference_joints(robot: Robot, readings: Readings) -> FloatArray:
         q_0[anew] = _where_displacement_began(robot, readings)[anew]
         return q_0
     return _where_displacement_began(robot, readings)
+
+
+def with_references(robot: Robot, readings: Readings) -> Readings:
+    """Return readings that hold their `reference_joints`, so that each is sought only once."""
+    return replace(readings, reference_joint_position=reference_joints(robot, readings))
 
 
 def _where_displacement_began(robot: Robot, readings: Readings) -> FloatArray:

@@ -20,7 +20,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, KnownSpring, bearing
 from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind
-from elastocal.identification.displacement import reference_joints
+from elastocal.identification.displacement import with_references
 from elastocal.identification.knowledge import DriveCompliances, with_knowledge
 from elastocal.identification.options import FitOptions
 from elastocal.identification.paired import Judgement, Overlap, judge_models
@@ -210,8 +210,7 @@ def usable_for_choice(
     robot, readings, options, marker_offset
         As for `choose_model`.
     """
-    # Searched once, not for every rung.
-    readings = replace(readings, reference_joint_position=reference_joints(robot, readings))
+    readings = with_references(robot, readings)
     if not options.set_blunders_aside:
         return readings
     # Judged by springs that every reading can be judged by; they would decide otherwise.

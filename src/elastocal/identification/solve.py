@@ -212,8 +212,7 @@ class PoseGrams:
         projected = (Vt @ total[:, :n, n:])[..., 0]
         y = np.divide(projected, s, out=np.zeros_like(s), where=s > 0.0)
         lower, upper = self.lower * self.scale, self.upper * self.scale
-        fits = [minimise(*system, lower, upper) for system in zip(s, Vt, y, strict=True)]
-        return np.array(fits) / self.scale
+        return minimise(s, Vt, y, lower, upper) / self.scale
 
 
 @brief_repr
@@ -289,9 +288,5 @@ def _minimised(
     gain, scale = column_scaling(norms, size)
     U, s, Vt = np.linalg.svd(triangles[:, :n, :n] * gain[:, None])
     y = np.einsum("fij,fi->fj", U, triangles[:, :n, n])
-    return np.array(
-        [
-            minimise_certified(*system, lower * norm, upper * norm)[0] / norm
-            for system, norm in zip(zip(s, Vt, y, strict=True), scale, strict=True)
-        ]
-    ).clip(lower, upper)
+    x, _ = minimise_certified(s, Vt, y, lower * scale, upper * scale)
+    return np.clip(x / scale, lower, upper)

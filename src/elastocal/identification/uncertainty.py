@@ -400,9 +400,9 @@ def widen_draws(
         return np.asarray(stretched)
     system = factor(problem)
     s, Vt, scale = system.s, system.Vt, system.scale
-    for draw in np.flatnonzero(beyond):
-        y = s * (Vt @ (stretched[draw] * scale))
-        stretched[draw] = minimise(s, Vt, y, lower * scale, upper * scale) / scale
+    y = s * (stretched[beyond] * scale @ Vt.T)
+    s, Vt = (np.broadcast_to(each, (len(y), *each.shape)) for each in (s, Vt))
+    stretched[beyond] = minimise(s, Vt, y, lower * scale, upper * scale) / scale
     return np.asarray(np.clip(stretched, lower, upper))
 
 
