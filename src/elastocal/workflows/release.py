@@ -48,8 +48,6 @@ _GROWTH = 50.0
 """Largest growth of the force during the retreat, in N."""
 _MEASURED = 0.4
 """Time over which the force is looked at before and after, in s."""
-_LIMIT_PER_LOAD = 1.3
-"""Default force limit over the largest load case, as in `elastocal run`."""
 
 
 @dataclass(frozen=True)
@@ -202,15 +200,7 @@ def _connected(cell: Cell, reserved: ReservedRig) -> Iterator[_Bench]:
                 problem = str(error)
         arm = next(each.arm for each in made if each.arm is not None)
         sensor = next((each.sensor for each in made if each.sensor is not None), None)
-        yield _Bench(arm, ForceTap(sensor, _load(cell)), clock, problem)
-
-
-def _load(cell: Cell) -> ToolLoad:
-    T_sensor_tcp = cell.T_sensor_tcp
-    R = np.eye(3) if T_sensor_tcp is None else T_sensor_tcp[:3, :3].T
-    largest = max(float(np.linalg.norm(each)) for each in cell.file.presses.values())
-    limit = cell.file.procedure.force_limit or _LIMIT_PER_LOAD * largest
-    return ToolLoad(cell.file.tool.mass * cell.gravity_base, R, limit)
+        yield _Bench(arm, ForceTap(sensor, ToolLoad.of(cell)), clock, problem)
 
 
 def _beyond(bench: _Bench) -> FloatArray | None:

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Clock, ForceSensor, Motion, RobotArm, SensorStatus, WrenchBlock
+from elastocal.cell import Cell, Clock, ForceSensor, Motion, RobotArm, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.procedure.run.steps import Fault, FaultError
 from elastocal.results import brief_repr
 
-_WRONG_WEIGHT = 0.35
+WRONG_WEIGHT = 0.35
 """Part of the weight that may be missing: a mass a quarter off, with a tool turned by 90 deg."""
-_STRAIGHT_TOLERANCE = 1e-3
+STRAIGHT_TOLERANCE = 1e-3
 """Largest distance of a straight motion's end from its target, in m."""
-_BIAS = 0.1
+BIAS = 0.1
 """Bias of a sensor that is let pass, as a part of the force limit."""
 
 
@@ -35,11 +35,18 @@ class ToolLoad:
     force_limit: float
     """Force limit of the procedure, in N."""
 
+    @classmethod
+    def of(cls, cell: Cell) -> "ToolLoad":
+        """Return that of a cell; without a sensor its axes are those of the tcp."""
+        T_sensor_tcp = cell.T_sensor_tcp
+        R = np.eye(3) if T_sensor_tcp is None else T_sensor_tcp[:3, :3].T
+        return cls(cell.file.tool.mass * cell.gravity_base, R, cell.force_limit)
+
     @property
     def tolerance(self) -> float:
         """Largest force that a wrong mass and a bias explain, in N; infinite without a mass."""
         weight = float(np.linalg.norm(self.weight_base))
-        return _WRONG_WEIGHT * weight + _BIAS * self.force_limit if weight > 0.0 else math.inf
+        return WRONG_WEIGHT * weight + BIAS * self.force_limit if weight > 0.0 else math.inf
 
     def beyond_weight(self, block: WrenchBlock, T_base_tcp: FloatArray) -> FloatArray | None:
         """Return the mean force on the robot less the tool's weight, base, shape (3,), in N.
@@ -171,7 +178,7 @@ def leave_surface(
             if block is not None:
                 watch.look(block, state.T_base_tcp)
             gone = float(np.linalg.norm(state.T_base_tcp[:3, 3] - start))
-            if state.motion is Motion.IDLE and gone > distance - _STRAIGHT_TOLERANCE:
+            if state.motion is Motion.IDLE and gone > distance - STRAIGHT_TOLERANCE:
                 return
             if state.fault is not None or state.motion is Motion.STOPPED:
                 reason = state.fault or state.motion.value
