@@ -32,6 +32,7 @@ from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.conventions import FORCE_MISTAKES
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.mistakes._motion import AXES, median_norm
+from elastocal.identification.mistakes.plausibility import sensor_frames
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import PoseGrams
@@ -41,8 +42,6 @@ from elastocal.robot import Robot
 
 _TRACKER = FitOptions(encoders=False)
 """What a force or a frame read otherwise changes is the tracker's: encoders would hide it."""
-_PARALLEL = 0.02
-"""Largest element by which axes of parallel frames differ."""
 
 
 @dataclass(frozen=True)
@@ -128,15 +127,8 @@ class Rows:
 
     @cached_property
     def frames(self) -> dict[str, FloatArray]:
-        """Axes of the frames that a sensor may have, in base, shape (reading, 3, 3)."""
-        robot = self.model.robot
-        R = robot.forward(self.readings.joint_position)[:, :3, :3]
-        last = robot.chain.T_last_tip[:3, :3]
-        found = {"tcp": R, "base": np.broadcast_to(np.eye(3), R.shape)}
-        # Axes that lie along those of the tcp, in whatever order, are among its other readings.
-        if not np.allclose(np.abs(last).max(axis=0), 1.0, atol=_PARALLEL):
-            found["last link"] = R @ last.T
-        return found
+        """See `sensor_frames`."""
+        return sensor_frames(self.model.robot, self.readings.joint_position)
 
     def read(self, reading: OtherReading) -> Problem:
         """Return the problem of the kept rows, read otherwise."""
@@ -387,13 +379,15 @@ def _drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
             _FITTED,
             estimated=True,
         )
-    found = _offset(rows, compliance, rows.frames["tcp"], t)
-    if found is not None:
+    for frame in ("tcp", "base"):
+        found = _offset(rows, compliance, rows.frames[frame], t)
+        if found is None:
+            continue
         yield OtherReading(
             (
-                "the zero of the force drifts by ({x}, {y}, {z}) N in the tcp frame over the"
+                "the zero of the force drifts by ({x}, {y}, {z}) N in the {frame} frame over the"
                 " campaign: zero the sensor before each pose"
-            ).format(**_parts(found[0])),
+            ).format(frame=frame, **_parts(found[0])),
             found[1],
             d,
             _FITTED,
