@@ -14,10 +14,12 @@ from operator import itemgetter
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.findings import Finding, Grade, Kind, as_number
+from elastocal.identification.contact import counts_from_other_stack
 from elastocal.robot import Robot, other_joint_readings
+from elastocal.wording import phrase, spans
 
 AXES = ("x", "y", "z")
 MM = as_number(".2f", 1e3)
@@ -34,10 +36,22 @@ _ALONG = 0.95
 """Cosine from which on an axis lies along another."""
 _LEAST_ZERO = 1.0
 """Smallest error of a joint's zero that is reported, in deg."""
+_LEAST_JUMP = 0.2
+"""The same of a zero that changes: it moves the tool as a whole. In deg."""
+_FINEST_JUMP = 1e-4
+"""Resolution of such a change, in deg: a few micrometres of the tool."""
 _FINE = 1e-5
 """Difference in m that a reading of a tracker explains."""
 _APART = 0.1
 """Part of the motion from which they contradict each other without a known cause."""
+_SOME = 3.0
+"""Times the distance at which joints and controller agree, from which a single reading does not."""
+_OUTLYING = 5.0
+"""Times the median distance from which it does not, either: the rest is resolution of joints."""
+_FEWEST_OF_SOME = 2
+"""Poses that contradict from which a mistake of their joints is looked for: one fits any."""
+_NAMED = 4
+"""Rows that a message names."""
 _COARSE = 1.5e-4
 """Difference in m that makes joints and controller contradict each other without a known cause."""
 
@@ -75,6 +89,8 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
     offset : ndarray, shape (3,)
         Marker in the tcp frame, in m.
     """
+    # On another stack of disks the tool came to its zero by a way that no joints tell.
+    readings = readings.take(~counts_from_other_stack(readings))
     moved = _moved(robot, readings, offset)
     if moved is None:
         return
@@ -84,6 +100,7 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
     )
     apart = _apart(robot, readings, offset)
     if not apart > max(_CLOSE * size, _FINE):
+        yield from _contradictions_of_some(robot, readings, offset, moved)
         return
     left, message = _likeliest(robot, readings, offset, moved)
     if left < _LEFT * min(apart / max(size, _FINE), 1.0):
@@ -95,14 +112,50 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
         yield CONTRADICTION(apart=apart, size=size, still=repeated)
 
 
+def _contradictions_of_some(
+    robot: Robot, readings: Readings, offset: FloatArray, moved: FloatArray
+) -> Iterator[Finding]:
+    """Yield that some readings contradict while most agree; see `contradictions`."""
+    controller = _counted(readings.controller_displacement, readings)
+    between = np.linalg.norm(moved - controller, axis=1)
+    size = median_norm(controller)
+    agreed = max(_CLOSE * size, _FINE)
+    wrong = between > max(_SOME * agreed, _OUTLYING * float(np.median(between)))
+    if not wrong.any() or not size > 0.0:
+        return
+    poses = np.unique(readings.pose[wrong])
+    apart = float(np.median(between[wrong]))
+
+    def rest(mistake: ReadingMistake) -> float:
+        undone = _motion(robot, mistake.undo(readings), offset) - controller
+        return float(np.linalg.norm(undone[wrong], axis=1).max())
+
+    exchanged = list(_exchanged_rows(robot, readings, offset, moved, wrong))
+    tried = [(rest(each) / size, each.message) for each in exchanged]
+    part = readings.take(np.isin(readings.pose, poses))
+    own = _moved(robot, part, offset) if len(poses) >= _FEWEST_OF_SOME else None
+    if own is not None:
+        left, message = _likeliest(robot, part, offset, own)
+        tried.append((left, f"at poses {spans(poses.tolist())} {message}"))
+    found = [each for each in tried if each[0] < min(agreed / size, _LEFT * apart / size)]
+    if found:
+        left, message = found[0]
+        yield UNDONE(message=message, left=left, apart=apart, size=size)
+    elif apart > max(_APART * size, _COARSE):
+        still = phrase(" at poses {poses}", poses=spans(poses.tolist()))
+        yield CONTRADICTION(apart=apart, size=size, still=still)
+
+
 def _likeliest(
     robot: Robot, readings: Readings, offset: FloatArray, moved: FloatArray
 ) -> tuple[float, str]:
     """Return the rest after undoing the likeliest mistake, and the name of that mistake."""
     mistakes = [
         ReadingMistake(each.message, partial(_read, each.read))
-        for each in joint_mistakes(robot, partial(_left_by_zero, robot, readings, offset))
+        for each in joint_mistakes(robot, partial(_left_by_zero, robot, readings, offset, _read))
     ]
+    if readings.reference_joint_position is not None:
+        mistakes += _zeros_under_load(robot, readings, offset)
     tried = [
         (_relative(robot, each.undo(readings), offset), each.message)
         for each in (*mistakes, *_motion_mistakes(robot, readings, moved))
@@ -159,9 +212,15 @@ def _relative(robot: Robot, readings: Readings, offset: FloatArray) -> float:
 
 
 def _left_by_zero(
-    robot: Robot, readings: Readings, offset: FloatArray, joint: int
+    robot: Robot,
+    readings: Readings,
+    offset: FloatArray,
+    read: "Callable[[JointRead, Readings], Readings]",
+    joint: int,
 ) -> Callable[[float], float]:
     """Return the rest of `_relative` as a function of an angle that is added to a joint.
+
+    ``read`` says which joints of readings another way to read joints is of.
 
     A point turned by an angle about an axis is ``centre + a cos + b sin``, moved along one it is
     linear; so few angles determine the motion at all others.
@@ -170,7 +229,7 @@ def _left_by_zero(
     size = median_norm(controller)
 
     def at(angle: float) -> FloatArray:
-        return _motion(robot, _read(partial(_turned, robot, joint, angle), readings), offset)
+        return _motion(robot, read(partial(_turned, robot, joint, angle), readings), offset)
 
     start = at(0.0)
     if robot.revolute[joint]:
@@ -232,10 +291,72 @@ def _motion_mistakes(
     turn = U @ Vt
     yield ReadingMistake(_of_turn(turn), lambda r: _told(r, r.controller_displacement @ turn.T))
     for axis, letter in enumerate(AXES):
+        if not _is_part_of(_counted(readings.controller_displacement, readings), moved, axis):
+            continue
         yield ReadingMistake(
             f"controller_displacement_{letter} is dead or in another unit",
             partial(_with_axis, axis, moved),
         )
+
+
+def _exchanged_rows(
+    robot: Robot, readings: Readings, offset: FloatArray, moved: FloatArray, wrong: BoolArray
+) -> Iterator[ReadingMistake]:
+    """Yield readings of wrong rows with the joints of those among them that fit best.
+
+    Joints under load are found by where they put the marker, with those of the reference where
+    they are; then both by the motion of the whole pose.
+    """
+    rows, zero = np.flatnonzero(wrong), readings.reference_joint_position
+    if zero is not None:
+        needed = _marker(robot, zero, offset) + readings.controller_displacement
+        there = _marker(robot, readings.joint_position, offset)[rows]
+        order = np.arange(len(readings))
+        order[rows] = rows[_distances(needed[rows], there).argmin(axis=1)]
+        yield ReadingMistake(
+            _who_is_who(readings, order), partial(_with_joints_of, order, reference=False)
+        )
+    of_pose = [np.flatnonzero(readings.pose == each) for each in np.unique(readings.pose[wrong])]
+    if len({tuple(readings.load_case[each].tolist()) for each in of_pose}) == 1:
+        told = _counted(readings.controller_displacement, readings)
+        each, order = np.array(of_pose), np.arange(len(readings))
+        count = len(each)
+        apart = _distances(told[each].reshape(count, -1), moved[each].reshape(count, -1))
+        order[each] = each[apart.argmin(axis=1)]
+        yield ReadingMistake(
+            _who_is_who(readings, order), partial(_with_joints_of, order, reference=True)
+        )
+
+
+def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(a[:, None] - b[None], axis=2))
+
+
+def _with_joints_of(order: IndexArray, readings: Readings, *, reference: bool) -> Readings:
+    """Return readings with the joints of other rows, and of their references if so wanted."""
+    zero = readings.reference_joint_position
+    return replace(
+        readings,
+        joint_position=readings.joint_position[order],
+        reference_joint_position=zero if zero is None or not reference else zero[order],
+    )
+
+
+def _who_is_who(readings: Readings, order: IndexArray) -> str:
+    """Return which joints stand in whose rows, by poses where whole poses are exchanged."""
+    moved = np.flatnonzero(order != np.arange(len(order)))
+    pose, case = readings.pose, readings.load_case
+    pairs = sorted({tuple(sorted((int(pose[row]), int(pose[order[row]])))) for row in moved})
+    whole = np.isin(pose, pose[moved]).sum() == len(moved)
+    if whole and np.array_equal(order[order], np.arange(len(order))):
+        named = ", ".join(f"{a} and {b}" for a, b in pairs)
+        return f"the joints of poses {named} look exchanged: put each row beside its forces"
+    named = ", ".join(
+        f"pose {pose[row]} ({case[row]}) those of pose {pose[order[row]]} ({case[order[row]]})"
+        for row in moved[:_NAMED].tolist()
+    )
+    more = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
+    return f"joints look like those of other rows: at {named}{more}; put each beside its forces"
 
 
 def _of_turn(turn: FloatArray) -> str:
@@ -249,6 +370,18 @@ def _of_turn(turn: FloatArray) -> str:
         return "the frame of controller_displacement is left-handed"
     angle = np.degrees(np.linalg.norm(Rotation.from_matrix(turn).as_rotvec()))
     return f"controller_displacement is in another frame than base, turned by {angle:.0f} deg"
+
+
+def _is_part_of(told: FloatArray, moved: FloatArray, axis: int) -> bool:
+    """Return whether a controller says nothing along an axis, or the joints' motion times a gain.
+
+    Any other difference along one axis has its cause elsewhere, such as in a joint.
+    """
+    own, true = told[:, axis], moved[:, axis]
+    if np.median(np.abs(own)) < _DEAD * median_norm(told):
+        return True
+    gain = float(own @ true) / max(float(true @ true), np.finfo(float).tiny)
+    return bool(np.median(np.abs(own - gain * true)) < _LEFT * np.median(np.abs(own)))
 
 
 def _with_axis(axis: int, moved: FloatArray, readings: Readings) -> Readings:
@@ -294,11 +427,25 @@ def joint_mistakes(
             )
 
 
-def _zero(left: Callable[[float], float]) -> float:
-    """Return the angle in rad at which a function of it is least."""
+def _zeros_under_load(
+    robot: Robot, readings: Readings, offset: FloatArray
+) -> Iterator[ReadingMistake]:
+    """Yield that a joint's zero is another under load than at the reference, for each joint."""
+    for joint in range(robot.external_axes, len(robot.joint_names)):
+        angle = _zero(_left_by_zero(robot, readings, offset, _read_loaded, joint), _FINEST_JUMP)
+        if abs(angle) > np.radians(_LEAST_JUMP):
+            yield ReadingMistake(
+                f"{robot.joint_names[joint]} reads {-np.degrees(angle):.3g} deg more under load"
+                " than at the reference: was its zero set in between?",
+                partial(_read_loaded, partial(_turned, robot, joint, angle)),
+            )
+
+
+def _zero(left: Callable[[float], float], finest: float = 0.05) -> float:
+    """Return the angle in rad at which a function of it is least, to so many deg."""
     step, best = np.radians(15.0), 0.0
     tried = step * np.arange(-11, 13)
-    while step > np.radians(0.05):
+    while step > np.radians(finest):
         best = min(tried, key=left)
         step /= 4.0
         tried = best + step * np.arange(-3, 4)
@@ -341,6 +488,10 @@ def _read(read: JointRead, readings: Readings) -> Readings:
         joint_position=read(readings.joint_position),
         reference_joint_position=None if zero is None else read(zero),
     )
+
+
+def _read_loaded(read: JointRead, readings: Readings) -> Readings:
+    return replace(readings, joint_position=read(readings.joint_position))
 
 
 def _columns(order: IndexArray, q: FloatArray) -> FloatArray:

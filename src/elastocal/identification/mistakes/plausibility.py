@@ -11,9 +11,9 @@ force causes both at once (docs/decisions/0105-mistakes-undone.md).
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, actuated
 from elastocal.findings import Finding, Grade, Kind, as_number
@@ -182,6 +182,7 @@ def find_implausible(
         return tuple(found)
     dead = [*_dead_forces(robot, readings)]
     found += dead or [*_zero_loads(readings)]
+    found += _clipped(robot, readings)
     found += [*_rounded(readings)] or [*_dead_markers(readings)]
     return (*found, *_repeated(readings))
 
@@ -211,6 +212,13 @@ REPEATED = Kind(
     "readings of pose {poses} are the same to the last digit under different load"
     " cases: a copied row, or a stream that stood still; leave them out (--exclude)",
 )
+CLIPPED = Kind(
+    "mistakes.clipped-forces",
+    "{what} stops at {size} N: {count} of {total} readings are as large to within 0.01 %, no"
+    " smaller force comes again so often; is the sensor at the end of its range? Press with less,"
+    " or take a sensor with a larger range",
+    shown={"size": as_number(".0f")},
+)
 ROUNDED = Kind(
     "mistakes.rounded-displacements",
     "displacements are rounded to {step} mm, {part} of the median deflection: export more digits",
@@ -238,6 +246,76 @@ def _zero_loads(readings: Readings) -> Iterator[Finding]:
             deflection[own]
         ) > _BENT * median_norm(deflection):
             yield ZERO_LOAD(case=case, deflection=median_norm(deflection[own]))
+
+
+_PARALLEL = 0.02
+"""Largest element by which axes of parallel frames differ."""
+
+
+def sensor_frames(robot: Robot, q: FloatArray) -> dict[str, FloatArray]:
+    """Return the axes of the frames that a force sensor may have, in base.
+
+    Parameters
+    ----------
+    q : ndarray, shape (reading, joint)
+        Joints, in rad or m.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (reading, 3, 3)
+        By the name of the frame; the last link only where its axes are not along those of the tcp.
+    """
+    R = robot.forward(q)[:, :3, :3]
+    last = robot.chain.T_last_tip[:3, :3]
+    found = {"tcp": R, "base": np.broadcast_to(np.eye(3), R.shape)}
+    # Axes that lie along those of the tcp, in whatever order, are among its other readings.
+    if not np.allclose(np.abs(last).max(axis=0), 1.0, atol=_PARALLEL):
+        found["last link"] = R @ last.T
+    return found
+
+
+_TIED = 1e-4
+"""Part of the largest force within which readings are equally large."""
+_FEWEST_TIED = 5
+_OFTENER = 4
+"""Times that so many readings are equally large at the end of a range as at any smaller force;
+2 at most on 200 correct campaigns."""
+
+
+def _clipped(robot: Robot, readings: Readings) -> Iterator[Finding]:
+    """Yield that forces end at a size that many readings have, along an axis or altogether."""
+    frames = sensor_frames(robot, readings.joint_position)
+    own = {name: np.einsum("rji,rj->ri", X, readings.force) for name, X in frames.items()}
+    sizes = {
+        f"force_{letter} in the {name} frame": np.abs(values[:, axis])
+        for name, values in own.items()
+        for axis, letter in enumerate(AXES)
+    }
+    sizes[phrase("the force")] = np.linalg.norm(readings.force, axis=1)
+    tied = {what: _tied_at_end(each) for what, each in sizes.items()}
+    what = max(tied, key=lambda each: np.count_nonzero(tied[each]))
+    largest = float(sizes[what].max())
+    # Weights, and forces that were asked for, are the same in each load case by their nature.
+    if tied[what].any() and all(
+        _varies(values[tied[what]], readings.load_case[tied[what]], _TIED * largest)
+        for values in (own["tcp"], readings.force)
+    ):
+        count = np.count_nonzero(tied[what])
+        yield CLIPPED(what=what, size=largest, count=count, total=len(readings))
+
+
+def _tied_at_end(sizes: FloatArray) -> BoolArray:
+    """Return which sizes are the largest; none where as many share a smaller one."""
+    tied = sizes >= (1.0 - _TIED) * sizes.max()
+    smaller = np.sort(sizes[~tied])
+    upper = np.searchsorted(smaller, smaller + _TIED * sizes.max(), side="right")
+    most = int((upper - np.arange(len(smaller))).max(initial=1))
+    return np.asarray(tied & (np.count_nonzero(tied) >= max(_FEWEST_TIED, _OFTENER * most)))
+
+
+def _varies(values: FloatArray, case: NDArray[np.str_], least: float) -> bool:
+    """Return whether vectors, shape (reading, 3), of any load case differ by more than that."""
+    return any(np.ptp(values[case == each], axis=0).max() > least for each in np.unique(case))
 
 
 def _dead_markers(readings: Readings) -> Iterator[Finding]:

@@ -32,6 +32,7 @@ from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.conventions import FORCE_MISTAKES
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.mistakes._motion import AXES, median_norm
+from elastocal.identification.mistakes.plausibility import sensor_frames
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.solve import PoseGrams
@@ -41,8 +42,6 @@ from elastocal.robot import Robot
 
 _TRACKER = FitOptions(encoders=False)
 """What a force or a frame read otherwise changes is the tracker's: encoders would hide it."""
-_PARALLEL = 0.02
-"""Largest element by which axes of parallel frames differ."""
 
 
 @dataclass(frozen=True)
@@ -128,15 +127,8 @@ class Rows:
 
     @cached_property
     def frames(self) -> dict[str, FloatArray]:
-        """Axes of the frames that a sensor may have, in base, shape (reading, 3, 3)."""
-        robot = self.model.robot
-        R = robot.forward(self.readings.joint_position)[:, :3, :3]
-        last = robot.chain.T_last_tip[:3, :3]
-        found = {"tcp": R, "base": np.broadcast_to(np.eye(3), R.shape)}
-        # Axes that lie along those of the tcp, in whatever order, are among its other readings.
-        if not np.allclose(np.abs(last).max(axis=0), 1.0, atol=_PARALLEL):
-            found["last link"] = R @ last.T
-        return found
+        """See `sensor_frames`."""
+        return sensor_frames(self.model.robot, self.readings.joint_position)
 
     def read(self, reading: OtherReading) -> Problem:
         """Return the problem of the kept rows, read otherwise."""
@@ -183,8 +175,11 @@ def apart(problem: Problem, late: BoolArray) -> Problem:
     )
 
 
-_CLEAR, _LIKELY, _FITTED = 0.9, 0.75, 0.85
-"""Part of the error that may be left: by forces and rows, by markers, by estimated numbers."""
+_CLEAR, _LIKELY, _FITTED, _IN_TIME = 0.9, 0.75, 0.85, 0.97
+"""Part of the error that may be left: by forces and rows, by markers, by estimated numbers, by
+those that grow in the order of poses, which no correct arm imitates."""
+_SHORTEST = 3
+"""Fewest poses of a part of the campaign that is mistaken by itself."""
 _SHIFTS = (
     (-1, "the row before"),
     (1, "the row after"),
@@ -196,6 +191,8 @@ _CONSTANT_ROUNDS = 10
 """A constant as large as half the force takes more rounds to settle than a gain."""
 _SMALLEST = 0.05
 """Part of the median force below which a constant is not reported."""
+_UPRIGHT = 0.95
+"""Cosine of its angle with the vertical from which a constant force may be a weight."""
 _LEAST_GAIN = 0.05
 _FARTHEST = 2.0
 """Distance in m between two places of a marker that is still believed."""
@@ -207,6 +204,7 @@ def other_readings(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]
     """Yield every other reading of the data, the plainest first."""
     yield from _turned_forces(rows)
     yield from _turned_markers(rows)
+    yield from _turned_for_a_part(rows)
     yield from _other_rows(rows)
     yield from _constants(rows, compliance)
     yield from _drifts(rows, compliance)
@@ -216,8 +214,11 @@ def other_readings(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]
     yield from _any_marker_frame(rows)
 
 
-def _turned_forces(rows: Rows) -> Iterator[OtherReading]:
-    """Yield readings of forces in other frames, with axes exchanged, reversed or turned."""
+def _turned_forces(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
+    """Yield readings of forces in other frames, with axes exchanged, reversed or turned.
+
+    Plain ones are turned by right angles.
+    """
     d, robot, r = rows.problem.d, rows.model.robot, rows.readings
     for mistake in FORCE_MISTAKES:
         force, light = mistake.undo(robot, r).force, r.reference_force
@@ -225,25 +226,26 @@ def _turned_forces(rows: Rows) -> Iterator[OtherReading]:
             light = mistake.undo(robot, replace(r, force=light)).force
         yield OtherReading(mistake.message, rows.blocks(force, light), d, _CLEAR, certain=True)
     for frame, X in rows.frames.items():
-        for message, A in _turns(f"force_{{axis}} in the {frame} frame", frame != "base"):
+        for message, A in _turns(f"force_{{axis}} in the {frame} frame", frame != "base", plain):
             G = X @ A @ np.swapaxes(X, 1, 2)
             blocks = rows.turned(G)
             remedy = f"{message}; check the sensor's frame in the map"
             yield OtherReading(remedy, blocks, d, _CLEAR, certain=True)
 
 
-def _turned_markers(rows: Rows) -> Iterator[OtherReading]:
+def _turned_markers(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
     r, blocks = rows.readings, rows.problem.O
-    for message, A in _turns("marker_displacement_{axis}", False):
+    for message, A in _turns("marker_displacement_{axis}", False, plain):
         d = r.marker_displacement @ A.T - r.controller_displacement
         remedy = f"{message}; check the tracker's frame"
         yield OtherReading(remedy, blocks, d, _LIKELY, certain=True)
 
 
-def _turns(name: str, any_angle: bool) -> list[tuple[str, FloatArray]]:
+def _turns(name: str, any_angle: bool, plain: bool) -> list[tuple[str, FloatArray]]:
     """Return matrices that undo exchanged, reversed and rotated axes, with their descriptions.
 
-    They include all 47 ways to interpret three columns as other axes, with or without their signs.
+    They include all 47 ways to interpret three columns as other axes, with or without their signs;
+    plain ones are one axis reversed, two exchanged, or a turn by a right angle.
     """
     whole, found = name.replace("_{axis}", ""), []
     for axis, letter in enumerate(AXES):
@@ -256,11 +258,12 @@ def _turns(name: str, any_angle: bool) -> list[tuple[str, FloatArray]]:
         pair = name.replace("{axis}", f"{AXES[a]} and {whole.split()[0]}_{AXES[b]}")
         found.append((f"{pair} look exchanged", A))
     for axis, letter in enumerate(AXES):
-        for angle in _ANGLES if any_angle and letter == "z" else _ANGLES[:3]:
+        for angle in _ANGLES if any_angle and letter == "z" and not plain else _ANGLES[:3]:
             A = Rotation.from_rotvec(np.radians(angle) * np.eye(3)[axis]).as_matrix()
             by = -angle if abs(angle) < 180 else 180
             found.append((f"{whole} looks turned by {by} deg about {letter}", A))
-    return found + list(_mixed(whole, [np.eye(3), *(A for _, A in found)]))
+    mixed = [] if plain else _mixed(whole, [np.eye(3), *(A for _, A in found)])
+    return [*found, *mixed]
 
 
 def _mixed(whole: str, known: Sequence[FloatArray]) -> Iterator[tuple[str, FloatArray]]:
@@ -273,6 +276,41 @@ def _mixed(whole: str, known: Sequence[FloatArray]) -> Iterator[tuple[str, Float
                 each = zip(np.abs(A).argmax(axis=1), A.sum(axis=1), strict=True)
                 read = ", ".join(f"{'-' if sign < 0.0 else ''}{AXES[i]}" for i, sign in each)
                 yield f"x, y, z of {whole} look mixed up: they read as {read}", A
+
+
+def _turned_for_a_part(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of forces and of markers that are turned up to a pose, or from one on.
+
+    Of each the turn and the pose that leave least: a plug was changed in a break.
+    """
+    labels, first = np.unique(rows.readings.pose, return_index=True)
+    order = labels[np.argsort(first)]
+    place = np.argsort(np.argsort(first))[np.searchsorted(labels, rows.readings.pose)]
+
+    def partly(reading: OtherReading, start: int, late: bool) -> OtherReading:
+        part = (place >= start) == late
+        when = f"from pose {order[start]} on" if late else f"before pose {order[start]}"
+        return replace(
+            reading,
+            message=f"{when} {reading.message}",
+            blocks=np.where(part[:, None, None], reading.blocks, rows.problem.O),
+            d=np.where(part[:, None], reading.d, rows.problem.d),
+            least=_FITTED,
+            certain=False,
+            estimated=True,
+        )
+
+    def left(reading: OtherReading) -> float:
+        return _residual(rows.read(reading))
+
+    starts = range(_SHORTEST, len(order) - _SHORTEST + 1)
+    if not starts:
+        return
+    coarse = sorted({starts[round(part * (len(starts) - 1))] for part in _PARTS})
+    for turns in (_turned_forces(rows, plain=True), _turned_markers(rows, plain=True)):
+        each = product(turns, coarse, (True, False))
+        turn, _, late = min(each, key=lambda tried: left(partly(*tried)))
+        yield min((partly(turn, start, late) for start in starts), key=left)
 
 
 def _other_rows(rows: Rows) -> Iterator[OtherReading]:
@@ -330,15 +368,21 @@ def _constants(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
         if not np.linalg.norm(offset) > _SMALLEST * median_norm(rows.readings.force):
             continue
         kind = "zeroed at the wrong moment? Or, where the tool tilts little, tool weight left in?"
-        if frame == "base":
-            down = float(offset @ np.array(rows.model.robot.gravity)) > 0.0
-            kind = "tool weight left in?" if down else "tool weight subtracted twice?"
+        down = _along(offset, np.array(rows.model.robot.gravity))
+        if frame == "base" and abs(down) > _UPRIGHT:
+            kind = "tool weight left in?" if down > 0.0 else "tool weight subtracted twice?"
         x, y, z = offset
         message = (
             f"the forces seem to contain a constant of ({x:.0f}, {y:.0f}, {z:.0f}) N in the"
             f" {frame} frame: {kind}"
         )
         yield OtherReading(message, blocks, rows.problem.d, _FITTED, estimated=True)
+
+
+def _along(a: FloatArray, b: FloatArray) -> float:
+    """Return the cosine of the angle between vectors; 1 where one is zero."""
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size > 0.0 else 1.0
 
 
 def _parts(offset: FloatArray, scale: float = 1.0, digits: int = 0) -> dict[str, str]:
@@ -384,19 +428,21 @@ def _drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
             ).format(how=how, **_parts(grown, 1000.0, 2)),
             rows.problem.O,
             d - course[:, None] * grown,
-            _FITTED,
+            _IN_TIME,
             estimated=True,
         )
-    found = _offset(rows, compliance, rows.frames["tcp"], t)
-    if found is not None:
+    for frame in ("tcp", "base"):
+        found = _offset(rows, compliance, rows.frames[frame], t)
+        if found is None:
+            continue
         yield OtherReading(
             (
-                "the zero of the force drifts by ({x}, {y}, {z}) N in the tcp frame over the"
+                "the zero of the force drifts by ({x}, {y}, {z}) N in the {frame} frame over the"
                 " campaign: zero the sensor before each pose"
-            ).format(**_parts(found[0])),
+            ).format(frame=frame, **_parts(found[0])),
             found[1],
             d,
-            _FITTED,
+            _IN_TIME,
             estimated=True,
         )
 
@@ -551,12 +597,11 @@ _LEFT_APART = 0.55
 """Part of the error that springs of both parts may leave: regions of the tooling differ, too."""
 _TRIED = 5
 """Readings that are judged at left-out poses, the best first."""
-_SURE = ((0.75, 2e-3), (1.0, 1e-4))
-"""Remaining part of the error, and the likelihood below which the gain is not chance. Estimated
-numbers explain part of the model error, in correct data too: the less they explain, the smaller
-this likelihood has to be. Without estimated numbers the first pair holds for every gain."""
-_MATTERS = 0.03
-"""Part of the deflections that an estimated number must change to be reported."""
+_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.04), (1.0, 1e-5, 0.05))
+"""Remaining part of the error, the likelihood below which the gain is not chance, and the part of
+the deflections that estimated numbers must change. Estimated numbers explain part of the model
+error, in correct data too: the less they explain, the smaller the likelihood and the larger the
+change have to be. Without estimated numbers the first likelihood holds for every gain."""
 _CERTAIN = 0.5
 _FITS_WELL = 0.2
 _EQUAL = 1.1
@@ -645,9 +690,10 @@ def _judged(
     before, after = (leave_poses_out(each).error for each in (stated, undone))
     after = after * max(reading.louder, 1.0)
     left, chance = _left(stated, before, after)
-    if not (left < reading.least and chance < _believed(left, reading.estimated)):
+    sure, matters = _believed(left, reading.estimated)
+    if not (left < reading.least and chance < sure):
         return None
-    if reading.estimated and not _change(stated, undone) > _MATTERS:
+    if reading.estimated and not _change(stated, undone) > matters:
         return None
     deflection = float(np.linalg.norm(undone.d, axis=1).mean()) * max(reading.louder, 1.0)
     certain = reading.certain and left < _CERTAIN and float(after.mean()) < _FITS_WELL * deflection
@@ -666,9 +712,9 @@ def _change(stated: Problem, undone: Problem) -> float:
     return float(moved / max(np.linalg.norm(stated.O @ before, axis=1).mean(), 1e-12))
 
 
-def _believed(left: float, estimated: bool) -> float:
-    """Return the likelihood of chance below which a gain that leaves a part of errors counts."""
-    return next(sure for part, sure in _SURE if not estimated or left < part)
+def _believed(left: float, estimated: bool) -> tuple[float, float]:
+    """Return how unlikely chance has to be for a gain, and how much it has to change; `_SURE`."""
+    return next((sure, change) for part, sure, change in _SURE if not estimated or left < part)
 
 
 def _left(problem: Problem, before: FloatArray, after: FloatArray) -> tuple[float, float]:
@@ -696,7 +742,7 @@ def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
         late = place >= round(part * len(order))
         after = leave_poses_out(apart(stated, late)).error
         left, chance = _left(stated, before, after)
-        if left < _LEFT_APART and chance < _believed(left, True):
+        if left < _LEFT_APART and chance < _believed(left, True)[0]:
             found.append((left, late, after))
     if not found:
         return None
