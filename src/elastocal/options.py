@@ -83,7 +83,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     ),
     "process": ("afp", "machining"),
     "example": ("afp", "machining", "ur20"),
-    "language": ("krl", "rapid", "fanuc", "urscript", "none"),
+    "language": ("krl", "rapid", "fanuc", "urscript", "as", "none"),
     "page language": ("en", "de", "fr"),
     "loss": ("linear", "huber", "cauchy"),
     "weights": ("none", "sigma"),

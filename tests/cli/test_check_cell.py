@@ -9,6 +9,7 @@ import yaml
 from elastocal.cell.examples import write_example
 from elastocal.errors import SchemaError
 from elastocal.planning import write_plan
+from elastocal.planning.surface import SurfaceError
 from elastocal.robot import catalogue
 from elastocal.workflows.check import describe_file
 from support import plans
@@ -152,3 +153,15 @@ def test_a_run_without_an_entry_is_refused(tmp_path):
     (tmp_path / "journal.jsonl").touch()
     with pytest.raises(SchemaError, match=r"journal\.jsonl is empty or cut off.* does not tell"):
         describe_file(tmp_path)
+
+
+def test_a_mesh_is_described_in_its_own_unit(folder):
+    kind, holds = describe_file(folder / "block.stl")
+    assert (kind, holds["extent"], holds["findings"]) == ("mesh", "600 x 400 x 300", [])
+    assert "surface.unit" in holds["unit"]
+
+
+def test_a_file_that_is_no_mesh_is_refused_by_name(tmp_path):
+    (tmp_path / "mould.stl").write_text("solid\n")
+    with pytest.raises(SurfaceError, match=r"mould\.stl has no faces"):
+        describe_file(tmp_path / "mould.stl")

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from elastocal.cli import output
-from elastocal.cli.output import bold, console
+from elastocal.cli.output import ProgressLines, bold, console
 from elastocal.cli.story import _log_console
 from elastocal.errors import FileAccessError
 from support.cli import elastocal
@@ -43,3 +43,14 @@ def test_closed_standard_output_is_a_refusal(monkeypatch, show):
     monkeypatch.setattr(sys, "stdout", None)  # as a shell's >&- leaves it
     with pytest.raises(FileAccessError, match="standard output is closed"):
         show()
+
+
+def test_progress_in_a_log_is_a_line_every_ten_seconds():
+    shown, passed = io.StringIO(), iter([0.0, 4.0, 11.0, 19.0, 25.0])
+    report = ProgressLines(console(file=shown, stderr=False, width=20), lambda: next(passed))
+    for done in (1, 2, 3, 4):
+        report("candidates for poses", done, 1500)
+    assert shown.getvalue().splitlines() == [
+        "candidates for poses: 2 of 1500 after 11 s",
+        "candidates for poses: 4 of 1500 after 25 s",
+    ]

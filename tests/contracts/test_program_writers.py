@@ -24,6 +24,7 @@ MODELS = {
     "rapid": ("IRB 6700-200/2.60", (0.0, 0.0, 0.0)),
     "fanuc": ("R-2000iC/210F", (0.0, 0.0, 0.0)),
     "urscript": ("UR20", (-0.85, -0.3, -0.35)),
+    "as": ("BXP210L", (0.0, 0.0, 0.0)),
 }
 """A robot of each language, and how far the poses are moved to be within its reach."""
 CASES = [
@@ -135,7 +136,7 @@ def test_speeds_are_the_cells_and_slow_at_the_surface(read):
 
 
 def test_axes_move_slowly(read, case):
-    most = {"krl": 10, "fanuc": 10, "rapid": 100, "urscript": np.radians(12.0) + 1e-9}
+    most = {"krl": 10, "fanuc": 10, "rapid": 100, "urscript": np.radians(12.0) + 1e-9, "as": 10}
     assert 0 < read.axes_speed <= most[case[0]]
 
 
@@ -205,7 +206,7 @@ class TestChoice:
         robot = Robot.from_urdf(urdfs.opw_arm_urdf(**urdfs.KR_LIKE), "tcp")
         writer, reason = choose_writer(robot)
         assert writer is None
-        assert reason.endswith("give --language krl|rapid|fanuc|urscript")
+        assert reason.endswith("give --language krl|rapid|fanuc|urscript|as")
         assert choose_writer(robot, "RAPID")[0].language == "rapid"
 
     def test_none_can_be_asked_for(self):
@@ -214,7 +215,7 @@ class TestChoice:
     def test_an_unknown_language_is_refused_with_the_known_ones(self):
         with pytest.raises(
             PlanningError,
-            match=r"did you mean .rapid.\? \(allowed: none, krl, rapid, fanuc, urscript\)",
+            match=r"did you mean .rapid.\? \(allowed: none, krl, rapid, fanuc, urscript, as\)",
         ):
             choose_writer(catalogue.load("UR20"), "rapit")
 

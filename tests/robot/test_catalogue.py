@@ -38,6 +38,8 @@ class TestNames:
         assert set(ALL) - set(NAMES) == {
             "IRB 6700-200/2.60",
             "R-2000iC/210F",
+            "BXP135X",
+            "BXP210L",
             "RX160",
             "UR10e",
             "UR20",

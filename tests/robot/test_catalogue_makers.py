@@ -14,19 +14,21 @@ from elastocal.robot.inverse import OpwInverse, inverse_for
 from elastocal.robot.inverse.numerical import NumericalInverse, ParallelInverse
 from support.urdfs import colliding_links
 
-OTHERS = ("IRB 6700-200/2.60", "R-2000iC/210F", "RX160", "UR10e", "UR20")
-WRISTED = OTHERS[:3]
-PARALLEL = OTHERS[3:]
-REACH = dict(zip(OTHERS, (2.60, 2.655, 1.60, 1.184, 1.591), strict=True))
+OTHERS = ("IRB 6700-200/2.60", "R-2000iC/210F", "BXP210L", "RX160", "UR10e", "UR20")
+WRISTED = OTHERS[:4]
+PARALLEL = OTHERS[4:]
+REACH = dict(zip(OTHERS, (2.60, 2.655, 2.597, 1.60, 1.184, 1.591), strict=True))
 FLANGES = {
     "IRB 6700-200/2.60": ((1.6625, 0.0, 2.105), (0, 0, -1), (1, 0, 0)),
     "R-2000iC/210F": ((1.807, 0.0, 1.97), (0, 0, 1), (1, 0, 0)),
+    "BXP210L": ((0.0, 1.675, 1.92), (1, 0, 0), (0, 1, 0)),
     "RX160": ((0.15, 0.0, 2.11), (1, 0, 0), (0, 0, 1)),
 }
 """At zero: place of the flange by adding up the source's origins; where its x and its z point."""
 SIGNS = {
     "IRB 6700-200/2.60": [1, 1, 1, 1, 1, 1],
     "R-2000iC/210F": [1, 1, -1, -1, -1, -1],
+    "BXP210L": [-1, 1, -1, 1, -1, 1],
     "RX160": [1, 1, 1, 1, 1, 1],
 }
 DH = {
@@ -74,12 +76,18 @@ def test_kinematics_are_those_of_an_independent_solver(name):
     )
     bend = np.radians([0, 0, 0 if name == "RX160" else 90, 0, 0, 0])
     solver, robot = opw.Robot(model, degrees=False), catalogue.load(name)
-    turn = {"R-2000iC/210F": np.diag([-1.0, -1.0, 1.0])}.get(name, np.eye(3))
+    turn = {
+        "R-2000iC/210F": np.diag([-1.0, -1.0, 1.0]),
+        "BXP210L": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+    }.get(name, np.eye(3))
+    # At zero a Kawasaki points along y.
+    forward = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    base = forward if name == "BXP210L" else np.eye(3)
     for q in np.random.default_rng(5).uniform(-1, 1, (20, 6)):
         T = solver.forward(tuple(np.array(SIGNS[name]) * q + bend)).as_matrix()
         reached = robot.forward(q)
-        np.testing.assert_allclose(reached[:3, 3], T[:3, 3], atol=1e-9)
-        np.testing.assert_allclose(reached[:3, :3], T[:3, :3] @ turn, atol=1e-9)
+        np.testing.assert_allclose(reached[:3, 3], base @ T[:3, 3], atol=1e-9)
+        np.testing.assert_allclose(reached[:3, :3], base @ T[:3, :3] @ turn, atol=1e-9)
 
 
 @pytest.mark.parametrize(("name", "reach"), [*REACH.items()])
@@ -149,6 +157,8 @@ def test_a_straight_ur_wrist_has_a_defined_answer():
         ("fanuc_m900ib700", "FANUC"),
         ("ur5e_robot", "Universal Robots"),
         ("staubli_tx2_90", "Staeubli"),
+        ("bxp135x-a001", "Kawasaki"),
+        ("khi_rs080n", "Kawasaki"),
         ("irb 6700-200/2.60", "ABB"),
         ("arm", None),
         ("figure_urban", None),

@@ -36,6 +36,42 @@ TWO_JOINTS = robot(
 )
 
 
+def six_joints(efforts: list[float], inertial: str = "") -> str:
+    """Return an arm of six joints with these efforts; every link has one inertia."""
+    limit = '<limit lower="-1" upper="2" velocity="3" effort="{}"/>'
+    joints = (
+        joint(f"j{i}", f"l{i - 1}", f"l{i}", inner=limit.format(effort))
+        for i, effort in enumerate(efforts, start=1)
+    )
+    links = "".join(f'<link name="l{i}">{inertial}</link>' for i in range(7))
+    return f'<robot name="r">{links}{"".join(joints)}</robot>'
+
+
+class TestFillers:
+    """Numbers that exporters write where they know none."""
+
+    def test_one_effort_for_all_six_joints_is_no_torque(self):
+        filled = Robot.from_urdf(six_joints([1000.0] * 6), "l6")
+        assert np.isnan(filled.limits.effort).all()
+        (found,) = filled.assumptions
+        assert found.field == "effort"
+        assert "every joint the same, 1000 N*m" in found.reason
+
+    @pytest.mark.parametrize("efforts", [[330.0, 330.0, 150.0, 54.0, 54.0, 54.0], [0.0] * 6])
+    def test_torques_of_an_arm_are_kept(self, efforts):
+        arm = Robot.from_urdf(six_joints(efforts), "l6")
+        known = [effort or math.nan for effort in efforts]
+        np.testing.assert_array_equal(arm.limits.effort, known)
+        assert arm.assumptions == ()
+
+    @pytest.mark.parametrize(("place", "gap"), [("0 0 0", "at its joint"), ("0 0 0.1", "")])
+    def test_centres_of_mass_that_all_lie_at_joints_are_a_gap(self, place, gap):
+        inertial = f'<inertial><origin xyz="{place}"/><mass value="5"/></inertial>'
+        found = read_chain(six_joints([0.0] * 6, inertial), "l6").weight_gap
+        assert gap in found
+        assert bool(gap) == bool(found)
+
+
 class TestParsing:
     def test_text_that_is_not_xml_is_refused(self):
         with pytest.raises(RobotError, match="URDF is not valid XML: "):
@@ -51,8 +87,11 @@ class TestParsing:
             read_chain(text, "x")
 
     def test_assumptions_are_read(self):
-        root = parse_urdf(robot('<assumption field="effort" reason="no source"/>'))
-        assert assumptions(root) == (Assumption("effort", "no source"),)
+        marked = '<assumption field="inertia" reason="no source"/>'
+        text = robot(marked, joint("j1", "base", "tcp"), links="base tcp")
+        assert assumptions(parse_urdf(text), read_chain(text, "tcp")) == (
+            Assumption("inertia", "no source"),
+        )
 
     def test_leaves_are_the_links_without_children(self):
         root = parse_urdf(

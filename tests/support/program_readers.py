@@ -302,9 +302,45 @@ def _ur_target(value: ast.expr) -> Target:
     return Target(T=_T(np.array((x, y, z)), Rotation.from_rotvec(turn)))
 
 
+def read_as(files: tuple[Path, ...]) -> Read:
+    """Return a program in the AS language."""
+    lines = lines_of(files[0], "\r\n")
+    name = re.fullmatch(r"\.PROGRAM ([A-Za-z]\w{0,14})\(\)", lines[0])[1]
+    assert lines[-1] == ".END"
+    body = [line.removeprefix("  ") for line in lines[1:-1]]
+    comments = [line[2:] for line in body if line.startswith(";")]
+    orders = [line for line in body if not line.startswith(";")]
+    tool = re.fullmatch(r"TOOL TRANS\((.*)\)", orders[0])[1]
+    assert orders[1] == "ACCURACY 1 ALWAYS"
+    x, y, z, *turn = numbers(tool)
+    T = _T(np.array((x, y, z)) / 1e3, Rotation.from_euler("ZYZ", turn, degrees=True))
+    steps, targets, percents, speed = [], {}, set(), None
+    for order, following in zip(orders[2:], [*orders[3:], ""], strict=True):
+        if match := re.fullmatch(r"POINT #(\w{1,15}) = #PPOINT\((.*)\)", order):
+            assert not steps
+            values = numbers(match[2])
+            targets[match[1]] = Target(arm=np.radians(values[:6]), external=tuple(values[6:]))
+        elif match := re.fullmatch(r"SPEED (\d+) ALWAYS", order):
+            percents.add(int(match[1]))
+            speed = None
+        elif match := re.fullmatch(r"SPEED (\d+\.\d+) MM/S ALWAYS", order):
+            speed = 1e-3 * float(match[1])
+        elif match := re.fullmatch(r"([JL])MOVE #(\w+)", order):
+            assert following == "BREAK"
+            assert (match[1] == "J") == (speed is None)
+            steps.append(("axes", match[2]) if speed is None else ("straight", match[2], speed))
+        elif order == "PAUSE":
+            steps.append(("stop",))
+        else:
+            assert order == "BREAK", order
+    (percent,) = percents
+    return Read(name, steps, targets, T, comments, percent, lines)
+
+
 READERS: Mapping[str, Callable[[tuple[Path, ...]], Read]] = {
     "krl": read_krl,
     "rapid": read_rapid,
     "fanuc": read_fanuc,
     "urscript": read_urscript,
+    "as": read_as,
 }

@@ -150,7 +150,8 @@ def _new(given: Given) -> None:
     ask = given.here["ask"]
     if ask if ask is not None else people:
         settings = answered(settings)
-    result = workflows.new(settings)
+    with output.progress_bars() as progress:
+        result = workflows.new(settings, progress)
     if given.as_json:
         output.print_json(result)
         return

@@ -10,7 +10,8 @@ import json
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -271,19 +272,52 @@ def _cell(value: "Cell") -> str:
     return grade(cell_text(value)) if grade else cell_text(value)
 
 
+_EVERY = 10.0
+"""Seconds between lines of progress where bars cannot be drawn."""
+
+
+class ProgressLines:
+    """Shows progress where bars cannot be drawn, in a log or a pipe: a line every ten seconds.
+
+    Work that takes less says nothing.
+
+    Parameters
+    ----------
+    screen : Console
+        From `console`.
+    clock : callable, optional
+        Seconds that have passed since any moment.
+    """
+
+    def __init__(self, screen: "Console", clock: Callable[[], float] = time.monotonic) -> None:
+        self._screen, self._clock = screen, clock
+        self._begun = self._last = clock()
+
+    def __call__(self, stage: str, done: int, total: int, /) -> None:
+        """Take note of ``done`` of ``total`` steps of a stage."""
+        now = self._clock()
+        if now - self._last >= _EVERY:
+            self._last = now
+            self._screen.print(
+                f"{stage}: {done} of {total} after {now - self._begun:.0f} s", soft_wrap=True
+            )
+
+
 @contextmanager
 def progress_bars() -> Iterator[Progress]:
-    """Yield a function that shows progress; nothing is shown where no person looks."""
+    """Yield a function that shows progress: bars on a terminal, else lines."""
     from rich import progress
 
     screen = console()
+    if not screen.is_terminal:
+        yield ProgressLines(screen)
+        return
     bars = progress.Progress(
         progress.TextColumn("{task.description}", markup=False),
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TimeElapsedColumn(),
         console=screen,
-        disable=not screen.is_terminal,
     )
     tasks = {}
 

@@ -95,12 +95,16 @@ class SerialChain:
     def weight_gap(self) -> str:
         """Why the arm's own weight is not known, in words; empty where it is.
 
-        The last joint carries the tool, whose mass says nothing of the arm.
+        The last joint carries the tool, whose mass says nothing of the arm. Exporters that know no
+        centre of mass write the origin of the link.
         """
-        *arm, last = (joint.mass > 0.0 for joint in self.joints)
-        if any(arm):
+        *arm, last = self.joints
+        heavy = [joint for joint in arm if joint.mass > 0.0]
+        if len(heavy) > 1 and not any(np.any(joint.centre_of_mass) for joint in heavy):
+            return "the centre of mass of every link is written at its joint, as on no arm"
+        if heavy:
             return ""
-        return "only what the last joint carries has a mass" if last else "no link has a mass"
+        return "only what the last joint carries has a mass" if last.mass else "no link has a mass"
 
 
 @brief_repr

@@ -136,7 +136,7 @@ class Robot:
         """
         chain = read_chain(text, tip, base)
         root = parse_urdf(text)
-        return cls(robot_name(root), text, chain, assumptions(root), meshes)
+        return cls(robot_name(root), text, chain, assumptions(root, chain), meshes)
 
     @classmethod
     def from_file(cls, path: Path, tip: str, base: str | None = None) -> "Robot":

@@ -30,7 +30,7 @@ from elastocal.files import read_bytes
 from elastocal.robot.chain import ChainJoint, SerialChain
 from elastocal.robot.dh_table import urdf_of_table
 from elastocal.units import impossible, parse_number
-from elastocal.wording import listed
+from elastocal.wording import listed, phrase
 
 _NUMBERS = {
     "origin": {"xyz": 3, "rpy": 3},
@@ -245,6 +245,8 @@ _BEFORE_ROOT = re.compile(r"\A(?:\ufeff|\s|<!--.*?-->)*(?:<\?xml\b.*?\?>)?", re.
 """Text that authors put before the XML declaration, where XML allows none; and the declaration."""
 _FEWEST_OF_AN_ARM, _MOST_OF_A_FINGER = 3, 4
 """Joints before a gripper, and of one of its fingers."""
+_FEWEST_AXES = 6
+"""Turning joints of an arm whose efforts are compared with each other."""
 _TOOL_LINKS = ("flange", "tool0", "tool_0")
 """Links that carry the tool in URDFs as they are published."""
 _NO_INERTIA = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0")
@@ -525,12 +527,35 @@ def tool_link(text: str) -> str:
     return next(straight, first)
 
 
-def assumptions(root: ElementTree.Element) -> tuple[Assumption, ...]:
-    """Return the values that the URDF itself marks as having no source."""
-    return tuple(
+def assumptions(root: ElementTree.Element, chain: SerialChain) -> tuple[Assumption, ...]:
+    """Return the values that the URDF itself marks as having no source, or that are fillers."""
+    marked = tuple(
         Assumption(element.get("field", ""), element.get("reason", ""))
         for element in root.iter("assumption")
     )
+    names = {joint.name for joint in chain.joints}
+    filler = _filler_effort(each for each in root.findall("joint") if each.get("name") in names)
+    if filler is None:
+        return marked
+    reason = phrase(
+        "unknown: the URDF gives every joint the same, {effort:g} N*m, as no arm has;"
+        " limits.torque.values of the cell file takes those of the data sheet",
+        effort=filler,
+    )
+    return (*marked, Assumption("effort", reason))
+
+
+def _filler_effort(joints: Iterable[ElementTree.Element]) -> float | None:
+    """Return the effort that all joints of an arm share: exporters write one that is none.
+
+    An arm's shoulder has several times the torque of its wrist. None if efforts differ or are not
+    known, or for fewer joints than an arm has.
+    """
+    turning = [each for each in joints if each.get("type") in ("revolute", "continuous")]
+    efforts = {limits_of(each)["effort"] for each in turning}
+    common = next(iter(efforts), math.nan)
+    same = len(turning) >= _FEWEST_AXES and len(efforts) == 1 and math.isfinite(common)
+    return common if same else None
 
 
 def read_chain(text: str, tip: str, base: str | None = None) -> SerialChain:
@@ -621,13 +646,14 @@ def _chain_of(
 ) -> SerialChain:
     """Return the chain of the joints that move in a model, with the limits of the URDF."""
     T_root_base = _placement_in_joint(model, base)
+    unknown = {} if _filler_effort(joints) is None else {"effort": math.nan}
     chain = []
     for index, joint in enumerate(joints):
         joint_id = model.getJointId(joint.get("name", ""))
         placement = model.jointPlacements[joint_id]
         if index == 0:
             placement = T_root_base.actInv(placement)
-        chain.append(_joint_of(model, joint_id, placement, limits_of(joint)))
+        chain.append(_joint_of(model, joint_id, placement, limits_of(joint) | unknown))
     return SerialChain(tuple(chain), base, tip, _placement_in_joint(model, tip).homogeneous)
 
 

@@ -29,6 +29,7 @@ from elastocal.geometry import PositionPlan, read_geometry, read_position_map
 from elastocal.identification import read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
+from elastocal.planning.surface import load_surface, mesh_findings
 from elastocal.records import read_json, read_yaml_data, schema_of
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._table_kinds import dataset_file
@@ -84,6 +85,24 @@ def cell_file(path: Path) -> FileDescription:
         "technique": cell.technique,
         "faces": len(surface.mesh.faces),
         "findings": [str(finding) for finding in findings] + doors + refused,
+    }
+
+
+def mesh_file(path: Path) -> FileDescription:
+    """Describe a mesh in its own unit, which the file does not state; its place is a cell's.
+
+    Raises
+    ------
+    SurfaceError
+        If it is no mesh, or has no face.
+    """
+    mesh = load_surface(path, 1.0, np.eye(4))
+    extent = np.ptp(mesh.mesh.vertices, axis=0)
+    return "mesh", {
+        "faces": len(mesh.mesh.faces),
+        "extent": " x ".join(f"{length:.4g}" for length in extent),
+        "unit": f"not in the file: --unit of `elastocal new --mesh {path}`, or surface.unit",
+        "findings": [str(finding) for finding in mesh_findings(mesh)],
     }
 
 

@@ -157,8 +157,10 @@ class Rig:
         name = self.cell.file.devices.arm.driver
         driver = self.drivers[name]
         if not isinstance(driver, PathDriver):
+            able = [each for each in DRIVERS if isinstance(DRIVERS.named(each), PathDriver)]
             raise DeviceError(
                 f"{self.cell.path}: devices.arm: driver {name!r} takes no corrections of a path"
+                f" ({', '.join(able)} does); other controllers run the C of `elastocal export`"
             )
         return driver, self.wanted[name]["arm"]
 

@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
-from elastocal import planning, verdict, workflows
+from elastocal import meshes, planning, verdict, workflows
 from elastocal.blocks import Block, Facts
 from elastocal.cell import Cell, load_cell
 from elastocal.codec import ARRAYS, VERDICTS
@@ -75,8 +75,8 @@ def _robot(path: Path, tcp: str | None = None) -> FileDescription:
         robot = Robot.from_urdf(text, tcp or tool_link(text))
         require_joint_names(robot.joint_names)
         beside = [leaf for leaf in leaf_links(root) if leaf not in tips]
-        meshes = find_meshes(text, path.parent)
-    missing = [str(file) for _, file in meshes if not file.is_file()]
+        shapes = find_meshes(text, path.parent)
+    missing = [str(file) for _, file in shapes if not file.is_file()]
     return "robot description", {
         "robot": robot.name,
         "tips": list(tips),
@@ -86,8 +86,8 @@ def _robot(path: Path, tcp: str | None = None) -> FileDescription:
         "inverse_kinematics": inverse_for(robot).method,
         "joints": list(robot.joint_names),
         "external_axes": list(robot.joint_names[: robot.external_axes]),
-        "masses": not robot.chain.weight_gap,
-        "collision_meshes": f"{len(meshes) - len(missing)} of {len(meshes)} found",
+        "masses": robot.chain.weight_gap or True,
+        "collision_meshes": f"{len(shapes) - len(missing)} of {len(shapes)} found",
         **({"missing": missing} if missing else {}),
         "assumptions": [f"{a.field}: {a.reason}" for a in robot.assumptions],
     }
@@ -203,7 +203,7 @@ class CheckSettings:
     """Settings of ``check``: the file to validate."""
 
     file: Annotated[str | PathLike[str], Option(argument=True)]
-    """Any file of ours, a dataset, a robot, or a folder that a command made."""
+    """Any file of ours, a dataset, a robot, a mesh, or a folder that a command made."""
     tcp: str | None = None
     """Link of a robot at the tool centre point; by default that behind the most joints."""
     preview: Annotated[str | PathLike[str] | None, Option(metavar="PAGE.html")] = None
@@ -384,6 +384,7 @@ _BY_SUFFIX: dict[str, _Describe] = {
     ".csv": _table,
     ".json": _json,
     **dict.fromkeys(ROBOT_SUFFIXES, _robot),
+    **dict.fromkeys(meshes.SUFFIXES, kinds.mesh_file),
     ".jsonl": kinds.journal_file,
     ".mcap": _recording,
     ".yaml": _settings,

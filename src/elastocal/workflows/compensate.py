@@ -20,6 +20,7 @@ from elastocal.compensation.programs import (
     LIN_SPEED,
     NO_PROGRAM,
     PROGRAM_READERS,
+    PROGRAM_WRITERS,
     PathProgram,
     choose_writer,
     compensate_program,
@@ -172,6 +173,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     """
     path, forces = settings.path, settings.forces
     is_program = path.suffix.lower() in PROGRAM_READERS
+    _require_readable(path)
     if is_program != (settings.out.suffix.lower() in PROGRAM_READERS):
         raise FileAccessError(f"--out {settings.out} must end in {path.suffix} like {path}")
     if settings.program is None and settings.language is not None:
@@ -229,6 +231,24 @@ def _grown(state: ArmGrowth | None, arm: UnloadedArm) -> Unloaded | None:
         return cold + state.shift(arm.controller, q)
 
     return unloaded
+
+
+def _require_readable(path: Path) -> None:
+    """Refuse a program in a language that is written, and not read.
+
+    Raises
+    ------
+    FileAccessError
+        With the way to a corrected program.
+    """
+    suffix = path.suffix.lower()
+    for writer in PROGRAM_WRITERS.values():
+        if suffix in writer.suffixes and not PROGRAM_READERS.keys() & set(writer.suffixes):
+            raise FileAccessError(
+                f"{path}: programs in {writer.title} are written, not read (read are"
+                f" {', '.join(PROGRAM_READERS)}): give its points as a path (.csv), and"
+                " --program NAME writes them, corrected"
+            )
 
 
 def _program_of(

@@ -54,7 +54,7 @@ class NewResult(Result):
 
 
 @workflow(NewSettings)
-def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001 - seconds
+def new(settings: NewSettings, progress: Progress) -> NewResult:
     """Write a cell file for a robot and a mesh, which ``check`` passes.
 
     Positions of the surface are tried, unless given, until the arm reaches it. HOME is a posture
@@ -86,7 +86,9 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:  # noqa: ARG001
     out, known = Path(settings.out), settings.filled()
     refused: ElastocalError | None = None
     with settings.in_its_folder(), replacing(out) as temporary:
-        for place, flip in _tries(settings, known):
+        tries = _tries(settings, known)
+        for number, (place, flip) in enumerate(tries):
+            progress("positions of the surface", number, len(tries))
             trial = replace(known, place=place)
             cell = _begun(temporary, out, trial, flip)
             try:
@@ -277,10 +279,10 @@ def _rail(travel: tuple[str, str, str] | None) -> str:
 
 def _masses(robot: Robot) -> str:
     """Return where the masses of an arm of one's own come from, for a remark in the file."""
-    if not robot.has_masses:
+    if gap := robot.chain.weight_gap:
         return (
-            "its links have no masses (<inertial>), so the arm's own weight is left out of torques;"
-            " the maker's data sheet, or `elastocal robots NAME` of a like arm, has some"
+            f"{gap} (<inertial>), so torques of the arm's own weight are wrong or left out; the"
+            " maker's data sheet, or `elastocal robots NAME` of a like arm, has some"
         )
     moved = sum(joint.mass for joint in robot.chain.joints)
     return f"its moved links weigh {moved:.4g} kg together, by <inertial> of the URDF: not checked"

@@ -1,5 +1,6 @@
 """Languages of robot controllers, and which one a robot is programmed in."""
 
+from elastocal.compensation.programs.as_writer import AsWriter
 from elastocal.compensation.programs.fanuc_writer import FanucWriter
 from elastocal.compensation.programs.krl_writer import KrlWriter
 from elastocal.compensation.programs.rapid_writer import RapidWriter
@@ -15,14 +16,20 @@ PROGRAM_WRITERS: Registry[ProgramWriter] = Registry(
     "program language",
     {
         writer.language: writer
-        for writer in (KrlWriter(), RapidWriter(), FanucWriter(), UrScriptWriter())
+        for writer in (KrlWriter(), RapidWriter(), FanucWriter(), UrScriptWriter(), AsWriter())
     },
     PlanningError,
 )
 """Writers of programs by their language."""
 NO_PROGRAM = "none"
 """Name that requests no program, where a language is expected."""
-_LANGUAGES = {"KUKA": "krl", "ABB": "rapid", "FANUC": "fanuc", "Universal Robots": "urscript"}
+_LANGUAGES = {
+    "KUKA": "krl",
+    "ABB": "rapid",
+    "FANUC": "fanuc",
+    "Universal Robots": "urscript",
+    "Kawasaki": "as",
+}
 """Language of each maker."""
 
 

@@ -7,8 +7,8 @@ estimated from those of a related one with sourced masses.
 Zero pose and signs are those of the maker's pendant, so that its angles can be used unchanged.
 KUKA: at zero the arm is stretched forward along x, positive A1, A4 and A6 turn clockwise about the
 axis that points out of the robot. ABB, FANUC: upper arm up, forearm forward; FANUC's J3 is counted
-from the upper arm here and from the horizontal on the pendant. Staeubli: the arm straight up.
-Universal Robots: stretched along -x, level.
+from the upper arm here and from the horizontal on the pendant. Kawasaki (BX): as these two, but
+forward is y of base. Staeubli: the arm straight up. Universal Robots: stretched along -x, level.
 
 Boxes and cylinders represent the links until real meshes are given. They are sized from the
 dimensions to look and collide plausibly, and are assumptions, not drawings: collision checks close
@@ -55,7 +55,7 @@ class Group(StrictModel):
         return self
 
 
-Maker = Literal["ABB", "FANUC", "KUKA", "Staeubli", "Universal Robots"]
+Maker = Literal["ABB", "FANUC", "Kawasaki", "KUKA", "Staeubli", "Universal Robots"]
 """Maker of a robot, whose pendant's zeros and signs its joints have."""
 
 
@@ -274,6 +274,8 @@ class _Pendant:
     """Zero positions of axes 2 and 3, in rad from the arm stretched forward, positive down."""
     flange: tuple[float, ...] = (0.0, math.pi / 2, 0.0)
     """Flange against the last link, whose x points out, as roll, pitch, yaw."""
+    forward: float = 0.0
+    """Direction of the arm at zero in base, in rad from x about z."""
 
 
 _PENDANTS: Mapping[Maker, _Pendant] = {
@@ -281,6 +283,12 @@ _PENDANTS: Mapping[Maker, _Pendant] = {
     "ABB": _Pendant((1, 1, 1, 1, 1, 1), (-math.pi / 2, math.pi / 2)),
     "FANUC": _Pendant(
         (1, 1, -1, -1, -1, -1), (-math.pi / 2, math.pi / 2), (math.pi, -math.pi / 2, 0.0)
+    ),
+    "Kawasaki": _Pendant(
+        (-1, 1, -1, 1, -1, 1),
+        (-math.pi / 2, math.pi / 2),
+        (-math.pi / 2, 0.0, -math.pi / 2),
+        forward=math.pi / 2,
     ),
     "Staeubli": _Pendant((1, 1, 1, 1, 1, 1), (-math.pi / 2, 0.0)),
 }
@@ -434,12 +442,13 @@ def _wrist_arm(arm: Dimensions, maker: Maker) -> _Arm:
     x = (0.0, arm.a1, arm.c2, arm.c3, 0.0, 0.0)
     z = (arm.c1, 0.0, 0.0, -arm.a2, 0.0, 0.0)
     pitch = (0.0, *pendant.zeros, 0.0, 0.0, 0.0)
+    yaw = (pendant.forward, 0.0, 0.0, 0.0, 0.0, 0.0)
     prefix = "joint_a" if maker == "KUKA" else "joint_"
     axes = tuple(
         _Axis(
             f"{prefix}{i + 1}",
             (x[i], 0.0, z[i]),
-            (0.0, pitch[i], 0.0),
+            (0.0, pitch[i], yaw[i]),
             tuple(pendant.signs[i] * part for part in _NEUTRAL[i]),
         )
         for i in range(6)
@@ -550,6 +559,9 @@ _MAKERS: Mapping[Maker, re.Pattern[str]] = {
     "KUKA": re.compile(r"\b(kuka|kr ?\d+|lbr)\b", re.IGNORECASE),
     "ABB": re.compile(r"\b(abb|irb ?\d*)\b", re.IGNORECASE),
     "FANUC": re.compile(r"\b(fanuc|(r|m|lr) ?(mate )?\d+ ?i[a-d])", re.IGNORECASE),
+    "Kawasaki": re.compile(
+        r"\b(kawasaki|khi|(bxp?|rs|zx|mx|cx|cp) ?\d{2,3} ?[a-z])", re.IGNORECASE
+    ),
     "Staeubli": re.compile(r"\b(sta?eubli|staubli|stäubli|(rx|tx)2?[ -]?\d+)", re.IGNORECASE),
     "Universal Robots": re.compile(r"\b(universal robots?|ur ?\d{1,2}e?)\b", re.IGNORECASE),
 }
