@@ -181,6 +181,7 @@ class FakeRun:
     faults: list[str] = field(default_factory=list)
     """What was told at once."""
     enough: Callable[[Any], str] = lambda _: ""
+    stack: Callable[[int], Callable[[], bool]] = lambda _: lambda: True
     order: tuple[int, ...] = ()
 
     @property
@@ -243,7 +244,9 @@ class FakeRun:
             order=self.order,
         )
         recorder = self.recorder or (lambda: MemoryRecorder(self.kept))
-        hooks = SessionHooks(recorder, self.tell, self.interrupted, self.faults.append, self.enough)
+        hooks = SessionHooks(
+            recorder, self.tell, self.interrupted, self.faults.append, self.enough, self.stack
+        )
         return Runner(job, self.cell.devices, log, hooks).run()
 
     def readings(self) -> dict[tuple[int, str | None], np.ndarray]:

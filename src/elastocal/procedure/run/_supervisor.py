@@ -207,6 +207,22 @@ class Supervisor:
             return self._read_arm()
         return None
 
+    def wait_for_person(self, is_done: Callable[[], bool]) -> None:
+        """Let cycles pass until a person has done something in the cell, the arm disarmed.
+
+        Devices are read so that nothing piles up on their lines, and are not judged: a gate that
+        is opened may silence them.
+
+        Raises
+        ------
+        FaultError
+            If the run is asked to stop.
+        """
+        while not is_done():
+            if self._observers.interrupted():
+                raise FaultError(Fault.INTERRUPTED)
+            self.arm_cycle()
+
     def _read_devices(self) -> Snapshot:
         """Let one cycle pass and return the readings of the devices."""
         self._pass_time()

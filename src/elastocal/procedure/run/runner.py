@@ -29,7 +29,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import CONDITIONING, LIGHT_CONTACT, ArmState, Devices, Motion
 from elastocal.errors import ProcedureError, present
-from elastocal.planning import Joints, PlanResult, PoseRecord
+from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import (
     Action,
     Event,
@@ -86,6 +86,7 @@ from elastocal.procedure.run.steps import (
     why_shaking,
     why_unsteady,
 )
+from elastocal.wording import counted
 
 _AGREES = 0.5
 """Smallest part of a force of the arm that its sensor must feel."""
@@ -666,7 +667,7 @@ class Runner:
         self._location, self._stop = ArmLocation.BETWEEN_POSES, HOME_AT_START
         self._watched = True
         # A session that goes on does not know what an earlier one has left.
-        self._disks: int | None = None if session.resumes and _stacks(session.plan) else 1
+        self._disks: int | None = None if session.resumes and session.plan.doubled else 1
 
     def run(self) -> SessionResult:
         """Visit all poses that are not committed and return how it went.
@@ -794,7 +795,7 @@ class Runner:
         Raises
         ------
         FaultError
-            If nobody says that it is done.
+            If the run is asked to stop before somebody says that it is done.
         """
         home = self._plan.robot.home
         before = max((at for at, leg in enumerate(legs) if leg == home), default=-1) + 1
@@ -809,9 +810,10 @@ class Runner:
             drive(self._supervisor, to_home, Guard(self._free_limit, free=True))
         self._location = ArmLocation.HOME
         disarm(self._supervisor)
-        refused = self._hooks.stack(disks)
-        if refused:
-            raise FaultError(Fault.INTERRUPTED, f": {refused}")
+        self._log.pose = self._log.attempt = self._log.step = None
+        self._log.write(Event.ASKED, text=f"for {counted(disks, 'disk')}")
+        self._supervisor.wait_for_person(self._hooks.stack(disks))
+        self._log.write(Event.HANDLED, text=counted(disks, "disk"))
         self._devices.stack(disks)
         self._disks = disks
         self._supervisor.start()
@@ -976,11 +978,6 @@ class Runner:
         text = f"{text}: {result.message}" if result.message else text
         with contextlib.suppress(*EXPECTED_ERRORS):
             self._log.write(Event.FINISH, text=text, lines=self._devices.lines())
-
-
-def _stacks(plan: PlanResult) -> bool:
-    """Return whether a plan presses on two disks at any pose."""
-    return any(pose.disks > 1 for pose in plan.poses)
 
 
 def _save(recorder: StreamRecorder, path: Path) -> str | None:
