@@ -13,6 +13,7 @@ import pytest
 import elastocal as ec
 from elastocal import workflows
 from elastocal.cell import load_cell, without_tracker, write_example
+from elastocal.codec import read_codec
 from elastocal.dataset import read
 from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
@@ -119,7 +120,21 @@ def test_codec_refuses_readings_that_no_tracker_took_in_one_line(story):
     )  # fmt: skip
     assert ran.code == 1
     assert "no marker_displacement" in ran.err
+    assert "--contact CONTACT.yaml" in ran.err
     assert "Traceback" not in ran.err
+
+
+def test_the_codec_of_a_campaign_without_a_tracker(story):
+    out = story / "codec-contact"
+    ran = elastocal(
+        "codec", story / "run", "--contact", story / "contact.yaml", "--splits", 3, "--jobs", 1,
+        "--compare", "springs=actuated", "--out", out, "--json",
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    (curve,) = json.loads(ran.out)["variants"].values()
+    # What no model would leave is what the controller travels: a part of a millimetre.
+    assert curve["error_mean"][-1] < 0.1 * float(np.median(read_codec(out).zero_error))
+    assert "no tracker measured at 6 poses" in " ".join(json.loads(ran.out)["findings"])
 
 
 class Person(Unattended):
