@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CACHE = ROOT / ".cache" / "figures"
 PROCESSES = (
     ("placement", "notebooks"),
-    ("machining", "small", "budget", "demos", "faults", "mistakes", "studio"),
+    ("machining", "small", "budget", "demos", "instruments", "faults", "mistakes", "studio"),
 )
 """Modules of ``gallery``, by the process that runs them."""
 TOLD = "told.json"

@@ -4,6 +4,7 @@ The figures stand in ``gallery/process_figures.json``, which ``make process-figu
 paper's row comes from the report's own copy of it. ``<!-- process campaigns: afp -->`` becomes the
 table of shorter campaigns, ``<!-- process touched: afp -->`` that of touches before production,
 ``<!-- process procedures: afp -->`` what every procedure beside the springs costs and brings,
+``<!-- process instruments: afp -->`` what is reached without a tracker, and with encoders,
 ``<!-- process summary: typical -->`` the sentences that the README has,
 ``<!-- process demos: typical -->`` what every example cell reaches on a truth (``all``: on each).
 """
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 _QUOTED = Path(__file__).parent / "gallery" / "process_figures.json"
 _MARK = re.compile(
-    r"<!-- process (table|campaigns|touched|procedures|summary|short|demos): (\S+) -->"
+    r"<!-- process (table|campaigns|touched|procedures|instruments|summary|short|demos): (\S+) -->"
 )
 _HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
          "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
@@ -34,6 +35,15 @@ _TOUCHED = ("truth", "correction", "minutes before production", "reduction of th
 _PROCEDURES = ("truth", "procedure", "time in the cell, beside springs alone",
                "mean: springs alone", "with it", "3-D: springs alone", "with it",
                "half load: springs alone", "with it", "seeds")  # fmt: skip
+_INSTRUMENTS = ("measured by", "springs", "minutes in the cell", "reduction of the mean", "3-D",
+                "at half load", "3-D", "seeds")  # fmt: skip
+INSTRUMENTS = {
+    "template": "tracker",
+    "no tracker": "no tracker, disk doubled",
+    "encoders fitted": "tracker and encoders",
+    "encoders read": "and encoders in production",
+}
+"""What measures, by the name of its campaign."""
 TOUCHED = "touched"
 """Name of the campaign whose growth was touched."""
 MORE = {
@@ -70,7 +80,8 @@ def on_page_markdown(markdown: str, page: "Page", **_: object) -> str:  # noqa: 
     """Return the page with the tables in place of their marks."""
     made: dict[str, Callable[[str], str]] = {
         "table": table, "campaigns": campaigns, "touched": touched,
-        "procedures": procedures, "summary": summary, "short": short, "demos": demos,
+        "procedures": procedures, "instruments": instruments, "summary": summary, "short": short,
+        "demos": demos,
     }  # fmt: skip
     return _MARK.sub(lambda mark: made[mark[1]](mark[2]), markdown)
 
@@ -99,7 +110,8 @@ _INTERVALS = (
 
 def campaigns(kind: str) -> str:
     """Return what shorter campaigns reach on the typical truth, on the seeds that all have."""
-    found = [each for each in _of(quoted(), kind, "typical") if each["campaign"] not in MORE]
+    others = MORE.keys() | INSTRUMENTS.keys() - {"template"}
+    found = [each for each in _of(quoted(), kind, "typical") if each["campaign"] not in others]
     seeds_of: dict[str, set[int]] = {}
     for each in found:
         seeds_of.setdefault(each["campaign"], set()).add(each["case"]["seed"])
@@ -158,6 +170,28 @@ def procedures(kind: str) -> str:
                 ]
                 rows.append((truth, title, _cost(pairs), *cells, str(len(pairs))))
     return _markdown(_PROCEDURES, rows)
+
+
+def instruments(kind: str) -> str:
+    """Return what each instrument reaches on the typical truth, on the seeds that all have."""
+    found = {
+        (name, springs): _by_seed(kind, "typical", campaign=name, springs=springs)
+        for name in INSTRUMENTS
+        for springs in ("bearing", "auto")
+    }
+    seeds = sorted(set.intersection(*(set(each) for each in found.values())))
+    rows = []
+    for (name, springs), by_seed in found.items():
+        some = [by_seed[seed] for seed in seeds]
+        if some:
+            cells = [
+                _mean([_reduction(_measure(each, which, load)["mean"]) for each in some], ".1%")
+                for load in (1.0, 0.5)
+                for which in (0, 1)
+            ]
+            minutes = _span({each["minutes"] for each in some}, ".1f")
+            rows.append((INSTRUMENTS[name], f"`{springs}`", minutes, *cells, str(len(some))))
+    return _markdown(_INSTRUMENTS, rows)
 
 
 def _by_seed(kind: str, truth: str, **which: str) -> dict[int, Figures]:

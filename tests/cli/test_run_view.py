@@ -1,7 +1,10 @@
 """The view of a run never makes it wait, and never ends it."""
 
 import io
+import queue
+import signal
 import threading
+import time
 
 import pytest
 from rich.console import Console
@@ -107,3 +110,69 @@ class TestIdentify:
     @pytest.mark.parametrize(("asks", "stdin"), [(False, Answers), (True, io.StringIO)])
     def test_nobody_is_asked_without_a_terminal_or_when_told_not_to(self, monkeypatch, asks, stdin):
         assert identified(monkeypatch, "M. Weber\n", asks, stdin) == ({}, "")
+
+
+class Typed(Answers):
+    """What a person types, line by line, when it is time."""
+
+    def __init__(self):
+        super().__init__()
+        self._lines = queue.Queue()
+
+    def type(self, line):
+        self._lines.put(line)
+
+    def readline(self, *_):
+        return self._lines.get()
+
+
+class TestAskedInTheMiddle:
+    """A person does something in the cell while a run waits."""
+
+    @pytest.fixture
+    def asked(self, monkeypatch):
+        """Return a person at a terminal, with the supervision of a run, and what was shown."""
+        stdin, shown = Typed(), io.StringIO()
+        monkeypatch.setattr("sys.stdin", stdin)
+        operator = run_view.TerminalOperator(Console(file=shown, width=200))
+        assert operator.answers
+        with operator.supervise(9) as supervision:
+            stdin.type("\n")  # pressed before, for nothing
+            yield stdin, supervision, supervision.ask("put the second disk on the first"), shown
+
+    def until(self, condition):
+        end = time.monotonic() + 10.0
+        while not condition() and time.monotonic() < end:
+            time.sleep(0.005)
+        assert condition()
+
+    def test_the_word_is_the_answer_and_enter_is_not(self, asked):
+        stdin, supervision, is_done, shown = asked
+        self.until(lambda: shown.getvalue().count("type done and Enter") == 2)
+        assert "put the second disk on the first" in shown.getvalue()
+        assert not is_done()
+        stdin.type(" Done\n")
+        self.until(is_done)
+        assert not supervision.interrupted()
+
+    def test_a_terminal_whose_input_ends_stops_the_run(self, asked):
+        stdin, supervision, is_done, _ = asked
+        stdin.type("")
+        self.until(supervision.interrupted)
+        assert not is_done()
+
+    def test_ctrl_c_stops_it(self, asked):
+        _, supervision, is_done, _ = asked
+        signal.raise_signal(signal.SIGINT)
+        assert supervision.interrupted()
+        assert not is_done()
+
+
+def test_the_disks_of_a_simulated_cell_are_typed(monkeypatch):
+    stdin, shown, stacked = Typed(), io.StringIO(), queue.Queue()
+    monkeypatch.setattr("sys.stdin", stdin)
+    run_view.stack_by_hand(Console(file=shown, width=200), stacked.put)
+    for line in ("three\n", "2\n", "1\n", ""):
+        stdin.type(line)
+    assert [stacked.get(timeout=10.0) for _ in range(2)] == [2, 1]
+    assert shown.getvalue().count("type 1 or 2") == 2

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +11,16 @@ import numpy as np
 import pytest
 
 import elastocal as ec
+from elastocal import workflows
 from elastocal.cell import load_cell, without_tracker, write_example
+from elastocal.codec import read_codec
 from elastocal.dataset import read
 from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
 from elastocal.planning.untracked import TURN, doubled_findings, joined_moves, require_doubled
 from elastocal.sim.workcell._contact import ContactLaw, PlaceSpread
+from elastocal.workflows._operator_and_devices import Supervision, Unattended
+from support import drivers
 from support.cli import elastocal
 from support.kept import kept
 
@@ -115,7 +120,65 @@ def test_codec_refuses_readings_that_no_tracker_took_in_one_line(story):
     )  # fmt: skip
     assert ran.code == 1
     assert "no marker_displacement" in ran.err
+    assert "--contact CONTACT.yaml" in ran.err
     assert "Traceback" not in ran.err
+
+
+def test_the_codec_of_a_campaign_without_a_tracker(story):
+    out = story / "codec-contact"
+    ran = elastocal(
+        "codec", story / "run", "--contact", story / "contact.yaml", "--splits", 3, "--jobs", 1,
+        "--compare", "springs=actuated", "--out", out, "--json",
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    (curve,) = json.loads(ran.out)["variants"].values()
+    # What no model would leave is what the controller travels: a part of a millimetre.
+    assert curve["error_mean"][-1] < 0.1 * float(np.median(read_codec(out).zero_error))
+    assert "no tracker measured at 6 poses" in " ".join(json.loads(ran.out)["findings"])
+
+
+class Person(Unattended):
+    """Puts the second disk on when asked, or wants to stop then."""
+
+    answers = True
+
+    def __init__(self, stops=False):
+        self.asked, self._stops = [], stops
+
+    @contextmanager
+    def supervise(self, poses):  # noqa: ARG002 - the protocol's form
+        def ask(what):
+            self.asked.append(what)
+            return lambda: not self._stops
+
+        yield Supervision(lambda _: None, lambda: self._stops and bool(self.asked), ask)
+
+
+def test_a_person_puts_the_second_disk_on_where_the_arm_is_real(story, tmp_path, monkeypatch):
+    drivers.install(tmp_path / "site", monkeypatch, "fake", drivers.REAL)
+    cell = story / "cell" / "real.yaml"
+    cell.write_text(
+        f"{(story / 'cell' / 'cell.yaml').read_text()}\ndevices: {{arm: fake, sensor: fake}}\n"
+    )
+    ec.plan(cell, out=tmp_path / "plan", poses=1, doubled=1, without="tracker", compare="none")
+    how = {"plan": tmp_path / "plan", "out": tmp_path / "run", "confirmed": True}
+    with pytest.raises(ElastocalError, match="nobody can be asked to put the second one on"):
+        ec.run(cell, **how)
+    assert not (tmp_path / "run").exists()
+    stopped = ec.run(cell, **how, operator=(first := Person(stops=True))).figures
+    assert (stopped.state, stopped.arm, stopped.committed) == ("interrupted", "at HOME", 1)
+    done = ec.run(cell, **how, resume=True, operator=(second := Person())).figures
+    assert (done.state, done.committed) == ("done", 2)
+    wanted = "the arm is at HOME and disarmed: put the second disk on the first, and leave the cell"
+    assert first.asked == second.asked == [wanted]
+    assert read(tmp_path / "run" / "dataset.nc").contacts.max() == 2
+
+
+def test_a_rehearsal_says_what_is_to_be_done_by_hand(story, tmp_path):
+    cell, plan = story / "cell" / "cell.yaml", story / "plan"
+    assert dict(workflows.dry_run(cell, plan=plan, out=tmp_path / "run").facts())["by hand"] == (
+        "put the second disk on for pose 6 to 9"
+    )
 
 
 def test_a_run_with_a_plan_for_a_tracker_is_refused_where_there_is_none(story, tmp_path):

@@ -1,5 +1,7 @@
 """Refits through triangles equal the fit itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import nnls
@@ -20,6 +22,23 @@ def test_refits_equal_solve_on_the_same_poses(options):
     for compliance, choice in zip(found, choices, strict=True):
         wanted = solve(problem.take(np.isin(problem.block, choice))).compliance
         np.testing.assert_allclose(compliance, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+def test_refits_have_the_prior_of_the_problem():
+    problem, _ = planted(sigma=2e-5, poses=8, options=FitOptions())
+    prior = np.append(2.0 * problem.scaled().scale, 1e-3)[None]
+    problem = replace(problem, prior_rows=prior)
+    triangles = PoseTriangles.of(problem, np.arange(8))
+    choices = [np.arange(3), np.arange(5), np.arange(2, 8)]
+    for compliance, choice in zip(triangles.fit(choices), choices, strict=True):
+        part = problem.take(np.isin(problem.block, choice))
+        wanted = solve(part).compliance
+        scale = 1e-10 * np.abs(wanted).max()
+        np.testing.assert_allclose(compliance, wanted, rtol=0, atol=scale)
+        assert np.abs(compliance - solve(part.without_prior()).compliance).max() > 1e3 * scale
+        stacked = triangles.stacked(choice)
+        rows = np.vstack([part.weighted().reshape(-1, stacked.shape[1]), prior])
+        np.testing.assert_allclose(stacked.T @ stacked, rows.T @ rows, rtol=1e-9, atol=1e-20)
 
 
 def test_a_full_rank_refit_is_that_of_plain_nnls():

@@ -1,6 +1,7 @@
 """What a page can ask of a session: figures of postures, edits, work."""
 
 import base64
+import multiprocessing
 import threading
 from types import SimpleNamespace
 
@@ -15,11 +16,12 @@ from elastocal.studio.posture import CellView
 from elastocal.studio.recorded import RunView, find_runs
 from elastocal.studio.springs import _caveats
 from elastocal.studio.trials import compare_techniques, survey_reach
-from elastocal.studio.worker import Worker, WorkState
+from elastocal.studio.worker import Outbox, Worker, WorkState
 from elastocal.workflows.check import describe_file
+from elastocal.workflows.studio import _PageOperator
 from support.recorded_runs import record_run
 from support.run_cells import planned_cell
-from support.tasks import fail, tick_until_stopped
+from support.tasks import ask_twice, fail, tick_until_stopped
 
 
 class Commands:
@@ -258,6 +260,36 @@ def test_a_run_that_is_stopped_comes_to_its_own_end():
     assert news.live == {"heard": "stop"}
 
 
+@pytest.mark.parametrize(
+    ("second", "state", "result"),
+    [
+        (lambda worker: worker.answer(2), WorkState.DONE, {"ended": "well"}),
+        (lambda worker: worker.stop(), WorkState.STOPPED, {"ended": "stopped", "at": 2}),
+    ],
+)
+def test_a_run_waits_for_the_answer_to_its_own_question(second, state, result):
+    """A second click on the button of the first question does not answer the next."""
+    asked, ended = {1: threading.Event(), 2: threading.Event()}, threading.Event()
+
+    def changed():
+        if "question" in worker.news.live:
+            asked[worker.news.live["question"]].set()
+        if worker.news.state not in (WorkState.NONE, WorkState.BUSY):
+            ended.set()
+
+    worker = Worker(changed)
+    worker.begin("run", ask_twice)
+    assert asked[1].wait(60.0)
+    worker.answer(1)
+    worker.answer(1)
+    assert asked[2].wait(60.0)
+    assert not ended.wait(0.2)
+    second(worker)
+    assert ended.wait(60.0)
+    worker.close()
+    assert (worker.news.state, worker.news.result) == (state, result)
+
+
 def test_other_work_ends_at_once():
     news = worked("plan", tick_until_stopped, stop=True)
     assert (news.state, news.message, news.result) == (WorkState.STOPPED, "stopped", {})
@@ -333,3 +365,20 @@ def test_the_view_opens_on_arm_and_tooling_and_not_on_the_floor(view):
     high, wide = seen @ np.cross(right, ahead) / edge, seen @ right / edge / 1.5
     part_of_picture = np.abs([high, wide]).max()
     assert 0.75 < part_of_picture < 1.0
+
+
+def test_the_operator_at_a_page_is_asked_there():
+    ours, theirs = multiprocessing.Pipe()
+    operator = _PageOperator(Outbox(theirs), [], [], 0.0)
+    assert operator.answers
+    with operator.supervise(1) as supervision:
+        first = supervision.ask("put the second disk on")
+        assert ours.recv() == ("live", {"asked": "put the second disk on", "question": 1})
+        assert not first()
+        ours.send(("answer", 1))
+        assert first()
+        second = supervision.ask("take it off")
+        assert not second()
+        ours.send("stop")
+        assert supervision.interrupted()
+        assert not second()

@@ -181,8 +181,8 @@ class FakeRun:
     faults: list[str] = field(default_factory=list)
     """What was told at once."""
     enough: Callable[[Any], str] = lambda _: ""
+    stack: Callable[[int], Callable[[], bool]] = lambda _: lambda: True
     order: tuple[int, ...] = ()
-    stack: Callable[[int], str] = lambda _: ""
 
     @property
     def settings(self) -> RunSettings:

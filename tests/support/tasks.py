@@ -44,6 +44,17 @@ def tick_until_stopped(outbox):
     return {"ended": "well"}
 
 
+def ask_twice(outbox):
+    """Work for the studio: two questions, each until it is answered."""
+    for question in (1, 2):
+        outbox.tell({"asked": "put it on", "question": question})
+        while outbox.answered() != question:
+            if outbox.stopped():
+                return {"ended": "stopped", "at": question}
+            time.sleep(0.01)
+    return {"ended": "well"}
+
+
 def fail(outbox):
     """Work for the studio that cannot be done."""
     raise ProcedureError("it cannot be done")

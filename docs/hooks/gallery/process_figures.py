@@ -9,8 +9,9 @@ layout of springs, the tool is weighed, and the process simulated at the program
 load, as `elastocal simulate-process` does. On `typical` the same is done, at the programmed load,
 with shorter campaigns and with that of the paper; on every truth with the growth of the arm that is
 touched before production, with a press before every reference, alone and with the offset of each
-course, and with all of these. Of `ur20`, an example without a process, the deflection at left-out
-poses is measured, and what its prediction leaves of it.
+course, and with all of these; on `typical` also without a tracker, and with secondary encoders
+that are fitted, or read in production as well. Of `ur20`, an example without a process, the
+deflection at left-out poses is measured, and what its prediction leaves of it.
 """
 
 import argparse
@@ -20,6 +21,8 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
 from pathlib import Path
 
 from process_tables import renew_readme
@@ -29,12 +32,22 @@ from elastocal.compensation import ArmGrowth, process
 from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.process import Course, DeviationComparison
 from elastocal.errors import CompensationError
-from elastocal.identification import CalibrateResult
+from elastocal.identification import CalibrateResult, Contact
 from elastocal.procedure import RunFolder, read_summary
 from elastocal.progress import silent
 from elastocal.records import from_data, record, to_data
 from elastocal.robot import Robot
-from elastocal.workflows import ProcessTrial, calibrate, init, plan, run, run_loads, tool, touch
+from elastocal.workflows import (
+    ProcessTrial,
+    calibrate,
+    init,
+    plan,
+    run,
+    run_loads,
+    tool,
+    touch,
+)
+from elastocal.workflows.simulate_process import with_encoders
 
 QUOTED = Path(__file__).with_name("process_figures.json")
 KINDS = (*process.PROCESSES, "ur20")
@@ -56,15 +69,21 @@ class Campaign:
     """Points that are touched cold and warm, so that the growth of the arm is corrected too."""
     loads: tuple[float, ...] = _LOADS
     """Shares of the force that the process is run under."""
-    conditioned: bool = False
-    """Whether a full press goes before the reference, which is read in light contact."""
+    edits: tuple[tuple[str, str], ...] = ()
+    """Patterns in the cell file, and what takes their place."""
+    measured: str = ""
+    """Campaign of which it has cell and run; empty: its own."""
     offset: bool = False
     """Whether every course begins with a press and a reading of its offset."""
+    contact: Contact | None = None
+    """What is known of the contact, where no tracker measures."""
+    encoders: bool = False
+    """Whether secondary encoders are read in production."""
 
     @property
     def cell(self) -> str:
         """The word for its cell and its run; campaigns that measure alike share them."""
-        return CONDITIONED.name if self.conditioned else self.name
+        return self.measured or self.name
 
 
 TEMPLATE = Campaign("template", {}, ("bearing", "auto"))
@@ -75,9 +94,26 @@ SHORTER = (
 )
 
 TOUCHED = Campaign("touched", {}, ("auto",), points=12)
-CONDITIONED = Campaign("conditioned", {}, ("auto",), conditioned=True)
-OFFSET = Campaign("course offset", {}, ("auto",), conditioned=True, offset=True)
-ALL = Campaign("touched and offset", {}, ("auto",), points=12, conditioned=True, offset=True)
+_CONDITIONED = ((r"# procedure:.*$", _CONDITIONING),)
+CONDITIONED = Campaign("conditioned", {}, ("auto",), edits=_CONDITIONED)
+_AFTER_IT = partial(Campaign, search={}, springs=("auto",), edits=_CONDITIONED, offset=True)
+OFFSET = _AFTER_IT("course offset", measured=CONDITIONED.name)
+ALL = _AFTER_IT("touched and offset", measured=CONDITIONED.name, points=12)
+_INSTRUMENT = partial(Campaign, search={}, springs=TEMPLATE.springs, loads=_LOADS[:2])
+_SPREAD = 0.1
+"""Standard deviation of a place's compliance over the mean, of a disk of urethane."""
+UNTRACKED = _INSTRUMENT(
+    "no tracker",
+    edits=(
+        (r"  disk_radius:", '  disk_thickness: "5 mm"\n  disk_radius:'),
+        (r"  preset: typical", f"  preset: typical\n  contact: {{spread: {_SPREAD}}}"),
+    ),
+    contact=Contact(spread=_SPREAD),
+)
+_ENCODERS = ((r"  preset: typical", "  preset: typical\n  encoders: {noise: 2e-6 rad}"),)
+FITTED = _INSTRUMENT("encoders fitted", edits=_ENCODERS)
+READ = _INSTRUMENT("encoders read", edits=_ENCODERS, measured=FITTED.name, encoders=True)
+INSTRUMENTS = UNTRACKED, FITTED, READ
 
 
 @record()
@@ -141,11 +177,11 @@ def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
     for seed in SEEDS[1:]:
         for kind in process.PROCESSES:
             yield Case(kind, TYPICAL, seed), SHORTER
-    for campaigns in ((TOUCHED,), (CONDITIONED, OFFSET), (ALL,)):
-        for preset in (TYPICAL, *OTHERS):
-            for seed in SEEDS:
-                for kind in process.PROCESSES:
-                    yield Case(kind, preset, seed), campaigns
+    presets = TYPICAL, *OTHERS
+    more = *product(((TOUCHED,), (CONDITIONED, OFFSET), (ALL,)), presets), (INSTRUMENTS, TYPICAL)
+    for campaigns, preset in more:
+        for seed, kind in product(SEEDS, process.PROCESSES):
+            yield Case(kind, preset, seed), campaigns
 
 
 def quoted() -> list[ProcessFigures]:
@@ -235,12 +271,16 @@ class Measurement:
         state = self._touched(case, cell, campaign, made) if campaign.points else None
         for springs in campaign.springs:
             result = self._results.get((made, springs))
-            result = result or calibrate(folder.dataset, springs=springs, process=path)
+            given = {"springs": springs, "process": path, "contact": campaign.contact}
+            result = result or calibrate(folder.dataset, **given)
             self._results[made, springs] = result
             trial = self._trial(case, cell, result, made) if path else None
             if trial is not None:
                 landing = process.Landing.of(trial.cell) if campaign.offset else None
                 trial = replace(trial, state=state, landing=landing)
+                if campaign.encoders:
+                    read = with_encoders(trial.settings, trial.cell)
+                    trial = replace(trial, settings=read)
             yield _Model(campaign, springs, poses, minutes, result, trial, state)
 
     def _touched(self, case: Case, cell: Path, campaign: Campaign, made: Path) -> ArmGrowth:
@@ -270,10 +310,12 @@ class Measurement:
             text = cell.read_text(encoding="utf-8")
             for name, value in campaign.search.items():
                 text = re.sub(rf"(?m)^  (# )?{name}: \S+", f"  {name}: {value}", text)
-            if campaign.conditioned:
-                text = re.sub(r"(?m)^# procedure:.*$", _CONDITIONING, text)
+            for pattern, replacement in campaign.edits:
+                text, count = re.subn(f"(?m)^{pattern}", replacement, text)
+                assert count == 1, pattern
             cell.write_text(text, encoding="utf-8")
-            plan(cell, out=folder / "plan", compare="none")
+            without = "tracker" if campaign.contact else None
+            plan(cell, out=folder / "plan", compare="none", without=without)
         text = (folder / "cell.yaml").read_text(encoding="utf-8")
         cell = folder / f"{case.preset}.yaml"
         cell.write_text(text.replace("preset: typical", f"preset: {case.preset}"), encoding="utf-8")

@@ -186,6 +186,10 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
+_DONE = "done"
+"""Answer that something has been done in the cell, and that it is clear."""
+_DISKS = {"1": "one disk", "2": "two disks"}
+"""Number of disks that can be typed, with what is said to it."""
 _SKIP = "skip"
 """Answer that leaves out all further questions."""
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
@@ -237,6 +241,11 @@ class TerminalOperator:
         for line in lines:
             self._console.print(line, soft_wrap=True)
 
+    @property
+    def answers(self) -> bool:
+        """Whether there is a terminal to answer at."""
+        return sys.stdin.isatty()
+
     def confirm(self) -> None:
         """Ask whether the cell is clear.
 
@@ -278,8 +287,52 @@ class TerminalOperator:
     @contextmanager
     def supervise(self, poses: int) -> Iterator[Supervision]:
         """Show every step; signals that end a program stop the run instead."""
+        gone = threading.Event()
         with interruption() as interrupted, watching(self._console, poses) as show:
-            yield Supervision(show, interrupted)
+            yield Supervision(
+                show, lambda: interrupted() or gone.is_set(), lambda what: self._ask(what, gone)
+            )
+
+    def _ask(self, what: str, gone: threading.Event) -> Callable[[], bool]:
+        """Ask for something to be done, which a typed word says; set ``gone`` where input ends."""
+        done = threading.Event()
+
+        def listen() -> None:
+            # A word rather than Enter, which somebody may have pressed long before.
+            while line := sys.stdin.readline():
+                if line.strip().lower() == _DONE:
+                    done.set()
+                    return
+                self.warn([remedy])
+            gone.set()
+
+        remedy = f"type {_DONE} and Enter when it is; Ctrl-C stops the run, --resume goes on"
+        self.warn([f"{what}; {remedy}"])
+        threading.Thread(target=listen, name="answer", daemon=True).start()
+        return done.is_set
+
+
+def stack_by_hand(console: Console, stack: Callable[[int], None]) -> None:
+    """Stack as many disks in a simulated cell as are typed, from now on; where there is a terminal.
+
+    Parameters
+    ----------
+    console : Console
+        Console of the person.
+    stack : callable
+        Stacks one disk or two.
+    """
+
+    def listen() -> None:
+        while line := sys.stdin.readline():
+            if line.strip() in _DISKS:
+                stack(int(line))
+            console.print(_DISKS.get(line.strip(), how))
+
+    how = "type 1 or 2 and Enter for so many disks between tool and tooling"
+    if sys.stdin.isatty():
+        console.print(how)
+        threading.Thread(target=listen, name="disks", daemon=True).start()
 
 
 class _View:

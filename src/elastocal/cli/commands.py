@@ -367,12 +367,16 @@ def _release(given: Given) -> None:
 
 @command("Measure")
 def _simulate(given: Given) -> None:
+    from elastocal.cli._operator import stack_by_hand
+
     def show(found: workflows.SimulateResult) -> None:
         if given.as_json:
             output.print_json(found)
         else:
             output.print_lines(found.lines())
         _say("Ctrl-C ends it")
+        if found.stack is not None:
+            stack_by_hand(output.console(), found.stack)
         found.wait()
 
     workflows.simulate(**given.settings, meanwhile=show)

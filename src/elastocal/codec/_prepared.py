@@ -8,7 +8,7 @@ the same in any split.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ from elastocal.codec.splits import Campaign, CodecOptions, Split, drawn_poses, m
 from elastocal.codec.variants import ALL_LOADS, Variant, training_cases
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
-from elastocal.errors import CodecError
+from elastocal.errors import CodecError, IdentificationError
 from elastocal.identification import (
     AUTO,
     MINIMUM_BLOCKS,
@@ -68,6 +68,7 @@ class PreparedVariant:
         springs: str,
         model: ElasticModel,
         campaign: Campaign,
+        options: CodecOptions,
         marker_offset: ArrayLike | None,
     ) -> "PreparedVariant":
         """Return a variant prepared for a campaign.
@@ -77,7 +78,8 @@ class PreparedVariant:
         DatasetError
             If the dataset lacks a load case.
         """
-        problem = build(model, campaign.readings, variant.options, marker_offset)
+        fit = replace(variant.options, contact=options.contact)
+        problem = build(model, campaign.readings, fit, marker_offset)
         cases = training_cases(variant.load_cases, campaign.load_cases)
         trains = np.isin(campaign.readings.load_case, cases)
         poses = np.arange(len(campaign))
@@ -89,15 +91,16 @@ class PreparedVariant:
         return split.training[np.isin(split.training, self.problem.block[self.trains])]
 
     def rows(self, poses: IndexArray, which: BoolArray) -> FloatArray:
-        """Return observation rows of poses, zeros where readings are missing.
+        """Return observation rows of the springs at poses, zeros where readings are missing.
 
         Shape (pose, row, spring).
         """
-        found = [self.problem.O[which & (self.problem.block == pose)] for pose in poses]
-        rows = np.zeros((len(poses), max(map(len, found)), 3, self.problem.columns))
+        of_springs = self.problem.O[:, :, self.problem.springs]
+        found = [of_springs[which & (self.problem.block == pose)] for pose in poses]
+        rows = np.zeros((len(poses), max(map(len, found)), *of_springs.shape[1:]))
         for filled, blocks in zip(rows, found, strict=True):
             filled[: len(blocks)] = blocks
-        return rows.reshape(len(poses), -1, self.problem.columns)
+        return rows.reshape(len(poses), -1, of_springs.shape[2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,14 +146,30 @@ def climbed_ladder(
     for each in variants:
         # Refuses an unknown word before any fit.
         _ = each.springs == AUTO or rung_of(robot, each.springs)
-    fit = FitOptions(set_blunders_aside=options.set_blunders_aside)
+    fit = _fit_options(options)
     beside = [each.springs for each in variants]
     return choose_model(robot, readings, AUTO, fit, marker_offset, beside)
 
 
+def _fit_options(options: CodecOptions) -> FitOptions:
+    """Return the options of fits to all readings."""
+    return FitOptions(set_blunders_aside=options.set_blunders_aside, contact=options.contact)
+
+
 def taken_springs(ladder: Choice, springs: str) -> str:
-    """Return the name of the springs that `calibrate` takes for a user's word."""
-    return take_best(ladder.ladder, allowed_rungs(springs)).taken
+    """Return the name of the springs that `calibrate` takes for a user's word.
+
+    Raises
+    ------
+    IdentificationError
+        If the readings carry none of them.
+    """
+    allowed = allowed_rungs(springs)
+    if not {each.name for each in ladder.ladder}.intersection(allowed):
+        refused = (each for each in ladder.refused if each.values["springs"] in allowed)
+        if (why := next(refused, None)) is not None:
+            raise IdentificationError(why)
+    return take_best(ladder.ladder, allowed).taken
 
 
 def make_entrant(
@@ -158,13 +177,14 @@ def make_entrant(
     taken: str,
     models: Mapping[str, ElasticModel],
     campaign: Campaign,
+    options: CodecOptions,
     marker_offset: ArrayLike | None,
 ) -> Entrant:
     """Return a variant prepared with each of the springs that it may have.
 
     Parameters
     ----------
-    variant, campaign, marker_offset
+    variant, campaign, options, marker_offset
         As for `PreparedVariant.of`.
     taken : str
         From `taken_springs`.
@@ -173,7 +193,7 @@ def make_entrant(
     """
     allowed = [name for name in allowed_rungs(variant.springs) if name in models]
     prepared = {
-        name: PreparedVariant.of(variant, name, models[name], campaign, marker_offset)
+        name: PreparedVariant.of(variant, name, models[name], campaign, options, marker_offset)
         for name in allowed
     }
     return Entrant(prepared[taken], tuple(prepared.values()), low_loads(campaign.readings))
@@ -219,8 +239,7 @@ def prepared_variants(
         If the data lack a load case, or joints are not this robot's.
     """
     readings = drawn_poses(readings, data.options)
-    aside = FitOptions(set_blunders_aside=data.options.set_blunders_aside)
-    kept = usable_for_choice(robot, readings, aside, marker_offset)
+    kept = usable_for_choice(robot, readings, _fit_options(data.options), marker_offset)
     models = {
         name: ElasticModel(robot, rung_of(robot, name).springs(robot, kept))
         for name in dict.fromkeys(data.layouts)
@@ -240,6 +259,6 @@ def prepared_variants(
             f" {len(data.contact)}, or poses lie elsewhere"
         )
     return tuple(
-        PreparedVariant.of(each, name, models[name], campaign, marker_offset)
+        PreparedVariant.of(each, name, models[name], campaign, data.options, marker_offset)
         for each, name in zip(data.variants, data.layouts, strict=True)
     )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import BoolArray, FloatArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.codec._prepared import PreparedVariant, prepared_variants
 from elastocal.codec.data import NO_POSE, CodecData
 from elastocal.codec.indices import Correlation, IndexValues, correlate, index_values
@@ -92,19 +92,21 @@ def analyse(
 
 
 def _spring_observability(data: CodecData, prepared: PreparedVariant) -> SpringObservability:
-    variant, rows = prepared.variant, prepared.triangles.rows[:, :, :-1]
-    chosen, size = data.chosen[data.index(variant.name)], prepared.problem.size
-    determined = np.array(
-        [[_determined(rows[poses[poses != NO_POSE]], size) for poses in row] for row in chosen]
-    )
-    system = factor(prepared.problem.take(prepared.trains))
+    variant, problem = prepared.variant, prepared.problem
+    chosen, springs = data.chosen[data.index(variant.name)], problem.springs
+
+    def determines(poses: IndexArray) -> BoolArray:
+        rows = prepared.triangles.stacked(poses[poses != NO_POSE])
+        return _determined(rows, problem.size, springs)
+
+    determined = np.array([[determines(poses) for poses in row] for row in chosen])
+    system = factor(problem.take(prepared.trains).of_springs())
     found = observability(system, prepared.model.springs)
     return SpringObservability(variant.name, determined, found.unobservable)
 
 
-def _determined(triangles: FloatArray, size: FloatArray | float) -> BoolArray:
-    """Return which springs the rows of some poses determine, shape (spring,)."""
-    rows = unit_columns(triangles, size).rows
-    triangle = np.linalg.qr(rows.reshape(-1, rows.shape[2]), mode="r")
-    _, s, Vt = np.linalg.svd(triangle, full_matrices=True)
-    return np.asarray(np.linalg.norm(Vt[rank(s) :], axis=0) <= _SHARE)
+def _determined(rows: FloatArray, size: FloatArray | float, springs: slice) -> BoolArray:
+    """Return which springs rows ``[O d]`` of some poses determine, shape (spring,)."""
+    (scaled,) = unit_columns(rows[None, :, :-1], size).rows
+    _, s, Vt = np.linalg.svd(np.linalg.qr(scaled, mode="r"), full_matrices=True)
+    return np.asarray(np.linalg.norm(Vt[rank(s) :, springs], axis=0) <= _SHARE)

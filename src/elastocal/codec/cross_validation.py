@@ -122,12 +122,13 @@ def cross_validate(
     splits = make_splits(campaign.contact, options.splits, verification, campaign.company)
     training = max(training, len(splits[0].training))
     entrants = [
-        make_entrant(each, name, models, campaign, marker_offset)
+        make_entrant(each, name, models, campaign, options, marker_offset)
         for each, name in zip(variants, taken, strict=True)
     ]
     prepared = [each.taken for each in entrants]
     most = min(_largest_training_set(each, splits) for each in prepared)
-    findings = [*_draw_findings(measured, readings, options), *campaign.findings]
+    drawn = _draw_findings(measured, readings, options)
+    findings = [*drawn, *campaign.findings, *ladder.refused]
     if most < training:
         findings.append(TRAINING_ENDS(most=most, training=training))
     curves = _run_splits(entrants, splits, most, options.seed, jobs, progress)
@@ -254,7 +255,8 @@ def _require_a_fit(prepared: PreparedVariant, curves: Sequence[_LearningCurve]) 
     """Refuse a variant whose largest training sets leave every spring at a bound."""
     last = np.array([curve.compliance[-1] for curve in curves])
     problem = prepared.problem
-    if np.all((last == problem.lower) | (last == problem.upper)):
+    lower, upper = problem.lower[problem.springs], problem.upper[problem.springs]
+    if np.all((last == lower) | (last == upper)):
         raise CodecError(
             f"variant {prepared.variant.name!r} fits nothing: in all {len(curves)} splits every"
             " spring ends at a bound"
@@ -300,6 +302,7 @@ def _train(
         springs += len(fitted) * [each.springs]
         errors.append(_verification_errors(each.problem, split, fitted))
     error = np.concatenate(errors)
+    compliance = compliance[:, taken.problem.springs]
     return _LearningCurve(
         tuple(springs), tuple(chosen), compliance, error.mean(axis=1), error.max(axis=1)
     )
@@ -329,7 +332,7 @@ def _verification_errors(problem: Problem, split: Split, compliance: FloatArray)
 
 
 def _fit(prepared: PreparedVariant, chosen: Sequence[IndexArray]) -> FloatArray:
-    """Return the compliances of each choice of poses, shape (choice, spring)."""
+    """Return the compliances of each choice of poses, shape (choice, column)."""
     if prepared.variant.options.loss == "linear":
         return prepared.triangles.fit(chosen)
     return np.array([_robust_fit(prepared, poses) for poses in chosen])

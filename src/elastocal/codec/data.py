@@ -20,7 +20,7 @@ from elastocal.codec.variants import KEYS, Variant
 from elastocal.elastic import Spring
 from elastocal.errors import CodecError, SchemaError, nearest
 from elastocal.findings import Finding
-from elastocal.identification import RungSummary
+from elastocal.identification import Contact, RungSummary
 from elastocal.records import (
     SEAL,
     LabelledArray,
@@ -324,17 +324,19 @@ def _arrays_of(data: CodecData) -> LabelledArrays:
 
 def _read_options(stated: Mapping[str, Any]) -> CodecOptions:
     own = {name: value for name, value in stated.items() if name != "set_blunders_aside"}
+    if own.get("contact") is not None:
+        own["contact"] = from_data(Contact, own["contact"], "contact")
     return CodecOptions(**(_ALL_POSES | own), keep_blunders=not stated["set_blunders_aside"])
 
 
 def _attributes(data: CodecData) -> dict[str, str]:
     options = {name: getattr(data.options, name) for name in _OPTIONS}
-    splits = data.options.splits
+    splits, contact = data.options.splits, to_data(data.options.contact)
     return {
         "schema": ARRAYS_SCHEMA,
         "robot_name": data.robot,
         "provenance": data.provenance,
-        "options": json.dumps(options | {"splits": splits}),
+        "options": json.dumps(options | {"splits": splits, "contact": contact}),
         "load_cases": json.dumps(data.load_cases),
         "findings": json.dumps(to_data(data.findings, stored=True)),
         "versions": json.dumps(data.versions),

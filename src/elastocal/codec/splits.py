@@ -18,6 +18,8 @@ from elastocal.errors import CodecError, ConventionError
 from elastocal.findings import Finding, Kind
 from elastocal.identification import (
     MINIMUM_BLOCKS,
+    Contact,
+    FitOptions,
     build,
     check_conventions,
     check_joints,
@@ -51,6 +53,8 @@ class CodecOptions:
     """Use also data that fit far better with a sign or frame read otherwise."""
     poses: Annotated[int, Option(most=1_000_000)] = 100
     """Most poses; of a larger dataset as many are drawn by the seed."""
+    contact: Contact | None = None
+    """What is known of the contact that held the tool where no tracker measured."""
 
     @property
     def set_blunders_aside(self) -> bool:
@@ -131,6 +135,11 @@ SAME_CONFIGURATION = Kind(
     "codec.same-configuration",
     "poses {poses} are one configuration: kept on one side of each split",
 )
+HELD_BY_CONTACT = Kind(
+    "codec.held-by-contact",
+    "no tracker measured at {count} poses: there errors are those of predicting what the controller"
+    " travels, the spread of the contact from place to place in them",
+)
 FAR_FROM_OTHERS = Kind(
     "codec.far-from-others",
     "pose {pose} is far from all others: it trains, and verifies nothing, as it is left"
@@ -170,14 +179,18 @@ def make_campaign(
         If there are fewer than three distinct poses.
     """
     findings = list(check_joints(models[0].robot, readings))
+    held = np.unique(readings.pose[readings.by_contact])
+    if len(held):
+        findings.append(HELD_BY_CONTACT(count=len(held)))
+    fit = FitOptions(contact=options.contact)
     try:
-        check_conventions(models[0], readings, marker_offset)
+        check_conventions(models[0], readings, marker_offset, fit)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
         findings.append(IN_SPITE(error=str(error)))
     if options.set_blunders_aside:
-        blunder = _blunders(models, readings, marker_offset)
+        blunder = _blunders(models, readings, fit, marker_offset)
         findings += [
             SET_ASIDE(pose=int(readings.pose[row]), load_case=str(readings.load_case[row]))
             for row in np.flatnonzero(blunder)
@@ -202,10 +215,13 @@ def _group_by_pose(robot: Robot, readings: Readings, findings: list[Finding]) ->
 
 
 def _blunders(
-    models: Sequence[ElasticModel], readings: Readings, marker_offset: ArrayLike | None
+    models: Sequence[ElasticModel],
+    readings: Readings,
+    fit: FitOptions,
+    marker_offset: ArrayLike | None,
 ) -> BoolArray:
     """Return which readings every model takes for blunders, shape (reading,)."""
-    found = [screen(build(model, readings, None, marker_offset)).blunder for model in models]
+    found = [screen(build(model, readings, fit, marker_offset)).blunder for model in models]
     return np.asarray(np.all(found, axis=0))
 
 

@@ -287,13 +287,13 @@ def require_metrology(readings: Readings) -> None:
         raise IdentificationError(
             "dataset has no marker_displacement: to identify springs, metrology is needed (a"
             " tracker that measures the marker), or what is known of the contact that holds the"
-            " tool (calibrate --contact CONTACT.yaml)"
+            " tool (--contact CONTACT.yaml)"
         )
     poses = len(np.unique(readings.pose[held]))
     raise IdentificationError(
         f"marker_displacement has no number at pose {readings.pose[held][0]} ({poses} such poses):"
         " leave them out (--exclude), or give what is known of the contact that holds the tool"
-        " there (calibrate --contact CONTACT.yaml)"
+        " there (--contact CONTACT.yaml)"
     )
 
 

@@ -218,11 +218,13 @@ class PoseGrams:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class PoseTriangles:
-    """Triangles of the weighted rows of each pose block, without any prior."""
+    """Triangles of the weighted rows of each pose block, and the prior that each fit has."""
 
     rows: FloatArray
     """Triangle of ``weight * [O d]`` of each block, filled up with zeros, shape
     (block, row, spring + 1)."""
+    prior: FloatArray
+    """`Problem.prior_rows`, shape (row, spring + 1)."""
     lower: FloatArray
     upper: FloatArray
     size: FloatArray | float = 1.0
@@ -235,7 +237,7 @@ class PoseTriangles:
         Parameters
         ----------
         problem : Problem
-            The problem; its prior, if it has one, is left out.
+            The problem.
         blocks : ndarray of int, shape (block,)
             Block numbers, in the order in which choices count them. One that has no reading
             has a triangle of zeros.
@@ -249,7 +251,11 @@ class PoseTriangles:
         rows = np.zeros((len(found), max(map(len, found), default=0), width))
         for filled, triangle in zip(rows, found, strict=True):
             filled[: len(triangle)] = triangle
-        return cls(rows, problem.lower, problem.upper, problem.size)
+        return cls(rows, problem.prior_rows, problem.lower, problem.upper, problem.size)
+
+    def stacked(self, choice: IndexArray) -> FloatArray:
+        """Return the rows of a choice of poses with those of the prior, shape (row, spring + 1)."""
+        return np.concatenate([self.prior, *self.rows[choice]])
 
     def fit(self, choices: Sequence[IndexArray]) -> FloatArray:
         """Return the compliances of each choice of poses, shape (choice, spring).
@@ -268,10 +274,10 @@ class PoseTriangles:
         """
         width = self.rows.shape[2]
         triangles = np.zeros((len(choices), width, width))
-        known, before = np.zeros((0, width)), np.zeros(0, dtype=np.intp)
+        known, before = self.prior, np.zeros(0, dtype=np.intp)
         for triangle, choice in zip(triangles, choices, strict=True):
             if not np.array_equal(choice[: len(before)], before):
-                known, before = known[:0], before[:0]
+                known, before = self.prior, before[:0]
             stacked = np.concatenate([known, *self.rows[choice[len(before) :]]])
             known, before = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=float), choice
             triangle[: len(known)] = known

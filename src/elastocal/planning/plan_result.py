@@ -261,6 +261,11 @@ class PlanResult(Result):
         yield Facts((*covered, *((("marker seen by", stations),) if seen else ()), *notes))
 
     @property
+    def doubled(self) -> tuple[int, ...]:
+        """Ids of the poses that are pressed on two disks."""
+        return tuple(pose.id for pose in self.poses if pose.disks > 1)
+
+    @property
     def travel_time(self) -> float:
         """Estimated time of the moves between poses, in s."""
         return sum(move.duration for move in self.moves)

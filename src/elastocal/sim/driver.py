@@ -38,6 +38,7 @@ class SimulatedDriver:
             sensor=live.sensor() if "sensor" in wanted else None,
             metrology=live.metrology() if "metrology" in wanted else None,
             feed=live if "sensor" in wanted else None,
+            stack=live.stack,
         )
 
 

@@ -89,6 +89,14 @@ class RunMessage:
 
 
 @record()
+class AnswerMessage:
+    """Answer to a question of a run: what it asked for has been done."""
+
+    question: int
+    """Its number."""
+
+
+@record()
 class FolderMessage:
     """A folder beside the cell file."""
 
@@ -173,6 +181,7 @@ class Session:
             (RunMessage, self._run),
             (Nothing, self._watch),
             (Nothing, self._stop),
+            (AnswerMessage, self._answer),
             (Nothing, self._folders),
             (FolderMessage, self._record),
         )
@@ -332,6 +341,10 @@ class Session:
 
     def _stop(self, _: Nothing) -> Mapping[str, object]:
         self.worker.stop()
+        return {}
+
+    def _answer(self, message: AnswerMessage) -> Mapping[str, object]:
+        self.worker.answer(message.question)
         return {}
 
     def _folders(self, _: Nothing) -> Mapping[str, object]:

@@ -71,7 +71,7 @@ class Outbox:
     """
 
     def __init__(self, line: "Connection[object, object]") -> None:
-        self._line, self._stopped = line, False
+        self._line, self._stopped, self._answered = line, False, 0
         self._stage: tuple[str, int, int] | None = None
         self._waiting: deque[tuple[object, ...]] = deque(maxlen=_MOST_WAITING)
         self._news, self._closed = threading.Event(), False
@@ -115,12 +115,25 @@ class Outbox:
 
     def stopped(self) -> bool:
         """Return whether the studio wants the work to stop, or is gone."""
-        if not self._stopped:
-            try:
-                self._stopped = self._line.poll()
-            except OSError:
-                self._stopped = True
+        self._hear()
         return self._stopped
+
+    def answered(self) -> int:
+        """Return the number of the question that was answered last; 0: none was."""
+        self._hear()
+        return self._answered
+
+    def _hear(self) -> None:
+        """Take in what the studio has said so far."""
+        try:
+            while not self._stopped and self._line.poll():
+                match self._line.recv():
+                    case ("answer", int(question)):
+                        self._answered = question
+                    case _:
+                        self._stopped = True
+        except (EOFError, OSError):
+            self._stopped = True
 
 
 Work = Callable[[Outbox], Data]
@@ -182,6 +195,13 @@ class Worker:
                         self._line.send("stop")
             else:
                 self._process.terminate()
+
+    def answer(self, question: int) -> None:
+        """Tell the work that a person has done what its question of this number asked for."""
+        with self._lock:
+            if self.news.state is WorkState.BUSY and self._line is not None:
+                with contextlib.suppress(OSError):
+                    self._line.send(("answer", question))
 
     def close(self) -> None:
         """Stop the work and wait for its end: a run for as long as its arm needs."""

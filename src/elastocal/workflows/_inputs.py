@@ -27,9 +27,11 @@ from elastocal.errors import (
 from elastocal.identification import (
     MOST_UNEXPLAINED,
     CalibratedModel,
+    Contact,
     ModelSource,
     attainable_rank,
     describe_briefly,
+    read_contact,
     read_model,
     unseen_groups,
 )
@@ -142,6 +144,26 @@ def require_same_robot(model: Robot, cell: Robot, names: tuple[str, str]) -> Non
 
 DatasetSource = str | PathLike[str] | Dataset | Sequence[str | PathLike[str] | Dataset]
 """A dataset, the file that holds it, the folder of a run, or several of them."""
+
+
+KnownContact = Annotated[
+    Path | Contact | None,
+    Option(metavar="CONTACT.yaml", help="What is known of the contact, without a tracker."),
+]
+"""What is known of the contact that holds the tool where no tracker measured, or its file."""
+
+
+def known_contact(contact: Path | Contact | None) -> Contact | None:
+    """Return what is known of a contact; None: nothing is stated.
+
+    Raises
+    ------
+    SchemaError, FileAccessError
+        If its file cannot be read or does not fit.
+    """
+    if contact is None or isinstance(contact, Contact):
+        return contact
+    return read_contact(Path(contact))
 
 
 def dataset_files(source: DatasetSource) -> tuple[Path, ...]:

@@ -50,10 +50,18 @@ class Supervision:
     """Takes note of every step; never raises, never waits."""
     interrupted: Callable[[], bool]
     """Whether the run was asked to stop: it releases, retracts and stops."""
+    ask: Callable[[str], Callable[[], bool]] = lambda _: lambda: False
+    """Asks for something to be done in the cell, the arm disarmed; returns at once a function that
+    says whether the person has said that it is done, and that the cell is clear. By default nobody
+    ever does."""
 
 
 class Operator(Protocol):
     """The person at the cell."""
+
+    @property
+    def answers(self) -> bool:
+        """Whether there is somebody to ask while a run goes on."""
 
     def warn(self, lines: Sequence[str]) -> None:
         """Read what should be known before anything moves."""
@@ -70,6 +78,11 @@ class Operator(Protocol):
 
 class Unattended:
     """Nobody: agrees to nothing, interrupts nothing, hears progress by the callable alone."""
+
+    @property
+    def answers(self) -> bool:
+        """Whether there is somebody: no."""
+        return False
 
     def warn(self, lines: Sequence[str]) -> None:
         """Read nothing."""

@@ -17,7 +17,6 @@ from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
     Climbed,
-    Contact,
     FitSettings,
     PredictionDoubt,
     ProductionCoverage,
@@ -26,7 +25,6 @@ from elastocal.identification import (
     check_loads,
     choose_model,
     error_budget,
-    read_contact,
     summary,
     update_springs,
     weigh_contact,
@@ -40,8 +38,10 @@ from elastocal.robot import Robot, of_one_arm, same_joints, tool_gap
 from elastocal.robot.inverse import nearest_zero_posture
 from elastocal.workflows._inputs import (
     DatasetSource,
+    KnownContact,
     dataset_files,
     find_robot,
+    known_contact,
     read_datasets,
 )
 from elastocal.workflows._workflow import workflow
@@ -91,10 +91,7 @@ class CalibrateSettings(FitSettings):
     """Path of production, ``.csv``: ``auto`` chooses for it, and how much of it the readings cover
     is stated. None: that which the cell file of the data's own run names, where there is one."""
     # Wider than what a model file keeps of it; see `fit`.
-    contact: Annotated[
-        Path | Contact | None,
-        Option(metavar="CONTACT.yaml", help="What is known of the contact, without a tracker."),
-    ] = field(default=None, kw_only=True)  # type: ignore[assignment]
+    contact: KnownContact = field(default=None, kw_only=True)  # type: ignore[assignment]
     """What is known of the contact that holds the tool where no tracker measured: a contact file.
     In Python also a `Contact`."""
     force: bool = False
@@ -208,9 +205,7 @@ def _with_contact_file(settings: CalibrateSettings) -> CalibrateSettings:
                 f"--{name.replace('_', '-')} is about what a tracker measures: it does not go with"
                 " --contact"
             )
-    if isinstance(settings.contact, Contact):
-        return settings
-    return replace(settings, contact=read_contact(Path(settings.contact)))
+    return replace(settings, contact=known_contact(settings.contact))
 
 
 _WITH_UPDATE = frozenset(

@@ -28,11 +28,18 @@ from elastocal.codec import (
 from elastocal.dataset import content_sha256, merge_files, without
 from elastocal.files import filling
 from elastocal.findings import group_alike
+from elastocal.identification import FitOptions, at_tcp, weigh_contact
 from elastocal.options import Exclude, Marker, Option, ToolFrame
 from elastocal.parallel import one_blas_thread
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
-from elastocal.workflows._inputs import DatasetSource, find_robot, read_datasets
+from elastocal.workflows._inputs import (
+    DatasetSource,
+    KnownContact,
+    find_robot,
+    known_contact,
+    read_datasets,
+)
 from elastocal.workflows._workflow import workflow
 
 
@@ -77,6 +84,10 @@ class CodecSettings(CodecOptions):
     """Also draw the errors along x, y and z."""
     jobs: Annotated[int | None, Option(least=1, most=1024)] = None
     """Processes; by default all cores for long work."""
+    # Wider than what a codec keeps of it; see `chosen`.
+    contact: KnownContact = field(default=None, kw_only=True)  # type: ignore[assignment]
+    """What is known of the contact that held the tool where no tracker measured, as for
+    `calibrate`: a contact file. In Python also a `Contact`."""
     force: bool = False
     """Replace the files of a codec that is there."""
 
@@ -155,6 +166,9 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
     arm = find_robot(settings.robot, settings.tcp, settings.tool_frame, measured)
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
+    readings = at_tcp(arm, readings, marker)
+    known = FitOptions(contact=known_contact(settings.contact))
+    settings = replace(settings, contact=weigh_contact(arm, readings, known, marker).contact)
     with filling(Path(settings.out), VERDICTS, settings.force) as folder:
         data = cross_validate(
             arm,

@@ -50,7 +50,15 @@ from elastocal.progress import Progress
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.sim import truth_of
-from elastocal.workflows._operator_and_devices import Operator, Rig, Unattended, arm_devices, rig_of
+from elastocal.wording import spans
+from elastocal.workflows._operator_and_devices import (
+    Operator,
+    Rig,
+    Supervision,
+    Unattended,
+    arm_devices,
+    rig_of,
+)
 from elastocal.workflows._workflow import workflow
 from elastocal.workflows.until import ROUND, AccuracyWatch, ReachedAccuracy
 
@@ -274,8 +282,14 @@ class DryRunResult(Result):
             ("load cases", ", ".join(self.load_cases)),
             ("force limit", f"{self.force_limit:.6g} N"),
             ("time", f"{self.seconds / 60.0:.0f} min"),
+            *self._by_hand(),
             *(("warning", text) for text in self.warnings),
         )
+
+    def _by_hand(self) -> Iterator[tuple[str, str]]:
+        """Yield what a person is asked to do in between."""
+        if self.plan.doubled:
+            yield "by hand", f"put the second disk on for pose {spans(self.plan.doubled)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,6 +342,7 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
     journal_file = job.folder.journal
     entries = procedure.read_journal(journal_file) if journal_file.is_file() else ()
     _check_folder(job, entries, settings.resume)
+    _require_somebody(job, entries, settings.operator)
     with job.rig.reserved("run") as rig:
         procedure.make_folder(job.folder.path)
         with Journal(journal_file, os.fsync if job.rig.real else None) as journal:
@@ -347,9 +362,8 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
                     journal.write(devices.clock.now(), Event.START, run=record)
                 else:
                     journal.write(devices.clock.now(), Event.RESUME)
-                stack = partial(_stack, job, settings.operator)
-                told = settings.operator, progress, watch, stack
-                result = _carry_out(session, devices, journal, *told)
+                told = settings.operator, progress, watch
+                result = _carry_out(job, session, devices, journal, *told)
     if job.key is not None:
         vouched = verdict.sign(job.key, verdict.OF_RUN, procedure.file_sha256(journal_file), _now())
         verdict.write_signature(job.folder.signature, vouched)
@@ -450,13 +464,13 @@ def _now() -> str:
 
 
 def _carry_out(
+    job: _Job,
     session: Session,
     devices: Devices,
     journal: Journal,
     operator: Operator,
     progress: Progress,
     watch: AccuracyWatch | None,
-    stack: Callable[[int], str],
 ) -> procedure.SessionResult:
     count = len(session.plan.poses)
     with operator.supervise(count) as supervision:
@@ -471,22 +485,31 @@ def _carry_out(
             supervision.interrupted,
             lambda fault: tell_at_once(operator, fault),
             watch or (lambda _: ""),
-            stack,
+            partial(_stack, job.rig, operator, supervision),
         )
         return procedure.Runner(session, devices, journal, hooks).run()
 
 
-def _stack(job: _Job, operator: Operator, disks: int) -> str:
-    """Have a person stack disks; return why nobody did, or nothing. A simulated cell does it."""
-    if not job.rig.real:
-        return ""
+def _stack(
+    rig: Rig, operator: Operator, supervision: Supervision, disks: int
+) -> Callable[[], bool]:
+    """Ask a person to stack disks; return what says whether it is done."""
     what = "put the second disk on the first" if disks > 1 else "leave one disk alone on the tool"
-    operator.warn([f"the arm is at HOME and disarmed: {what}, and leave the cell"])
-    try:
-        operator.confirm()
-    except ProcedureError as error:
-        return str(error)
-    return ""
+    if rig.real:
+        return supervision.ask(f"the arm is at HOME and disarmed: {what}, and leave the cell")
+    operator.warn([f"on a real cell a person would now {what}; the simulated cell does it"])
+    return lambda: True
+
+
+def _require_somebody(job: _Job, entries: tuple[procedure.Entry, ...], operator: Operator) -> None:
+    """Refuse to begin a run in the middle of which nobody could be asked to stack disks."""
+    left = len(procedure.commits(entries)) < len(job.plan.poses)
+    if left and job.plan.doubled and job.rig.real and not operator.answers:
+        raise ProcedureError(
+            f"from pose {job.plan.doubled[0]} on the plan presses on two disks, and nobody can be"
+            " asked to put the second one on: run it at a terminal or in the studio (--yes does not"
+            " answer that)"
+        )
 
 
 def _accuracy_watch(

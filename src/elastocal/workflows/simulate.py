@@ -66,6 +66,8 @@ class SimulateResult(Result):
     cell: str
     rate: float
     ports: Ports
+    stack: Callable[[int], None] | None
+    """Stacks so many disks between tool and tooling, as a person would; None: the cell has none."""
 
     def lines(self) -> list[str]:
         """Return a line a device: driver, and each protocol with its address and port."""
@@ -132,7 +134,8 @@ def simulate(
             server.start()
         if settings.out is not None:
             write_json(settings.out, ports)
-        result = SimulateResult(cell.name, rate, ports)
+        has_disks = cell.file.engagement.disk_thickness is not None
+        result = SimulateResult(cell.name, rate, ports, live.stack if has_disks else None)
         settings.meanwhile(result)
     return result
 

@@ -239,7 +239,7 @@ def _watch(cell: Path, outbox: Outbox) -> Data:
 
 
 class _PageOperator(Unattended):
-    """The person at the page: agreed before, sees the run there, and stops it there.
+    """The person at the page: agreed before, sees, answers and stops the run there.
 
     Parameters
     ----------
@@ -263,6 +263,12 @@ class _PageOperator(Unattended):
         self._outbox, self._steps, self._stations, self._rate = outbox, steps, stations, rate
         self._shown_at = -_PAUSE
         self._begun: tuple[float, float] | None = None
+        self._questions = 0
+
+    @property
+    def answers(self) -> bool:
+        """Whether there is a page."""
+        return True
 
     def warn(self, lines: Sequence[str]) -> None:
         """Show what should be known, with the next report."""
@@ -270,8 +276,15 @@ class _PageOperator(Unattended):
 
     @contextlib.contextmanager
     def supervise(self, poses: int) -> Iterator[Supervision]:  # noqa: ARG002 - the protocol's form
-        """Show every step on the page, and heed its stop button."""
-        yield Supervision(self._show, self._outbox.stopped)
+        """Show every step on the page, and heed its buttons."""
+        yield Supervision(self._show, self._outbox.stopped, self._ask)
+
+    def _ask(self, what: str) -> Callable[[], bool]:
+        """Show what is to be done, beside a button by which it is said to be done."""
+        self._questions = question = self._questions + 1
+        self._outbox.tell({"asked": what, "question": question})
+        # A page in another window may still show a question that has been answered.
+        return lambda: self._outbox.answered() == question
 
     def _show(self, step: RunProgress) -> None:
         now = time.monotonic()

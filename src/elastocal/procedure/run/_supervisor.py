@@ -207,6 +207,23 @@ class Supervisor:
             return self._read_arm()
         return None
 
+    def wait_for_person(self, is_done: Callable[[], bool]) -> None:
+        """Let cycles pass until a person has done something in the cell, the arm disarmed.
+
+        Devices are read so that nothing piles up on their lines, and are not judged: a gate that
+        is opened may silence them.
+
+        Raises
+        ------
+        FaultError
+            If the run is asked to stop.
+        """
+        while not self._observers.interrupted():
+            if is_done():
+                return
+            self.arm_cycle()
+        raise FaultError(Fault.INTERRUPTED)
+
     def _read_devices(self) -> Snapshot:
         """Let one cycle pass and return the readings of the devices."""
         self._pass_time()

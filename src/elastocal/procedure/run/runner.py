@@ -29,7 +29,7 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.cell import CONDITIONING, LIGHT_CONTACT, ArmState, Devices, Motion
 from elastocal.errors import ProcedureError, present
-from elastocal.planning import Joints, PlanResult, PoseRecord
+from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import (
     Action,
     Event,
@@ -86,6 +86,7 @@ from elastocal.procedure.run.steps import (
     why_shaking,
     why_unsteady,
 )
+from elastocal.wording import counted
 
 _AGREES = 0.5
 """Smallest part of a force of the arm that its sensor must feel."""
@@ -666,7 +667,7 @@ class Runner:
         self._location, self._stop = ArmLocation.BETWEEN_POSES, HOME_AT_START
         self._watched = True
         # A session that goes on does not know what an earlier one has left.
-        self._disks: int | None = None if session.resumes and _stacks(session.plan) else 1
+        self._disks: int | None = None if session.resumes and session.plan.doubled else 1
 
     def run(self) -> SessionResult:
         """Visit all poses that are not committed and return how it went.
@@ -794,7 +795,8 @@ class Runner:
         Raises
         ------
         FaultError
-            If the arm does not say that it is disarmed, or nobody says that the disks are stacked.
+            If the arm does not say that it is disarmed, or the run is asked to stop before somebody
+            says that the disks are stacked.
         """
         home, legs = self._plan.robot.home, route(self._plan, self._stop, pose.id)
         if home not in legs and self._stop != HOME_AT_START:
@@ -811,9 +813,10 @@ class Runner:
         state = self._supervisor.arm_state()
         if state is None or state.motion is not Motion.DISARMED:
             raise FaultError(Fault.ARM_FAULT, "it does not say that it is disarmed: do not enter")
-        refused = self._hooks.stack(pose.disks)
-        if refused or self._hooks.interrupted():
-            raise FaultError(Fault.INTERRUPTED, f": {refused}" if refused else "")
+        self._log.pose = self._log.attempt = self._log.step = None
+        self._log.write(Event.ASKED, text=f"for {counted(pose.disks, 'disk')}")
+        self._supervisor.wait_for_person(self._hooks.stack(pose.disks))
+        self._log.write(Event.HANDLED, text=counted(pose.disks, "disk"))
         self._devices.stack(pose.disks)
         self._disks = pose.disks
         self._supervisor.start()
@@ -978,11 +981,6 @@ class Runner:
         text = f"{text}: {result.message}" if result.message else text
         with contextlib.suppress(*EXPECTED_ERRORS):
             self._log.write(Event.FINISH, text=text, lines=self._devices.lines())
-
-
-def _stacks(plan: PlanResult) -> bool:
-    """Return whether a plan presses on two disks at any pose."""
-    return any(pose.disks > 1 for pose in plan.poses)
 
 
 def _save(recorder: StreamRecorder, path: Path) -> str | None:

@@ -78,9 +78,9 @@ class SessionHooks:
     enough: Callable[[PoseLog], str] = lambda _: ""
     """Called after each pose is committed, while the arm stands still off the surface; returns why
     the run has enough poses, or nothing."""
-    stack: Callable[[int], str] = lambda _: ""
-    """Has a person stack so many disks between tool and tooling, the arm at HOME and disarmed;
-    returns why nobody did, or nothing."""
+    stack: Callable[[int], Callable[[], bool]] = lambda _: lambda: True
+    """Asks a person to stack so many disks between tool and tooling, the arm at HOME and disarmed;
+    returns at once a function that says whether it is done."""
 
 
 class RunEnd(Enum):

@@ -64,6 +64,10 @@ class LiveCell:
             self._advance()
             return act(self.sim)
 
+    def stack(self, disks: int) -> None:
+        """Let so many disks be stacked between tool and tooling, from the next contact on."""
+        self.apart(lambda sim: sim.devices.stack(disks))
+
     def _advance(self) -> None:
         sim_clock = self.sim.devices.clock
         behind = self.clock.now() - sim_clock.now()

@@ -117,6 +117,9 @@ async function openPlan(folder) {
 }
 
 function showLive(live) {
+  $("asked").hidden = !live.asked;
+  $("asked-text").textContent = live.asked || "";
+  $("answer").value = live.question || "";
   if (live.warnings) say(live.warnings.join(" · "), false, $("run-stop"));
   if (live.time === undefined) return;
   const marker = live.marker ? `${live.marker.map((x) => (1e3 * x).toFixed(2)).join(", ")} mm, in ${live.station}` : "not seen";
@@ -247,6 +250,7 @@ export function openRuns() {
   $("watch").addEventListener("click", () => begin("watch"));
   $("work-stop").addEventListener("click", () => begin("stop"));
   $("run-stop").addEventListener("click", () => begin("stop"));
+  $("answer").addEventListener("click", () => begin("answer", { question: Number($("answer").value) }));
   $("plan-form").addEventListener("submit", (event) => {
     event.preventDefault();
     const { folder, replace } = event.target.elements;
