@@ -213,6 +213,9 @@ def cell_file_model() -> type[CellFile]:
 _TCP = "tcp"
 """Name of the link at the tool centre point."""
 
+_LIMIT_PER_LOAD = 1.3
+"""Default force limit, as a multiple of the largest press."""
+
 _Result = TypeVar("_Result")
 
 
@@ -311,6 +314,12 @@ class Cell:
         if self.file.sensor is None:
             return None
         return inverse_transform(self.file.sensor.T_flange_sensor) @ self.T_flange_tcp
+
+    @property
+    def force_limit(self) -> float:
+        """Largest force that is let happen, in N: the procedure's, by default 1.3 presses."""
+        largest = max(float(np.linalg.norm(press)) for press in self.file.presses.values())
+        return self.file.procedure.force_limit or _LIMIT_PER_LOAD * largest
 
     @property
     def joint_margin(self) -> FloatArray:

@@ -48,8 +48,6 @@ _GROWTH = 50.0
 """Largest growth of the force during the retreat, in N."""
 _MEASURED = 0.4
 """Time over which the force is looked at before and after, in s."""
-_LIMIT_PER_LOAD = 1.3
-"""Default force limit over the largest load case, as in `elastocal run`."""
 
 
 @dataclass(frozen=True)
@@ -208,9 +206,7 @@ def _connected(cell: Cell, reserved: ReservedRig) -> Iterator[_Bench]:
 def _load(cell: Cell) -> ToolLoad:
     T_sensor_tcp = cell.T_sensor_tcp
     R = np.eye(3) if T_sensor_tcp is None else T_sensor_tcp[:3, :3].T
-    largest = max(float(np.linalg.norm(each)) for each in cell.file.presses.values())
-    limit = cell.file.procedure.force_limit or _LIMIT_PER_LOAD * largest
-    return ToolLoad(cell.file.tool.mass * cell.gravity_base, R, limit)
+    return ToolLoad(cell.file.tool.mass * cell.gravity_base, R, cell.force_limit)
 
 
 def _beyond(bench: _Bench) -> FloatArray | None:

@@ -4,9 +4,10 @@ import sys
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from elastocal.cell import LOOPBACK, Arming, RigContext, WallClock, load_cell
+from elastocal.cell import LOOPBACK, Arming, Motion, RigContext, WallClock, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.drivers.rtde import DRIVER
 from elastocal.drivers.rtde.driver import RtdeDriver, RtdeSettings
@@ -23,15 +24,18 @@ class Controller:
         T[2, 3] += shift
         self.q, self.pose = cell.home.tolist(), pose_of_T(T)
         self.modes = robot_mode, safety_mode
-        self.ended = False
+        self.ended = self.deaf = False
+        self.said, self.force, self.stamp = [], 0.0, time.monotonic()
 
     def __getattr__(self, name):
+        if not self.deaf:
+            self.stamp = time.monotonic()
         values = {
             "isConnected": True,
-            "getTimestamp": time.monotonic(),
+            "getTimestamp": self.stamp,
             "getActualQ": self.q,
             "getActualTCPPose": self.pose,
-            "getActualTCPForce": [0.0] * 6,
+            "getActualTCPForce": [0.0, 0.0, self.force, 0.0, 0.0, 0.0],
             "getFtRawWrench": [1.0, 2.0, 250.0, 0.0, 0.0, 0.0],
             "getRobotMode": self.modes[0],
             "getSafetyMode": self.modes[1],
@@ -41,6 +45,8 @@ class Controller:
 
         def call(*given):
             self.ended = self.ended or name == "stopScript"
+            if name not in values:
+                self.said.append(name)
             return values.get(name, True)
 
         return call
@@ -123,3 +129,114 @@ def test_a_line_whose_time_stands_is_lost(cell):
     with pytest.raises(DeviceError, match="has said nothing for"):
         line.sample()
     line.close()
+
+
+def test_a_line_that_breaks_says_why(cell):
+    controller = Controller(cell)
+    line = UrLine(controller, WallClock(), 500.0)
+    line.start()
+    controller.getTimestamp = lambda: 5.0
+    time.sleep(0.1)
+    with pytest.raises(DeviceError, match="the controller is lost: .*rtde"):
+        line.sample()
+    line.close()
+
+
+def until(holds, patience=5.0):
+    """Wait until something holds, in s of the wall."""
+    end = time.monotonic() + patience
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def pressing(cell):
+    """Return a controller and its arm, which holds a force in force mode."""
+    controller = Controller(cell)
+    devices = connect(cell, controller, "arm")
+    arm = devices.arm
+    arm.arming = Arming.of(cell)
+    arm.enable()
+    arm.approach(np.array([0.0, 0.0, -1.0]), 0.05, 0.005, 15.0)
+    time.sleep(0.1)
+    controller.force = 15.0
+    until(lambda: arm.state().motion is Motion.IDLE)
+    arm.hold(np.array([0.0, 0.0, -50.0]), 500.0)
+    controller.said.clear()
+    until(lambda: "forceMode" in controller.said)
+    yield controller, arm
+    devices.close()
+
+
+def test_an_arm_that_is_not_heard_any_more_is_told_to_stop_before_anybody_closes_it(pressing):
+    controller, arm = pressing
+    controller.deaf = True
+    until(lambda: "stopJ" in controller.said)
+    assert controller.said.index("forceModeStop") < controller.said.index("stopJ")
+    said = len(controller.said)
+    arm.stop()
+    time.sleep(0.1)
+    assert "forceMode" not in controller.said[said:]
+
+
+def test_a_refusal_of_the_controller_ends_the_force_at_once(pressing):
+    controller, arm = pressing
+    controller.forceMode = lambda *_: False
+    arm.hold(np.array([0.0, 0.0, -60.0]), 500.0)
+    until(lambda: arm.state().fault is not None)
+    until(lambda: "stopJ" in controller.said)
+    assert arm.state().motion is Motion.STOPPED
+
+
+def test_a_protective_stop_ends_the_press_for_good(pressing):
+    controller, arm = pressing
+    controller.modes = 7, 3
+    until(lambda: arm.state().fault == "protective stop")
+    controller.modes = 7, 1
+    until(lambda: "stopJ" in controller.said)
+    said = len(controller.said)
+    time.sleep(0.1)
+    assert "forceMode" not in controller.said[said:]
+    assert arm.state().motion is Motion.STOPPED
+
+
+def test_a_retract_that_follows_a_stop_at_once_is_made(pressing):
+    controller, arm = pressing
+    for _ in range(20):
+        arm.stop()
+        arm.enable()
+        controller.said.clear()
+        arm.retract(np.array([0.0, 0.0, 1.0]), 0.05, 0.05)
+        until(lambda: "moveL" in controller.said)
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (lambda arm, down: arm.approach(down, 0.05, 0.005, float("nan")), "contact force"),
+        (lambda arm, down: arm.approach(down, 0.05, float("nan"), 15.0), "approach speed"),
+        (lambda arm, down: arm.approach(down, -0.05, 0.005, 15.0), "approach distance"),
+        (lambda arm, down: arm.retract(-down, float("inf"), 0.05), "retract distance"),
+        (lambda arm, down: arm.hold(1e4 * down, 50.0), "the force limit"),
+        (lambda arm, _: arm.release(float("nan")), "force rate"),
+        (lambda arm, down: arm.move_joints(np.full(6, 9.0), 0.5), "joint target"),
+        (lambda arm, down: arm.move_joints(np.full(6, np.nan), 0.5), "joint target"),
+    ],
+)
+def test_numbers_that_no_move_may_have_are_refused(cell, command, said):
+    devices = connect(cell, Controller(cell), "arm")
+    try:
+        devices.arm.arming = Arming.of(cell)
+        devices.arm.enable()
+        with pytest.raises(DeviceError, match=said):
+            command(devices.arm, np.array([0.0, 0.0, -1.0]))
+        assert devices.arm.state().motion is Motion.IDLE
+    finally:
+        devices.close()
+
+
+def test_no_retract_leads_into_the_surface(pressing):
+    _, arm = pressing
+    with pytest.raises(DeviceError, match="leads into the surface"):
+        arm.retract(np.array([0.0, 0.0, -1.0]), 0.05, 0.05)

@@ -16,10 +16,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from elastocal.arrays import FloatArray
 from elastocal.cell import (
     LOOPBACK,
     Cell,
@@ -50,8 +48,6 @@ _WRONG_PAIRS = {
     ("absolute", 0): "a lost answer would be a jump to zero for one cycle",
     ("relative", 1): "a lost answer would repeat the last piece: the arm would run away",
 }
-_LIMIT_PER_LOAD = 1.3
-"""Default force limit over the largest load case, as in `elastocal run`."""
 _LAST_RESORT = 1.2
 """Excess over that limit at which the arm stops by itself. The supervisor acts first and can
 retract the arm, whereas an arm that has stopped stays on the surface."""
@@ -218,14 +214,12 @@ def bounds_of(cell: Cell, settings: RsiSettings) -> Bounds:
     largest = settings.largest_correction or usual
     # A whole number of tenths of a millimetre: it is compared by hand.
     poscorr = 1e-4 * math.ceil(1e4 * largest / _BELOW - 1e-6)
-    loads: list[FloatArray] = list(cell.file.presses.values())
-    most = max(float(np.linalg.norm(load)) for load in loads)
     return Bounds(
         correction=largest,
         poscorr=poscorr,
         monitor=1e-4 * math.ceil(1e4 * _MONITOR * poscorr - 1e-6),
         turn=math.radians(1.0),
         speed=settings.correction_speed,
-        force=_LAST_RESORT * (procedure.force_limit or _LIMIT_PER_LOAD * most),
+        force=_LAST_RESORT * cell.force_limit,
         travel=procedure.travel_limit,
     )

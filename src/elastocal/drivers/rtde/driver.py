@@ -23,6 +23,7 @@ from elastocal.cell import (
     ArmState,
     Cell,
     Clock,
+    CommandChecks,
     DevicePlace,
     DeviceSet,
     DeviceSettings,
@@ -58,20 +59,6 @@ class Guard:
         return fresh and float(-now.force_base @ self.direction) >= _FELT * self.force
 
 
-def unit_vector(direction: FloatArray) -> FloatArray:
-    """Return a direction.
-
-    Raises
-    ------
-    DeviceError
-        If it is no unit vector of three parts.
-    """
-    found = np.asarray(direction, dtype=float)
-    if not (found.shape == (3,) and abs(float(np.linalg.norm(found)) - 1.0) < 1e-6):
-        raise DeviceError(f"rtde: direction {found}: must be a unit vector")
-    return found
-
-
 def frame_along(direction: FloatArray, origin: FloatArray) -> FloatArray:
     """Return a frame whose z axis is a direction, shape (4, 4)."""
     side = np.eye(3)[int(np.argmin(np.abs(direction)))]
@@ -84,6 +71,7 @@ def frame_along(direction: FloatArray, origin: FloatArray) -> FloatArray:
 
 
 _SOURCE = "rtde"
+_CHECKS = CommandChecks(_SOURCE)
 _CYCLE = 0.01
 """Cycle of the thread, in s of the wall."""
 _TOOL_ACCELERATION = 0.5
@@ -100,6 +88,7 @@ _PRESS_SPEED = 0.02
 """Fastest motion along a force that is held, in m/s."""
 _SETTLED = 5
 """Cycles that a motion must be said to be over: the controller's word comes a cycle late."""
+_RESTING = (Motion.DISARMED, Motion.STOPPED)
 _STANDING = (Motion.IDLE,)
 _FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
 
@@ -146,6 +135,8 @@ class UrArm:
         self._motion = Motion.DISARMED
         self._touched: bool | None = None
         """None: no contact was detected or left since the connection."""
+        self._into = np.zeros(3)
+        """Direction of the last approach, base, shape (3,)."""
         self._forced = False
         self._fault: str | None = None
         self._order: _Order | None = None
@@ -194,7 +185,7 @@ class UrArm:
             raise DeviceError(f"{_SOURCE} cannot be enabled: its program does not start")
         with self._lock:
             self._fault = None
-            if self._motion in (Motion.DISARMED, Motion.STOPPED):
+            if self._motion in _RESTING:
                 self._motion = Motion.IDLE
 
     def disable(self) -> None:
@@ -213,17 +204,17 @@ class UrArm:
 
     def move_joints(self, q: FloatArray, speed: float) -> None:
         """Start a joint move; see `RobotArm.move_joints`."""
-        if not 0.0 < speed <= 1.0:
-            raise DeviceError(f"{_SOURCE} refuses move_joints: speed {speed:g}: must be in (0, 1]")
+        limits = self._cell.robot.limits
+        target = _CHECKS.joint_move(q, speed, self._names, (limits.lower, limits.upper))
         if self._touched:
             raise DeviceError(f"{_SOURCE} refuses move_joints: the tool is at the surface, retract")
 
         def begin(sample: UrSample) -> _Step:
-            way = np.abs(np.asarray(q) - sample.q)
+            way = np.abs(target - sample.q)
             # The controller takes the speed of the joint that goes farthest.
             part = way / max(float(way.max()), 1e-9)
             leading = float((speed * self._speeds / np.maximum(part, 1e-3)).min())
-            self._control.moveJ([*map(float, q)], leading, leading / self._time, True)
+            self._control.moveJ(target.tolist(), leading, leading / self._time, True)
             return self._arrival()
 
         self._give("move_joints", _Order(begin, Motion.MOVING), _STANDING)
@@ -235,11 +226,13 @@ class UrArm:
         self, direction_base: FloatArray, distance: float, speed: float, contact_force: float
     ) -> None:
         """Start a guarded straight move; see `RobotArm.approach`."""
-        direction = unit_vector(direction_base)
+        direction = _CHECKS.line("approach", direction_base, distance, speed)
+        _CHECKS.require(contact_force > 0.0, "contact force", contact_force, "above 0 N")
         if self._touched:
             raise DeviceError(f"{_SOURCE} refuses approach: in contact, retract first")
 
         def begin(sample: UrSample) -> _Step:
+            self._into = direction
             if not np.isfinite(contact_force):
                 return self._line_by(sample, distance * direction, speed)
             self._control.zeroFtSensor()
@@ -251,9 +244,12 @@ class UrArm:
 
     def hold(self, force_tcp: FloatArray, rate: float) -> None:
         """Start to build up a force and hold it; see `RobotArm.hold`."""
-        wanted = np.asarray(force_tcp, dtype=float)
-        if not (wanted.shape == (3,) and np.isfinite(wanted).all() and wanted[2] < 0.0):
-            raise DeviceError(f"{_SOURCE} refuses hold: force {wanted}: z must be below 0 N")
+        wanted = _CHECKS.vector("force", force_tcp, 3)
+        _CHECKS.require(
+            wanted[2] < 0.0, "force z", wanted[2], "below 0 N: the robot can only press"
+        )
+        size, most = float(np.linalg.norm(wanted)), self._cell.force_limit
+        _CHECKS.require(size <= most, "force", size, f"at most {most:g} N, the force limit")
         if not self._touched:
             raise DeviceError(f"{_SOURCE} refuses hold: allowed only in contact")
         self._give("hold", _Order(self._ramp_to(wanted, rate, None), Motion.HOLDING), _FORCED)
@@ -266,7 +262,12 @@ class UrArm:
 
     def retract(self, direction_base: FloatArray, distance: float, speed: float) -> None:
         """Start a straight move away from the surface; see `RobotArm.retract`."""
-        way = distance * unit_vector(direction_base)
+        direction = _CHECKS.line("retract", direction_base, distance, speed)
+        if self._touched and not float(direction @ self._into) < 0.0:
+            raise DeviceError(
+                f"{_SOURCE} refuses retract: direction {direction.tolist()} leads into the surface"
+            )
+        way = distance * direction
 
         def begin(sample: UrSample) -> _Step:
             self._end_force()
@@ -306,20 +307,24 @@ class UrArm:
     def _work(self) -> None:
         while not self._closed.wait(_CYCLE):
             try:
-                self._cycle(self._line.sample())
+                self._cycle()
             except (DeviceError, RuntimeError, OSError) as error:
                 with self._lock:
                     self._fail(str(error))
         if self._halt:
             self._stop_now()
 
-    def _cycle(self, sample: UrSample) -> None:
+    def _cycle(self) -> None:
         with self._lock:
-            halt, order, step = self._halt, self._order, self._step
-            self._halt, self._order = False, None
+            halt, self._halt = self._halt, False
         if halt:
+            # Before the line is asked: an arm that is not heard any more must stop as well. An
+            # order that came after the stop waits for the next cycle.
             self._stop_now()
             return
+        sample = self._line.sample()
+        with self._lock:
+            order, step, self._order = self._order, self._step, None
         if order is not None:
             step = order.begin(sample)
         after = None if step is None else step(sample)
@@ -339,7 +344,10 @@ class UrArm:
                 self._fail(str(error))
 
     def _fail(self, fault: str) -> None:
-        self._fault, self._motion, self._step = " ".join(fault.split()), Motion.STOPPED, None
+        """Stop with a fault: the controller would go on with its last command."""
+        self._halt = self._halt or self._motion not in _RESTING
+        self._fault, self._motion = " ".join(fault.split()), Motion.STOPPED
+        self._order = self._step = None
 
     def _pressed_way(self, goal: Guard, speed: float) -> _Step:
         """Return an approach in force mode: the controller stops at the force, we at the end."""
@@ -392,8 +400,7 @@ class UrArm:
         self, wanted: FloatArray, rate: float, after: Motion | None
     ) -> Callable[[UrSample], _Step]:
         """Return the lines that ramp the force; ``after``: what follows them, None: it is held."""
-        if not (np.isfinite(rate) and rate > 0.0):
-            raise DeviceError(f"{_SOURCE}: force rate {rate:g} N/s: must be above 0 and finite")
+        _CHECKS.require(0.0 < rate < np.inf, "force rate", rate, "above 0 N/s and finite")
 
         def begin(sample: UrSample) -> _Step:
             frame, last = pose_of_T(sample.T_base_tcp), self._clock.now()

@@ -75,6 +75,8 @@ class UrLine:
         self._heard = time.monotonic()
         self._received = self._skipped = 0
         self._faults: dict[str, None] = {}
+        self._lost = ""
+        """Why nothing is heard any more; empty while the thread listens."""
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._hear, daemon=True)
 
@@ -107,6 +109,9 @@ class UrLine:
         """
         with self._lock:
             sample, silent = self._sample, time.monotonic() - self._heard
+            lost = self._lost
+        if lost:
+            raise DeviceError(f"rtde: the controller is lost: {lost}")
         if sample is None or silent > _DEAF:
             raise DeviceError(f"rtde: the controller has said nothing for {silent:.1f} s")
         return sample
@@ -167,8 +172,12 @@ class UrLine:
 
     def _hear(self) -> None:
         pause = 0.5 / self.rate
-        while not self._closed.wait(pause):
-            self._look()
+        try:
+            while not self._closed.wait(pause):
+                self._look()
+        except (DeviceError, RuntimeError, OSError, ValueError) as error:
+            with self._lock:
+                self._lost = " ".join(str(error).split())
 
     def _look(self) -> None:
         receive, stamp = self._receive, self._receive.getTimestamp()

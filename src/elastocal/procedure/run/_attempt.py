@@ -16,7 +16,7 @@ from elastocal.planning import Joints, PoseRecord
 from elastocal.procedure.record import Action, PoseLog, ReadingStatus, Window
 from elastocal.procedure.run._supervisor import Supervisor
 from elastocal.procedure.run._watchdog import Guard, Snapshot
-from elastocal.procedure.run.leaving import LeavingWatch
+from elastocal.procedure.run.leaving import BIAS, STRAIGHT_TOLERANCE, LeavingWatch
 from elastocal.procedure.run.routes import ApproachLine
 from elastocal.procedure.run.settings import RunSettings
 from elastocal.procedure.run.steps import (
@@ -152,10 +152,6 @@ class Attempt:
 
 _JOINT_TOLERANCE = 5e-3
 """A joint that is closer to its target than this has arrived, in rad or m."""
-_STRAIGHT_TOLERANCE = 1e-3
-"""The same of a straight motion, in m."""
-_BIAS = 0.1
-"""Bias of a sensor that is let pass, as a part of the force limit."""
 
 
 def drive(supervisor: Supervisor, legs: tuple[Joints, ...], guard: Guard) -> None:
@@ -306,7 +302,7 @@ def require_tool_weight(force: FloatArray, settings: RunSettings) -> None:
     weight = settings.tool_weight
     if not weight > 0.0:
         return
-    size, tolerance = float(np.linalg.norm(force)), 0.5 * weight + _BIAS * settings.force_limit
+    size, tolerance = float(np.linalg.norm(force)), 0.5 * weight + BIAS * settings.force_limit
     if not abs(size - weight) <= tolerance:
         text = f"{size:.0f} N in free air, it weighs {weight:.0f} N, tolerance {tolerance:.0f} N"
         raise FaultError(Fault.WEIGHT, text)
@@ -328,7 +324,7 @@ def has_gone(arm: ArmState, start: FloatArray, distance: float) -> bool:
     Idle alone is not enough: an arm may still be idle in the first cycle after a command.
     """
     gone = float(np.linalg.norm(arm.T_base_tcp[:3, 3] - start))
-    return is_idle(arm) and gone > distance - _STRAIGHT_TOLERANCE
+    return is_idle(arm) and gone > distance - STRAIGHT_TOLERANCE
 
 
 def release_limit(settings: RunSettings) -> float:

@@ -15,11 +15,11 @@ from elastocal.errors import DeviceError
 from elastocal.procedure.run.steps import Fault, FaultError
 from elastocal.results import brief_repr
 
-_WRONG_WEIGHT = 0.35
+WRONG_WEIGHT = 0.35
 """Part of the weight that may be missing: a mass a quarter off, with a tool turned by 90 deg."""
-_STRAIGHT_TOLERANCE = 1e-3
+STRAIGHT_TOLERANCE = 1e-3
 """Largest distance of a straight motion's end from its target, in m."""
-_BIAS = 0.1
+BIAS = 0.1
 """Bias of a sensor that is let pass, as a part of the force limit."""
 
 
@@ -39,7 +39,7 @@ class ToolLoad:
     def tolerance(self) -> float:
         """Largest force that a wrong mass and a bias explain, in N; infinite without a mass."""
         weight = float(np.linalg.norm(self.weight_base))
-        return _WRONG_WEIGHT * weight + _BIAS * self.force_limit if weight > 0.0 else math.inf
+        return WRONG_WEIGHT * weight + BIAS * self.force_limit if weight > 0.0 else math.inf
 
     def beyond_weight(self, block: WrenchBlock, T_base_tcp: FloatArray) -> FloatArray | None:
         """Return the mean force on the robot less the tool's weight, base, shape (3,), in N.
@@ -171,7 +171,7 @@ def leave_surface(
             if block is not None:
                 watch.look(block, state.T_base_tcp)
             gone = float(np.linalg.norm(state.T_base_tcp[:3, 3] - start))
-            if state.motion is Motion.IDLE and gone > distance - _STRAIGHT_TOLERANCE:
+            if state.motion is Motion.IDLE and gone > distance - STRAIGHT_TOLERANCE:
                 return
             if state.fault is not None or state.motion is Motion.STOPPED:
                 reason = state.fault or state.motion.value

@@ -17,20 +17,15 @@ from elastocal.findings import Finding
 from elastocal.planning import PlanResult
 from elastocal.planning.checks import REGISTRATION_POSES, registration_shortages, station_shortage
 from elastocal.planning.motion import AxisMotion
-from elastocal.procedure.run.leaving import ToolLoad
+from elastocal.procedure.run.leaving import WRONG_WEIGHT, ToolLoad
 from elastocal.results import brief_repr
 
-_LIMIT_PER_LOAD = 1.3
-"""Default force limit, as a multiple of the largest load case."""
 _TOLERANCE_PER_LOAD, _LEAST_TOLERANCE = 0.01, 5.0
 """Default force tolerance, as a part of the largest load case, and its least, in N."""
 _COLLISION, _COLLISION_PER_WEIGHT = 50.0, 0.2
 """Default force of a collision, in N and as a part of the tool's weight: its inertia at 2 m/s²."""
 _COLLISION_WINDOW = 0.1
 """Time over which its change is looked at, in s: two cycles and a half."""
-_WRONG_WEIGHT = 0.35
-"""Part of the weight that may be missing during a retreat: a mass wrong by a quarter, turned by 90
-deg."""
 _SAME_PLACE = 1e-5
 """Largest distance between a frame and where its joints lead, in m."""
 _SAME_TURN = 1e-5
@@ -87,7 +82,7 @@ class RunSettings:
         """Return the watch for collisions on free moves."""
         weight, limit = self.tool_weight, self.collision_limit
         # What is wrong with the mass turns with the tool; without one all of its weight does.
-        largest = limit + _WRONG_WEIGHT * weight if weight > 0.0 else np.inf
+        largest = limit + WRONG_WEIGHT * weight if weight > 0.0 else np.inf
         return CollisionWatch(self.weight_base, limit, largest, _COLLISION_WINDOW)
 
 
@@ -195,7 +190,7 @@ def _force_limit(
         norm / float(np.max(np.abs(R_sensor_tcp @ force) / sensor.largest_force))
         for norm, (_, force) in zip(norms, loads, strict=True)
     )
-    limit = min(_LIMIT_PER_LOAD * largest, within) if asked is None else asked
+    limit = min(cell.force_limit, within) if asked is None else asked
     room = largest + tolerance
     if not room < limit <= within:
         raise ProcedureError(
