@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from elastocal.dataset import read, write
-from elastocal.errors import IdentificationError
+from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.identification import calibrate, update_springs
 from elastocal.workflows import calibrate as calibrate_files
 from support import problems
@@ -84,7 +84,9 @@ def test_springs_that_would_predict_left_out_courses_worse_stay_as_they_were(few
     moved, worth = update_springs(few, production(), np.random.default_rng(1))
     assert not worth.taken
     assert moved is few
-    assert dict(worth.facts())["springs"] == "left as they were: nothing is gained"
+    facts = dict(worth.facts())
+    assert facts["springs"] == "left as they were"
+    assert facts["warning"].kind == "update.no-gain"
 
 
 def test_the_place_that_a_course_is_counted_from_does_not_matter(few):
@@ -98,8 +100,52 @@ def test_the_place_that_a_course_is_counted_from_does_not_matter(few):
 def test_springs_move_no_farther_than_the_calibration_doubted():
     model = problems.elastic("bearing")
     sure = calibrate(model, readings_of(31, 0), np.random.default_rng(0)).calibrated
-    _, worth = update_springs(sure, production(softer=3.0), np.random.default_rng(1))
-    assert worth.farthest <= 3.0
+    _, worth = update_springs(sure, production(softer=1.1), np.random.default_rng(1))
+    assert worth.farthest == pytest.approx(3.0)
+
+
+def _of_force(change):
+    return lambda readings: replace(readings, force=change(readings.force))
+
+
+def _inches(readings):
+    seen = readings.controller_displacement + readings.deflection / 25.4
+    return replace(readings, marker_displacement=seen)
+
+
+def _degrees(readings):
+    return replace(readings, joint_position=np.degrees(readings.joint_position))
+
+
+@pytest.mark.parametrize(
+    ("mistake", "said"),
+    [
+        (_of_force(np.negative), "has its sign turned"),
+        (_of_force(lambda f: f / 9.80665), "times as much as its forces say: another unit"),
+        (_of_force(lambda f: f / 1e3), "another unit of force or displacement"),
+        (_inches, "another unit of force or displacement"),
+        (_degrees, "degrees, another joint order, or another robot"),
+    ],
+    ids=["sign", "kgf", "kN", "inches", "degrees"],
+)
+def test_mistaken_production_is_refused_with_the_mistake(few, mistake, said):
+    with pytest.raises((ConventionError, DatasetError), match=said):
+        update_springs(few, mistake(production()), np.random.default_rng(1))
+
+
+@pytest.mark.parametrize(
+    ("mistake", "kind"),
+    [
+        (_of_force(lambda f: 1.3 * f), "update.no-arm-changes-so-much"),
+        (_of_force(lambda f: f * [1.0, 1.0, 0.0]), "update.unexplained"),
+        (_of_force(lambda f: f[:, [1, 0, 2]]), "update.unexplained"),
+    ],
+    ids=["gain", "dead axis", "swapped axes"],
+)
+def test_production_that_the_model_hardly_explains_moves_no_spring(few, mistake, kind):
+    moved, worth = update_springs(few, mistake(production()), np.random.default_rng(1))
+    assert moved is few
+    assert worth.refusal.kind == kind
 
 
 def test_noise_alone_moves_nothing_or_next_to_nothing(few):

@@ -30,7 +30,7 @@ from elastocal.robot import JointReading, Robot, other_joint_readings
 
 POOR_FIT = 0.35
 """Part of the median deflection that may stay unexplained without a warning."""
-_LEFT_BY_UNDOING = 0.6
+LEFT_BY_UNDOING = 0.6
 """A mistake is named when undoing it leaves at most this part of the unexplained deflection. Model
 errors and noise remain for correct data, so that undoing a mistake that was not made leaves more,
 not less."""
@@ -88,7 +88,7 @@ def check_conventions(
     robust = solve(problem, "huber")
     stated = _unexplained(problem.reweighted(robust.reading_weight))
     found = []
-    for mistake in _mistakes_of(model.robot):
+    for mistake in mistakes_of(model.robot):
         undone = mistake.undo(model.robot, readings)
         blocks = displacement_blocks(model, undone, marker_offset)
         # The weights of the stated reading keep a blunder out of every other one, too.
@@ -97,7 +97,7 @@ def check_conventions(
     best, message = min(found, key=itemgetter(0))
     few = problem.d.size < 4 * problem.columns
     enough = stated > (_POOR_WITH_FEW_EQUATIONS if few else _ROUND_OFF)
-    if enough and best <= min(_LEFT_BY_UNDOING * stated, _FITS_WELL):
+    if enough and best <= min(LEFT_BY_UNDOING * stated, _FITS_WELL):
         raise ConventionError(
             f"{message}: read that way the fit leaves {best:.1%} of the median deflection"
             f" unexplained, as stated {stated:.1%}"
@@ -123,7 +123,7 @@ class ForceMistake:
     """Returns the readings as they would be if the mistake had been made."""
 
 
-def _mistakes_of(robot: Robot) -> tuple[ForceMistake, ...]:
+def mistakes_of(robot: Robot) -> tuple[ForceMistake, ...]:
     """Return the mistakes that are possible with a robot, the likeliest first."""
     joints = (
         ForceMistake(each.message, _reading_joints(each)) for each in other_joint_readings(robot)
@@ -270,7 +270,7 @@ def _cause(robot: Robot, readings: Readings, recorded: FloatArray, median: float
         place = robot.forward(read(readings.joint_position))[:, :3, 3]
         return float(np.median(np.linalg.norm(place - recorded, axis=1)))
 
-    enough = min(_TCP_OFF, _LEFT_BY_UNDOING * median)
+    enough = min(_TCP_OFF, LEFT_BY_UNDOING * median)
     if named := name_joint_mistake(robot, left, enough):
         return named
     T = robot.forward(readings.joint_position)

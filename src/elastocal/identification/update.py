@@ -10,8 +10,12 @@ marker is counted from, so rows and deflections count from their means over the 
 What the springs cannot explain changes slowly along a course: readings of one course are not
 independent, and count by ``g = (1 + r) / (1 - r)`` less, ``r`` the correlation of neighbouring
 residuals (Bayley and Hammersley 1946). The springs move only as far as the calibration doubted
-them, and only if courses that were left out are predicted better for it. Draws are moved alike,
-each with noise of its own (randomised maximum a posteriori).
+them, and only if courses that were left out are predicted better for it, by more than one standard
+error of the paired difference. Draws are moved alike, each with noise of its own (randomised
+maximum a posteriori).
+
+The calibrated model knows what production should look like: where it explains little of it, the
+production is another arm's or is read wrongly, and nothing is learnt from it.
 """
 
 from collections.abc import Iterator
@@ -24,10 +28,18 @@ from scipy.optimize import lsq_linear
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.dataset import Readings
-from elastocal.errors import IdentificationError
+from elastocal.errors import ConventionError, IdentificationError
+from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.contact import require_metrology
+from elastocal.identification.conventions import (
+    LEFT_BY_UNDOING,
+    POOR_FIT,
+    check_joints,
+    mistakes_of,
+)
 from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.paired import Overlap, paired_difference
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.wording import mm
@@ -36,9 +48,32 @@ LEAST_COURSES = 2
 """One course to learn from, and one to test the result."""
 _FARTHEST = 3.0
 """Largest move of a direction of the draws, in standard deviations."""
+_STIFFEST, _SOFTEST = 0.85, 2.0
+"""Ratio of measured and predicted deflection within which an arm changes: it wears, and no arm gets
+stiffer by more than a calibration errs."""
 _MOST_CORRELATED = 0.99
 _NEGLIGIBLE = 1e-9
 """Share of the largest standard deviation below which a direction of the draws is left out."""
+
+UNEXPLAINED = Kind(
+    "update.unexplained",
+    "{left} of how deflections differ along courses is left unexplained, at most {most} is allowed",
+    advice="Look whether it is this arm, and whether forces, joints and marker are as stated.",
+    shown=dict.fromkeys(("left", "most"), as_number(".0%")),
+)
+ANOTHER_ARM = Kind(
+    "update.no-arm-changes-so-much",
+    "production deflects {ratio} times as much as predicted, and no arm changes so much"
+    " ({low} to {high} times are allowed)",
+    advice="Check the gain of the force sensor; calibrate again if the arm has changed.",
+    shown={"ratio": as_number(".2f"), "low": as_number("g"), "high": as_number("g")},
+)
+NO_GAIN = Kind(
+    "update.no-gain",
+    "nothing is gained at left-out courses beyond one standard error, {error} mm",
+    grade=Grade.NOTE,
+    shown={"error": as_number(".3f", 1e3)},
+)
 
 
 @brief_repr
@@ -55,6 +90,10 @@ class SpringUpdate:
     """The same with the springs of the other courses."""
     farthest: float
     """Largest move of a direction of the draws, in its standard deviations; 0 where none is."""
+    ratio: float | None = None
+    """Measured over predicted deflection, counted so too, by least squares; None in older files."""
+    refusal: Finding | None = None
+    """Why the springs were left as they were; None where they were moved, and in older files."""
 
     @property
     def taken(self) -> bool:
@@ -69,8 +108,12 @@ class SpringUpdate:
             f"{mm(self.before)} mean with the springs as they were, {mm(self.after)} with those of"
             " the other courses",
         )
+        if self.ratio is not None:
+            yield "deflection", f"{self.ratio:.2f} times what the springs as they were predict"
         moved = f"by {self.farthest:.1f} standard deviations at most"
-        yield "springs", moved if self.taken else "left as they were: nothing is gained"
+        yield "springs", moved if self.taken else "left as they were"
+        if self.refusal is not None:
+            yield "warning", self.refusal
 
 
 def draws_factor(draws: FloatArray) -> FloatArray:
@@ -155,6 +198,10 @@ def update_springs(
     ------
     IdentificationError
         If there are fewer than `LEAST_COURSES`.
+    ConventionError
+        If the model explains them only with a sign, a frame or a unit read otherwise.
+    DatasetError
+        If joints are outside the robot's limits, or elsewhere than the recorded positions.
     """
     names = readings.campaign
     courses = tuple(dict.fromkeys(names.tolist())) if names is not None else ()
@@ -166,28 +213,111 @@ def update_springs(
     model, c = calibrated.model, calibrated.compliance
     course = np.array([courses.index(name) for name in names.tolist()], dtype=np.intp)
     require_metrology(readings)
+    check_joints(model.robot, readings)
+    measured = _centred(readings.deflection, course)
     blocks = _centred(displacement_blocks(model, readings, marker_offset), course)
+    _require_read_as_stated(calibrated, readings, course, marker_offset)
     L = draws_factor(calibrated.draws)
-    rows = _Rows(blocks @ L, _centred(readings.deflection, course) - blocks @ c, course)
+    rows = _Rows(blocks @ L, measured - blocks @ c, course)
     z, weight = rows.moved()
-    before, after = [], []
+    before, after = np.zeros((2, len(courses), 1))
     for number in range(len(courses)):
         own = course == number
         others, _ = rows.take(np.flatnonzero(~own)).moved()
         move = blocks[own] @ (_springs(calibrated, c + L @ others) - c)
-        before.append(np.linalg.norm(rows.r[own], axis=1))
-        after.append(np.linalg.norm(rows.r[own] - move, axis=1))
+        before[number] = np.linalg.norm(rows.r[own], axis=1).mean()
+        after[number] = np.linalg.norm(rows.r[own] - move, axis=1).mean()
+    gain = paired_difference(before, after, Overlap.leaving_one_out(len(courses)))
+    count = np.bincount(course)
+    ratio = _ratio(measured, blocks @ c)
     known = SpringUpdate(
         readings=len(readings),
         courses=courses,
-        before=float(np.concatenate(before).mean()),
-        after=float(np.concatenate(after).mean()),
+        before=float(np.average(before[:, 0], weights=count)),
+        after=float(np.average(after[:, 0], weights=count)),
         farthest=float(np.abs(z).max()),
+        ratio=ratio,
     )
-    if not known.after < known.before:
-        return calibrated, replace(known, farthest=0.0)
+    size = max(float(np.linalg.norm(measured, axis=1).mean()), np.finfo(float).tiny)
+    refusal = _refusal(
+        known.after / size, ratio, float(gain.mean[0]), float(gain.standard_error[0])
+    )
+    if refusal is not None:
+        return calibrated, replace(known, farthest=0.0, refusal=refusal)
     draws = _draws(calibrated, rows, L, weight, rng)
     return replace(calibrated, compliance=_springs(calibrated, c + L @ z), draws=draws), known
+
+
+def _refusal(left: float, ratio: float, gain: float, standard_error: float) -> Finding | None:
+    """Return why the springs are left as they were; None: they are moved.
+
+    Parameters
+    ----------
+    left : float
+        Part of the deflections that springs of the other courses leave unexplained.
+    ratio : float
+        Measured over predicted deflection.
+    gain, standard_error : float
+        Mean over the courses of what the error at a course falls by, in m.
+    """
+    if not left <= POOR_FIT:
+        return UNEXPLAINED(left=left, most=POOR_FIT)
+    if not _STIFFEST <= ratio <= _SOFTEST:
+        return ANOTHER_ARM(ratio=ratio, low=_STIFFEST, high=_SOFTEST)
+    return None if gain > standard_error else NO_GAIN(error=standard_error)
+
+
+def _ratio(measured: FloatArray, predicted: FloatArray) -> float:
+    """Return measured over predicted deflections, by least squares; 0 where none is predicted."""
+    square = float((predicted**2).sum())
+    return float((measured * predicted).sum()) / square if square > 0.0 else 0.0
+
+
+def _require_read_as_stated(
+    calibrated: CalibratedModel,
+    readings: Readings,
+    course: IndexArray,
+    marker_offset: ArrayLike | None,
+) -> None:
+    """Refuse production that the model explains only with a sign, frame or unit read otherwise.
+
+    Raises
+    ------
+    ConventionError
+        With the mistake.
+    """
+    model, c = calibrated.model, calibrated.compliance
+
+    def differ(stated: Readings) -> tuple[FloatArray, FloatArray]:
+        blocks = displacement_blocks(model, stated, marker_offset)
+        return _centred(stated.deflection, course), _centred(blocks @ c, course)
+
+    def left(measured: FloatArray, predicted: FloatArray) -> float:
+        off = float(np.linalg.norm(measured - predicted, axis=1).mean())
+        size = float(np.linalg.norm(measured, axis=1).mean())
+        return off / max(size, np.finfo(float).tiny)
+
+    measured, predicted = differ(readings)
+    stated = left(measured, predicted)
+    if stated <= POOR_FIT:
+        return
+    found = [
+        (left(*differ(mistake.undo(model.robot, readings))), mistake.message)
+        for mistake in mistakes_of(model.robot)
+    ]
+    ratio = _ratio(measured, predicted)
+    if ratio > 0.0:
+        message = (
+            f"production deflects {ratio:.3g} times as much as its forces say: another unit of"
+            " force or displacement"
+        )
+        found.append((left(measured, ratio * predicted), message))
+    best, message = min(found)
+    if best <= min(LEFT_BY_UNDOING * stated, POOR_FIT):
+        raise ConventionError(
+            f"{message}: read that way the calibrated springs leave {best:.0%} of how deflections"
+            f" differ along courses unexplained, as stated {stated:.0%}"
+        )
 
 
 def _centred(values: FloatArray, course: IndexArray) -> FloatArray:

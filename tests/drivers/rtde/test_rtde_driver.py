@@ -137,7 +137,7 @@ def test_a_line_that_breaks_says_why(cell):
     line.start()
     controller.getTimestamp = lambda: 5.0
     time.sleep(0.1)
-    with pytest.raises(DeviceError, match="the controller is lost: .*rtde"):
+    with pytest.raises(DeviceError, match=r"the controller is lost: .*rtde"):
         line.sample()
     line.close()
 
@@ -220,8 +220,8 @@ def test_a_retract_that_follows_a_stop_at_once_is_made(pressing):
         (lambda arm, down: arm.retract(-down, float("inf"), 0.05), "retract distance"),
         (lambda arm, down: arm.hold(1e4 * down, 50.0), "the force limit"),
         (lambda arm, _: arm.release(float("nan")), "force rate"),
-        (lambda arm, down: arm.move_joints(np.full(6, 9.0), 0.5), "joint target"),
-        (lambda arm, down: arm.move_joints(np.full(6, np.nan), 0.5), "joint target"),
+        (lambda arm, _: arm.move_joints(np.full(6, 9.0), 0.5), "joint target"),
+        (lambda arm, _: arm.move_joints(np.full(6, np.nan), 0.5), "joint target"),
     ],
 )
 def test_numbers_that_no_move_may_have_are_refused(cell, command, said):
