@@ -43,6 +43,7 @@ from elastocal.compensation.online import (
 )
 from elastocal.errors import CompensationError, DeviceError, ElastocalError, present
 from elastocal.identification import CalibratedModel
+from elastocal.procedure.run import ToolLoad
 from elastocal.units import in_unit, quantity
 from elastocal.workflows._operator_and_devices import ReservedRig, Rig
 
@@ -285,7 +286,8 @@ class LiveSession:
             )
         tare = None
         if self._ready.tares:
-            tare = Tare(numbers.load, numbers.functions().orientation)
+            free = ToolLoad.of(self._ready.cell).tolerance
+            tare = Tare(numbers.load, numbers.functions().orientation, free)
         return tare, LiveLoop(
             Compensator(numbers),
             newest_sample(feed) if sample == cycle else every_sample(sensor),
@@ -407,7 +409,8 @@ class LiveSession:
         """Yield what has come to light meanwhile."""
         if tare is not None and tare.bias is None:
             scatter = "" if tare.scatter is None else f" (it scatters by {tare.scatter[0]:.1f} N)"
-            yield f"nothing was corrected: the sensor's bias was never quiet{scatter}"
+            never = tare.refusal or f"the sensor's bias was never quiet{scatter}"
+            yield f"nothing was corrected: {never}"
         if self._log is not None and self._log.failure:
             yield f"the log ends early: {self._log.failure}"
         if self._missed_courses:

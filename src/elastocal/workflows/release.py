@@ -200,13 +200,7 @@ def _connected(cell: Cell, reserved: ReservedRig) -> Iterator[_Bench]:
                 problem = str(error)
         arm = next(each.arm for each in made if each.arm is not None)
         sensor = next((each.sensor for each in made if each.sensor is not None), None)
-        yield _Bench(arm, ForceTap(sensor, _load(cell)), clock, problem)
-
-
-def _load(cell: Cell) -> ToolLoad:
-    T_sensor_tcp = cell.T_sensor_tcp
-    R = np.eye(3) if T_sensor_tcp is None else T_sensor_tcp[:3, :3].T
-    return ToolLoad(cell.file.tool.mass * cell.gravity_base, R, cell.force_limit)
+        yield _Bench(arm, ForceTap(sensor, ToolLoad.of(cell)), clock, problem)
 
 
 def _beyond(bench: _Bench) -> FloatArray | None:

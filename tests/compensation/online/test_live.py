@@ -33,6 +33,7 @@ class Bench:
     """A loop whose arm stands still and whose sensor says what a test wants."""
 
     tares: bool = False
+    free: float = np.inf
     load: SensorLoad = field(default_factory=SensorLoad)
     force: tuple = PRESSING
     streams: bool = True
@@ -42,7 +43,9 @@ class Bench:
     def __post_init__(self) -> None:
         settings = compensated.settings(deadband="0 mm", limits={"correction": "3 mm"})
         numbers = design(compensated.arm(), settings, self.load)
-        tare = Tare(numbers.load, numbers.functions().orientation) if self.tares else None
+        tare = (
+            Tare(numbers.load, numbers.functions().orientation, self.free) if self.tares else None
+        )
         self.settings, self.time = settings, 10.0
         self.sample = None
         self.cycles: list[LiveCycle] = []
@@ -209,6 +212,18 @@ def test_no_bias_is_taken_while_something_shakes_the_tool():
     assert not np.any([cycle.correction for cycle in bench.cycles])
     bench.run(1.1, force=(0.0, 0.0, 0.0))
     assert bench.loop._tare.bias is not None
+
+
+def test_a_press_at_the_beginning_is_no_bias():
+    bench = Bench(tares=True, free=150.0)
+    bench.step(begins=True)
+    bench.run(1.0)
+    assert bench.loop._tare.bias is None
+    assert "602 N beyond the tool's weight, at most 150 N" in bench.loop.refusal
+    assert not np.any([cycle.correction for cycle in bench.cycles])
+    bench.run(1.1, force=(3.0, 0.0, -4.0))
+    assert bench.loop.refusal == ""
+    assert bench.loop._tare.bias[:3] == pytest.approx((3.0, 0.0, -4.0))
 
 
 def test_what_is_not_measured_anew_is_no_reading_of_the_bias():

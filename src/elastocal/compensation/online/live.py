@@ -159,16 +159,20 @@ class Tare:
         The tool, as the cell file has it; without bias and matrix.
     orientation : Function
         R_base_tcp at joints, by rows; of the model.
+    largest : float
+        Force beyond the tool's weight from which the tool is not free, in N.
     """
 
-    def __init__(self, load: SensorLoad, orientation: Function) -> None:
-        self._load, self._orientation = load, orientation
+    def __init__(self, load: SensorLoad, orientation: Function, largest: float = math.inf) -> None:
+        self._load, self._orientation, self._largest = load, orientation, largest
         self._rows: list[FloatArray] = []
         self._time = -math.inf
         self.bias: tuple[float, ...] | None = None
         """In N and N·m, six numbers; None as long as it is not known."""
         self.scatter: tuple[float, float] | None = None
         """Largest standard deviation of a component in the last window, in N and N·m."""
+        self.refusal = ""
+        """Why the last window gave no bias although it was quiet; empty: it was not quiet."""
 
     def take(self, q: Sequence[float], sample: LiveSample) -> None:
         """Take a reading; the bias is known after half a second in which nothing has changed."""
@@ -186,7 +190,16 @@ class Tare:
         self.scatter = float(spread[:3].max()), float(spread[3:].max())
         mean = rows.mean(axis=0)
         known = impossible("force", *mean[:3].tolist()) or impossible("moment", *mean[3:].tolist())
-        if known is None and self.scatter[0] <= _STILL_FORCE and self.scatter[1] <= _STILL_MOMENT:
+        quiet = self.scatter[0] <= _STILL_FORCE and self.scatter[1] <= _STILL_MOMENT
+        # A press that was taken for a bias would be corrected the other way when the tool is free.
+        size = math.hypot(*mean[:3].tolist())
+        self.refusal = (
+            f"{size:.0f} N beyond the tool's weight, at most {self._largest:.0f} N can be the bias:"
+            " the tool must be free"
+            if quiet and not size <= self._largest
+            else ""
+        )
+        if known is None and quiet and not self.refusal:
             self.bias = tuple(mean.tolist())
 
 
@@ -292,6 +305,7 @@ class LiveLoop:
                 self._tare.take(q, sample)
             if self._tare.bias is not None:
                 self._bias = self._tare.bias
+            self.refusal = self.refusal or self._tare.refusal
             return sample
         bx, by, bz, ba, bb, bc = self._bias
         for sample in samples:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import Clock, ForceSensor, Motion, RobotArm, SensorStatus, WrenchBlock
+from elastocal.cell import Cell, Clock, ForceSensor, Motion, RobotArm, SensorStatus, WrenchBlock
 from elastocal.errors import DeviceError
 from elastocal.procedure.run.steps import Fault, FaultError
 from elastocal.results import brief_repr
@@ -34,6 +34,13 @@ class ToolLoad:
     """Axes of the sensor in the tcp frame, shape (3, 3)."""
     force_limit: float
     """Force limit of the procedure, in N."""
+
+    @classmethod
+    def of(cls, cell: Cell) -> "ToolLoad":
+        """Return that of a cell; without a sensor its axes are those of the tcp."""
+        T_sensor_tcp = cell.T_sensor_tcp
+        R = np.eye(3) if T_sensor_tcp is None else T_sensor_tcp[:3, :3].T
+        return cls(cell.file.tool.mass * cell.gravity_base, R, cell.force_limit)
 
     @property
     def tolerance(self) -> float:
