@@ -182,6 +182,7 @@ class FakeRun:
     """What was told at once."""
     enough: Callable[[Any], str] = lambda _: ""
     order: tuple[int, ...] = ()
+    stack: Callable[[int], str] = lambda _: ""
 
     @property
     def settings(self) -> RunSettings:
@@ -243,7 +244,8 @@ class FakeRun:
             order=self.order,
         )
         recorder = self.recorder or (lambda: MemoryRecorder(self.kept))
-        hooks = SessionHooks(recorder, self.tell, self.interrupted, self.faults.append, self.enough)
+        told = self.tell, self.interrupted, self.faults.append, self.enough, self.stack
+        hooks = SessionHooks(recorder, *told)
         return Runner(job, self.cell.devices, log, hooks).run()
 
     def readings(self) -> dict[tuple[int, str | None], np.ndarray]:

@@ -778,7 +778,7 @@ class Runner:
         """Commit a pose, or return why it was given up."""
         legs, failure = route(self._plan, self._stop, pose.id), None
         if pose.disks != self._disks:
-            legs = self._stack(pose.disks, legs)
+            legs = self._stack(pose)
         for _ in range(1 + self._settings.procedure.retries):
             failure = self._try(pose, legs)
             self._stop, legs = pose.id, (pose.approach_joints,)
@@ -788,32 +788,34 @@ class Runner:
         self._log.write(Event.GIVEN_UP, text=str(failure))
         return failure
 
-    def _stack(self, disks: int, legs: tuple[Joints, ...]) -> tuple[Joints, ...]:
-        """Have a person stack disks, the arm at HOME and disarmed; return the legs that are left.
+    def _stack(self, pose: PoseRecord) -> tuple[Joints, ...]:
+        """Have a person stack a pose's disks, the arm at HOME and disarmed; return the legs on.
 
         Raises
         ------
         FaultError
-            If nobody says that it is done.
+            If the arm does not say that it is disarmed, or nobody says that the disks are stacked.
         """
-        home = self._plan.robot.home
+        home, legs = self._plan.robot.home, route(self._plan, self._stop, pose.id)
+        if home not in legs and self._stop != HOME_AT_START:
+            # Straight from HOME to a leg of the way from pose to pose nothing was checked.
+            end = home_stop(self._plan, self._stop)
+            legs = (*route(self._plan, self._stop, end), *route(self._plan, end, pose.id))
         before = max((at for at, leg in enumerate(legs) if leg == home), default=-1) + 1
-        if self._stop == HOME_AT_START:
-            # The arm is at HOME, whichever end of the round the legs begin at.
-            legs, before = legs[before:], 0
-        else:
-            to_home = legs[:before] or route(
-                self._plan, self._stop, home_stop(self._plan, self._stop)
-            )
+        # The first session begins at HOME, whichever end of the round the legs begin at.
+        if self._stop != HOME_AT_START:
             self._enable()
-            drive(self._supervisor, to_home, Guard(self._free_limit, free=True))
+            drive(self._supervisor, legs[:before], Guard(self._free_limit, free=True))
         self._location = ArmLocation.HOME
         disarm(self._supervisor)
-        refused = self._hooks.stack(disks)
-        if refused:
-            raise FaultError(Fault.INTERRUPTED, f": {refused}")
-        self._devices.stack(disks)
-        self._disks = disks
+        state = self._supervisor.arm_state()
+        if state is None or state.motion is not Motion.DISARMED:
+            raise FaultError(Fault.ARM_FAULT, "it does not say that it is disarmed: do not enter")
+        refused = self._hooks.stack(pose.disks)
+        if refused or self._hooks.interrupted():
+            raise FaultError(Fault.INTERRUPTED, f": {refused}" if refused else "")
+        self._devices.stack(pose.disks)
+        self._disks = pose.disks
         self._supervisor.start()
         self._location = ArmLocation.BETWEEN_POSES
         return legs[before:]
