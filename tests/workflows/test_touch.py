@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.errors import ProcedureError
-from elastocal.procedure import read_journal, read_touches
+from elastocal.procedure import Event, Journal, read_journal, read_touches
 from elastocal.procedure.derive import read_taught_markers, touches as touches_module
 from elastocal.sim import truth_of
 from elastocal.workflows import check, derive, run, touch
@@ -179,6 +179,16 @@ def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(touched, tm
         touch(made.cell, **files)
     assert not (tmp_path / "w.json").exists()
     assert len(touch(made.cell, **files, resume=True, confirmed=True).points) == POSES
+
+
+def test_a_warm_run_that_a_fault_has_ended_is_not_taken_for_all_of_it(touched, tmp_path):
+    folder, made, _ = touched
+    half = copied(folder / "state-run", tmp_path / "half", 4)
+    with Journal(half / "journal.jsonl") as journal:
+        journal.write(1e4, Event.FINISH, text="stopped, retracted to the approach pose: a fault")
+    with pytest.raises(ProcedureError, match="half: the warm touches are not done: `--resume`"):
+        touch(made.cell, cold=folder / "cold", warm=half, out=tmp_path / "w.json")
+    assert not (tmp_path / "w.json").exists()
 
 
 @pytest.mark.parametrize("moved", ["cold", "state-run"])

@@ -10,9 +10,9 @@ from elastocal.compensation import ArmGrowth, Touches, arm_growth, write_arm_gro
 from elastocal.errors import ProcedureError
 from elastocal.options import Option, Statements
 from elastocal.procedure import (
-    Event,
     RunEnd,
     RunFolder,
+    last_known,
     read_journal,
     read_touches,
     require_cold_touches,
@@ -131,9 +131,9 @@ def _touch_warm(settings: TouchSettings, progress: Progress) -> None:
 
 
 def _require_done(folder: RunFolder) -> None:
-    """Refuse a run whose session did not come to its end: half of the points would be lost."""
+    """Refuse a run that was stopped before its end: half of the points would be lost."""
     entries = read_journal(folder.journal)
-    if entries and entries[-1].event is not Event.FINISH:
+    if entries and not last_known(entries).finished:
         raise ProcedureError(
             f"{folder.path}: the warm touches are not done: `--resume` goes on with them"
         )
