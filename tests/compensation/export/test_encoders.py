@@ -44,6 +44,8 @@ def test_the_c_follows_encoders_as_python_does(remembers, tmp_path):
         q = q + 1e-4 * rng.standard_normal(6)
         force = 900.0 * np.sin(0.02 * step) * np.array([0.1, 0.2, -1.0, 0.0, 0.0, 0.0])
         links = None if step % 50 == 7 else q[1:3] + 1e-3 + 1e-4 * rng.standard_normal(2)
+        if links is not None and step % 40 == 9:
+            links[1] += 0.01  # a lost count
         there.correct(CycleInput(time, q, force[None], np.zeros(3), links))
         reading = Reading(time[0], q.tolist(), force[:3].tolist(), force[3:].tolist())
         state = python.condition(state, reading)

@@ -145,6 +145,20 @@ def test_a_link_that_is_not_read_keeps_what_was_seen_last_and_says_so(links):
     np.testing.assert_allclose(answer.deflection, answers[-1].deflection, atol=1e-9)
 
 
+@pytest.mark.parametrize("lost", [2.0 * np.pi, -0.02, 3.2e-3])
+def test_a_zeroed_encoder_that_loses_its_count_is_not_followed(lost):
+    extra = np.array([2e-4, 0.0])
+    state, sound = run(200, extra)
+    made, q = compensator(), posture()
+    yields = model().model.joint_blocks(q, FORCE) @ model().compliance
+    links = q[[1, 2]] + in_air(q) + yields[[1, 2]] + extra + [lost, 0.0]
+    for step in range(201, 230):
+        reading = Reading(step * CYCLE, q.tolist(), in_tcp(q).tolist(), [0.0] * 3)
+        state, answer = made.correct(made.condition(state, reading), q.tolist(), links.tolist())
+        assert answer.status & Status.ENCODER
+    np.testing.assert_allclose(answer.deflection, sound[-1].deflection, atol=1e-9)
+
+
 def test_noise_is_smoothed_over_the_stated_time():
     made, q = compensator("100 ms"), posture()
     rng, state, beyond = np.random.default_rng(0), made.start(), []

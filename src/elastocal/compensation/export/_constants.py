@@ -10,7 +10,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.compensation.kernel import Call
-from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, Design
+from elastocal.compensation.online import JOINT_RANGE, LONG_AGO, MOST_BEYOND, Design
 
 _FNV_START, _FNV_PRIME = 14695981039346656037, 1099511628211
 """FNV-1a, 64 bits (Fowler, Noll and Vo)."""
@@ -177,6 +177,9 @@ def _encoders(numbers: Design) -> list[Constant]:
     found = [
         Constant("ENCODER_JOINT", own, "numbers in q", whole=True),
         _one("ENCODER_SHARE", settings.encoder_share, "of a new reading"),
+        _one(
+            "MOST_BEYOND", MOST_BEYOND, "that a zeroed encoder may see beyond the model, rad or m"
+        ),
         Constant("REST_SPREAD", numbers.rest_spread, "SPREAD of what encoders do not see"),
     ]
     if numbers.deflection.memory:

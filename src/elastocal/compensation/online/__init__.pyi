@@ -9,6 +9,7 @@ from .courses import (
 from .design import (
     JOINT_RANGE as JOINT_RANGE,
     LONG_AGO as LONG_AGO,
+    MOST_BEYOND as MOST_BEYOND,
     Design as Design,
     design as design,
 )

@@ -13,7 +13,7 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import SensorLoad
 from elastocal.compensation.growth import ArmGrowth
 from elastocal.compensation.kernel import Function, ModelFunctions
-from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, Design, design
+from elastocal.compensation.online.design import JOINT_RANGE, LONG_AGO, MOST_BEYOND, Design, design
 from elastocal.compensation.online.state import Correction, Reading, State, Status, Triple
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.identification import CalibratedModel
@@ -302,10 +302,12 @@ class Compensator:
         else:
             out = self._links(*arguments)
         beyond, unread = state.beyond, 0
+        seen: tuple[float, ...] = ()
         if links is not None and len(links) == len(own) and _are_joints(links):
             seen = tuple(
                 [x - q[n] - y for x, n, y in zip(links, own, out[: len(own)], strict=True)]
             )
+        if seen and _are_near(seen, state.zero):
             before, share = beyond or seen, self._share
             pairs = zip(before, seen, strict=True)
             beyond = tuple([b + share * (s - b) for b, s in pairs])
@@ -507,6 +509,14 @@ def _are_joints(q: Sequence[float]) -> bool:
     """Return whether positions can be a joint's; a NaN cannot."""
     for x in q:  # noqa: SIM110, a generator takes twice the time
         if not -JOINT_RANGE < x < JOINT_RANGE:
+            return False
+    return True
+
+
+def _are_near(seen: Sequence[float], zero: Sequence[float]) -> bool:
+    """Return whether encoders see no more beyond their zeros than gears turn; none: they do."""
+    for x, y in zip(seen, zero, strict=False):  # noqa: SIM110, as above
+        if not -MOST_BEYOND <= x - y <= MOST_BEYOND:
             return False
     return True
 

@@ -33,6 +33,9 @@ LONG_AGO = -1.0e300
 """Time of a reading that never was, in s."""
 JOINT_RANGE = 1000.0
 """Positions beyond it are no joint's, in rad or m."""
+MOST_BEYOND = 3e-3
+"""More than any gear turns beyond its model, in rad or m: under its permissible torque it winds up
+by some 2 mrad. What a zeroed encoder sees beyond it is a lost count or a broken line."""
 _PUSHING = 1e-12
 """Compliance below its smallest by which rounding may have brought it there, in SI."""
 _NOTHING = 1e-9

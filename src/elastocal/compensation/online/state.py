@@ -37,7 +37,8 @@ class Status(IntFlag):
     OFFSET = 1024
     """The reading at the start of the course was not taken: its offset stays what it was."""
     ENCODER = 2048
-    """A position of a link was missing or no joint's: what the encoders saw last counts."""
+    """A position of a link was missing, no joint's, or farther from the model than any gear turns:
+    what the encoders saw last counts."""
 
 
 class Reading(NamedTuple):

@@ -129,6 +129,7 @@ static void off_by(const double q[], const double deflection[3], const double of
 @LINKS@                         const double force[3], const double moment[3], double shift[3])
 @LINKS@{
 @LINKS@    double out[4 * ELASTOCAL_ENCODERS];
+@LINKS@    double seen[ELASTOCAL_ENCODERS];
 @LINKS@    unsigned int status = 0U;
 @LINKS@    int usable = (links == NULL) ? 0 : 1;
 @LINKS@    int i;
@@ -138,11 +139,17 @@ static void off_by(const double q[], const double deflection[3], const double of
 @LINKS@    for (k = 0; (k < ELASTOCAL_ENCODERS) && (usable != 0); k++) {
 @LINKS@        usable = ((links[k] > -JOINT_RANGE) && (links[k] < JOINT_RANGE)) ? 1 : 0;
 @LINKS@    }
+@LINKS@    for (k = 0; (k < ELASTOCAL_ENCODERS) && (usable != 0); k++) {
+@LINKS@        seen[k] = (links[k] - q[ENCODER_JOINT[k]]) - out[k];
+@LINKS@        if (state->zeroed != 0) {
+@LINKS@            const double change = seen[k] - state->zero[k];
+@LINKS@            usable = ((change >= -MOST_BEYOND) && (change <= MOST_BEYOND)) ? 1 : 0;
+@LINKS@        }
+@LINKS@    }
 @LINKS@    if (usable != 0) {
 @LINKS@        for (k = 0; k < ELASTOCAL_ENCODERS; k++) {
-@LINKS@            const double seen = (links[k] - q[ENCODER_JOINT[k]]) - out[k];
-@LINKS@            const double before = (state->seen != 0) ? state->beyond[k] : seen;
-@LINKS@            state->beyond[k] = before + (ENCODER_SHARE * (seen - before));
+@LINKS@            const double before = (state->seen != 0) ? state->beyond[k] : seen[k];
+@LINKS@            state->beyond[k] = before + (ENCODER_SHARE * (seen[k] - before));
 @LINKS@        }
 @LINKS@        state->seen = 1;
 @LINKS@    } else {

@@ -48,7 +48,7 @@ extern "C" {
 #define ELASTOCAL_INVALID 256U /* the reading holds a NaN, an infinity or no joint position */
 #define ELASTOCAL_SENSOR 512U /* the sensor called the reading bad */
 #define ELASTOCAL_OFFSET 1024U /* the offset of the course was not taken: it is what it was */
-@LINKS@#define ELASTOCAL_ENCODER 2048U /* a link was not read: what encoders saw last counts */
+@LINKS@#define ELASTOCAL_ENCODER 2048U /* a link was not read, or lost its count: what encoders saw last counts */
 
 /* What arm and sensor say. */
 typedef struct {
