@@ -9,6 +9,7 @@ import multiprocessing
 import signal
 import sys
 import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -18,6 +19,8 @@ from types import FrameType
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.results import brief_repr
 
+_MOST_WAITING = 100
+"""Messages that wait for a studio that does not read; older ones are dropped."""
 _GRACE = 5.0
 """Time in which a stopped worker may clean up, in s."""
 _ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
@@ -59,6 +62,8 @@ class WorkNews:
 class Outbox:
     """The worker's line to the studio.
 
+    A thread of its own writes: a studio that reads nothing must not keep an arm from being watched.
+
     Parameters
     ----------
     line : Connection
@@ -68,18 +73,41 @@ class Outbox:
     def __init__(self, line: "Connection[object, object]") -> None:
         self._line, self._stopped = line, False
         self._stage: tuple[str, int, int] | None = None
+        self._waiting: deque[tuple[object, ...]] = deque(maxlen=_MOST_WAITING)
+        self._news, self._closed = threading.Event(), False
+        self._writer = threading.Thread(target=self._write, name="outbox", daemon=True)
+        self._writer.start()
 
     def progress(self, stage: str, done: int, total: int, /) -> None:
         """Report the progress of a stage; it is an `elastocal.progress.Progress`."""
         if (stage, done, total) != self._stage:
             self._stage = (stage, done, total)
-            with contextlib.suppress(OSError):
-                self._line.send(("progress", *self._stage))
+            self._put(("progress", *self._stage))
 
     def tell(self, live: Data) -> None:
         """Report other news of the work."""
+        self._put(("live", live))
+
+    def close(self, last: tuple[object, ...]) -> None:
+        """Send the last message after all others, and end."""
+        self._waiting.append(last)
+        self._closed = True
+        self._news.set()
+        self._writer.join()
+
+    def _put(self, message: tuple[object, ...]) -> None:
+        self._waiting.append(message)
+        self._news.set()
+
+    def _write(self) -> None:
         with contextlib.suppress(OSError):
-            self._line.send(("live", live))
+            closed = False
+            while not closed:
+                self._news.wait()
+                self._news.clear()
+                closed = self._closed
+                while self._waiting:
+                    self._line.send(self._waiting.popleft())
 
     def stop(self) -> None:
         """Take note that the work is to stop."""
@@ -228,8 +256,7 @@ def _carry_out(line: "Connection[object, object]", work: Work, orderly: bool) ->
         said: tuple[object, ...] = ("done", work(outbox))
     except ElastocalError as error:
         said = ("failed", str(error))
-    with contextlib.suppress(OSError):
-        line.send(said)
+    outbox.close(said)
     line.close()
 
 
