@@ -119,7 +119,7 @@ def test_a_killed_program_does_not_leave_the_arm_pushing(cell, rig):
     assert wait(arm, Motion.IDLE).in_contact
     arm.hold(PRESS, 200.0)
     until(lambda: live.arm().state().motion is Motion.HOLDING)
-    time.sleep(1.0)
+    time.sleep(1.5)
     assert server.robot.program
     # As a kill does: nothing is sent any more, not even a stop.
     arm._closed.set()

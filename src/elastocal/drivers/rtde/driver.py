@@ -74,7 +74,7 @@ _SOURCE = "rtde"
 _CHECKS = CommandChecks(_SOURCE)
 _CYCLE = 0.01
 """Cycle of the thread, in s of the wall."""
-_WATCHDOG = 2.0
+_WATCHDOG = 1.0
 """Signs of life a second, in Hz, without which the controller ends its program: force mode would go
 on when this program is killed, or its line is cut."""
 _TOOL_ACCELERATION = 0.5
