@@ -41,7 +41,7 @@ def test_what_the_page_quotes_is_printed(printed):
     rows = [" ".join(row.split()) for block in quoted for row in block.splitlines() if row != "…"]
     assert len(rows) == 15
     assert [row for row in rows if row not in shown] == []
-    assert "0.968 mm mean" in printed
+    assert "deviation as programmed: 1.12 mm mean" in printed
 
 
 def test_the_compliances_are_those_of_any_least_squares(printed):

@@ -28,7 +28,7 @@ from elastocal.identification.rungs import gears, has_levels
 from elastocal.robot import T_from_xyzabc, with_tool
 from elastocal.sim.arm import Linkage, press_poses
 from support.cells import TRACKED, Cell, linear_truth, rich_truth, robot
-from support.problems import campaign
+from support.problems import campaign, linear_readings
 
 OPTIONS = FitOptions()
 
@@ -98,6 +98,36 @@ def test_a_pose_that_stands_alone_does_not_hide_which_rung_is_better():
     alone = [replace(each, counted=company) for each in tried]
     assert take_best([replace(each, counted=None) for each in tried], allowed).taken == "bearing"
     assert take_best(alone, allowed).taken == "links"
+
+
+def judged(gain, spread):
+    """Return the rung taken of two, the richer of which errs less by a part, with a scatter."""
+    rich = chosen("rich", 31)["links"]
+    rng = np.random.default_rng(0)
+    scatter = rng.standard_normal(31)
+    rich = replace(rich, score=np.full(31, 100e-6), counted=None)
+    scatter = 100e-6 * spread * (scatter - scatter.mean()) / scatter.std(ddof=1)
+    simple = replace(rich, name="bearing", score=rich.score * (1.0 + gain) + scatter)
+    return take_best([simple, rich], ["bearing", "links"]).taken
+
+
+@pytest.mark.parametrize(
+    ("gain", "spread", "taken"),
+    [
+        (0.03, 0.01, "links"),  # little, and certain
+        (0.03, 0.30, "bearing"),  # little, within one standard error
+        (0.08, 0.50, "links"),  # more than a twentieth, though it is not certain
+        (-0.01, 0.01, "bearing"),
+    ],
+)
+def test_a_richer_rung_must_gain_a_twentieth_or_more_than_a_standard_error(gain, spread, taken):
+    assert judged(gain, spread) == taken
+
+
+@pytest.mark.parametrize("seed", [0, 5, 10])
+def test_springs_of_the_axes_alone_are_not_shared_among_more(seed):
+    readings, _ = linear_readings("actuated", sigma=20e-6, seed=seed)
+    assert choose_model(robot(), readings, "auto", FitOptions()).taken == "actuated"
 
 
 def test_the_interval_counts_that_refits_overlap():

@@ -159,6 +159,13 @@ class UrClient:
         self._until(lambda: self._values["output_int_register_0"] == _READY)
         return True
 
+    def setWatchdog(self, min_frequency):
+        return self._command(35, (), (min_frequency,))
+
+    def kickWatchdog(self):
+        self._put()
+        return True
+
     def setTcp(self, pose):
         return self._command(29, (), pose)
 

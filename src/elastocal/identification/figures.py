@@ -419,6 +419,11 @@ def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
         return f"{um(found.mean)} (95 % interval {um(found.low)} to {um(found.high)})"
 
     text = f"{taken.springs} is taken, the best at left-out poses"
+    if taken is not best:
+        text = (
+            f"{taken.springs} is taken: {best.springs}, the best at left-out poses, errs less by"
+            f" {um(taken.difference.mean)}, neither a twentieth nor one standard error"
+        )
     if taken.production_error is not None:
         text = (
             f"{taken.springs} is taken: of the rungs within one standard error of the best at"

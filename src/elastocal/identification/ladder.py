@@ -3,10 +3,11 @@
 More springs always fit better; whether they predict better is measured at poses left out of a refit
 and, if there is one, at a low load left out of it. (A refit without the full load, or without an
 isolated pose, would have to extrapolate, which no rung is required to do.) The rung with the lowest
-such error is chosen, among those with no more parameters than the readings hold numbers. Where
-production is known, it decides between rungs that are not worse by more than one standard error of
-their paired difference (`elastocal.identification.paired`,
-`elastocal.identification.prediction_doubt`).
+such error is chosen, among those with no more parameters than the readings hold numbers; or a
+simpler one, where that gains less than a twentieth of the error and less than one standard error of
+their paired difference (`elastocal.identification.paired`). Where production is known, it decides
+between all rungs that are not worse by more than one standard error
+(`elastocal.identification.prediction_doubt`).
 """
 
 from collections.abc import Sequence
@@ -47,6 +48,9 @@ from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
+_LEAST_GAIN = 0.05
+"""Part of the error that a richer rung must gain where the evidence for it is within one standard
+error; measured in docs/decisions/0066-ladder.md."""
 REFUSED = Kind(
     "ladder.refused",
     "springs {springs} were not tried: {reason}",
@@ -277,8 +281,9 @@ def climb(
 
 
 def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
-    """Return the allowed rung with the least error at left-out poses.
+    """Return the simplest allowed rung that no other beats clearly at left-out poses.
 
+    Clearly is by a twentieth of the error, or by more than one standard error of the difference.
     A rung with more parameters than the readings hold numbers is chosen only if there is no smaller
     one, since with few left-out poses one of them may be best by chance. Where production is known,
     a rung with large uncertainty there is chosen only if all have it; and of those within one
@@ -307,7 +312,7 @@ def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
     found = judge_models(score, may, Overlap.leaving_one_out(len(score)))
     on_production = _errors_on_production(tried, found)
     known = np.isfinite(on_production).any()
-    chosen = int(np.nanargmin(on_production)) if known else found.best
+    chosen = int(np.nanargmin(on_production)) if known else _simplest(found, score)
     each = found.difference
     figures = (each.mean, each.low, each.high, np.nan_to_num(each.standard_error))
     ladder = tuple(
@@ -324,6 +329,12 @@ def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
         for number, (rung, mean, low, high, error) in enumerate(zip(tried, *figures, strict=True))
     )
     return Choice(ladder[chosen].model, ladder)
+
+
+def _simplest(found: Judgement, score: FloatArray) -> int:
+    """Return the simplest of the near rungs that the best one beats by less than a twentieth."""
+    most = _LEAST_GAIN * float(score[:, found.best].mean())
+    return int(found.near[np.argmax(found.difference.mean[found.near] <= most)])
 
 
 def _errors_on_production(tried: Sequence[Climbed], found: Judgement) -> FloatArray:

@@ -107,6 +107,43 @@ def test_a_press_of_the_procedure_by_force_mode(cell, rig):
     assert server.robot.unserved == set()
 
 
+def test_a_killed_program_does_not_leave_the_arm_pushing(cell, rig):
+    live, server, devices = rig
+    arm, down = devices.arm, np.array([0.0, 0.0, -1.0])
+    arm.enable()
+    arm.move_joints(above(cell), 1.0)
+    wait(arm, Motion.IDLE)
+    arm.approach(down, 0.095, 0.05, 15.0)
+    wait(arm, Motion.IDLE)
+    arm.approach(down, 0.02, 0.005, 15.0)
+    assert wait(arm, Motion.IDLE).in_contact
+    arm.hold(PRESS, 200.0)
+    until(lambda: live.arm().state().motion is Motion.HOLDING)
+    time.sleep(1.5)
+    assert server.robot.program
+    # As a kill does: nothing is sent any more, not even a stop.
+    arm._closed.set()
+    arm._thread.join()
+    until(lambda: not server.robot.program)
+    assert live.arm().state().motion is Motion.STOPPED
+
+
+def test_a_program_that_somebody_has_ended_is_a_fault(cell, rig):
+    live, server, devices = rig
+    arm = devices.arm
+    arm.enable()
+    arm.move_joints(above(cell), 0.05)
+    until(lambda: live.arm().state().motion is Motion.MOVING)
+    time.sleep(0.5)
+    server.robot.unload()
+    until(lambda: arm.state().fault is not None)
+    assert arm.state().fault == "the program on the controller has ended"
+    arm.enable()
+    assert server.robot.program
+    arm.move_joints(above(cell), 1.0)
+    wait(arm, Motion.IDLE)
+
+
 def test_what_does_not_fit_is_refused_and_a_stop_always_goes(cell, rig):
     _, _, devices = rig
     arm = devices.arm

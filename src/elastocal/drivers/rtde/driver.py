@@ -74,6 +74,9 @@ _SOURCE = "rtde"
 _CHECKS = CommandChecks(_SOURCE)
 _CYCLE = 0.01
 """Cycle of the thread, in s of the wall."""
+_WATCHDOG = 1.0
+"""Signs of life a second, in Hz, without which the controller ends its program: force mode would go
+on when this program is killed, or its line is cut."""
 _TOOL_ACCELERATION = 0.5
 """In m/s²."""
 _STOP = 2.0
@@ -144,6 +147,8 @@ class UrArm:
         self._force_tcp = np.zeros(3)
         """Force on the robot that is asked for now."""
         self._halt = False
+        self._watched = False
+        """Whether the program that runs ends without our signs of life."""
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
@@ -184,7 +189,7 @@ class UrArm:
         if not self._control.isProgramRunning() and not self._control.reuploadScript():
             raise DeviceError(f"{_SOURCE} cannot be enabled: its program does not start")
         with self._lock:
-            self._fault = None
+            self._fault, self._watched = None, False
             if self._motion in _RESTING:
                 self._motion = Motion.IDLE
 
@@ -315,6 +320,7 @@ class UrArm:
             self._stop_now()
 
     def _cycle(self) -> None:
+        self._give_sign_of_life()
         with self._lock:
             halt, self._halt = self._halt, False
         if halt:
@@ -335,10 +341,24 @@ class UrArm:
             if after is not None:
                 self._motion = after
 
+    def _give_sign_of_life(self) -> None:
+        if not self._control.isProgramRunning():
+            if self._motion not in _RESTING:
+                raise DeviceError("the program on the controller has ended")
+        elif self._watched:
+            self._control.kickWatchdog()
+        else:
+            # A watchdog goes with its program: each has its own.
+            self._watched = self._control.setWatchdog(_WATCHDOG)
+
     def _stop_now(self) -> None:
         try:
-            self._end_force()
-            self._control.stopJ(_STOP, True)
+            if self._control.isProgramRunning():
+                self._end_force()
+                self._control.stopJ(_STOP, True)
+            else:
+                # The arm has stopped with its program, and force mode ended.
+                self._forced, self._force_tcp = False, np.zeros(3)
         except (RuntimeError, OSError) as error:
             with self._lock:
                 self._fail(str(error))

@@ -26,6 +26,7 @@ master board, Cartesian info. Not sent: kinematics, configuration, force mode, a
 """
 
 import contextlib
+import math
 import re
 import select
 import socket
@@ -97,6 +98,9 @@ class UrRobot:
         """Commands of the program that came and are not simulated."""
         self._offset = 0
         self._executing = self._by_line = False
+        self._heard, self._silence = time.monotonic(), math.inf
+        """When registers were written last, and how long without ends the program, in s of the
+        wall, as the line is."""
         self._waits_for: Callable[[], bool] | None = None
         self._finishes: Callable[[], bool] | None = None
         self._operations = self._writes = 0
@@ -116,7 +120,8 @@ class UrRobot:
             40: self._tell_tcp,
             43: self._tell_pose,
             47: self._tell_steady,
-            **dict.fromkeys((15, 16, 17, 20, 21, 24, 29, 35, 59, 65), _nothing),
+            **dict.fromkeys((15, 16, 17, 20, 21, 24, 29, 59, 65), _nothing),
+            35: self._watch,
             **dict.fromkeys((36, 37), lambda: self._put_int(1, 1)),
         }
 
@@ -124,6 +129,7 @@ class UrRobot:
 
     def take(self, values: Mapping[str, Value]) -> None:
         """Write input registers."""
+        self._heard = time.monotonic()
         self._registers.inputs.update(values)
 
     def run(self, script: str) -> str:
@@ -184,6 +190,7 @@ class UrRobot:
         self.program = match[1] if match else "unnamed"
         self._executing, self._waits_for, self._finishes = False, None, None
         self._registers.inputs.clear()
+        self._silence = math.inf
         self._set_progress(False)
         if self._arm.state().motion in (Motion.DISARMED, Motion.STOPPED):
             self._arm.enable()
@@ -229,6 +236,7 @@ class UrRobot:
 
     def cycle(self) -> None:
         """Run the program for one cycle of the controller."""
+        self._look_at_watchdog()
         if not self.program:
             return
         if self._by_line:
@@ -328,6 +336,14 @@ class UrRobot:
         if not self._idle():
             self._arm.stop()
             self._arm.enable()
+
+    def _look_at_watchdog(self) -> None:
+        if time.monotonic() - self._heard > self._silence:
+            self.unload()
+
+    def _watch(self) -> None:
+        frequency = self._double(0)
+        self._silence = 1.0 / frequency if frequency > 0.0 else math.inf
 
     def _zero_sensor(self) -> None:
         wrench = self._live.wrench()
