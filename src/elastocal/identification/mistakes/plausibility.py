@@ -294,13 +294,15 @@ def _clipped(robot: Robot, readings: Readings) -> Iterator[Finding]:
     sizes[phrase("the force")] = np.linalg.norm(readings.force, axis=1)
     tied = {what: _tied_at_end(each) for what, each in sizes.items()}
     what = max(tied, key=lambda each: np.count_nonzero(tied[each]))
-    largest = float(sizes[what].max())
+    at_end, largest, case = tied[what], float(sizes[what].max()), readings.load_case
+    if not at_end.any():
+        return
     # Weights, and forces that were asked for, are the same in each load case by their nature.
-    if tied[what].any() and all(
-        _varies(values[tied[what]], readings.load_case[tied[what]], _TIED * largest)
-        for values in (own["tcp"], readings.force)
-    ):
-        count = np.count_nonzero(tied[what])
+    least = _TIED * largest
+    if not at_end.all() and not _varies(sizes[what][~at_end, None], case[~at_end], least):
+        return
+    if all(_varies(each[at_end], case[at_end], least) for each in (own["tcp"], readings.force)):
+        count = np.count_nonzero(at_end)
         yield CLIPPED(what=what, size=largest, count=count, total=len(readings))
 
 
@@ -314,7 +316,7 @@ def _tied_at_end(sizes: FloatArray) -> BoolArray:
 
 
 def _varies(values: FloatArray, case: NDArray[np.str_], least: float) -> bool:
-    """Return whether vectors, shape (reading, 3), of any load case differ by more than that."""
+    """Return whether values, shape (reading, n), of any load case differ by more than that."""
     return any(np.ptp(values[case == each], axis=0).max() > least for each in np.unique(case))
 
 
