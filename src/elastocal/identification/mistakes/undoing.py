@@ -206,6 +206,8 @@ _SMALLEST = 0.05
 """Part of the median force below which a constant is not reported."""
 _UPRIGHT = 0.95
 """Cosine of its angle with the vertical from which a constant force may be a weight."""
+_HEAVY = 0.7
+"""Part of the median force above which it is hardly one."""
 _LEAST_GAIN = 0.05
 _LONGEST_LAG = 2.0
 """Factor of the change since the load case before that is still believed."""
@@ -401,6 +403,8 @@ def _constants(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
         down = _along(offset, np.array(rows.model.robot.gravity))
         if frame == "base" and abs(down) > _UPRIGHT:
             kind = "tool weight left in?" if down > 0.0 else "tool weight subtracted twice?"
+            if np.linalg.norm(offset) > _HEAVY * median_norm(rows.readings.force):
+                kind += " Or zeroed at the wrong moment?"
         x, y, z = offset
         message = (
             f"the forces seem to contain a constant of ({x:.0f}, {y:.0f}, {z:.0f}) N in the"
@@ -651,7 +655,7 @@ _LEFT_APART = 0.55
 """Part of the error that springs of both parts may leave: regions of the tooling differ, too."""
 _TRIED = 5
 """Readings that are judged at left-out poses, the best first."""
-_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.04), (1.0, 1e-5, 0.05))
+_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.04), (np.inf, 1e-5, 0.05))
 """Remaining part of the error, the likelihood below which the gain is not chance, and the part of
 the deflections that estimated numbers must change. Estimated numbers explain part of the model
 error, in correct data too: the less they explain, the smaller the likelihood and the larger the
