@@ -655,7 +655,7 @@ _LEFT_APART = 0.55
 """Part of the error that springs of both parts may leave: regions of the tooling differ, too."""
 _TRIED = 5
 """Readings that are judged at left-out poses, the best first."""
-_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.04), (np.inf, 1e-5, 0.05))
+_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.05), (np.inf, 1e-5, 0.05))
 """Remaining part of the error, the likelihood below which the gain is not chance, and the part of
 the deflections that estimated numbers must change. Estimated numbers explain part of the model
 error, in correct data too: the less they explain, the smaller the likelihood and the larger the
