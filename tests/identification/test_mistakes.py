@@ -130,6 +130,15 @@ def test_a_zero_that_is_off_at_the_last_poses_alone_is_named_with_them():
     assert "at poses 11 to 14 the zero of joint_a2 is" in str(found)
 
 
+def test_readings_that_contradict_for_no_known_reason_are_named_by_their_poses():
+    made = campaign(ON_RAIL)
+    there = np.isin(made.readings.pose, (2, 3, 6))[:, None]
+    moved = made.readings.controller_displacement
+    bad = changed(made, controller_displacement=np.where(there, moved[:, ::-1] * [1, -2, 1], moved))
+    (found,) = find_implausible(bad.robot, bad.readings, bad.marker)
+    assert str(found).startswith("at poses 2, 3, 6 joints and controller displacement contradict")
+
+
 def test_weights_and_forces_that_were_asked_for_are_not_clipped():
     made = campaign(ON_RAIL)
     of_case = np.unique(made.readings.load_case, return_inverse=True)[1]

@@ -214,9 +214,9 @@ REPEATED = Kind(
 )
 CLIPPED = Kind(
     "mistakes.clipped-forces",
-    "{what} stops at {size} N: {count} of {total} readings are as large to within 0.01 %, no"
-    " smaller force comes again so often; is the sensor at the end of its range? Press with less,"
-    " or take a sensor with a larger range",
+    "{what} stops at {size} N: {count} of {total} readings are as large to within 0.01 %, and no"
+    " smaller force is so common; is the sensor at the end of its range? Press with less, or take"
+    " a sensor with a larger range",
     shown={"size": as_number(".0f")},
 )
 ROUNDED = Kind(
@@ -287,7 +287,9 @@ def _clipped(robot: Robot, readings: Readings) -> Iterator[Finding]:
     frames = sensor_frames(robot, readings.joint_position)
     own = {name: np.einsum("rji,rj->ri", X, readings.force) for name, X in frames.items()}
     sizes = {
-        f"force_{letter} in the {name} frame": np.abs(values[:, axis])
+        phrase("force_{axis} in the {frame} frame", axis=letter, frame=name): np.abs(
+            values[:, axis]
+        )
         for name, values in own.items()
         for axis, letter in enumerate(AXES)
     }
