@@ -5,7 +5,9 @@ import pytest
 
 from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import ConventionError
+from elastocal.findings import Grade
 from elastocal.identification import FitOptions, calibrate
+from elastocal.identification.mistakes import find_implausible, find_undone
 from support.by_day import some_by_day
 from support.campaigns import Sound, campaign, sounds
 from support.further_mistakes import FURTHER
@@ -34,6 +36,8 @@ REFUSED = (
     "zero of the third joint off, controller displacement computed",
     "tcp 100 mm off along z",
     "all of another base, upside down",
+    "joints of two poses exchanged",
+    "joints and references of two poses exchanged",
 )
 WARNED = (
     "force in kgf",
@@ -46,6 +50,8 @@ WARNED = (
     "forces read before they settled",
     "station moved in the middle third",
     "forces in lbf from half way on",
+    "drift of the force zero by 30 % of base",
+    "sensor turned by 90 deg from half way on",
 )
 
 
@@ -76,6 +82,77 @@ def test_conventions_that_are_trusted_turn_a_refusal_into_a_warning():
     options = FitOptions(draws=40, trust_conventions=True)
     found = calibrate(model, bad.readings, rng, options, marker_offset=bad.marker)
     assert any("fitted in spite of this: joint_a1" in text for text in found.warnings)
+
+
+def seen_at_once(name):
+    """Return what readings of a campaign with a mistake show without a fit."""
+    bad = KNOWN[name].make(campaign(ON_RAIL))
+    return find_implausible(bad.robot, bad.readings, bad.marker)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("forces clipped at 80 % of the largest", "the force stops at"),
+        ("force axes of tcp clipped at 80 %", "force_z in the tcp frame stops at"),
+        ("force axes of base clipped at 80 %", "force_z in the base frame stops at"),
+        ("joints of two poses exchanged", "the joints of poses 4 and 12 look exchanged"),
+        ("joints and references of two poses exchanged", "poses 4 and 12 look exchanged"),
+        (
+            "second joint 2 deg off under load from the third pose on",
+            "joint_a2 reads 2 deg more under load than at the reference",
+        ),
+    ],
+)
+def test_what_readings_show_by_themselves_is_named_with_what_to_do(name, said):
+    (found,) = seen_at_once(name)
+    assert said in str(found)
+
+
+def test_joints_of_single_rows_that_stand_elsewhere_are_named_by_pose_and_load_case():
+    made = campaign(ON_RAIL)
+    q = made.readings.joint_position.copy()
+    q[[8, 17]] = q[[17, 8]]
+    (found,) = find_implausible(made.robot, changed(made, joint_position=q).readings, made.marker)
+    a, b = (f"pose {made.readings.pose[row]} ({made.readings.load_case[row]})" for row in (8, 17))
+    assert f"joints look like those of other rows: at {a} those of {b}" in str(found)
+    assert found.grade is Grade.REFUSAL
+
+
+def test_a_zero_that_is_off_at_the_last_poses_alone_is_named_with_them():
+    made = campaign(ON_RAIL)
+    off = np.radians(2.0) * (np.arange(7) == 2) * (made.readings.pose >= 11)[:, None]
+    moved = {
+        name: getattr(made.readings, name) + off
+        for name in ("joint_position", "reference_joint_position")
+    }
+    (found,) = find_implausible(made.robot, changed(made, **moved).readings, made.marker)
+    assert "at poses 11 to 14 the zero of joint_a2 is" in str(found)
+
+
+def test_readings_that_contradict_for_no_known_reason_are_named_by_their_poses():
+    made = campaign(ON_RAIL)
+    there = np.isin(made.readings.pose, (2, 3, 6))[:, None]
+    moved = made.readings.controller_displacement
+    bad = changed(made, controller_displacement=np.where(there, moved[:, ::-1] * [1, -2, 1], moved))
+    (found,) = find_implausible(bad.robot, bad.readings, bad.marker)
+    assert str(found).startswith("at poses 2, 3, 6 joints and controller displacement contradict")
+
+
+def test_weights_and_forces_that_were_asked_for_are_not_clipped():
+    made = campaign(ON_RAIL)
+    of_case = np.unique(made.readings.load_case, return_inverse=True)[1]
+    hung = np.array([0.0, 0.0, -1.0]) * (200.0 + 100.0 * np.minimum(of_case, 3))[:, None]
+    R = made.robot.forward(made.readings.joint_position)[:, :3, :3]
+    for force in (hung, np.einsum("rij,rj->ri", R, hung)):
+        found = find_implausible(made.robot, changed(made, force=force).readings, made.marker)
+        assert not any("stops at" in str(each) for each in found)
+
+
+def test_a_turn_from_a_pose_on_is_named_with_the_pose():
+    made = KNOWN["force_x reversed from half way on"].make(campaign(ON_RAIL))
+    (found,) = find_undone(made.robot, made.readings, made.marker)
+    assert "from pose 8 on force_x in the tcp frame looks reversed" in str(found)
 
 
 @pytest.mark.slow

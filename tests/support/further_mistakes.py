@@ -21,6 +21,7 @@ from support.mistakes import (
     forces,
     joints,
     marker,
+    order,
     picked,
     rows,
     times,
@@ -96,6 +97,66 @@ def saturated(made: Made) -> Made:
     R = axes(made, "tcp")
     own = np.einsum("rji,rj->ri", R, made.readings.force)
     return changed(made, force=np.einsum("rij,rj->ri", R, change(own)))
+
+
+def clipped(frame: str):
+    """Return a mistake of a sensor whose range ends at eight tenths of the largest force."""
+
+    def make(made: Made) -> Made:
+        R, force = axes(made, frame), made.readings.force
+        own = np.einsum("rji,rj->ri", R, force)
+        limit = 0.8 * np.abs(own).max()
+        return changed(made, force=np.einsum("rij,rj->ri", R, np.clip(own, -limit, limit)))
+
+    return make
+
+
+def shortened(made: Made) -> Made:
+    """Return forces that are no longer than eight tenths of the longest."""
+    size = np.linalg.norm(made.readings.force, axis=1)
+    factor = np.minimum(1.0, 0.8 * size.max() / size)
+    return changed(made, force=made.readings.force * factor[:, None])
+
+
+def upright_drift(made: Made) -> Made:
+    """Return forces whose zero drifts along z of base, as that of a sensor under the part."""
+    size = 0.3 * np.median(np.linalg.norm(made.readings.force, axis=1))
+    return changed(
+        made, force=made.readings.force + size * order(made)[:, None] * np.array([0.0, 0.0, 1.0])
+    )
+
+
+def zeroed_at_first_press(made: Made) -> Made:
+    return changed(made, force=made.readings.force - made.readings.force[0])
+
+
+def two_poses(values: np.ndarray) -> np.ndarray:
+    """Return values, shape (pose, load case, column), with two poses exchanged."""
+    values = values.copy()
+    values[[4, -3]] = values[[-3, 4]]
+    return values
+
+
+def of_two_poses(made: Made) -> Made:
+    """Return joints, of the reference too, that stand in each other's rows."""
+    for name in ("joint_position", "reference_joint_position"):
+        made = rows(name, two_poses)(made)
+    return made
+
+
+def loaded_from_third_pose(made: Made) -> Made:
+    """Return a second joint that reads 2 deg more under load from the third pose on."""
+
+    def change(values: np.ndarray) -> np.ndarray:
+        values = values.copy()
+        values[2:, :, made.robot.external_axes + 1] += np.radians(2.0)
+        return values
+
+    return rows("joint_position", change)(made)
+
+
+def off_along_z(made: Made) -> Made:
+    return replace(made, marker=made.marker + np.array([0.0, 0.0, 0.15]))
 
 
 def one_off(joint: int, gain: float):
@@ -282,4 +343,23 @@ FURTHER = (
     Mistake("tcp 50 mm aside", another_tcp(0.05, 0.0, 0.0), ("tcp",)),
     Mistake("marker offset in inches", marker_lever(1 / 25.4), ("marker",)),
     Mistake("marker offset reversed", marker_lever(-1.0), ("marker",)),
+    Mistake("forces clipped at 80 % of the largest", shortened, ("the end of its range",)),
+    Mistake("force axes of tcp clipped at 80 %", clipped("tcp"), ("the end of its range",)),
+    Mistake("force axes of base clipped at 80 %", clipped("base"), ("the end of its range",)),
+    Mistake("drift of the force zero by 30 % of base", upright_drift, ("force drifts",)),
+    Mistake(
+        "zero of the force taken in the first press",
+        zeroed_at_first_press,
+        ("zeroed at the wrong", "zeroed in contact"),
+    ),
+    Mistake(
+        "joints of two poses exchanged", rows("joint_position", two_poses), ("joints of poses",)
+    ),
+    Mistake("joints and references of two poses exchanged", of_two_poses, ("joints of poses",)),
+    Mistake(
+        "second joint 2 deg off under load from the third pose on",
+        loaded_from_third_pose,
+        ("a2 reads", "lift_joint reads"),
+    ),
+    Mistake("marker 150 mm off along z", off_along_z, ("marker seems to sit",)),
 )

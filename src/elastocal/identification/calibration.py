@@ -432,9 +432,10 @@ def _fitted_mistakes(
     """Return mistakes that fits show, beside those that readings show by themselves."""
     if options.free_frame != "none" or any(each.grade is Grade.REFUSAL for each in seen):
         return []
-    # Other readings of a marker's columns can be tried where there is a marker throughout.
-    held = readings.by_contact.any()
-    found = () if held else find_undone(model.robot, readings, marker_offset)
+    held = readings.by_contact
+    alike = held.all() or not held.any()
+    at = None if held.all() else marker_offset
+    found = find_undone(model.robot, readings, at, options.contact) if alike else ()
     if not (seen or found):
         found = tuple(find_wrong_units(model.robot, readings, marker_offset))
     return _stated(found, options)

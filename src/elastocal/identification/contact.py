@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
@@ -419,12 +419,31 @@ def contact_columns(
 
 
 def _columns(R: FloatArray, readings: Readings) -> FloatArray:
-    """Return the columns of both compliances, shape (reading, 3, 2), in m per m/N."""
+    """Return the columns of both compliances under the force since the light touch."""
     df = readings.force.copy()
     if readings.reference_force is not None:
         df -= readings.reference_force
-    along = np.einsum("ri,ri->r", R[:, :, 2], df)[:, None] * R[:, :, 2]
-    return np.asarray(np.stack([along, df - along], axis=2) * readings.disks[:, None, None])
+    return compliance_columns(R, df, readings.disks)
+
+
+def compliance_columns(R: FloatArray, force: FloatArray, disks: NDArray[np.int8]) -> FloatArray:
+    """Return the columns of the normal and the lateral compliance, in m per m/N.
+
+    Parameters
+    ----------
+    R : ndarray, shape (reading, 3, 3)
+        Axes of the tcp in base; the third is the normal of the surface.
+    force : ndarray, shape (reading, 3)
+        Force on the tool since the light touch, in base, in N.
+    disks : ndarray of int, shape (reading,)
+        Disks between tool and tooling.
+
+    Returns
+    -------
+    ndarray, shape (reading, 3, 2)
+    """
+    along = np.einsum("ri,ri->r", R[:, :, 2], force)[:, None] * R[:, :, 2]
+    return np.asarray(np.stack([along, force - along], axis=2) * disks[:, None, None])
 
 
 def with_doubled(contact: Contact, robot: Robot, readings: Readings, arm: FloatArray) -> Contact:

@@ -19,7 +19,7 @@ from elastocal.dataset import Readings
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.contact import counts_from_other_stack
 from elastocal.robot import Robot, other_joint_readings
-from elastocal.wording import phrase, spans
+from elastocal.wording import spans
 
 AXES = ("x", "y", "z")
 MM = as_number(".2f", 1e3)
@@ -75,6 +75,14 @@ CONTRADICTION = Kind(
     "joints and controller displacement contradict each other: {apart} mm apart, of"
     " {size} mm{still}; another robot of the family, joints of other rows, or a"
     " displacement in another frame?",
+    shown={"apart": MM, "size": MM},
+)
+
+
+SOME_CONTRADICT = Kind(
+    "mistakes.some-joints-contradict",
+    "at poses {poses} joints and controller displacement contradict each other: {apart} mm apart,"
+    " of {size} mm; joints of other rows, or was a zero or a tool changed there?",
     shown={"apart": MM, "size": MM},
 )
 
@@ -142,8 +150,7 @@ def _contradictions_of_some(
         left, message = found[0]
         yield UNDONE(message=message, left=left, apart=apart, size=size)
     elif apart > max(_APART * size, _COARSE):
-        still = phrase(" at poses {poses}", poses=spans(poses.tolist()))
-        yield CONTRADICTION(apart=apart, size=size, still=still)
+        yield SOME_CONTRADICT(apart=apart, size=size, poses=spans(poses.tolist()))
 
 
 def _likeliest(

@@ -214,9 +214,9 @@ REPEATED = Kind(
 )
 CLIPPED = Kind(
     "mistakes.clipped-forces",
-    "{what} stops at {size} N: {count} of {total} readings are as large to within 0.01 %, no"
-    " smaller force comes again so often; is the sensor at the end of its range? Press with less,"
-    " or take a sensor with a larger range",
+    "{what} stops at {size} N: {count} of {total} readings are as large to within 0.01 %, and no"
+    " smaller force is so common; is the sensor at the end of its range? Press with less, or take"
+    " a sensor with a larger range",
     shown={"size": as_number(".0f")},
 )
 ROUNDED = Kind(
@@ -287,20 +287,24 @@ def _clipped(robot: Robot, readings: Readings) -> Iterator[Finding]:
     frames = sensor_frames(robot, readings.joint_position)
     own = {name: np.einsum("rji,rj->ri", X, readings.force) for name, X in frames.items()}
     sizes = {
-        f"force_{letter} in the {name} frame": np.abs(values[:, axis])
+        phrase("force_{axis} in the {frame} frame", axis=letter, frame=name): np.abs(
+            values[:, axis]
+        )
         for name, values in own.items()
         for axis, letter in enumerate(AXES)
     }
     sizes[phrase("the force")] = np.linalg.norm(readings.force, axis=1)
     tied = {what: _tied_at_end(each) for what, each in sizes.items()}
     what = max(tied, key=lambda each: np.count_nonzero(tied[each]))
-    largest = float(sizes[what].max())
+    at_end, largest, case = tied[what], float(sizes[what].max()), readings.load_case
+    if not at_end.any():
+        return
     # Weights, and forces that were asked for, are the same in each load case by their nature.
-    if tied[what].any() and all(
-        _varies(values[tied[what]], readings.load_case[tied[what]], _TIED * largest)
-        for values in (own["tcp"], readings.force)
-    ):
-        count = np.count_nonzero(tied[what])
+    least = _TIED * largest
+    if not at_end.all() and not _varies(sizes[what][~at_end, None], case[~at_end], least):
+        return
+    if all(_varies(each[at_end], case[at_end], least) for each in (own["tcp"], readings.force)):
+        count = np.count_nonzero(at_end)
         yield CLIPPED(what=what, size=largest, count=count, total=len(readings))
 
 
@@ -314,7 +318,7 @@ def _tied_at_end(sizes: FloatArray) -> BoolArray:
 
 
 def _varies(values: FloatArray, case: NDArray[np.str_], least: float) -> bool:
-    """Return whether vectors, shape (reading, 3), of any load case differ by more than that."""
+    """Return whether values, shape (reading, n), of any load case differ by more than that."""
     return any(np.ptp(values[case == each], axis=0).max() > least for each in np.unique(case))
 
 

@@ -29,6 +29,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, ModelPosture, bearing
 from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
+from elastocal.identification.contact import Contact, compliance_columns
 from elastocal.identification.conventions import FORCE_MISTAKES
 from elastocal.identification.displacement import reference_joints
 from elastocal.identification.mistakes._motion import AXES, median_norm
@@ -83,29 +84,41 @@ class Rows:
     """Readings that are no blunders, shape (reading,)."""
 
     @classmethod
-    def of(cls, robot: Robot, readings: Readings, marker_offset: ArrayLike | None) -> "Rows":
-        """Return the rows of readings, of the arm with the springs of its bearings."""
+    def of(
+        cls,
+        robot: Robot,
+        readings: Readings,
+        marker_offset: ArrayLike | None,
+        contact: Contact | None = None,
+    ) -> "Rows":
+        """Return the rows of readings, of the arm with the springs of its bearings.
+
+        Columns of a contact that holds the tool follow; what its rows share is small beside what
+        mistakes change, and is left out.
+        """
         model = ElasticModel(robot, bearing(robot))
         zero = reference_joints(robot, readings)
         readings = replace(readings, reference_joint_position=zero)
-        problem = build(model, readings, _TRACKER, marker_offset)
+        options = replace(_TRACKER, contact=contact)
+        problem = replace(build(model, readings, options, marker_offset), shared=None)
+        R = robot.forward(readings.joint_position)[:, :3, :3]
         at, before = model.at(readings.joint_position), model.at(zero)
 
         def unit(posture: ModelPosture) -> FloatArray:
             shape = readings.force.shape
-            each = [
-                model.observation_blocks(
-                    posture, np.broadcast_to(e, shape), marker_offset=marker_offset
-                )
-                for e in np.eye(3)
-            ]
+            each = []
+            for axis in np.eye(3):
+                e = np.broadcast_to(axis, shape)
+                springs = model.observation_blocks(posture, e, marker_offset=marker_offset)
+                held = compliance_columns(R, e, readings.disks)[:, :, : len(problem.contact)]
+                each.append(np.concatenate([springs, held], axis=2))
             return np.stack(each, axis=2)
 
         light = readings.reference_force
         reference = unit(before) if light is not None else np.zeros(0)
         kept = ~screen(problem).blunder
         place = np.zeros(3) if marker_offset is None else np.asarray(marker_offset, dtype=float)
-        moved = [build(model, readings, _TRACKER, place + e).O - problem.O for e in np.eye(3)]
+        moved = [build(model, readings, options, place + e).O - problem.O for e in np.eye(3)]
         lever = np.stack(moved, axis=2)
         bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), lever, kept)
         return replace(bare, rest=problem.O - bare.blocks(readings.force, light))
@@ -153,7 +166,7 @@ def beside(problem: Problem, columns: FloatArray) -> Problem:
         O=np.concatenate([problem.O, columns], axis=2),
         lower=np.concatenate([problem.lower, -free]),
         upper=np.concatenate([problem.upper, free]),
-        prior_rows=np.zeros((0, problem.columns + count + 1)),
+        prior_rows=np.insert(problem.prior_rows, [problem.columns] * count, 0.0, axis=1),
         size=np.concatenate([np.broadcast_to(problem.size, problem.lower.shape), size]),
     )
 
@@ -193,7 +206,11 @@ _SMALLEST = 0.05
 """Part of the median force below which a constant is not reported."""
 _UPRIGHT = 0.95
 """Cosine of its angle with the vertical from which a constant force may be a weight."""
+_HEAVY = 0.7
+"""Part of the median force above which it is hardly one."""
 _LEAST_GAIN = 0.05
+_LONGEST_LAG = 2.0
+"""Factor of the change since the load case before that is still believed."""
 _FARTHEST = 2.0
 """Distance in m between two places of a marker that is still believed."""
 _ANGLES = (90, -90, 180, 30, -30, 45, -45, 60, -60, 120, -120, 135, -135, 150, -150)
@@ -201,17 +218,28 @@ _ANGLES = (90, -90, 180, 30, -30, 45, -45, 60, -60, 120, -120, 135, -135, 150, -
 
 
 def other_readings(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
-    """Yield every other reading of the data, the plainest first."""
-    yield from _turned_forces(rows)
-    yield from _turned_markers(rows)
-    yield from _turned_for_a_part(rows)
-    yield from _other_rows(rows)
-    yield from _constants(rows, compliance)
-    yield from _drifts(rows, compliance)
-    yield from _gains(rows, compliance)
-    yield from _lags(rows, compliance)
-    yield from _marker_places(rows, compliance)
-    yield from _any_marker_frame(rows)
+    """Yield every other reading of the data, the plainest first; of markers where there are any."""
+    each = (
+        (_turned_forces(rows), False),
+        (_turned_markers(rows), True),
+        (_turned_for_a_part(rows, _turned_forces(rows, plain=True)), False),
+        (_turned_for_a_part(rows, _turned_markers(rows, plain=True)), True),
+        (_other_force_rows(rows), False),
+        (_other_marker_rows(rows), True),
+        (_constants(rows, compliance), False),
+        (_marker_drifts(rows), True),
+        (_force_drifts(rows, compliance), False),
+        (_force_gains(rows, compliance), False),
+        (_marker_gains(rows), True),
+        (_force_lag(rows, compliance), False),
+        (_marker_lag(rows), True),
+        (_marker_places(rows, compliance), True),
+        (_any_marker_frame(rows), True),
+    )
+    seen = not rows.readings.by_contact.any()
+    for readings, of_marker in each:
+        if seen or not of_marker:
+            yield from readings
 
 
 def _turned_forces(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
@@ -278,10 +306,10 @@ def _mixed(whole: str, known: Sequence[FloatArray]) -> Iterator[tuple[str, Float
                 yield f"x, y, z of {whole} look mixed up: they read as {read}", A
 
 
-def _turned_for_a_part(rows: Rows) -> Iterator[OtherReading]:
-    """Yield readings of forces and of markers that are turned up to a pose, or from one on.
+def _turned_for_a_part(rows: Rows, turns: Iterator[OtherReading]) -> Iterator[OtherReading]:
+    """Yield the reading that is turned before a pose, or from one on, and leaves least.
 
-    Of each the turn and the pose that leave least: a plug was changed in a break.
+    A plug was changed in a break.
     """
     labels, first = np.unique(rows.readings.pose, return_index=True)
     order = labels[np.argsort(first)]
@@ -307,18 +335,22 @@ def _turned_for_a_part(rows: Rows) -> Iterator[OtherReading]:
     if not starts:
         return
     coarse = sorted({starts[round(part * (len(starts) - 1))] for part in _PARTS})
-    for turns in (_turned_forces(rows, plain=True), _turned_markers(rows, plain=True)):
-        each = product(turns, coarse, (True, False))
-        turn, _, late = min(each, key=lambda tried: left(partly(*tried)))
-        yield min((partly(turn, start, late) for start in starts), key=left)
+    each = product(turns, coarse, (True, False))
+    turn, _, late = min(each, key=lambda tried: left(partly(*tried)))
+    yield min((partly(turn, start, late) for start in starts), key=left)
 
 
-def _other_rows(rows: Rows) -> Iterator[OtherReading]:
-    """Yield readings of forces and markers in another order."""
+def _other_force_rows(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of forces in another order."""
     r, d = rows.readings, rows.problem.d
     for message, order in _orders(r):
         blocks = rows.blocks(r.force[order], r.reference_force)
         yield OtherReading((f"forces are {message}"), blocks, d, _CLEAR, certain=True)
+
+
+def _other_marker_rows(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of markers in another order, or counted from elsewhere."""
+    r = rows.readings
     for shift, which in _SHIFTS:
         order = np.roll(np.arange(len(r)), shift)
         moved = r.marker_displacement[order] - r.controller_displacement
@@ -371,6 +403,8 @@ def _constants(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
         down = _along(offset, np.array(rows.model.robot.gravity))
         if frame == "base" and abs(down) > _UPRIGHT:
             kind = "tool weight left in?" if down > 0.0 else "tool weight subtracted twice?"
+            if np.linalg.norm(offset) > _HEAVY * median_norm(rows.readings.force):
+                kind += " Or zeroed at the wrong moment?"
         x, y, z = offset
         message = (
             f"the forces seem to contain a constant of ({x:.0f}, {y:.0f}, {z:.0f}) N in the"
@@ -408,9 +442,9 @@ def _offset(
     return offset, blocks
 
 
-def _drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
-    """Yield readings without what grew, or came at once, in the order of time."""
-    t = np.linspace(0.0, 1.0, len(rows.readings))
+def _marker_drifts(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of markers without what grew, or came at once, in the order of time."""
+    t = _time(rows)
     d, eye = rows.problem.d, np.eye(3)
     steps = [(part, (t > part).astype(float)) for part in (0.25, 0.33, 0.42, 0.5, 0.58, 0.67, 0.75)]
     whiles = [
@@ -431,8 +465,17 @@ def _drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
             _IN_TIME,
             estimated=True,
         )
+
+
+def _time(rows: Rows) -> FloatArray:
+    """Return the place of each reading in the campaign, from 0 to 1."""
+    return np.linspace(0.0, 1.0, len(rows.readings))
+
+
+def _force_drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings of forces without a constant that grew in the order of time."""
     for frame in ("tcp", "base"):
-        found = _offset(rows, compliance, rows.frames[frame], t)
+        found = _offset(rows, compliance, rows.frames[frame], _time(rows))
         if found is None:
             continue
         yield OtherReading(
@@ -441,14 +484,14 @@ def _drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
                 " campaign: zero the sensor before each pose"
             ).format(frame=frame, **_parts(found[0])),
             found[1],
-            d,
+            rows.problem.d,
             _IN_TIME,
             estimated=True,
         )
 
 
-def _gains(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
-    """Yield readings with one axis of force or marker scaled."""
+def _force_gains(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings with one axis of the force scaled."""
     for frame, X in rows.frames.items():
         for axis, letter in enumerate(AXES):
             found = _force_gain(rows, compliance, X[:, :, axis])
@@ -464,6 +507,10 @@ def _gains(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
                 _FITTED,
                 estimated=True,
             )
+
+
+def _marker_gains(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings with one axis of the marker scaled, or all."""
     columns = (
         (f"marker_displacement_{each}", axis) for each, axis in zip(AXES, np.eye(3), strict=True)
     )
@@ -505,31 +552,42 @@ def _force_gain(
     return gain, blocks
 
 
-def _lags(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
-    """Yield readings that hold no part of what was read in the load case before."""
-    r, d = rows.readings, rows.problem.d
-    force, marker = (
-        np.where(_begins(r)[:, None], 0.0, values - np.roll(values, 1, axis=0))
-        for values in (r.force, r.marker_displacement)
+def _force_lag(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+    """Yield readings of forces without a part of what was read in the load case before."""
+    r = rows.readings
+    change = _since_case_before(r, r.force)
+    late = _lag(rows, np.einsum("rikn,rk,n->ri", rows.basis, change, compliance))
+    if 0.0 < late < _LONGEST_LAG:
+        blocks = rows.blocks(r.force + late * change, r.reference_force)
+        message = _lagging("forces", late)
+        yield OtherReading(message, blocks, rows.problem.d, _FITTED, estimated=True)
+
+
+def _marker_lag(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of markers without a part of what was read in the load case before."""
+    change = _since_case_before(rows.readings, rows.readings.marker_displacement)
+    late = _lag(rows, -change)
+    if 0.0 < late < _LONGEST_LAG:
+        d = rows.problem.d + late * change
+        message = _lagging("marker displacements", late)
+        yield OtherReading(message, rows.problem.O, d, _FITTED, estimated=True)
+
+
+def _since_case_before(r: Readings, values: FloatArray) -> FloatArray:
+    """Return the change of values, shape (reading, 3), since the load case before at the pose."""
+    return np.where(_begins(r)[:, None], 0.0, values - np.roll(values, 1, axis=0))
+
+
+def _lag(rows: Rows, column: FloatArray) -> float:
+    """Return the factor of a column, shape (reading, 3), that is fitted beside the springs."""
+    return float(fitted(beside(rows.problem, column[..., None]).take(rows.kept))[-1])
+
+
+def _lagging(name: str, late: float) -> str:
+    return (
+        f"{name} lag: they seem to hold {late / (1.0 + late):.0%} of the load case before; let each"
+        " press settle, and read all devices at the same time"
     )
-    softer = np.einsum("rikn,rk,n->ri", rows.basis, force, compliance)
-    for name, change, column in (
-        ("forces", force, softer),
-        ("marker displacements", marker, -marker),
-    ):
-        widened = beside(rows.problem, column[..., None]).take(rows.kept)
-        late = float(fitted(widened)[-1])
-        if not 0.0 < late < 2.0:
-            continue
-        message = (
-            f"{name} lag: they seem to hold {late / (1.0 + late):.0%} of the load case before; let"
-            " each press settle, and read all devices at the same time"
-        )
-        if name == "forces":
-            blocks = rows.blocks(r.force + late * change, r.reference_force)
-            yield OtherReading(message, blocks, d, _FITTED, estimated=True)
-        else:
-            yield OtherReading(message, rows.problem.O, d + late * change, _FITTED, estimated=True)
 
 
 def _marker_places(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
@@ -597,7 +655,7 @@ _LEFT_APART = 0.55
 """Part of the error that springs of both parts may leave: regions of the tooling differ, too."""
 _TRIED = 5
 """Readings that are judged at left-out poses, the best first."""
-_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.04), (1.0, 1e-5, 0.05))
+_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.05), (np.inf, 1e-5, 0.05))
 """Remaining part of the error, the likelihood below which the gain is not chance, and the part of
 the deflections that estimated numbers must change. Estimated numbers explain part of the model
 error, in correct data too: the less they explain, the smaller the likelihood and the larger the
@@ -611,7 +669,10 @@ _ALIKE = 1.25
 
 
 def find_undone(
-    robot: Robot, readings: Readings, marker_offset: ArrayLike | None = None
+    robot: Robot,
+    readings: Readings,
+    marker_offset: ArrayLike | None = None,
+    contact: Contact | None = None,
 ) -> tuple[Finding, ...]:
     """Return the mistake whose undoing explains readings far better; none of sound readings.
 
@@ -621,12 +682,14 @@ def find_undone(
         With joints in the robot's order.
     marker_offset : array_like, shape (3,), optional
         Marker in the tcp frame, in m.
+    contact : Contact, optional
+        What is known of the tooling that holds the tool, where no tracker measured.
     """
     poses = len(np.unique(readings.pose))
     if poses < _FEWEST:
         return ()
     try:
-        rows = Rows.of(robot, readings, marker_offset)
+        rows = Rows.of(robot, readings, marker_offset, contact)
     except IdentificationError:
         return ()
     stated = rows.problem.take(rows.kept)
@@ -736,12 +799,14 @@ def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
         return None
     order = blocks[np.argsort(first)]
     place = np.argsort(np.argsort(first))[np.searchsorted(blocks, stated.block)]
-    before = leave_poses_out(stated).error
+    # What is known beforehand would count for one fit and not for the other.
+    free = replace(stated, prior_rows=np.zeros((0, stated.columns + 1)))
+    before = leave_poses_out(free).error
     found = []
     for part in _PARTS:
         late = place >= round(part * len(order))
-        after = leave_poses_out(apart(stated, late)).error
-        left, chance = _left(stated, before, after)
+        after = leave_poses_out(apart(free, late)).error
+        left, chance = _left(free, before, after)
         if left < _LEFT_APART and chance < _believed(left, True)[0]:
             found.append((left, late, after))
     if not found:
