@@ -64,6 +64,7 @@ def test_of_two_flanges_the_one_whose_z_points_out_of_the_arm_carries_the_tool(
     facts = json.loads(elastocal("check", staeubli, "--json").out)
     assert facts["tcp"] == "tool0"
     assert facts["z_of_tcp"] == "out of the arm, along joint_6"
+    assert facts["inverse_kinematics"] == "closed form of arms with a spherical wrist"
     assert elastocal("new", "--robot", staeubli, "--mesh", dome, "-o", cell).code == 0
     assert load_cell(cell).file.robot.flange == "tool0"
     known = ("new", "--robot", staeubli, "--mesh", dome, "-o", cell, "--force")

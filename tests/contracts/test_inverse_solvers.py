@@ -4,10 +4,23 @@ import numpy as np
 import pytest
 
 from elastocal.errors import RobotError
-from elastocal.robot import Rail, Robot, T_from_xyzabc, catalogue, on_rail, with_tool
+from elastocal.robot import (
+    Rail,
+    Robot,
+    T_from_xyzabc,
+    catalogue,
+    on_rail,
+    with_joint_origins,
+    with_tool,
+)
 from elastocal.robot.inverse import InverseKinematics, OpwInverse
 from elastocal.robot.inverse.arm import nearest_zero
-from elastocal.robot.inverse.numerical import NumericalInverse, ParallelInverse
+from elastocal.robot.inverse.numerical import (
+    NearInverse,
+    NumericalInverse,
+    ParallelInverse,
+    inverse_for,
+)
 from support.urdfs import (
     CEILING,
     HALF_TURN,
@@ -25,12 +38,21 @@ def _robot(text: str) -> Robot:
     return Robot.from_urdf(text, "tcp")
 
 
-def _parallel_robot(rail: bool = False) -> Robot:
-    """Return a UR20 with a crooked tool."""
+def _near(robot: Robot) -> InverseKinematics:
+    solver = inverse_for(robot)
+    assert isinstance(solver, NearInverse)
+    return solver
+
+
+def _parallel_robot(rail: bool = False, skew: float = 0.0) -> Robot:
+    """Return a UR20 with a crooked tool, perhaps with its joints turned by so many rad."""
     T = T_from_xyzabc(0.1, -0.05, 0.2, 0.3, 0.2, -0.4)
     text = with_tool(catalogue.urdf("UR20"), "flange", "tcp", T)
     if rail:
         text = on_rail(text, Rail("rail", (0.0, 1.0, 0.0), -1.0, 4.0))
+    if skew:
+        turned = T_from_xyzabc(0.0, 0.0, 0.0, skew, skew, skew)
+        text = with_joint_origins(text, dict.fromkeys(_robot(text).joint_names, turned))
     return _robot(text)
 
 
@@ -51,6 +73,8 @@ def _solvers() -> dict[str, InverseKinematics]:
         "opw on external axes": OpwInverse(_robot(external)),
         "parallel axes": ParallelInverse(_parallel_robot()),
         "parallel axes on a rail": ParallelInverse(_parallel_robot(rail=True)),
+        "nearly opw": _near(_robot(opw_arm_urdf(**KR_LIKE, skew=4e-6))),
+        "nearly parallel axes": _near(_parallel_robot(skew=2e-4)),
         "numerical on an opw arm": NumericalInverse(floor),
         "numerical, offset wrist": NumericalInverse(_robot(offset_wrist_urdf())),
         "numerical on a rail": NumericalInverse(_robot(offset_wrist_urdf(rail=(-1.0, 4.0)))),
@@ -113,6 +137,9 @@ class TestEverySolver:
         pose, branch = np.nonzero(found.exists)
         count = solver.robot.external_axes
         np.testing.assert_array_equal(found.q[pose, branch, :count], external[pose])
+
+    def test_it_says_how_it_solves(self, solver):
+        assert ("closed form" in solver.method) != isinstance(solver, NumericalInverse)
 
     def test_a_slot_is_whole_or_empty(self, found):
         assert np.array_equal(np.isnan(found.q).any(axis=-1), np.isnan(found.q).all(axis=-1))

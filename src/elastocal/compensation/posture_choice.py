@@ -16,7 +16,7 @@ from elastocal.compensation.posture_survey import (
 from elastocal.identification import CalibratedModel
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
-from elastocal.robot.inverse import InverseKinematics, OpwInverse
+from elastocal.robot.inverse import InverseKinematics, NumericalInverse
 from elastocal.tables import write_table
 
 
@@ -57,7 +57,7 @@ def choose_postures(survey: PostureSurvey, solver: InverseKinematics) -> Posture
     stiffness = np.where(np.isnan(survey.stiffness), -np.inf, survey.stiffness)
     flat = stiffness.reshape(len(stiffness), -1)
     each = _path_postures(survey, "stiffest at each station", flat.argmax(axis=1))
-    follows = isinstance(solver, OpwInverse)
+    follows = not isinstance(solver, NumericalInverse)
     kept = stiffness if follows else stiffness.max(axis=-1, keepdims=True)
     softest = kept.min(axis=0)
     best = int(softest.argmax())

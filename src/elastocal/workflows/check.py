@@ -37,6 +37,7 @@ from elastocal.robot import (
     tip_links,
     tool_link,
 )
+from elastocal.robot.inverse import inverse_for
 from elastocal.wording import phrase, plainly
 from elastocal.workflows import _file_kinds as kinds
 from elastocal.workflows._file_kinds import FileDescription
@@ -82,6 +83,7 @@ def _robot(path: Path, tcp: str | None = None) -> FileDescription:
         "other_leaves": beside,
         "tcp": robot.tip,
         "z_of_tcp": robot.chain.tip_direction,
+        "inverse_kinematics": inverse_for(robot).method,
         "joints": list(robot.joint_names),
         "external_axes": list(robot.joint_names[: robot.external_axes]),
         "masses": not robot.chain.weight_gap,

@@ -4,6 +4,7 @@ from .arm import (
     turns as turns,
 )
 from .numerical import (
+    NumericalInverse as NumericalInverse,
     inverse_for as inverse_for,
 )
 from .opw import (

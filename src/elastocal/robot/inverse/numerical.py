@@ -18,7 +18,7 @@ from elastocal.errors import RobotError
 from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.robot.inverse.arm import AxisLines, arm_axes, arm_base, arm_joints, nearest_zero
-from elastocal.robot.inverse.opw import NotOrthoParallelError, OpwInverse, derive_opw
+from elastocal.robot.inverse.opw import EDGE, NotOrthoParallelError, OpwInverse
 from elastocal.robot.inverse.solver import InverseKinematics, distinct, pose_error, reaches
 from elastocal.robot.robot import Robot
 from elastocal.robot.singularity import characteristic_length, wrist_angle
@@ -27,6 +27,8 @@ _EXACT = 1e-8
 """Largest deviation of an axis from the geometry of the kind, in m or rad."""
 _SINGULAR = 1e-9
 """Lengths (m) and sines below this count as zero."""
+_AT_THE_EDGE = 1e-9
+"""Accuracy of a pose."""
 _BRANCHES = 8
 
 
@@ -43,6 +45,8 @@ class ParallelGeometry:
     """Axes at q = 0, in the arm frame."""
     wrist: FloatArray
     """Intersection of axes 5 and 6, shape (3,), in m."""
+    deviation: float
+    """Largest deviation of an axis, in m or rad."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,15 +64,22 @@ class ParallelInverse(InverseKinematics):
         If the arm is not of this kind.
     """
 
+    tolerance: float = _EXACT
+    """Largest deviation of an axis, in m or rad; see `OpwInverse.tolerance`."""
     geometry: ParallelGeometry = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "geometry", derive_parallel(self.robot))
+        object.__setattr__(self, "geometry", derive_parallel(self.robot, self.tolerance))
 
     @property
     def branches(self) -> int:
         """Number of slots a pose has: eight."""
         return _BRANCHES
+
+    @property
+    def method(self) -> str:
+        """Closed form."""
+        return "closed form of arms with three parallel axes"
 
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
         """Return the eight branches whatever the limits; see `InverseKinematics.candidates`."""
@@ -96,20 +107,21 @@ def _branch(
     h = d[1]
     # Axes 5 and 6 leave their common point alone, and 2, 3 and 4 its place along their direction.
     w = motion[:, :3, :3] @ geometry.wrist + motion[:, :3, 3]
-    q1 = -_projected(h, d[0], w - p[0], h @ (geometry.wrist - p[0]), signs[0])
+    edge = max(_AT_THE_EDGE, EDGE * geometry.deviation)
+    q1 = -_projected(h, d[0], w - p[0], h @ (geometry.wrist - p[0]), signs[0], edge)
     behind = _turns(p[0], d[0], -q1) @ motion
     # Nor do they turn a direction's part along their own: joint 5 bends axis 6 towards it.
-    q5 = _projected(h, d[4], d[5], behind[:, :3, :3] @ d[5] @ h, signs[1])
+    q5 = _projected(h, d[4], d[5], behind[:, :3, :3] @ d[5] @ h, signs[1], edge)
     before = np.einsum("nji,j->ni", _turns(p[4], d[4], q5)[:, :3, :3], h)
     after = np.einsum("nji,j->ni", behind[:, :3, :3], h)
     q6 = -_angle(d[5], before, after, rest)
     hand = _turns(p[4], d[4], q5) @ _turns(p[5], d[5], q6)
     planar = behind @ inverse_transform(hand)
-    return np.stack([q1, *_planar(p, d, planar, signs[2]), q5, q6], axis=-1)
+    return np.stack([q1, *_planar(p, d, planar, signs[2], edge), q5, q6], axis=-1)
 
 
 def _planar(
-    p: FloatArray, d: FloatArray, planar: FloatArray, sign: int
+    p: FloatArray, d: FloatArray, planar: FloatArray, sign: int, edge: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return joints 2, 3 and 4 whose product is a motion in the plane across their axes."""
     h = d[1]
@@ -121,7 +133,7 @@ def _planar(
     reached = across(planar[:, :3, :3] @ p[3] + planar[:, :3, 3] - p[1])
     reach = (reached**2).sum(axis=-1)
     # |upper + Rot(q3) fore|² = reach²
-    q3 = _projected(upper, d[2], fore, 0.5 * (reach - upper @ upper - fore @ fore), sign)
+    q3 = _projected(upper, d[2], fore, 0.5 * (reach - upper @ upper - fore @ fore), sign, edge)
     elbow = _turns(p[2], d[2], q3)
     stretched = across(elbow[:, :3, :3] @ p[3] + elbow[:, :3, 3] - p[1])
     q2 = _angle(d[1], stretched, reached, 0.0)
@@ -133,7 +145,7 @@ def _planar(
 
 
 def _projected(
-    n: FloatArray, axis: FloatArray, v: FloatArray, wanted: FloatArray, sign: int
+    n: FloatArray, axis: FloatArray, v: FloatArray, wanted: FloatArray, sign: int, edge: float
 ) -> FloatArray:
     """Return one of the two angles with ``n · Rot(axis, angle) v = wanted``; NaN: there is none.
 
@@ -147,13 +159,17 @@ def _projected(
         Its part along ``n``, times the length of ``n``.
     sign : int
         Which of the two.
+    edge : float
+        Part of the reach beyond it that counts as at its edge, where the two are one: a stretched
+        elbow, a straight wrist.
     """
     along = (v @ axis)[..., None] * axis
     cosine, sine = (v - along) @ n, np.cross(axis, v) @ n
     size = np.hypot(cosine, sine)
     ratio = (wanted - along @ n) / np.maximum(size, _SINGULAR)
-    # Within the accuracy of a pose the two roots are one: a stretched elbow, a straight wrist.
-    ratio = np.where(np.abs(ratio) <= 1.0 + 1e-9, np.clip(ratio, -1.0, 1.0), np.nan)
+    # Where the arm is only nearly this one the two roots stay apart.
+    most = 1.0 - (edge - _AT_THE_EDGE)
+    ratio = np.where(np.abs(ratio) <= 1.0 + edge, np.clip(ratio, -most, most), np.nan)
     return np.asarray(np.arctan2(sine, cosine) + sign * np.arccos(ratio))
 
 
@@ -180,13 +196,15 @@ def _turns(point: FloatArray, axis: FloatArray, angle: FloatArray) -> FloatArray
     return T
 
 
-def derive_parallel(robot: Robot) -> ParallelGeometry:
+def derive_parallel(robot: Robot, tolerance: float = _EXACT) -> ParallelGeometry:
     """Return the axes of an arm with three parallel ones.
 
     Parameters
     ----------
     robot : Robot
         A robot whose last six joints are the arm.
+    tolerance : float
+        Largest deviation of an axis, in m or rad.
 
     Raises
     ------
@@ -205,18 +223,21 @@ def derive_parallel(robot: Robot) -> ParallelGeometry:
             named = ", ".join(names[index] for index in which)
             raise NotParallelError(f"{robot.name}: the axes of {named} must {condition}")
 
+    deviation = 0.0
     for i in (2, 3):
-        require(bool(np.linalg.norm(np.cross(d[1], d[i])) <= _EXACT), "be parallel", 1, i)
+        off = float(np.linalg.norm(np.cross(d[1], d[i])))
+        require(off <= tolerance, "be parallel", 1, i)
         apart = np.linalg.norm(np.cross(p[i] - p[i - 1], d[1]))
-        require(bool(apart > _EXACT), "lie apart", i - 1, i)
+        require(bool(apart > tolerance), "lie apart", i - 1, i)
+        deviation = max(deviation, off)
     for i, j in ((0, 1), (3, 4), (4, 5)):
         require(bool(np.linalg.norm(np.cross(d[i], d[j])) > 0.1), "not be parallel", i, j)
     # Where the common perpendicular of axes 5 and 6 has its feet.
     across = np.cross(d[4], d[5])
     gap = float((p[5] - p[4]) @ across / np.linalg.norm(across))
-    require(abs(gap) <= _EXACT, "meet in one point", 4, 5)
+    require(abs(gap) <= tolerance, "meet in one point", 4, 5)
     along = np.linalg.lstsq(np.column_stack([d[4], -d[5]]), p[5] - p[4], rcond=None)[0]
-    return ParallelGeometry(axes, p[4] + along[0] * d[4])
+    return ParallelGeometry(axes, p[4] + along[0] * d[4], max(deviation, abs(gap)))
 
 
 _MOST_SOLUTIONS = 16
@@ -225,13 +246,14 @@ _SAME = 1e-4
 """Two ends of a descent nearer than this (rad, m) are one solution, found twice."""
 _CONVERGED = 1e-11
 _LARGEST_STEP = 1.0
-_NEAR = 1e-4
-"""Largest deviation (m, rad) from OPW of an arm that is OPW but for the digits of its file.
+_NEAR = 3e-2
+"""Largest deviation (m, rad) from a closed form of an arm that has it but for the digits of its
+file, or for how it was built.
 
-`1.5708` for a quarter turn is off by 4e-6 rad.
+`1.5708` for a quarter turn is off by 4e-6 rad, an arm as built by some 1e-3.
 """
-_STRAIGHT = 1e-3
-"""Angle (rad) between axes 4 and 6 below which such an arm loses branches."""
+_STRAIGHT = 100.0
+"""Angle between axes 4 and 6, in deviations, below which such an arm loses branches."""
 
 
 def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
@@ -246,21 +268,21 @@ def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
 
     Returns
     -------
-    OpwInverse, ParallelInverse, NearOpwInverse or NumericalInverse
+    OpwInverse, ParallelInverse, NearInverse or NumericalInverse
         The last one's ``reason`` says what the closed forms failed on.
     """
-    try:
-        return OpwInverse(robot)
-    except NotOrthoParallelError as error:
-        reason = str(error)
-    try:
-        return ParallelInverse(robot)
-    except NotParallelError as error:
-        reason = f"{reason}; {error}"
-    try:
-        return NearOpwInverse(robot)
-    except NotOrthoParallelError:
-        return NumericalInverse(robot, seed=seed, reason=reason)
+    reasons = []
+    for closed in (OpwInverse, ParallelInverse):
+        try:
+            found = closed(robot, _NEAR)
+        except (NotOrthoParallelError, NotParallelError) as error:
+            reasons.append(str(error))
+            continue
+        try:
+            return closed(robot)
+        except (NotOrthoParallelError, NotParallelError):
+            return NearInverse(robot, found)
+    return NumericalInverse(robot, seed=seed, reason="; ".join(reasons))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -300,6 +322,15 @@ class NumericalInverse(InverseKinematics):
     def branches(self) -> int:
         """Number of slots a pose has: sixteen."""
         return _MOST_SOLUTIONS
+
+    @property
+    def method(self) -> str:
+        """Descents from anywhere, and why."""
+        why = f": {self.reason}" if self.reason else ""
+        return (
+            f"descents from {self.starts} random starts a pose, which are slow and may miss"
+            f" solutions{why}"
+        )
 
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
         """Return the solutions of the descents; see `InverseKinematics.candidates`."""
@@ -386,25 +417,31 @@ class NumericalInverse(InverseKinematics):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class NearOpwInverse(OpwInverse):
-    """The branches of an arm that misses OPW by the digits of its file.
+class NearInverse(InverseKinematics):
+    """The branches of an arm that misses a closed form by the digits of its file, or as built.
 
-    The descents of `NumericalInverse` start at the branches of the nearest OPW arm, so that
-    eight of them do what takes 96 random ones. At a straight wrist, within the arm's deviation of
-    it, a branch may be lost; where none within the limits is left, the random starts are tried.
-
-    Raises
-    ------
-    NotOrthoParallelError
-        If the arm is farther from OPW than 1e-4 m or rad.
+    The descents of `NumericalInverse` start at the branches of the nearest arm with a closed form,
+    so that eight of them do what takes 96 random ones. At a straight wrist, within some deviations
+    of it, a branch may be lost; where none within the limits is left, the random starts are tried.
     """
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "geometry", derive_opw(self.robot, _NEAR))
+    nearest: OpwInverse | ParallelInverse
+    """The closed form, of as large a tolerance as the arm needs."""
+
+    @property
+    def branches(self) -> int:
+        """Number of slots a pose has: eight."""
+        return self.nearest.branches
+
+    @property
+    def method(self) -> str:
+        """Descents from a closed form."""
+        off = self.nearest.geometry.deviation
+        return f"descents from the {self.nearest.method}, which it misses by {off:.1g} m or rad"
 
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
         """Return the branches after their descent; see `InverseKinematics.candidates`."""
-        arm = super().candidates(T_base_tcp, external)
+        arm = self.nearest.candidates(T_base_tcp, external)
         pose, branch = np.nonzero(np.isfinite(arm).all(axis=-1))
         q = np.hstack([external[pose], arm[pose, branch]])
         descent = NumericalInverse(self.robot)
@@ -412,7 +449,7 @@ class NearOpwInverse(OpwInverse):
         arm[pose, branch] = q[:, self.robot.external_axes :]
         arrived = reaches(self.robot, q, T_base_tcp[pose])
         inside = np.isfinite(nearest_zero(self.robot, arm[pose, branch])).all(axis=-1)
-        straight = wrist_angle(self.robot, q) < _STRAIGHT
+        straight = wrist_angle(self.robot, q) < _STRAIGHT * self.nearest.geometry.deviation
         # Only a straight wrist loses branches that are within the limits.
         left = np.setdiff1d(pose[straight], pose[arrived & inside])
         lost = np.union1d(np.setdiff1d(pose, pose[arrived]), left)

@@ -30,6 +30,11 @@ A tenth of what a solution may miss its pose by, and far above round-off.
 """
 
 
+EDGE = 30.0
+"""Distance beyond the reach of a closed form, in deviations of an arm from it, that the arm may
+reach."""
+
+
 class NotOrthoParallelError(RobotError):
     """An arm that has no analytic solution of the OPW kind; the message says why."""
 
@@ -117,15 +122,23 @@ class OpwInverse(InverseKinematics):
         If the arm is not of this kind.
     """
 
+    tolerance: float = _EXACT
+    """Largest deviation of an axis and of the forward kinematics from OPW, in m and rad. Branches
+    of an arm that is only nearly OPW miss their poses: `NearInverse` takes them from there."""
     geometry: OpwGeometry = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "geometry", derive_opw(self.robot))
+        object.__setattr__(self, "geometry", derive_opw(self.robot, self.tolerance))
 
     @property
     def branches(self) -> int:
         """Number of slots a pose has: eight."""
         return _BRANCHES
+
+    @property
+    def method(self) -> str:
+        """Closed form."""
+        return "closed form of arms with a spherical wrist"
 
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
         """Return the eight branches whatever the limits; see `InverseKinematics.candidates`."""
@@ -133,7 +146,8 @@ class OpwInverse(InverseKinematics):
         T_opw_base = inverse_transform(arm_base(self.robot, external) @ geometry.T_arm_opw)
         T_opw_flange = T_opw_base @ T_base_tcp @ inverse_transform(geometry.T_flange_tcp)
         signs, offsets = np.array(parameters.signs), np.array(parameters.offsets)
-        theta = opw_branches(parameters, T_opw_flange, signs * self._rest() + offsets)
+        edge = max(_SINGULAR, EDGE * geometry.deviation)
+        theta = opw_branches(parameters, T_opw_flange, signs * self._rest() + offsets, edge)
         return np.asarray(signs * (theta - offsets))
 
     def _rest(self) -> FloatArray:
@@ -143,7 +157,7 @@ class OpwInverse(InverseKinematics):
 
 
 def opw_branches(
-    parameters: OpwParameters, T_opw_flange: FloatArray, rest: FloatArray
+    parameters: OpwParameters, T_opw_flange: FloatArray, rest: FloatArray, edge: float = _SINGULAR
 ) -> FloatArray:
     """Return the OPW angles of all eight branches.
 
@@ -155,6 +169,8 @@ def opw_branches(
         Poses of the OPW flange in the OPW base, in m.
     rest : ndarray, shape (6,)
         Angles that joint 1 and joint 4 take where any would do, in rad.
+    edge : float
+        Distance beyond reach, in m, that counts as at its edge.
 
     Returns
     -------
@@ -165,11 +181,11 @@ def opw_branches(
     centre = T_opw_flange[:, :3, 3] - parameters.c4 * rotation[:, :, 2]
     theta = np.empty((len(centre), _BRANCHES, 6))
     for shoulder in (0, 1):
-        theta1, reach = _shoulder(parameters, centre, shoulder, float(rest[0]))
+        theta1, reach = _shoulder(parameters, centre, shoulder, float(rest[0]), edge)
         for elbow in (0, 1):
             slot = 2 * shoulder + elbow
             height = centre[:, 2] - parameters.c1
-            theta2, theta3 = _elbow(parameters, reach - parameters.a1, height, elbow)
+            theta2, theta3 = _elbow(parameters, reach - parameters.a1, height, elbow, edge)
             R_forearm_flange = _forearm(theta1, theta2 + theta3) @ rotation
             for wrist in (0, 1):
                 theta[:, 4 * wrist + slot, 0] = theta1
@@ -180,7 +196,7 @@ def opw_branches(
 
 
 def _shoulder(
-    parameters: OpwParameters, centre: FloatArray, shoulder: int, rest: float
+    parameters: OpwParameters, centre: FloatArray, shoulder: int, rest: float, edge: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return joint 1, and how far the wrist centre is in front of axis 1 after it."""
     radius = np.hypot(centre[:, 0], centre[:, 1])
@@ -190,19 +206,21 @@ def _shoulder(
     reach = np.sqrt(np.maximum(radius**2 - b**2, 0.0)) * (1 - 2 * shoulder)
     # atan2 distinguishes a reach of -0.0 from 0.0: the two shoulders stay half a turn apart.
     theta1 = bearing - np.arctan2(b, reach)
-    return np.where(radius >= abs(b) - _SINGULAR, theta1, np.nan), reach
+    return np.where(radius >= abs(b) - edge, theta1, np.nan), reach
 
 
 def _elbow(
-    parameters: OpwParameters, x: FloatArray, z: FloatArray, elbow: int
+    parameters: OpwParameters, x: FloatArray, z: FloatArray, elbow: int, edge: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return joints 2 and 3 that put the wrist centre at (x, z) from axis 2."""
     c2, forearm = parameters.c2, np.hypot(parameters.a2, parameters.c3)
     distance = np.hypot(x, z)
     cosine = (distance**2 - c2**2 - forearm**2) / (2.0 * c2 * forearm)
-    bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (1 - 2 * elbow)
+    # Where the arm is only nearly this one the two elbows stay apart.
+    most = 1.0 - (edge - _SINGULAR) / forearm
+    bend = np.arccos(np.clip(cosine, -most, most)) * (1 - 2 * elbow)
     lift = np.arctan2(forearm * np.sin(bend), c2 + forearm * np.cos(bend))
-    within = (distance <= c2 + forearm + _SINGULAR) & (distance >= abs(c2 - forearm) - _SINGULAR)
+    within = (distance <= c2 + forearm + edge) & (distance >= abs(c2 - forearm) - edge)
     theta2 = np.where(within, np.arctan2(x, z) - lift, np.nan)
     return theta2, bend - np.arctan2(parameters.a2, parameters.c3)
 

@@ -80,6 +80,11 @@ class InverseKinematics(ABC):
     def branches(self) -> int:
         """Number of slots a pose has in `solve_many`."""
 
+    @property
+    @abstractmethod
+    def method(self) -> str:
+        """How poses are solved, in a phrase for people."""
+
     @abstractmethod
     def candidates(self, T_base_tcp: FloatArray, external: FloatArray) -> FloatArray:
         """Return arm configurations that reach the poses, without regard to limits.
