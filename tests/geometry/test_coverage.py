@@ -14,6 +14,7 @@ from elastocal.progress import silent
 from support.measured_arms import ARMS, Measured, measure, rounded, seven_axes, universal
 
 NOISE = 3e-5
+DRAWS = 1000
 FOUR_ARMS = {**ARMS, "rounded angles": lambda: rounded("1.5708")}
 CAMPAIGNS = {
     "few": {"rows": 18},
@@ -35,7 +36,7 @@ def truths(exact: Measured, rung: str) -> dict[str, float]:
 
 def fitted(measured: Measured, seed: int) -> GeometryModel:
     problem = GeometryProblem(measured.robot, measured.data)
-    found = climb(problem, 200, np.random.default_rng(seed), silent)
+    found = climb(problem, DRAWS, np.random.default_rng(seed), silent)
     return geometry_model(problem, found, "test")
 
 
