@@ -8,7 +8,7 @@ spring of the same name, in few and in many poses. Light arms are pressed as far
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -116,6 +116,7 @@ class Campaign:
     planted: dict[str, float]
     sums: tuple[bool, ...]
     """Whether each sum of springs that are not known holds what was planted."""
+    warnings: tuple[str, ...]
 
     def held(self) -> Iterator[tuple[str, bool]]:
         """Yield each known spring that was planted, and whether its interval holds it."""
@@ -125,9 +126,12 @@ class Campaign:
 
 
 @one_blas_thread()
-def campaign(arm: str, poses: int, seed: int) -> Campaign:
-    """Press at poses about a posture, and calibrate."""
+def campaign(
+    arm: str, poses: int, seed: int, *, press: float | None = None, springs: str = "auto"
+) -> Campaign:
+    """Press at poses about a posture, by default with its kind's force, and calibrate."""
     of, rng = kind(arm), np.random.default_rng([seed, poses])
+    of = of if press is None else replace(of, press=press)
     real, planted = truth(of, rng)
     spread = np.full(len(of.middle), 0.5)
     spread[-1] = 2.5
@@ -139,16 +143,18 @@ def campaign(arm: str, poses: int, seed: int) -> Campaign:
     measured = measure(real, q, force, noise, rng, load_cases=cases)
     robot = of.robot
     readings = measured.readings(robot.joint_names)
-    choice = choose_model(robot, readings, "auto", FitOptions())
+    choice = choose_model(robot, readings, springs, FitOptions())
     options = with_knowledge(FitOptions(), choice.known, choice.model, readings)
-    found = calibrate(choice.model, readings, rng, options, ladder=choice.ladder).calibrated
+    calibration = calibrate(choice.model, readings, rng, options, ladder=choice.ladder)
+    found = calibration.calibrated
     sums = tuple(
         each.low <= sum(t.weight * planted[t.spring] for t in each.terms) <= each.high
         for each in sum_summaries(found)
         if all(t.spring in planted for t in each.terms)
     )
-    springs = spring_summaries(found, known=choice.known)
-    return Campaign(choice.taken, springs, planted, sums)
+    summaries = spring_summaries(found, known=choice.known)
+    warnings = tuple(map(str, calibration.warnings))
+    return Campaign(choice.taken, summaries, planted, sums, warnings)
 
 
 def held_by_spring(arm: str, poses: int, campaigns: int) -> dict[str, list[bool]]:
@@ -184,3 +190,11 @@ def test_one_campaign_of_a_small_arm_says_what_it_knows():
     held = dict(found.held())
     assert {"joint_2.axial", "joint_3.axial", "joint_1.x", "joint_1.y"} <= held.keys()
     assert sum(held.values()) >= len(held) - 1
+
+
+def test_an_arm_that_yields_so_far_that_its_levers_change_is_warned_of():
+    """A UR10e pressed with 165 N yields 5 mm: its last tilt was held in 22 of 27 campaigns."""
+    soft = campaign("parallel axes", POSES["few"], 0, press=165.0, springs="bearing")
+    assert any("changes its levers" in each for each in soft.warnings)
+    stiff = campaign("3 kg", POSES["few"], 0, springs="bearing")
+    assert not any("changes its levers" in each for each in stiff.warnings)
