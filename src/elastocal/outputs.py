@@ -122,12 +122,17 @@ def ruled(
     Raises
     ------
     FileAccessError
-        If an output may not be written; see `OutputRule.require`.
+        If an output may not be written (see `OutputRule.require`), or two are one file.
     """
     for path in inputs:
         rule.note_input(path)
+    named: set[_Key] = set()
     for path in outputs:
         rule.require(path)
+        name = _keys(path)[0]
+        if name in named:
+            raise FileAccessError(f"cannot write two outputs to {path}; name another file")
+        named.add(name)
     token = _AT_WORK.set(rule)
     try:
         yield

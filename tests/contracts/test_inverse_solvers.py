@@ -13,7 +13,7 @@ from elastocal.robot import (
     with_joint_origins,
     with_tool,
 )
-from elastocal.robot.inverse import InverseKinematics, OpwInverse
+from elastocal.robot.inverse import InverseKinematics
 from elastocal.robot.inverse.arm import nearest_zero
 from elastocal.robot.inverse.numerical import (
     NearInverse,
@@ -21,6 +21,7 @@ from elastocal.robot.inverse.numerical import (
     ParallelInverse,
     inverse_for,
 )
+from elastocal.robot.inverse.opw import OpwInverse
 from support.urdfs import (
     CEILING,
     HALF_TURN,

@@ -299,7 +299,10 @@ def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
         (lambda text: text.replace("[deg]", "(deg)"), "it is written like 'joint_a1[deg]'"),
         (lambda text: text.replace("s0,0.0", "s0,-5", 1), "it must not be negative"),
         (lambda text: text.replace("s0,0.0", "s0,1e300", 1), "the largest mass is"),
-        (lambda text: "\n".join([*text.splitlines()[:2]] + text.splitlines()[1:2] * 20), "1 poses"),
+        (
+            lambda text: "\n".join([*text.splitlines()[:2]] + text.splitlines()[1:2] * 20),
+            "one posture",
+        ),
     ],
 )
 def test_bad_positions_are_refused_in_a_line(tmp_path, change, message):

@@ -10,8 +10,9 @@ import pytest
 from elastocal.robot import catalogue
 from elastocal.robot.catalogue import maker_of
 from elastocal.robot.catalogue.catalogue import LINKS
-from elastocal.robot.inverse import OpwInverse, inverse_for
+from elastocal.robot.inverse import inverse_for
 from elastocal.robot.inverse.numerical import NumericalInverse, ParallelInverse
+from elastocal.robot.inverse.opw import OpwInverse
 from support.urdfs import colliding_links
 
 OTHERS = ("IRB 6700-200/2.60", "R-2000iC/210F", "BXP210L", "RX160", "UR10e", "UR20")

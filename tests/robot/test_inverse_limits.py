@@ -5,8 +5,9 @@ import pytest
 
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import OpwInverse, turns
+from elastocal.robot.inverse import turns
 from elastocal.robot.inverse.arm import nearest_zero
+from elastocal.robot.inverse.opw import OpwInverse
 from support.urdfs import HALF_TURN, KR_LIKE, opw_arm_urdf, sliding_arm_urdf
 
 KUKA = np.radians(350.0)

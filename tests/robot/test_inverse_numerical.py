@@ -7,8 +7,9 @@ import pytest
 
 from elastocal.errors import RobotError
 from elastocal.robot import Robot
-from elastocal.robot.inverse import OpwInverse, pose_error
+from elastocal.robot.inverse import pose_error
 from elastocal.robot.inverse.numerical import NearInverse, NumericalInverse, inverse_for
+from elastocal.robot.inverse.opw import OpwInverse
 from elastocal.robot.inverse.solver import InverseKinematics, distinct
 from support.measured_arms import chain
 from support.urdfs import KR_LIKE, offset_wrist_urdf, opw_arm_urdf, planar_arm_urdf

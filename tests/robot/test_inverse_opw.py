@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 
 from elastocal.robot import Robot
-from elastocal.robot.inverse import OpwInverse, inverse_for
+from elastocal.robot.inverse import inverse_for
 from elastocal.robot.inverse.numerical import NumericalInverse
-from elastocal.robot.inverse.opw import NotOrthoParallelError, derive_opw, opw_branches
+from elastocal.robot.inverse.opw import (
+    NotOrthoParallelError,
+    OpwInverse,
+    derive_opw,
+    opw_branches,
+)
 from support.urdfs import (
     CEILING,
     FLOOR,

@@ -26,6 +26,7 @@ from .other_positions import (
 from .plausibility import (
     plausible_ladder as plausible_ladder,
     position_mistake as position_mistake,
+    require_as_many as require_as_many,
 )
 from .position_file import (
     read_position_map as read_position_map,

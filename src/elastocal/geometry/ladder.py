@@ -31,6 +31,7 @@ from elastocal.geometry.solve import GeometryFit, fit, freedom_of, noise, regist
 from elastocal.identification import Overlap, judge_models, paired_difference
 from elastocal.progress import Progress
 from elastocal.results import brief_repr
+from elastocal.wording import counted
 
 FOLDS = 5
 _BLOCKS = 100
@@ -160,7 +161,7 @@ def climb(
     fold = block % FOLDS
     if len(np.unique(fold[used])) < FOLDS:
         raise GeometryError(
-            f"the positions are of {len(np.unique(problem.data.pose))} poses: at least"
+            f"the positions are of {counted(len(np.unique(problem.data.pose)), 'pose')}: at least"
             f" {FOLDS} are needed, so that some can be left out; measure more poses"
         )
     errors = _errors([each.every for each in rungs], fold, used)
@@ -389,8 +390,7 @@ class _Sums:
         degrees of freedom (Student's t of few poses), about errors that are drawn from the prior:
         what the positions do not tell is as wide as the prior, not as narrow as their scatter. An
         unknown that blocks of poses scatter more than such noise does (gears, heat: errors of one
-        pose after the other are alike) is stretched to that scatter, each block weighed as if it
-        had been left out (R. M. Bell, D. F. McCaffrey, Survey Methodology 28(2), 2002).
+        pose after the other are alike) is stretched to that scatter (`_block_scatter`).
         """
         free, ridge = self.about.free, prior_weight(self.problem, self.about.sigma)[self.about.free]
         G = self.G.sum(axis=0)[np.ix_(free, free)]
@@ -411,16 +411,17 @@ class _Sums:
     def _block_scatter(self, free: IndexArray, H_inverse: FloatArray) -> FloatArray:
         """Return by how much blocks of poses move each free unknown, root of their sum of squares.
 
-        0 where there are too few to tell.
+        What is left of a block is too small, for it was fitted, and as if it had been left out too
+        large; the mean of their products is that of the noise (P. Kline, R. Saggio, M. Solvsten,
+        Econometrica 88(5), 2020). 0 where there are too few blocks to tell.
         """
         there = np.unique(self.block[self.about.used])
         if len(there) < _BLOCKS_THAT_TELL:
             return np.zeros(len(free))
         one = np.eye(len(free))
-        scores = np.array(
-            [
-                np.linalg.solve(one - self.G[k][np.ix_(free, free)] @ H_inverse, self.h[k][free])
-                for k in there
-            ]
-        )
-        return np.asarray(np.linalg.norm(scores @ H_inverse, axis=0))
+        square = np.zeros(len(free))
+        for k in there:
+            score = self.h[k][free]
+            alone = np.linalg.solve(one - self.G[k][np.ix_(free, free)] @ H_inverse, score)
+            square += (H_inverse @ score) * (H_inverse @ alone)
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))

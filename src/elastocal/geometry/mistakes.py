@@ -7,6 +7,7 @@ import numpy as np
 from elastocal.arrays import IndexArray
 from elastocal.findings import Finding, Kind, as_count
 from elastocal.geometry.left_out import left_out_findings
+from elastocal.geometry.positions import Positions
 from elastocal.geometry.problem import GeometryProblem
 from elastocal.geometry.sessions import session_findings
 from elastocal.geometry.solve import GeometryFit
@@ -27,14 +28,32 @@ SWAPPED = Kind(
     " left out",
     shown={"rows": as_count("row")},
 )
+COPIED = Kind(
+    "geometry.copied-rows",
+    "{rows} with the joints and markers of others, digit for digit ({numbers}, counted from 0):"
+    " were they copied? What is copied counts as measured anew, so that the intervals are too"
+    " narrow",
+    shown={"rows": as_count("row")},
+)
 
 
 def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[Finding, ...]:
     """Return the findings about the positions of a fit."""
     notes = [] if problem.robot.has_masses else [NO_MASSES(name=problem.robot.name)]
+    notes += _copied_rows(problem.data)
     notes += [*_swapped_markers(problem, fit), *(moved := tuple(session_findings(problem, fit)))]
     # A station or a marker that moved leaves out rows whose markers agree, too.
     return (*notes, *(() if moved else left_out_findings(problem, fit)))
+
+
+def _copied_rows(data: Positions) -> list[Finding]:
+    """Return the rows that are copies of others, whose markers no tracker sees at one place."""
+    table = np.column_stack([data.q, data.markers.reshape(len(data), -1)])
+    _, first, group = np.unique(
+        np.nan_to_num(table, nan=np.inf), axis=0, return_index=True, return_inverse=True
+    )
+    rows = np.flatnonzero(first[group.ravel()] != np.arange(len(data)))
+    return [COPIED(rows=len(rows), numbers=_named(rows))] if len(rows) else []
 
 
 def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:

@@ -44,6 +44,10 @@ _WHOLE = 6.0
 """A zero within so many degrees of a quarter turn is taken for it."""
 _RATIO = 0.02
 """A scale within so much of itself of a round one is taken for it."""
+_UNMOVED = 0.02
+"""Range of joints, in rad or m, within which an arm has not moved."""
+_FRAME = 3
+"""Positions that determine the frame of a station."""
 _LAGS = (1, -1, 2, -2)
 _PARTS = 10
 """Parts of a campaign between which a station or a tool may have changed."""
@@ -364,6 +368,7 @@ def plausible_ladder(
     GeometryError
         If there are too few positions, the fit does not settle, or what it finds is no arm.
     """
+    _require_enough(problem.data)
     length = arm_length(problem.robot)
     try:
         found = climb(problem, draws, rng, progress)
@@ -452,6 +457,53 @@ def implausible(problem: GeometryProblem, found: GeometryLadder) -> str | None:
     return None
 
 
+def _require_enough(data: Positions) -> None:
+    """Refuse positions of one posture, and stations that see too little for a frame of their own.
+
+    Raises
+    ------
+    GeometryError
+        If they are.
+    """
+    if np.ptp(data.q, axis=0).max() < _UNMOVED:
+        raise GeometryError(
+            f"all joints stay within {np.degrees(_UNMOVED):.2g} deg (linear axes"
+            f" {1e3 * _UNMOVED:g} mm): one posture says nothing of the geometry; measure all over"
+            " the range"
+        )
+    for station in data.stations:
+        rows = np.flatnonzero(data.station == station)
+        positions = int(data.seen[rows].sum())
+        if len(rows) < 2 or positions < _FRAME:
+            where = f"row {data.lines[rows[0]]}" if data.lines else f"index {rows[0]}"
+            raise GeometryError(
+                f"station {station!r} sees {counted(positions, 'position')} in"
+                f" {counted(len(rows), 'row')} ({where}): its frame needs {_FRAME} in two rows at"
+                " least; is its name mistyped? Leave such rows out, or measure more poses there"
+            )
+
+
+def require_as_many(known: FloatArray, measured: int) -> None:
+    """Refuse places of another number of markers than were measured.
+
+    Parameters
+    ----------
+    known : ndarray, shape (marker, 3)
+        Places as stated.
+    measured : int
+        Number of markers in the positions.
+
+    Raises
+    ------
+    GeometryError
+        If they are more or fewer.
+    """
+    if len(known) != measured:
+        raise GeometryError(
+            f"places of {counted(len(known), 'marker')} are given, positions are of {measured}"
+        )
+
+
 def require_known_markers(found: FloatArray, known: FloatArray) -> None:
     """Refuse places of markers on the tool that are not those which were measured.
 
@@ -465,10 +517,7 @@ def require_known_markers(found: FloatArray, known: FloatArray) -> None:
     GeometryError
         If a marker is farther from where it is stated than a tool is built wrong.
     """
-    if found.shape != known.shape:
-        raise GeometryError(
-            f"places of {counted(len(known), 'marker')} are given, positions are of {len(found)}"
-        )
+    require_as_many(known, len(found))
     off = np.linalg.norm(found - known, axis=1)
     if (off <= _TOOL + _TOOL_TURN * np.linalg.norm(known, axis=1)).all():
         return

@@ -4,6 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import GeometryError, UnitError, nearest
+from elastocal.geometry.arm import arm_length
 from elastocal.geometry.positions import LEAST_READINGS, Positions
 from elastocal.geometry.sessions import in_sessions
 from elastocal.records import from_data, read_arrays, read_yaml_data, record
-from elastocal.robot import Robot, T_from_xyzabc
+from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
 from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
 from elastocal.units import factor, impossible, split_column
 
@@ -31,6 +33,10 @@ _SAME_POSE = 1e-2
 _FAR = 100.0
 """In m: no tracker sees as far in a hall."""
 _EXAMPLES = {"angle": "deg", "length": "mm", "mass": "kg", "force": "N"}
+_BORNE, _HEAVIEST = 2.0, 300.0
+"""Largest payload over the mass of the arm, or in kg over the square of its length in m, whichever
+is more: the strongest arms carry 2300 kg at 3.7 m. Twice to be sure, and for masses of a URDF that
+are placeholders."""
 _BEYOND = 0.1
 """Distance beyond a joint's limit, in rad or m, that the limits of a drawing may be wrong by."""
 
@@ -213,6 +219,8 @@ class _Columns:
 
 def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Positions:
     columns, count = _Columns(header, rows), len(rows)
+    if not count:
+        raise GeometryError("no rows of numbers below a header: is it a table?")
     if count < LEAST_READINGS:
         raise GeometryError(f"{count} rows are too few: at least {LEAST_READINGS}")
     kinds = ["angle" if turns else "length" for turns in robot.revolute]
@@ -235,6 +243,7 @@ def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Position
         force=columns.vectors("force", "force") if "force_x" in columns.found else zeros,
         lines=tuple(rows.lines),
     )
+    _require_loads(positions, robot)
     return in_sessions(positions, columns.words("session", ""))
 
 
@@ -308,6 +317,23 @@ def _require_within_limits(
         )
 
 
+def _require_loads(data: Positions, robot: Robot) -> None:
+    """Refuse payloads and forces that no arm of this size bears."""
+    own = sum(joint.mass for joint in robot.chain.joints)
+    most = max(_BORNE * own, _HEAVIEST * arm_length(robot) ** 2)
+    weight = most * float(np.linalg.norm(GRAVITY))
+    force = np.linalg.norm(data.force, axis=1)
+    for what, unit, value, limit, other in (
+        ("payload", "kg", data.payload, most, "g"),
+        ("force", "N", force, weight, "mN, or grams-force"),
+    ):
+        for row in np.flatnonzero(value > limit)[:1].tolist():
+            raise GeometryError(
+                f"row {data.lines[row]}: a {what} of {value[row]:.4g} {unit}: an arm of"
+                f" {arm_length(robot):.2g} m bears less than {limit:.2g} {unit}; is it in {other}?"
+            )
+
+
 def _require_markers(markers: FloatArray, lines: Sequence[int]) -> None:
     seen = np.asarray(np.isfinite(markers).all(axis=2))
     for marker in np.flatnonzero(~seen.any(axis=0)).tolist():
@@ -316,6 +342,13 @@ def _require_markers(markers: FloatArray, lines: Sequence[int]) -> None:
         raise GeometryError(
             f"row {lines[row]}: marker {marker + 1} is more than {_FAR:g} m away: is it in mm?"
         )
+    for a, b in combinations(range(markers.shape[1]), 2):
+        both = seen[:, a] & seen[:, b]
+        if both.any() and (markers[both, a] == markers[both, b]).all():
+            raise GeometryError(
+                f"marker {a + 1} and marker {b + 1} stand at one place in every row: were columns"
+                " copied? Leave one of them out"
+            )
 
 
 def _poses(q: FloatArray) -> np.ndarray:

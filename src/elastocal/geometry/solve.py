@@ -150,7 +150,7 @@ def fit(
     names = [problem.unknowns[free[i]].name for i in found.most_moved]
     raise GeometryError(
         f"the fit does not settle: after {_STEPS} steps {', '.join(names)} still change together"
-        " by more than the noise; are joints, units or frames mistaken?"
+        " by more than the noise"
     )
 
 

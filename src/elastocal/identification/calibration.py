@@ -42,7 +42,7 @@ from elastocal.identification.observability import (
     find_hidden,
     observability,
 )
-from elastocal.identification.options import FitOptions
+from elastocal.identification.options import MEDIAN_NORM, FitOptions
 from elastocal.identification.problem import (
     Problem,
     build,
@@ -72,7 +72,10 @@ from elastocal.units import dimension_of_unit, largest
 
 _PART_OF_DATA = 1e-2
 """Least part of the measured deflection that must change when springs go to their bounds."""
-
+_LEVERS, _TRACKER = 0.3, 1e-5
+"""Part of the noise, or of that of a tracker in m, that changed levers may make."""
+_SOME_READINGS = 300
+"""Readings that show how far the levers change."""
 
 SAME_CONFIGURATION = Kind(
     "calibration.same-configuration",
@@ -131,6 +134,17 @@ STRANGE_ENCODERS = Kind(
     "calibration.strange-encoders",
     "the secondary encoders of {joints} see what no load on their gears makes: is a sign turned, or"
     " a column that of another joint?",
+)
+LEVERS_CHANGE = Kind(
+    "calibration.levers-change",
+    "the arm yields by {most} mm, which changes its levers and with them deflections by {change}"
+    " µm, beside {noise} µm of noise: springs behind short levers may be farther off than their"
+    " intervals say; press with less",
+    shown={
+        "most": as_number(".2g", 1e3),
+        "change": as_number(".2g", 1e6),
+        "noise": as_number(".2g", 1e6),
+    },
 )
 NOT_SETTLED = Kind(
     "calibration.loss-not-settled",
@@ -251,6 +265,7 @@ def calibrate(
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
+    warnings += _lever_warnings(calibrated, fitted, kept.residuals(c))
     encoders = _encoders(weighted, solution, held_out, calibrated.encoders)
     contact = _contact(model, weighted, fitted, options, widened)
     warnings += _encoder_warnings(encoders) + _contact_warnings(contact, options)
@@ -471,6 +486,27 @@ def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> 
     if left > MOST_UNEXPLAINED:
         warnings.append((UNFIT if left < 1.0 else WORSE_THAN_NONE)(left=left))
     return warnings
+
+
+def _lever_warnings(
+    calibrated: CalibratedModel, readings: Readings, residual: FloatArray
+) -> list[Finding]:
+    """Return the warning of an arm that yields so far that its levers are not those of the fit.
+
+    The fit takes the levers at the joints of the controller (paper Eq. 10). Those halfway to where
+    the joints have yielded are right to the second order.
+    """
+    some = np.unique(np.linspace(0, len(readings) - 1, _SOME_READINGS).astype(np.intp))
+    model, c = calibrated.model, calibrated.compliance
+    q, force = readings.joint_position[some], readings.force[some]
+    yielded = model.joint_blocks(q, force) @ c
+    as_fitted, halfway = (model.deflection(c, at, force) for at in (q, q + 0.5 * yielded))
+    change = float(np.sqrt(np.mean(np.square(halfway - as_fitted))))
+    noise = float(np.median(np.linalg.norm(residual, axis=1))) / MEDIAN_NORM
+    if change <= _LEVERS * max(noise, _TRACKER):
+        return []
+    most = float(np.linalg.norm(as_fitted, axis=1).max())
+    return [LEVERS_CHANGE(most=most, change=change, noise=noise)]
 
 
 def _require_data_decide(problem: Problem, compliance: FloatArray) -> None:

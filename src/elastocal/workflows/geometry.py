@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from elastocal.arrays import FloatArray
 from elastocal.blocks import Block
 from elastocal.errors import FileAccessError, GeometryError, present
 from elastocal.files import write_text
@@ -26,6 +27,7 @@ from elastocal.geometry import (
     plausible_ladder,
     read_position_map,
     read_positions,
+    require_as_many,
     show_geometry,
 )
 from elastocal.options import Option
@@ -73,7 +75,7 @@ class GeometrySettings:
     test: Path | None = None
     """Another table of positions, to judge the model by: frames and markers of a station or
     campaign that the first table does not have are fitted to it, and nothing else."""
-    draws: Annotated[int, Option(least=40, most=100_000)] = 200
+    draws: Annotated[int, Option(least=40, most=100_000)] = 1000
     """Draws of noise and prior, for the intervals."""
     seed: Annotated[int, Option(least=0)] = 0
     """Seed of the draws."""
@@ -180,11 +182,9 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     columns = None if settings.map is None else read_position_map(settings.map)
     problem = GeometryProblem(robot, read_positions(path, robot, columns))
     other = None if settings.test is None else read_positions(settings.test, robot, columns)
+    markers = _known_markers(settings, problem.data.markers.shape[1])
     found = plausible_ladder(
         problem, settings.draws, np.random.default_rng(settings.seed), progress
-    )
-    markers = (
-        np.array([parse_point(each) for each in settings.markers]) if settings.markers else None
     )
     model = geometry_model(problem, found, f"elastocal geometry {path.name}", markers)
     if settings.urdf is not None or settings.table is not None:
@@ -207,6 +207,15 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
                 settings.report_file, GeometryFindings(model, accuracy, links), language
             )
     return GeometryResult(model, accuracy, test, angles.findings())
+
+
+def _known_markers(settings: GeometrySettings, measured: int) -> FloatArray | None:
+    """Return where markers are known to be on the tool, shape (marker, 3), in m."""
+    if not settings.markers:
+        return None
+    known = np.array([parse_point(each) for each in settings.markers])
+    require_as_many(known, measured)
+    return known
 
 
 def _check_suffixes(settings: GeometrySettings) -> None:

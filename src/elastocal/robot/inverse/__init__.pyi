@@ -7,9 +7,6 @@ from .numerical import (
     NumericalInverse as NumericalInverse,
     inverse_for as inverse_for,
 )
-from .opw import (
-    OpwInverse as OpwInverse,
-)
 from .path_joints import (
     RowName as RowName,
     check_limits as check_limits,

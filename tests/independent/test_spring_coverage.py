@@ -1,0 +1,200 @@
+"""How often the interval of each spring holds the spring that was planted.
+
+The truth is an arm of `elastocal.sim.arm` at its exact loaded equilibrium, under its own weight if
+it has masses: a gear and two tilts at each joint, of sizes drawn anew in each campaign, which the
+ladder's `bearing` can express. What `calibrate --springs auto` calls known is held against the
+spring of the same name, in few and in many poses. Light arms are pressed as far as some 2 mm: at
+5 mm their levers are no longer those of the fit (docs/decisions/0135-known-by-name.md).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from elastocal.elastic.layouts import joint_origins
+from elastocal.identification import (
+    FitOptions,
+    calibrate,
+    choose_model,
+    spring_summaries,
+    sum_summaries,
+    with_knowledge,
+)
+from elastocal.identification.figures import SpringSummary
+from elastocal.parallel import one_blas_thread
+from elastocal.robot import Robot, T_from_xyzabc, catalogue, with_tool
+from elastocal.sim.arm import (
+    Linear,
+    Linkage,
+    Noise,
+    TruthSpring,
+    axial_spring,
+    measure,
+    press_forces,
+)
+from elastocal.sim.arm.elastic_arm import GRAVITY, ElasticArm
+from support.measured_arms import seven_axes
+from support.urdfs import opw_arm_urdf
+
+CAMPAIGNS = 25
+POSES = {"few": 7, "many": 31}
+TILT = 0.05, 0.4
+"""Compliance of a tilt over that of the gear of its joint."""
+GEAR = 0.7, 1.4
+"""Compliance of a gear over the usual one of the arm."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of arm, and how it is pressed."""
+
+    urdf: str
+    gears: tuple[float, ...]
+    """Usual compliance of each gear, in µrad/(N·m)."""
+    middle: tuple[float, ...]
+    """Posture about which it presses, in rad."""
+    press: float
+    """Force along the tool, in N."""
+
+    @property
+    def robot(self) -> Robot:
+        return Robot.from_urdf(self.urdf, "tool")
+
+
+def _tooled(urdf: str, flange: str, size: float) -> str:
+    T_flange_tool = T_from_xyzabc(0.15 * size, 0.0, size, 0.0, np.radians(20.0), 0.0)
+    return with_tool(urdf, flange, "tool", T_flange_tool)
+
+
+@cache
+def kind(arm: str) -> Kind:
+    """Return one of the four kinds."""
+    if arm == "parallel axes":
+        gears = 20.0, 20.0, 33.0, 100.0, 100.0, 100.0
+        middle = 0.0, -1.2, 1.6, -1.9, -1.57, 0.0
+        return Kind(_tooled(catalogue.urdf("UR10e"), "flange", 0.15), gears, middle, 60.0)
+    if arm == "210 kg":
+        gears = 0.42, 0.35, 0.39, 1.3, 1.7, 3.3
+        middle = 0.0, -1.75, 1.9, 0.0, 1.0, 0.0
+        return Kind(_tooled(catalogue.urdf("KR 210 R2700-2"), "flange", 0.3), gears, middle, 1100.0)
+    if arm == "seven axes":
+        gears = 67.0, 67.0, 83.0, 83.0, 100.0, 125.0, 170.0
+        middle = 0.0, 0.6, 0.3, 1.6, 0.2, 0.9, 0.0
+        return Kind(_tooled(seven_axes().urdf, "tcp", 0.15), gears, middle, 40.0)
+    small = opw_arm_urdf(0.0, -0.07, 0.0, 0.29, 0.27, 0.302, 0.072, name="3 kg")
+    gears = 25.0, 30.0, 40.0, 120.0, 150.0, 250.0
+    return Kind(_tooled(small, "tcp", 0.1), gears, (0.0, 0.4, 0.3, 0.2, 1.0, 0.0), 60.0)
+
+
+ARMS = ("parallel axes", "210 kg", "seven axes", "3 kg")
+
+
+def truth(of: Kind, rng: np.random.Generator) -> tuple[ElasticArm, dict[str, float]]:
+    """Return an arm, and the compliance of each of its springs by name, in rad/(N·m)."""
+    linkage, planted, springs = Linkage.from_urdf(of.urdf, "tool"), {}, []
+    for joint, origin in enumerate(joint_origins(of.robot.chain)):
+        name = linkage.joint_names[joint]
+        gear = planted[f"{name}.axial"] = 1e-6 * of.gears[joint] * rng.uniform(*GEAR)
+        springs.append(axial_spring(linkage, joint, 1.0 / gear))
+        for axis, direction in origin.directions.items():
+            tilt = planted[f"{name}.{axis}"] = gear * rng.uniform(*TILT)
+            springs.append(TruthSpring(name, direction, Linear(1.0 / tilt), at=origin.offset))
+    gravity = GRAVITY if of.robot.has_masses else (0.0, 0.0, 0.0)
+    return ElasticArm(linkage, tuple(springs), gravity), planted
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What a calibration says of its springs, and what was planted."""
+
+    taken: str
+    """The rung."""
+    springs: tuple[SpringSummary, ...]
+    planted: dict[str, float]
+    sums: tuple[bool, ...]
+    """Whether each sum of springs that are not known holds what was planted."""
+    warnings: tuple[str, ...]
+
+    def held(self) -> Iterator[tuple[str, bool]]:
+        """Yield each known spring that was planted, and whether its interval holds it."""
+        for each in self.springs:
+            if each.observable and each.name in self.planted:
+                yield each.name, each.low <= self.planted[each.name] <= each.high
+
+
+@one_blas_thread()
+def campaign(
+    arm: str, poses: int, seed: int, *, press: float | None = None, springs: str = "auto"
+) -> Campaign:
+    """Press at poses about a posture, by default with its kind's force, and calibrate."""
+    of, rng = kind(arm), np.random.default_rng([seed, poses])
+    of = of if press is None else replace(of, press=press)
+    real, planted = truth(of, rng)
+    spread = np.full(len(of.middle), 0.5)
+    spread[-1] = 2.5
+    q = np.array(of.middle) + spread * rng.uniform(-1.0, 1.0, (poses, len(spread)))
+    five = press_forces(real.linkage.forward(q), 0.25 * of.press, 0.25 * of.press, of.press)
+    force = np.concatenate([five, 0.45 * five[:, :1]], axis=1)
+    cases = ("normal", "north", "south", "east", "west", "normal_45")
+    noise = Noise(force=1e-3 * of.press, marker=15e-6)
+    measured = measure(real, q, force, noise, rng, load_cases=cases)
+    robot = of.robot
+    readings = measured.readings(robot.joint_names)
+    choice = choose_model(robot, readings, springs, FitOptions())
+    options = with_knowledge(FitOptions(), choice.known, choice.model, readings)
+    calibration = calibrate(choice.model, readings, rng, options, ladder=choice.ladder)
+    found = calibration.calibrated
+    sums = tuple(
+        each.low <= sum(t.weight * planted[t.spring] for t in each.terms) <= each.high
+        for each in sum_summaries(found)
+        if all(t.spring in planted for t in each.terms)
+    )
+    summaries = spring_summaries(found, known=choice.known)
+    warnings = tuple(map(str, calibration.warnings))
+    return Campaign(choice.taken, summaries, planted, sums, warnings)
+
+
+def held_by_spring(arm: str, poses: int, campaigns: int) -> dict[str, list[bool]]:
+    """Return whether intervals held what was planted, by spring, in campaigns of as many arms.
+
+    Sums of springs that are not known singly count under one name.
+    """
+    held: dict[str, list[bool]] = {}
+    for seed in range(campaigns):
+        found = campaign(arm, poses, seed)
+        for name, each in found.held():
+            held.setdefault(name, []).append(each)
+        held.setdefault("sums", []).extend(found.sums)
+    return held
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("poses", POSES)
+@pytest.mark.parametrize("arm", ARMS)
+def test_the_interval_of_a_known_spring_holds_what_was_planted(arm, poses):
+    """One of twenty may miss: of 25, five are more than chance makes of any spring."""
+    held = held_by_spring(arm, POSES[poses], CAMPAIGNS)
+    for name, each in held.items():
+        print(f"{arm}, {poses}: {name} {sum(each)} of {len(each)}")
+    every = np.concatenate(list(held.values()))
+    assert every.mean() > 0.93
+    assert all(np.sum(~np.array(each)) < 5 for name, each in held.items() if name != "sums")
+
+
+def test_one_campaign_of_a_small_arm_says_what_it_knows():
+    """A cheap watch on the study above."""
+    found = campaign("3 kg", POSES["few"], 0)
+    held = dict(found.held())
+    assert {"joint_2.axial", "joint_3.axial", "joint_1.x", "joint_1.y"} <= held.keys()
+    assert sum(held.values()) >= len(held) - 1
+
+
+def test_an_arm_that_yields_so_far_that_its_levers_change_is_warned_of():
+    """A UR10e pressed with 165 N yields 5 mm: its last tilt was held in 22 of 27 campaigns."""
+    soft = campaign("parallel axes", POSES["few"], 0, press=165.0, springs="bearing")
+    assert any("changes its levers" in each for each in soft.warnings)
+    stiff = campaign("3 kg", POSES["few"], 0, springs="bearing")
+    assert not any("changes its levers" in each for each in stiff.warnings)
