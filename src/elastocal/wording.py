@@ -44,6 +44,15 @@ def phrases(*templates: str) -> tuple[Phrase, ...]:
     return tuple(map(phrase, templates))
 
 
+def in_words(name: str) -> Phrase:
+    """Return a name of a file or an option as words for a reader.
+
+    >>> in_words("joint_limits")
+    'joint limits'
+    """
+    return phrase(name.replace("_", " "))
+
+
 def sentences(texts: Sequence[str], between: str = " ") -> Phrase:
     """Return texts one after the other as one phrase.
 

@@ -18,7 +18,7 @@ from elastocal.planning.pool import UNREACHABLE
 from elastocal.procedure.record import ReadingStatus
 from elastocal.report import language_of
 from elastocal.report.language import LANGUAGES
-from elastocal.wording import counted, mm, phrase, sentences
+from elastocal.wording import counted, in_words, mm, phrase, sentences
 
 SOURCE = Path(elastocal.__file__).parent
 CATALOGUES = {
@@ -109,7 +109,7 @@ def counts_of_the_pages():
 
 LIGHTS = {f"{colour} light" for colour in ("green", "yellow", "red")}
 CHECKS = {UNREACHABLE} | {
-    kind.name
+    in_words(kind.name)
     for kind in (getattr(checks, name) for name in dir(checks) if name.endswith("Check"))
     if isinstance(getattr(kind, "name", None), str)
 }

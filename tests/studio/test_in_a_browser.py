@@ -292,7 +292,7 @@ def run_it(page, cell, told):
     told["live"] = page.text("live-figures")
     page.keep("run")
     stopped = time.monotonic()
-    page.click("#run-stop")
+    page.click("#work-stop")
     page.wait("document.documentElement.dataset.work === 'run stopped'")
     told["seconds to stop"] = time.monotonic() - stopped
     told["stopped"] = page.text("message")
@@ -307,7 +307,7 @@ def run_it(page, cell, told):
     page.get("document.getElementById('live-figures').replaceChildren()")
     page.click("#run-form > button")
     page.wait("/Force/.test(document.getElementById('live-figures').textContent)")
-    page.click("#run-stop")
+    page.click("#work-stop")
     page.wait("document.documentElement.dataset.work === 'run stopped'")
     told["names"] = page.get(NAMES)
 

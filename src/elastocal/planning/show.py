@@ -6,7 +6,7 @@ from elastocal import blocks
 from elastocal.planning.plan_result import PlanResult
 from elastocal.planning.production import ProductionRecord
 from elastocal.units import quantity
-from elastocal.wording import duration, mm, phrase, phrases, readable
+from elastocal.wording import duration, in_words, mm, phrase, phrases, readable
 
 
 def show_plan(plan: PlanResult) -> Iterator[blocks.Block]:
@@ -29,12 +29,12 @@ def key_figures(plan: PlanResult) -> tuple[tuple[str, str], ...]:
         (phrase("Poses"), str(len(plan.poses))),
         (phrase("Covering radius"), radius),
         (phrase("Total time"), duration(plan.total_time)),
-        (phrase("travel between poses"), duration(plan.travel_time)),
+        (phrase("Travel between poses"), duration(plan.travel_time)),
         (
             phrase("Points with a posture"),
             phrase("{rank} of {all}", rank=pool.valid, all=pool.sampled),
         ),
-        (phrase("Most frequent reason to refuse a point"), phrase(pool.bottleneck or "none")),
+        (phrase("Most frequent reason to refuse a point"), in_words(pool.bottleneck or "none")),
         *(_covered(plan.production) if plan.production is not None else ()),
     )
 
@@ -127,7 +127,7 @@ def _checks(plan: PlanResult) -> blocks.Table:
         most = check.name == plan.pool.bottleneck
         rows.append(
             (
-                check.name,
+                in_words(check.name),
                 phrase("{points} (most)", points=check.refused) if most else str(check.refused),
                 "" if worst is None else _margin(margins[worst], check.unit),
                 "" if worst is None else str(worst),

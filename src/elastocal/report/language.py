@@ -24,6 +24,8 @@ LANGUAGES = {"en": "English", "de": "Deutsch", "fr": "Français"}
 """Languages that a page can be written in, by their code."""
 _BETWEEN_NUMBERS = re.compile(r"(?<=\d), (?=[-+−]?\d)")
 _DECIMAL = re.compile(r"(?<![\w.])([-+−]?\d*)\.(\d+)(?![\w.])")
+_PERCENT = re.compile(r"(?<=\d)%")
+_BEFORE_SIGN = re.compile(" (?=[:;?!%»])")
 _PLACE, _LETTER = re.compile(r"\{\w+\}"), re.compile("[A-Za-z]")
 _SENTENCE = re.compile(
     r"\b(?:a|an|and|are|as|by|from|has|is|no|not|of|on|that|the|to|was|with)\b(?=.* .* )"
@@ -41,11 +43,13 @@ class Language:
 
     def say(self, text: object) -> str:
         """Return a text in this language."""
-        if not self.catalogue or not isinstance(text, str):
+        if not isinstance(text, str):
             return str(text)
+        if not self.catalogue:
+            return _with_spaced_percent(text)
         known = self._template(text)
         if not known:
-            return _with_decimal_comma(text)
+            return _with_decimal_comma(_with_spaced_percent(text))
         template = self.catalogue.get(known, known)
         values = {name: self.say(value) for name, value in _parts(text).items()}
         return template.format(**values) if values else template
@@ -55,10 +59,10 @@ class Language:
         from markupsafe import Markup, escape
 
         if not self.catalogue or not isinstance(text, str):
-            return escape(str(text))
+            return escape(self.say(text))
         known = self._template(text)
         if not known:
-            shown = escape(_with_decimal_comma(text))
+            shown = escape(self.say(text))
             is_english = _SENTENCE.search(text)
             return Markup('<span lang="en">{}</span>').format(text) if is_english else shown
         template = escape(self.catalogue.get(known, known))
@@ -75,6 +79,15 @@ class Language:
 
 def _parts(text: str) -> Mapping[str, object]:
     return text.parts if isinstance(text, Phrase) else {}
+
+
+def _with_spaced_percent(text: str) -> str:
+    """Return figures in percent as the sentences of the pages write them (ISO 80000-1).
+
+    >>> _with_spaced_percent("±39%").replace(chr(160), "_")
+    '±39_%'
+    """
+    return _PERCENT.sub("\N{NO-BREAK SPACE}%", text)
 
 
 def _with_decimal_comma(text: str) -> str:
@@ -112,7 +125,18 @@ def language_of(code: str, option: str = "--language") -> Language:
     catalogue = parse_json(file.read_text(encoding="utf-8"), file.name)
     for words in plugins.load_all("words", code):
         catalogue = {**words, **catalogue}
+    if code == "fr":
+        catalogue = {each: _with_fixed_spaces(said) for each, said in catalogue.items()}
     return Language(code, catalogue)
+
+
+def _with_fixed_spaces(text: str) -> str:
+    """Return a French text whose signs stay on the line of the word before them.
+
+    >>> _with_fixed_spaces("pose 14 : 95 % des erreurs").replace(chr(160), "_")
+    'pose 14_: 95_% des erreurs'
+    """
+    return _BEFORE_SIGN.sub("\N{NO-BREAK SPACE}", text)
 
 
 ENGLISH = language_of("en")

@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.results import brief_repr
+from elastocal.wording import phrase
 
 _STRAIGHT = 0.02
 """Largest tilt in rad of a tip that is taken to point out of the arm."""
@@ -101,10 +102,12 @@ class SerialChain:
         *arm, last = self.joints
         heavy = [joint for joint in arm if joint.mass > 0.0]
         if len(heavy) > 1 and not any(np.any(joint.centre_of_mass) for joint in heavy):
-            return "the centre of mass of every link is written at its joint, as on no arm"
+            return phrase("the centre of mass of every link is written at its joint, as on no arm")
         if heavy:
             return ""
-        return "only what the last joint carries has a mass" if last.mass else "no link has a mass"
+        return phrase(
+            "only what the last joint carries has a mass" if last.mass else "no link has a mass"
+        )
 
 
 @brief_repr

@@ -538,9 +538,9 @@ def assumptions(root: ElementTree.Element, chain: SerialChain) -> tuple[Assumpti
     if filler is None:
         return marked
     reason = phrase(
-        "unknown: the URDF gives every joint the same, {effort:g} N*m, as no arm has;"
+        "unknown: the URDF gives every joint the same, {effort} N*m, as no arm has;"
         " limits.torque.values of the cell file takes those of the data sheet",
-        effort=filler,
+        effort=f"{filler:g}",
     )
     return (*marked, Assumption("effort", reason))
 

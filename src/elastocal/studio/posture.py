@@ -29,7 +29,7 @@ from elastocal.robot import xyzabc_from_T
 from elastocal.studio.springs import CaseFigure, StiffnessFigure, StudioSprings
 from elastocal.units import in_unit, quantity
 from elastocal.viewer import Scene, cell_scene, packed_places
-from elastocal.wording import millimetres, mm, readable
+from elastocal.wording import in_words, millimetres, mm, readable
 
 _PROBES = 32
 """Points by which positions of the rail are ranked, as planning does."""
@@ -222,7 +222,7 @@ class CellView:
             if len(pool.postures):
                 found = pool.postures.q[0]
                 return self.at(found, note=self._moved(before, found))
-        return self.at(q, f"no pose here, refused by {pool.refusals[pool.refused_by[0]]}")
+        return self.at(q, f"no pose here, refused by {in_words(pool.refusals[pool.refused_by[0]])}")
 
     def _moved(self, before: FloatArray, after: FloatArray) -> str:
         """Return which external axes were moved, in words; empty where none was."""
@@ -256,7 +256,7 @@ class CellView:
         )
         rows = zip(margins.names, margins.units, margins.advice, margins.margin[:, 0], strict=True)
         figures = tuple(
-            CheckFigure(name, readable(float(margin), unit), bool(margin > 0.0), advice)
+            CheckFigure(in_words(name), readable(float(margin), unit), bool(margin > 0.0), advice)
             for name, unit, advice, margin in rows
         )
         if away is not None:

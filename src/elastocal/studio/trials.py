@@ -12,7 +12,7 @@ from elastocal.parallel import one_blas_thread
 from elastocal.planning import SearchPool, cell_surface, sample_pool
 from elastocal.planning.search import technique
 from elastocal.studio.worker import Data, Outbox
-from elastocal.wording import readable
+from elastocal.wording import in_words, readable
 
 _SURVEYED = 300
 """Candidates of a survey: enough to see where they end."""
@@ -27,7 +27,10 @@ def survey_reach(path: Path, outbox: Outbox) -> Data:
     surface = cell_surface(cell)
     sampled = sample_pool(cell, surface, np.random.default_rng(0), 1, outbox.progress)
     pool = sampled.pool
-    names = [pool.refusals[number] if number >= 0 else "" for number in pool.refused_by.tolist()]
+    names = [
+        in_words(pool.refusals[number]) if number >= 0 else ""
+        for number in pool.refused_by.tolist()
+    ]
     share = f"{len(pool.postures)} of {pool.sampled} points can be pressed on"
     return {
         "points": sampled.points.position.tolist(),

@@ -28,7 +28,7 @@ from elastocal.records import (
     read_arrays,
 )
 from elastocal.verdict.evidence import MissingPart, Seal, UsedFile
-from elastocal.wording import phrases
+from elastocal.wording import Phrase, phrase, phrases
 
 BYTES, CONTENT = phrases("bytes", "content without times and folders")
 _LEFT_OUT = (
@@ -178,9 +178,14 @@ class PartReader:
         path = given or self.folders.default(default)
         if path is None:
             if not optional:
-                self.note_missing(name, f"there is no {default}; {hint}")
+                self.note_missing(name, self.no_file(default, hint))
             return None
         return self.read(name, path, lambda: read(path), named=given is not None)
+
+    @staticmethod
+    def no_file(file: str, hint: str) -> Phrase:
+        """Return why a part is missing whose file is not there, and what makes it."""
+        return phrase("there is no {file}; {hint}", file=file, hint=hint)
 
     def note_missing(self, name: str, reason: str, damaged: bool = False) -> None:
         """Note that the report does without a part."""

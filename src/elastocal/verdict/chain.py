@@ -256,7 +256,7 @@ def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
         if trusted is None:
             text = (
                 "the run is not signed: whoever edits its record can renew the hashes"
-                " (`elastocal run --sign KEY` signs one while it is recorded)"
+                " (run --sign KEY signs one while it is recorded)"
             )
             return Link("signature", LinkState.UNSIGNED, text)
         return _broken("signature", f"the run should be signed, and there is no {place.name}")

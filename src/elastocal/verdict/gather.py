@@ -69,8 +69,10 @@ from elastocal.verdict.evidence import (
 from elastocal.verdict.history import history_link
 from elastocal.wording import phrase
 
-_UNKNOWN = "nothing is known of how the readings came about"
-_NO_RUN = f"no folder of a run was given: {_UNKNOWN}"
+_NO_RUN = phrase("no folder of a run was given: nothing is known of how the readings came about")
+_NO_LOGS = phrase(
+    "the readings state no run, and no logs: nothing is known of how the readings came about"
+)
 _CELL = "cell.yaml"
 """Default name of a cell file beside a model."""
 
@@ -156,7 +158,7 @@ def _with_readings(evidence: Evidence, reader: PartReader, options: EvidenceOpti
     evidence = replace(evidence, dataset=data)
     stated = {} if data is None else read_made_from(data.attributes)
     if data is None or not stated or not data.provenance.startswith(IMPORTED):
-        reader.note_missing("run", f"the readings state no run, and no logs: {_UNKNOWN}")
+        reader.note_missing("run", _NO_LOGS)
         return _with_cell(evidence, reader, reader.folders.default(_CELL))
     logs = tuple(path.parent / name for name in stated)
     evidence = replace(evidence, logs=logs)
@@ -192,7 +194,12 @@ def _with_cell(evidence: Evidence, reader: PartReader, path: Path | None) -> Evi
         return evidence
     measured = "" if evidence.dataset is None else evidence.dataset.robot_name
     if measured and measured != cell.robot.name:
-        reason = f"{reader.folders.shown(path)} is of {cell.robot.name}, the readings of {measured}"
+        reason = phrase(
+            "{file} is of {name}, the readings are of {measured}",
+            file=reader.folders.shown(path),
+            name=cell.robot.name,
+            measured=measured,
+        )
         reader.note_missing("cell", reason)
         return evidence
     surface = reader.read("surface", cell.path, lambda: cell_surface(cell))
@@ -236,7 +243,8 @@ def _with_plan(evidence: Evidence, reader: PartReader, run: RunFolder) -> Eviden
         return pool
 
     if not (run.plan / POOL).exists():
-        reader.note_missing("pool", f"there is no {reader.folders.shown(run.plan / POOL)}")
+        file = reader.folders.shown(run.plan / POOL)
+        reader.note_missing("pool", phrase("there is no {file}", file=file))
         return replace(evidence, plan=plan)
     pool = reader.read("pool", run.plan / POOL, pool_of_plan)
     return replace(evidence, plan=plan, pool=pool)
@@ -246,9 +254,11 @@ def _derived(
     reader: PartReader, name: str, path: Path, read: Callable[[Path], Part], touches: bool
 ) -> Part | None:
     if not path.is_file():
-        reason = f"there is no {reader.folders.shown(path)}; `elastocal derive` makes it"
+        reason = reader.no_file(reader.folders.shown(path), phrase("`elastocal derive` makes it"))
         if touches:
-            reason = "touches have none, they press no load case: `elastocal touch` reads them"
+            reason = phrase(
+                "touches have none, they press no load case: `elastocal touch` reads them"
+            )
         reader.note_missing(name, reason)
         return None
     return reader.read(name, path, lambda: read(path))
@@ -258,7 +268,7 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
     given = options.model or reader.folders.model
     calibrated = reader.find(
         "calibrated model", given, MODEL, lambda path: _calibrated(path, evidence.dataset),
-        "`elastocal calibrate` makes one",
+        phrase("`elastocal calibrate` makes one"),
     )  # fmt: skip
     evidence = replace(evidence, calibrated=calibrated)
     if calibrated is None or evidence.dataset is None:
@@ -337,7 +347,7 @@ def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions)
         return check_process(read_process(folder), evidence, folder / TABLE)
 
     place = options.tool or reader.folders.default(TOOL)
-    found = reader.find("tool file", options.tool, TOOL, tool, "`elastocal tool` makes one")
+    found = reader.find("tool file", options.tool, TOOL, tool, phrase("`elastocal tool` makes one"))
     return replace(
         evidence,
         tool=found,
@@ -345,7 +355,7 @@ def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions)
         codecs=_codecs(evidence, reader, options.codec),
         process=reader.find(
             "process", options.process, PROCESS, process,
-            "`elastocal simulate-process` makes one for a simulated cell",
+            phrase("`elastocal simulate-process` makes one for a simulated cell"),
             optional=bool(evidence.logs),
         ),
     )  # fmt: skip
@@ -365,7 +375,7 @@ def _codecs(
     root = given or reader.folders.default(CODEC)
     inner = sorted(path.parent for path in root.glob(f"*/{ARRAYS}")) if root else []
     if root is None or not inner or (root / ARRAYS).exists():
-        hint = "`elastocal codec` makes one"
+        hint = phrase("`elastocal codec` makes one")
         found = reader.find("codec", given, CODEC, codec, hint)
         return () if found is None else (found,)
     read = (
@@ -379,13 +389,13 @@ def _with_old(evidence: Evidence, reader: PartReader, options: EvidenceOptions) 
     old = options.old
     new = options.model or reader.folders.model or reader.folders.default(MODEL)
     if old is None:
-        reason = (
+        reason = phrase(
             "no earlier calibration was given to compare with, so nothing is known of any change"
         )
         reader.note_missing("earlier calibration", reason)
         return evidence
     if new is None or evidence.calibrated is None:
-        reason = "there is no calibrated model to compare it with"
+        reason = phrase("there is no calibrated model to compare it with")
         reader.note_missing("comparison with the earlier calibration", reason)
         return evidence
     q, force = _rows_that_matter(evidence)

@@ -306,8 +306,8 @@ def test_table_1_has_the_figures_of_the_process_beside_those_of_the_paper(parts)
     text = words(process, parts)
     line = parts.process.table.lines[-1]
     assert f"{1e3 * line.before.mean:.3f} {1e3 * line.before.max:.3f}" in text
-    assert f"Reduction {line.reduction.mean:.2%}" in text
-    assert "Paper, reduction 89.30% 70.19% 54.00%" in text
+    assert f"Reduction {100.0 * line.reduction.mean:.2f} %" in text
+    assert "Paper, reduction 89.30 % 70.19 % 54.00 %" in text
 
 
 def test_reductions_of_the_paper_are_those_of_its_own_deviations():

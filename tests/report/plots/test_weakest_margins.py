@@ -18,7 +18,7 @@ def test_weakest_check_is_the_smallest_part_of_its_median(pool):
     found = weakest_margins(_with(pool, margin))
     assert (found.check[3], found.check[4]) == (0, 1)
     np.testing.assert_allclose(found.share[[3, 4]], [0.25, 0.1])
-    assert found.label[3] == f"{pool.check_names[0]} 50 mm"
+    assert found.label[3] == "joint limits 50 mm"
     assert found.label[4] == f"{pool.check_names[1]} 5.73°"
 
 

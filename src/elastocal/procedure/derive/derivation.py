@@ -746,7 +746,7 @@ def _reasons(rows: Sequence[LoadRow], registration: Registration) -> str:
 def run_provenance(folder: RunFolder, record: RunRecord, sensor: SensorLoad | None) -> str:
     """Return the provenance of a run's data, as its dataset states it."""
     corrected = "" if sensor is None else f", {SENSOR_CORRECTED}"
-    return f"elastocal run {folder.path.resolve().name}, {record.origin}{corrected}"
+    return f"elastocal run, folder {folder.path.resolve().name}, {record.origin}{corrected}"
 
 
 def _by_pose_and_case(

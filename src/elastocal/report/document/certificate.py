@@ -24,7 +24,6 @@ from elastocal.wording import Phrase, counted, mm, phrase, sentences
 
 _MOST_REASONS = 2
 """Reasons on the sheet, of two or three lines each on paper: the rest is in the appendix."""
-_LONG_REASON, _LONG_NAME = 110, 60
 _WIDE, _HIGH = 600.0, 190.0
 """Inner size of the picture before and after, in its own units."""
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
@@ -100,14 +99,6 @@ class Certificate:
     uncertainty: Phrase
     signature: Phrase
     run_signature: Phrase
-
-    @property
-    def is_full(self) -> bool:
-        """Whether so much is to be said that it fits on the sheet in small type only."""
-        long = [each for each in self.reasons if len(each) > _LONG_REASON]
-        parts = [part for _, parts in self.identity for part in parts if isinstance(part, str)]
-        names = [part for part in parts if len(part) > _LONG_NAME]
-        return len(long) > 1 or len(self.reasons) > 2 or len(names) > 1
 
 
 def certificate_of_evidence(evidence: Evidence, verdict: Verdict, signer: str = "") -> Certificate:

@@ -13,7 +13,7 @@ from elastocal.planning.surface import Surface
 from elastocal.report.plots import style
 from elastocal.results import brief_repr
 from elastocal.viewer import Dots, Layer, Scene, Strokes, Tags, cell_scene
-from elastocal.wording import duration, millimetres, phrase, readable, sentences
+from elastocal.wording import duration, in_words, millimetres, phrase, readable, sentences
 
 _OFF_SURFACE = 0.004
 """Dots are drawn this far off the surface, as part of its size, so that it does not swallow half
@@ -117,9 +117,9 @@ def _refused(pool: PoolData) -> list[Layer]:
         dots = Dots(
             at,
             np.tile(grey, (len(at), 1)),
-            (phrase("refused: {check}", check=phrase(name)),) * len(at),
+            (phrase("refused: {check}", check=in_words(name)),) * len(at),
         )
-        label = phrase("Refused by {check} ({count})", check=phrase(name), count=counts[number])
+        label = phrase("Refused by {check} ({count})", check=in_words(name), count=counts[number])
         layers.append(Layer(label, style.REFUSED, (dots,), shown=False))
     return layers
 
@@ -207,7 +207,7 @@ def weakest_margins(pool: PoolData) -> WeakestMargins:
     check = relative.argmin(axis=0)
     column = np.arange(len(check))
     label = tuple(
-        sentences((phrase(pool.check_names[row]), readable(float(margin), pool.check_units[row])))
+        sentences((in_words(pool.check_names[row]), readable(float(margin), pool.check_units[row])))
         for row, margin in zip(check, pool.margin[check, column], strict=True)
     )
     return WeakestMargins(relative[check, column], check, label)

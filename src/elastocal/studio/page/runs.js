@@ -12,6 +12,7 @@ export function showWork(work) {
   $("work").hidden = !busy;
   $("work-kind").textContent = KINDS[work.kind] || "";
   $("work-stage").textContent = work.total > 1 ? `${work.stage}: ${work.done} of ${work.total}` : work.stage;
+  $("work-stop").textContent = work.kind === "run" ? "Stop: release, retract, stand still" : "Stop";
   $("work-bar").value = work.total ? work.done / work.total : 0;
   for (const id of ["survey", "compare", "watch"]) $(id).disabled = busy;
   for (const id of ["plan-form", "run-form"]) $(id).querySelector("button").disabled = busy;
@@ -120,7 +121,7 @@ function showLive(live) {
   $("asked").hidden = !live.asked;
   $("asked-text").textContent = live.asked || "";
   $("answer").value = live.question || "";
-  if (live.warnings) say(live.warnings.join(" · "), false, $("run-stop"));
+  if (live.warnings) say(live.warnings.join(" · "), false, null);
   if (live.time === undefined) return;
   const marker = live.marker ? `${live.marker.map((x) => (1e3 * x).toFixed(2)).join(", ")} mm, in ${live.station}` : "not seen";
   fill($("live-figures"), [
@@ -249,7 +250,6 @@ export function openRuns() {
   $("compare").addEventListener("click", () => begin("compare"));
   $("watch").addEventListener("click", () => begin("watch"));
   $("work-stop").addEventListener("click", () => begin("stop"));
-  $("run-stop").addEventListener("click", () => begin("stop"));
   $("answer").addEventListener("click", () => begin("answer", { question: Number($("answer").value) }));
   $("plan-form").addEventListener("submit", (event) => {
     event.preventDefault();

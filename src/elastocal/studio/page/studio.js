@@ -34,7 +34,8 @@ function onPage(text) {
 
 // What is said stands beside the button that asked for it, and stays in sight; without one, on top.
 export function say(text, good = false, beside = origin) {
-  const message = $("message"), row = beside?.closest("[role=tabpanel]") && (beside.closest(".row, .buttons") || beside);
+  // What was begun in a part that is hidden now is said on top.
+  const message = $("message"), part = beside?.closest("[role=tabpanel]"), row = part && !part.hidden && (beside.closest(".row, .buttons") || beside);
   if (row) row.after(message);
   else $("work").after(message);
   message.hidden = !text;

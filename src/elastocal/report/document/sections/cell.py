@@ -47,7 +47,7 @@ def _presses(cell: Cell, tested: FittedReadings | None) -> blocks.Table:
         if tested is None or not of_name.any():
             return (name, *wanted, *("–",) * 3, "0")
         found = np.median(tested.force_tcp[of_name], axis=0)
-        return (name, *wanted, *(f"{each + 0.0:.0f}" for each in found), str(of_name.sum()))
+        return (name, *wanted, *(f"{round(each)}" for each in found), str(of_name.sum()))
 
     return blocks.Table(
         phrase(
