@@ -79,7 +79,8 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "technique": _TECHNIQUES,
     "technique or none": (*_TECHNIQUES, "none"),
     "springs": (
-        "auto", "actuated", "bearing", "bearing-joint", "bearing-ends", "links", "tensor", "gears",
+        "auto", "actuated", "bearing", "bearing-joint", "bearing-ends", "links", "tensor",
+        "bearing-gears", "gears",
     ),
     "process": ("afp", "machining"),
     "example": ("afp", "machining", "ur20"),

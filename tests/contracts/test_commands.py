@@ -158,7 +158,7 @@ def test_choices_that_help_lists_are_those_that_there_are():
     assert {
         "technique": tuple(TECHNIQUES),
         "technique or none": (*TECHNIQUES, "none"),
-        "springs": ("auto", *LAYOUTS, "gears"),
+        "springs": ("auto", *LAYOUTS, "bearing-gears", "gears"),
         "process": tuple(PROCESSES),
         "example": tuple(EXAMPLES),
         "language": (*PROGRAM_WRITERS, "none"),
@@ -200,7 +200,7 @@ class TestCompletion:
     def test_commands_choices_and_robots(self):
         assert self.asked("cal") == ["calibrate", "calibrate-pair"]
         assert self.asked("calibrate", "--springs", "bear") == [
-            "bearing", "bearing-joint", "bearing-ends",
+            "bearing", "bearing-joint", "bearing-ends", "bearing-gears",
         ]  # fmt: skip
         assert self.asked("robots", "UR") == ["UR10e", "UR20"]
 

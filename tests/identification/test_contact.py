@@ -249,3 +249,10 @@ def test_a_marker_of_zeros_ends_in_a_sentence_and_not_in_a_traceback():
 def test_a_stiffness_with_a_unit_is_refused_in_python():
     with pytest.raises(IdentificationError, match=r"^contact.normal is '50 N/um': in Python"):
         Contact(normal="50 N/um")
+
+
+def test_gears_on_bearing_springs_are_tried_beside_a_contact_alone():
+    """A free normal compliance leaves them where it leaves no springs of links."""
+    held = choose_model(arm(), readings(), "auto", FitOptions(contact=Contact()))
+    assert "bearing-gears" in [each.name for each in held.ladder]
+    assert {each.values["springs"] for each in held.refused} >= {"links", "gears"}

@@ -76,6 +76,13 @@ def test_a_free_steel_contact_costs_little_beside_a_tracker_with_the_same_spring
     assert free < 1.2 * judged("kuka", tracked, Contact(), "bearing")[0]
 
 
+def test_a_free_steel_contact_leaves_gears_that_stiffen_and_takes_the_links_out():
+    errors, inside = zip(*(judged(arm, STEEL, Contact()) for arm in ARMS), strict=True)
+    assert np.mean(errors) < 0.019
+    assert max(errors) < 0.019
+    assert np.mean(inside) > 0.75
+
+
 def test_gears_with_a_free_normal_and_presses_along_the_normal_alone_are_refused():
     with pytest.raises(IdentificationError, match=r"contact\.normal is free, and the springs"):
         ec.calibrate(dataset("kuka", STEEL), contact=Contact(), springs="gears")

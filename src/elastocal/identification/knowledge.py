@@ -10,6 +10,7 @@ docs/decisions/0066-ladder.md. What the prior alone made is not called known
 (docs/decisions/0124-known-by-readings.md).
 """
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -32,7 +33,7 @@ from elastocal.identification.contact import (
 from elastocal.identification.observability import find_hidden, likely_sizes, observability
 from elastocal.identification.options import MEDIAN_NORM, FitOptions, Prior, bounds
 from elastocal.identification.problem import Problem, build
-from elastocal.identification.rungs import gears
+from elastocal.identification.rungs import bearing_gears, gears
 from elastocal.identification.solve import factor, solve
 from elastocal.identification.uncertainty import leave_poses_out
 from elastocal.results import brief_repr
@@ -250,7 +251,8 @@ def weigh_contact(
 
     First fits state the robust residual of a row, against which the prior and the errors that
     readings share are weighed, and compliances of which the spread is a share. They are fits by
-    gears, or by bearing springs where gears imitate a compliance that is free.
+    gears, or by springs at bearings, with gears if these do not, where they imitate a compliance
+    that is free.
 
     Parameters
     ----------
@@ -274,13 +276,12 @@ def weigh_contact(
         problem = build(first, readings, guess, marker_offset)
         arm = _of_arm(problem, solve(problem, "huber").compliance)
         plain = replace(plain, contact=with_doubled(options.contact, robot, readings, arm))
-    try:
-        model = ElasticModel(robot, gears(robot, readings))
-        contact = _weighed(model, readings, plain, marker_offset)
-    except IdentificationError:
-        model = ElasticModel(robot, bearing(robot))
-        contact = _weighed(model, readings, plain, marker_offset)
-    return replace(options, contact=contact)
+    for springs in (gears, bearing_gears):
+        model = ElasticModel(robot, springs(robot, readings))
+        with contextlib.suppress(IdentificationError):
+            return replace(options, contact=_weighed(model, readings, plain, marker_offset))
+    model = ElasticModel(robot, bearing(robot))
+    return replace(options, contact=_weighed(model, readings, plain, marker_offset))
 
 
 def _weighed(

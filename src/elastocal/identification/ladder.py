@@ -172,7 +172,9 @@ def choose_model(
         If the readings carry no model that was asked for.
     """
     allowed = allowed_rungs(springs)
-    names = dict.fromkeys((*RUNGS, *allowed, *beside))
+    held = options.contact is not None
+    ladder = (name for name, each in RUNGS.items() if held or not each.by_contact)
+    names = dict.fromkeys((*ladder, *(() if springs == AUTO else allowed), *beside))
     rungs = tuple(rung_of(robot, name) for name in names if name != AUTO)
     options = replace(options, prior=None)
     readings = usable_for_choice(robot, readings, options, marker_offset)

@@ -54,6 +54,9 @@ class Rung:
     """Makes its springs for a robot, scaled to the loads of the readings."""
     needs_levels: bool = False
     """Whether it needs load cases of low and full load."""
+    by_contact: bool = False
+    """Whether it is a rung only where a contact holds the tool, whose free compliance the springs
+    of links imitate: a tracker tells these apart."""
 
 
 def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tuple[Spring, ...]:
@@ -70,7 +73,18 @@ def gears(robot: Robot, readings: Readings, slips: tuple[float, ...] = ()) -> tu
         Limits of friction elements, in that torque; none without. Those that no load made slide
         by far are left out.
     """
-    springs = links(robot)
+    return _with_gears(links(robot), robot, readings, slips)
+
+
+def bearing_gears(robot: Robot, readings: Readings) -> tuple[Spring, ...]:
+    """Return the layout `bearing` with gears for axial springs, without friction; see `gears`."""
+    return _with_gears(bearing(robot), robot, readings)
+
+
+def _with_gears(
+    springs: tuple[Spring, ...], robot: Robot, readings: Readings, slips: tuple[float, ...] = ()
+) -> tuple[Spring, ...]:
+    """Return springs with gears in place of the first of them, one a joint."""
     model = ElasticModel(robot, actuated(robot))
     torque = model.load_torques(readings.joint_position, readings.force, readings.moment)
     typical = dict(zip(robot.joint_names, np.median(np.abs(torque), axis=0), strict=True))
@@ -101,6 +115,7 @@ RUNGS: dict[str, Rung] = {
         Rung("bearing-ends", lambda robot, _: bearing_ends(robot)),
         Rung("links", lambda robot, _: links(robot)),
         Rung("tensor", lambda robot, _: tensor(robot)),
+        Rung("bearing-gears", bearing_gears, by_contact=True),
         Rung("gears", gears),
         Rung(
             "gears+friction",
