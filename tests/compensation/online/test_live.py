@@ -226,6 +226,14 @@ def test_a_press_at_the_beginning_is_no_bias():
     assert bench.loop._tare.bias[:3] == pytest.approx((3.0, 0.0, -4.0))
 
 
+def test_a_sensor_that_was_zeroed_with_its_tool_has_a_bias_as_large_as_the_tool():
+    bench = Bench(tares=True, free=150.0, load=SensorLoad(mass=60.0), force=(2.0, -3.0, 1.0))
+    bench.step(begins=True)
+    bench.run(1.0)
+    assert np.linalg.norm(bench.loop._tare.bias[:3]) > 500.0
+    assert bench.loop.refusal == ""
+
+
 def test_what_is_not_measured_anew_is_no_reading_of_the_bias():
     bench = Bench(tares=True)
     bench.step(begins=True)

@@ -35,6 +35,8 @@ _TARE_READINGS = 125
 _STILL_FORCE, _STILL_MOMENT = 5.0, 1.0
 """Standard deviation of a component over them above which something touches or shakes the tool, in
 N and N·m."""
+_ZEROED = 20.0
+"""Largest force that a sensor shows which was zeroed in the air with its tool, in N."""
 
 
 class LivePhase(Enum):
@@ -192,11 +194,12 @@ class Tare:
         known = impossible("force", *mean[:3].tolist()) or impossible("moment", *mean[3:].tolist())
         quiet = self.scatter[0] <= _STILL_FORCE and self.scatter[1] <= _STILL_MOMENT
         # A press that was taken for a bias would be corrected the other way when the tool is free.
-        size = math.hypot(*mean[:3].tolist())
+        size, shown = math.hypot(*mean[:3].tolist()), math.hypot(*sample.force)
+        pressed = not (size <= self._largest or shown <= _ZEROED)
         self.refusal = (
             f"{size:.0f} N beyond the tool's weight, at most {self._largest:.0f} N can be the bias:"
-            " the tool must be free"
-            if quiet and not size <= self._largest
+            " the tool must be free, or a tool file state the bias"
+            if quiet and pressed
             else ""
         )
         if known is None and quiet and not self.refusal:
