@@ -108,6 +108,27 @@ def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone
         assert with_it > alone - 1.0 if truth == "kind" else with_it > alone + 2.0
 
 
+def test_no_tracker_is_as_good_as_one_and_encoders_in_production_are_better_in_three_axes(tables):
+    rows = [row.strip("| ").split(" | ") for row in tables.instruments("afp").splitlines()[2:]]
+    taken = {(row[0], row[1]): [float(cell.partition("%")[0]) for cell in row[3:7]] for row in rows}
+    assert len(taken) == 2 * len(tables.INSTRUMENTS)
+    assert {row[-1] for row in rows} == {"5"}
+    # The same seeds: what there is to correct is the same by every instrument.
+    before = {}
+    for each in tables.quoted():
+        if each["campaign"] in tables.INSTRUMENTS and each["case"]["kind"] == "afp":
+            for own in each["deviations"][:4]:
+                key = (*each["case"].values(), own["name"], own["load"])
+                before.setdefault(key, set()).add(own["mean"][0])
+    assert {len(each) for each in before.values()} == {1}
+    for springs in ("`bearing`", "`auto`"):
+        tracker, none = taken["tracker", springs], taken["no tracker, disk doubled", springs]
+        assert none[:2] == pytest.approx(tracker[:2], abs=2.0)
+        assert none[2:] == pytest.approx(tracker[2:], abs=4.0)
+        read = taken["encoders in production too", springs]
+        assert min(read[1] - tracker[1], read[3] - tracker[3]) > 1.0
+
+
 @pytest.mark.slow
 def test_a_case_measured_anew_gives_the_figures_that_are_quoted(tables, tmp_path):
     from gallery.process_figures import SHORTER, Case, Measurement

@@ -36,12 +36,12 @@ _PROCEDURES = ("truth", "procedure", "time in the cell, beside springs alone",
                "mean: springs alone", "with it", "3-D: springs alone", "with it",
                "half load: springs alone", "with it", "seeds")  # fmt: skip
 _INSTRUMENTS = ("measured by", "springs", "minutes in the cell", "reduction of the mean", "3-D",
-                "at half load", "3-D", "seeds")  # fmt: skip
+                "at half load", "3-D, at half load", "seeds")  # fmt: skip
 INSTRUMENTS = {
     "template": "tracker",
     "no tracker": "no tracker, disk doubled",
     "encoders fitted": "tracker and encoders",
-    "encoders read": "and encoders in production",
+    "encoders read": "encoders in production too",
 }
 """What measures, by the name of its campaign."""
 TOUCHED = "touched"

@@ -59,7 +59,7 @@ def _draw(found: list[ProcessFigures], kinds: list[str]) -> Figure:
     ]
     figure.legend(handles=handles, loc="lower center", ncols=2, fontsize=8, frameon=False)
     bottom = 0.75 / figure.get_figheight()
-    figure.subplots_adjust(left=0.22, right=0.99, top=0.92, bottom=bottom, wspace=0.06, hspace=0.4)
+    figure.subplots_adjust(left=0.2, right=0.99, top=0.92, bottom=bottom, wspace=0.06, hspace=0.4)
     return figure
 
 
@@ -76,6 +76,6 @@ def _draw_measure(axes: Axes, found: list[ProcessFigures], number: int) -> None:
             axes.plot(some, np.full(len(some), place), "o", ms=4, color=colour, alpha=0.6)
             mean = float(np.mean(some))
             axes.plot([mean, mean], [place - _APART, place + _APART], color=colour, lw=2.0)
-    axes.set_yticks(range(len(INSTRUMENTS)), list(INSTRUMENTS.values()))
+    axes.set_yticks(range(len(INSTRUMENTS)), list(INSTRUMENTS.values()), fontsize=8)
     axes.set_xlim(0.0, None)
     style.open_frame(axes, grid="x")

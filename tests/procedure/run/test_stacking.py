@@ -12,7 +12,7 @@ from elastocal.planning.plan_result import MoveRecord
 from elastocal.procedure import Event, RunEnd, read_commits, read_journal
 from elastocal.procedure.record import Action
 from elastocal.procedure.run.routes import HOME_AT_START, route, stop_joints
-from elastocal.procedure.run.steps import ArmLocation
+from elastocal.procedure.run.steps import ArmLocation, Step
 from support.fake_devices import FakeCell
 from support.fake_runs import HOME, FakeRun, plan
 
@@ -187,3 +187,12 @@ def test_a_run_that_goes_on_before_the_second_disk_asks_for_one_alone(tmp_path):
     again, person = begun(run.path)
     assert again.resume().end is RunEnd.DONE
     assert [disks for disks, *_ in person.asked] == [1, 2]
+
+
+def test_on_the_way_home_the_weight_of_the_tool_is_not_shown_as_a_force(tmp_path):
+    run, _ = begun(tmp_path / "run")
+    told = []
+    run.tell = told.append
+    run.start()
+    assert max(each.force for each in told if each.step in (Step.MOVE, Step.DONE)) == 0.0
+    assert any(each.step is Step.DONE for each in told)

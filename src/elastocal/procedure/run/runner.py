@@ -937,7 +937,8 @@ class Runner:
         pose = None if a is None else a.pose.id
         left = self._left[count if pose is None else pose] - (seen.time - self._pose_start)
         # On a move the tool turns, and what the sensor shows is its weight.
-        shown = a is not None and a.step is not Step.MOVE and len(seen.force_tcp) > 0
+        moves = a is None or a.step in (Step.MOVE, Step.DONE)
+        shown = not moves and len(seen.force_tcp) > 0
         force = seen.force_tcp[-1] if shown else np.zeros(3)
         return Progress(
             time=seen.time,
