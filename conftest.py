@@ -7,6 +7,10 @@ import pytest
 def _in_an_empty_folder(request, monkeypatch, tmp_path_factory):
     if isinstance(request.node, pytest.DoctestItem):
         monkeypatch.chdir(tmp_path_factory.mktemp("example"))
+        # Simulated campaigns are made once for all examples, and not in the user's folder.
+        cache = str(tmp_path_factory.getbasetemp() / "cache")
+        for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
+            monkeypatch.setenv(name, cache)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -16,6 +20,6 @@ def pytest_collection_modifyitems(items):
         if isinstance(item, pytest.DoctestItem) and any(
             name in example.source
             for example in item.dtest.examples
-            for name in ("ec.plan(", "ec.plan_pair(")
+            for name in ("ec.plan(", "ec.plan_pair(", "ec.datasets.afp_run(")
         ):
             item.add_marker(pytest.mark.slow)

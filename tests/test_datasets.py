@@ -37,3 +37,8 @@ def test_the_simulated_campaign_is_made_once(tmp_path, monkeypatch):
     monkeypatch.setattr(datasets, "_measure", None)
     again = ec.datasets.afp_simulated(seed=3, poses=4)
     assert (again.force == found.force).all()
+    run = ec.datasets.afp_run(tmp_path / "afp", seed=3, poses=4)
+    assert (ec.read_dataset(run / "dataset.nc").force == found.force).all()
+    assert (tmp_path / "afp" / "plan" / "plan.json").is_file()
+    with pytest.raises(FileAccessError, match="holds files already"):
+        ec.datasets.afp_run(tmp_path / "afp", seed=3, poses=4)

@@ -5,6 +5,7 @@ Nothing is downloaded. The published readings are files that stand beside the do
 """
 
 import os
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,8 @@ from elastocal.files import filling, read_text
 DATA = "ELASTOCAL_DATA"
 """Environment variable with a folder that holds data sets, each in a folder of its name."""
 _FANUC = "fanuc_r2000ic"
+_CELL, _RUN = "cell.yaml", "run"
+"""The cell file and the folder of the run in a simulated campaign."""
 _EXAMPLES = Path(__file__).parents[2] / "examples"
 """In a checkout of the sources."""
 
@@ -100,23 +103,69 @@ def afp_simulated(seed: int = 0, poses: int = 31) -> Dataset:
     >>> readings = ec.datasets.afp_simulated(poses=5)  # doctest: +SKIP
     >>> ec.calibrate(readings, springs="actuated")  # doctest: +SKIP
     """
+    return read_dataset(_campaign(seed, poses) / _RUN / "dataset.nc")
+
+
+def afp_run(
+    out: str | os.PathLike[str], seed: int = 0, poses: int = 31, *, force: bool = False
+) -> Path:
+    """Write the campaign of `afp_simulated` into a folder: cell, production path, plan and run.
+
+    It is what `init`, `plan` and `run` leave, for all that begins with a run, and is copied from
+    the cache folder where it was made before.
+
+    Parameters
+    ----------
+    out : path
+        Folder to write: ``cell.yaml``, ``dome.stl``, ``process.csv``, ``plan`` and ``run``.
+    seed : int, default 0
+        Seed of the simulated cell.
+    poses : int, default 31
+        Number of poses.
+    force : bool, default False
+        Replace files that are there.
+
+    Returns
+    -------
+    Path
+        Folder of the run, ``run`` in that folder.
+
+    Raises
+    ------
+    FileAccessError
+        If the folder holds files already, or it or the cache folder cannot be written.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> run = ec.datasets.afp_run("afp", poses=4)
+    >>> dict(ec.derive(run).facts())["readings"]
+    '32 ok'
+    """
+    kept, out = _campaign(seed, poses), Path(out)
+    with filling(out, _CELL, force) as folder:
+        shutil.copytree(kept, folder, dirs_exist_ok=True)
+    return out / _RUN
+
+
+def _campaign(seed: int, poses: int) -> Path:
+    """Return the folder of a campaign that was simulated once, now or before."""
     kept = cache_folder() / f"afp-{__version__}-seed{seed}-poses{poses}"
-    if not (kept / "dataset.nc").is_file():
+    if not (kept / _RUN / "dataset.nc").is_file():
         _measure(kept, seed, poses)
-    return read_dataset(kept / "dataset.nc")
+    return kept
 
 
 def _measure(kept: Path, seed: int, poses: int) -> None:
-    """Plan and run the example cell; leave its dataset in a folder, whole or not at all."""
+    """Plan and run the example cell; leave all of it in a folder, whole or not at all."""
     from elastocal import workflows
 
     kept.parent.mkdir(parents=True, exist_ok=True)
-    with filling(kept, "dataset.nc") as folder:
+    with filling(kept, _CELL, force=True) as folder:
         workflows.init(folder, kind="afp")
-        cell, plan, run = folder / "cell.yaml", folder / "plan", folder / "run"
+        cell, plan, run = folder / _CELL, folder / "plan", folder / _RUN
         workflows.plan(cell, out=plan, poses=poses, compare="none")
         workflows.run(cell, plan=plan, out=run, seed=seed)
-        (run / "dataset.nc").rename(folder / "dataset.nc")
 
 
 def cache_folder() -> Path:

@@ -11,6 +11,7 @@ import yaml
 from elastocal import workflows
 from elastocal.cell import AnswerTimes, DeviceSet, PathLimits, load_cell
 from elastocal.errors import CompensationError, DeviceError, RobotError, UnitError
+from elastocal.identification import read_model
 from elastocal.procedure.derive.touches import TaughtMarkers
 from support import compensated, live_bench
 from support.cli import elastocal
@@ -46,6 +47,11 @@ def test_nothing_starts_without_arm_and_the_limits_are_told(files):
     with pytest.raises(DeviceError, match=r"up to 2 mm at up to 20 mm/s; give --arm"):
         correct(files, arm=False)
     assert DRIVER.arm is None
+
+
+def test_a_model_is_taken_as_a_file_or_as_it_was_read(files):
+    with pytest.raises(DeviceError, match="give --arm"):
+        correct((files[0], read_model(files[1])), arm=False)
 
 
 def test_nothing_starts_without_limits_in_the_cell_file(files, tmp_path):

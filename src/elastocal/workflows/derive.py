@@ -89,10 +89,8 @@ def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noq
     Examples
     --------
     >>> import elastocal as ec
-    >>> _ = ec.init("cell")
-    >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
-    >>> _ = ec.run("cell/cell.yaml", plan="plan", out="run")
-    >>> dict(ec.derive("run").facts())["readings"]
+    >>> run = ec.datasets.afp_run("afp", poses=4)
+    >>> dict(ec.derive(run).facts())["readings"]
     '32 ok'
     """
     folder = RunFolder(Path(settings.run))

@@ -15,7 +15,7 @@ from elastocal.compensation.conditioning import read_sensor_load
 from elastocal.compensation.online import LiveCounts, TaughtCourses, design
 from elastocal.errors import CompensationError, DeviceError
 from elastocal.files import filling
-from elastocal.identification import CalibratedModel
+from elastocal.identification import CalibratedModel, ModelSource, model_name
 from elastocal.options import Option
 from elastocal.procedure.derive import read_taught_markers, sensor_load
 from elastocal.progress import Progress
@@ -53,8 +53,8 @@ class LiveSettings(NewTool, TouchedArm):
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm takes corrections of a path."""
-    model: Annotated[Path, Option(metavar="MODEL.json")]
-    """Model file of `calibrate`."""
+    model: Annotated[ModelSource, Option(metavar="MODEL.json")]
+    """Model file of `calibrate`; in Python also what it returned."""
     arm: bool = False
     """Somebody has looked at the cell, and the arm may be corrected; refused without."""
     duration: str | float | None = None
@@ -205,7 +205,7 @@ def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG
 def _result(settings: LiveSettings, ready: Prepared, end: LiveEnd, started: str) -> LiveResult:
     return LiveResult(
         cell=ready.cell.name,
-        model=str(settings.model),
+        model=model_name(settings.model),
         robot=ready.cell.robot.name,
         started=started,
         limits=ready.limits,
@@ -222,15 +222,16 @@ def _prepare(settings: LiveSettings) -> Prepared:
     driver, arm = rig.path_arm()
     limits = driver.path_limits(cell, arm)
     calibrated = settings.read_model(settings.model)
-    require_same_robot(calibrated.model.robot, cell.robot, (str(settings.model), cell.name))
-    require_model_of_arm(calibrated, str(settings.model))
+    name = model_name(settings.model)
+    require_same_robot(calibrated.model.robot, cell.robot, (name, cell.name))
+    require_model_of_arm(calibrated, name)
     chosen = settings_within(settings.compensator, limits, cell)
     load = read_sensor_load(settings.tool, calibrated.model.robot) or sensor_load(cell)
     state = settings.growth(calibrated.model.robot)
     try:
         numbers = design(calibrated, chosen, load, state)
     except CompensationError as error:
-        raise CompensationError(f"{settings.model}: {error}") from error
+        raise CompensationError(f"{name}: {error}") from error
     return Prepared(
         cell=cell,
         rig=rig,

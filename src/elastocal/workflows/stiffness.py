@@ -224,11 +224,9 @@ def stiffness(settings: StiffnessSettings, progress: Progress) -> StiffnessResul
     Examples
     --------
     >>> import elastocal as ec
-    >>> _ = ec.init("cell")
-    >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
-    >>> _ = ec.run("cell/cell.yaml", plan="plan", out="run")
-    >>> model = ec.calibrate("run/dataset.nc", springs="actuated", draws=40)
-    >>> found = ec.stiffness(model, "cell/process.csv", out="stiffness", stations=5)
+    >>> run = ec.datasets.afp_run("afp", poses=4)
+    >>> model = ec.calibrate(run, springs="actuated", draws=40)
+    >>> found = ec.stiffness(model, "afp/process.csv", out="stiffness", stations=5)
     >>> dict(found.facts())["stiffness along"]
     "the tool's axis (normal)"
     """

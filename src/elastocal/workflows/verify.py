@@ -115,10 +115,8 @@ def verify(settings: VerifySettings, progress: Progress) -> VerifyResult:  # noq
     Examples
     --------
     >>> import elastocal as ec
-    >>> _ = ec.init("cell")
-    >>> _ = ec.plan("cell/cell.yaml", out="plan", poses=4)
-    >>> _ = ec.run("cell/cell.yaml", plan="plan", out="run")
-    >>> dict(ec.verify("run").facts())["dataset"]
+    >>> run = ec.datasets.afp_run("afp", poses=4)
+    >>> dict(ec.verify(run).facts())["dataset"]
     'whole: the dataset is what the streams give, made again from them'
     """
     target = Path(settings.file)
