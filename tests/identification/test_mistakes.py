@@ -149,10 +149,21 @@ def test_weights_and_forces_that_were_asked_for_are_not_clipped():
         assert not any("stops at" in str(each) for each in found)
 
 
-def test_a_turn_from_a_pose_on_is_named_with_the_pose():
-    made = KNOWN["force_x reversed from half way on"].make(campaign(ON_RAIL))
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "force_x reversed from half way on",
+            "from pose 8 on force_x in the tcp frame looks reversed",
+        ),
+        ("drift of the force zero by 30 % of base", "N in the base frame over the campaign"),
+        ("zero of the force taken in the first press", "zeroed at the wrong moment?"),
+    ],
+)
+def test_forces_that_are_wrong_for_a_part_or_by_a_constant_are_named(name, said):
+    made = KNOWN[name].make(campaign(ON_RAIL))
     (found,) = find_undone(made.robot, made.readings, made.marker)
-    assert "from pose 8 on force_x in the tcp frame looks reversed" in str(found)
+    assert said in str(found)
 
 
 @pytest.mark.slow
