@@ -11,6 +11,7 @@ import elastocal as ec
 from elastocal.dataset import Readings, write
 from elastocal.elastic import ElasticModel, actuated
 from elastocal.errors import ElastocalError, IdentificationError, SchemaError
+from elastocal.findings import Grade
 from elastocal.identification import (
     Contact,
     FitOptions,
@@ -21,6 +22,7 @@ from elastocal.identification import (
     weigh_contact,
 )
 from elastocal.identification.contact import ContactFigure, untold_stacks, whitened
+from elastocal.identification.mistakes import find_undone
 from support.cli import elastocal
 from support.held import PRESS, STIFFNESS, Held, held_by_contact, robot
 
@@ -244,6 +246,41 @@ def test_a_marker_of_zeros_ends_in_a_sentence_and_not_in_a_traceback():
     blank["marker_displacement"] = 0.0 * blank["controller_displacement"]
     found = ec.calibrate(ec.Dataset.from_xarray(blank), springs="actuated")
     assert any("marker_displacement_x is dead" in each for each in found.calibration.warnings)
+
+
+def of_pose_before(good: Readings) -> dict[str, np.ndarray]:
+    return {"force": np.roll(good.force.reshape(15, 5, 3), 1, axis=0).reshape(-1, 3)}
+
+
+def turned(good: Readings) -> dict[str, np.ndarray]:
+    R = robot().forward(good.joint_position)[:, :3, :3]
+    G = R @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]) @ np.swapaxes(R, 1, 2)
+    return {
+        name: np.einsum("rij,rj->ri", G, getattr(good, name))
+        for name in ("force", "reference_force")
+    }
+
+
+def with_drift(good: Readings) -> dict[str, np.ndarray]:
+    late = np.linspace(0.0, 1.0, len(good))[:, None]
+    return {"force": good.force + 0.3 * PRESS * late * np.array([0.4, 0.3, 0.8])}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said", "grade"),
+    [
+        (of_pose_before, "forces are those of the pose before", Grade.REFUSAL),
+        (turned, "force in the tcp frame looks turned by 90 deg about z", Grade.REFUSAL),
+        (with_drift, "the zero of the force drifts by", Grade.WARNING),
+    ],
+)
+def test_mistaken_forces_are_named_without_a_tracker_too(wrong, said, grade):
+    rng, good = np.random.default_rng(0), readings(Held(noise=5e-6))
+    good = replace(good, force=good.force + rng.standard_normal(good.force.shape))
+    assert find_undone(arm(), good, None, STATED) == ()
+    (found,) = find_undone(arm(), replace(good, **wrong(good)), None, STATED)
+    assert said in str(found)
+    assert found.grade is grade
 
 
 def test_a_stiffness_with_a_unit_is_refused_in_python():

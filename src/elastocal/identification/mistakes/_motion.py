@@ -110,6 +110,9 @@ def contradictions(robot: Robot, readings: Readings, offset: FloatArray) -> Iter
     if not apart > max(_CLOSE * size, _FINE):
         yield from _contradictions_of_some(robot, readings, offset, moved)
         return
+    if not size > 0.0:
+        yield NO_DISPLACEMENT(travel=travel)
+        return
     left, message = _likeliest(robot, readings, offset, moved)
     if left < _LEFT * min(apart / max(size, _FINE), 1.0):
         yield UNDONE(message=message, left=left, apart=apart, size=size)

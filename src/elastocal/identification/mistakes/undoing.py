@@ -62,6 +62,8 @@ class OtherReading:
     """Factor by which the noise of the marker is reduced."""
     estimated: bool = False
     """Whether numbers were estimated for it, which explain part of what the springs miss."""
+    cause: str = ""
+    """What it shares with another interpretation that adds nothing beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -410,7 +412,9 @@ def _constants(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
             f"the forces seem to contain a constant of ({x:.0f}, {y:.0f}, {z:.0f}) N in the"
             f" {frame} frame: {kind}"
         )
-        yield OtherReading(message, blocks, rows.problem.d, _FITTED, estimated=True)
+        yield OtherReading(
+            message, blocks, rows.problem.d, _FITTED, estimated=True, cause="constant force"
+        )
 
 
 def _along(a: FloatArray, b: FloatArray) -> float:
@@ -487,6 +491,7 @@ def _force_drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
             rows.problem.d,
             _IN_TIME,
             estimated=True,
+            cause="drift of the force",
         )
 
 
@@ -655,11 +660,18 @@ _LEFT_APART = 0.55
 """Part of the error that springs of both parts may leave: regions of the tooling differ, too."""
 _TRIED = 5
 """Readings that are judged at left-out poses, the best first."""
-_SURE = ((0.75, 2e-3, 0.03), (0.85, 1e-4, 0.05), (np.inf, 1e-5, 0.05))
-"""Remaining part of the error, the likelihood below which the gain is not chance, and the part of
-the deflections that estimated numbers must change. Estimated numbers explain part of the model
-error, in correct data too: the less they explain, the smaller the likelihood and the larger the
-change have to be. Without estimated numbers the first likelihood holds for every gain."""
+_BY_CHANCE = 2e-3
+"""Likelihood below which a gain is not chance."""
+_SURE = (
+    (0.75, _BY_CHANCE, 0.03),
+    (0.85, 1e-8, 0.03),
+    (0.85, 1e-4, 0.05),
+    (np.inf, 1e-5, 0.05),
+)
+"""Ways to believe estimated numbers: the part of the error below which they leave it, the
+likelihood of chance below which they do, and the part of the deflections above which they change.
+They explain part of the model error, in correct data too: the less they explain, the smaller the
+likelihood or the larger the change has to be."""
 _CERTAIN = 0.5
 _FITS_WELL = 0.2
 _EQUAL = 1.1
@@ -742,7 +754,9 @@ def _plainest(possible: Sequence[_Ranked]) -> tuple[OtherReading, Sequence[str]]
     near = [each for each in possible if each[0] <= (_EQUAL if each[2].certain else _ALIKE) * least]
     if first.certain:
         near = sorted((each for each in near if each[2].certain), key=lambda each: each[1])
-    return near[0][2], [each.message for _, _, each in near[1:2]]
+    plainest, *others = (each for _, _, each in near)
+    told = [each.message for each in others if not each.cause or each.cause != plainest.cause]
+    return plainest, told[:1]
 
 
 def _judged(
@@ -753,10 +767,9 @@ def _judged(
     before, after = (leave_poses_out(each).error for each in (stated, undone))
     after = after * max(reading.louder, 1.0)
     left, chance = _left(stated, before, after)
-    sure, matters = _believed(left, reading.estimated)
-    if not (left < reading.least and chance < sure):
+    if not (left < reading.least and chance < _BY_CHANCE):
         return None
-    if reading.estimated and not _change(stated, undone) > matters:
+    if reading.estimated and not _believed(left, chance, _change(stated, undone)):
         return None
     deflection = float(np.linalg.norm(undone.d, axis=1).mean()) * max(reading.louder, 1.0)
     certain = reading.certain and left < _CERTAIN and float(after.mean()) < _FITS_WELL * deflection
@@ -775,9 +788,9 @@ def _change(stated: Problem, undone: Problem) -> float:
     return float(moved / max(np.linalg.norm(stated.O @ before, axis=1).mean(), 1e-12))
 
 
-def _believed(left: float, estimated: bool) -> tuple[float, float]:
-    """Return how unlikely chance has to be for a gain, and how much it has to change; `_SURE`."""
-    return next((sure, change) for part, sure, change in _SURE if not estimated or left < part)
+def _believed(left: float, chance: float, change: float) -> bool:
+    """Return whether estimated numbers explain enough to be believed; see `_SURE`."""
+    return any(left < part and chance < odds and change > least for part, odds, least in _SURE)
 
 
 def _left(problem: Problem, before: FloatArray, after: FloatArray) -> tuple[float, float]:
@@ -807,7 +820,7 @@ def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
         late = place >= round(part * len(order))
         after = leave_poses_out(apart(free, late)).error
         left, chance = _left(free, before, after)
-        if left < _LEFT_APART and chance < _believed(left, True)[0]:
+        if left < _LEFT_APART and chance < _BY_CHANCE:
             found.append((left, late, after))
     if not found:
         return None
