@@ -201,6 +201,27 @@ def test_a_protective_stop_ends_the_press_for_good(pressing):
     assert arm.state().motion is Motion.STOPPED
 
 
+@pytest.mark.parametrize("name", ["forceModeStop", "stopJ"])
+def test_a_stop_that_is_not_taken_is_given_again_without_a_sign_of_life(pressing, name):
+    controller, arm = pressing
+    refused = []
+
+    def refuse(*_):
+        refused.append(name)
+        raise RuntimeError("one bad cycle")
+
+    setattr(controller, name, refuse)
+    arm.stop()
+    until(lambda: refused)
+    controller.said.clear()
+    until(lambda: len(refused) > 3)
+    assert "kickWatchdog" not in controller.said
+    delattr(controller, name)
+    until(lambda: {"forceModeStop", "stopJ"} <= {*controller.said} or name == "stopJ")
+    until(lambda: "stopJ" in controller.said)
+    assert arm.state().fault == "one bad cycle"
+
+
 def test_a_retract_that_follows_a_stop_at_once_is_made(pressing):
     controller, arm = pressing
     for _ in range(20):

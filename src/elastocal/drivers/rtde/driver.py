@@ -320,7 +320,6 @@ class UrArm:
             self._stop_now()
 
     def _cycle(self) -> None:
-        self._give_sign_of_life()
         with self._lock:
             halt, self._halt = self._halt, False
         if halt:
@@ -328,6 +327,7 @@ class UrArm:
             # order that came after the stop waits for the next cycle.
             self._stop_now()
             return
+        self._give_sign_of_life()
         sample = self._line.sample()
         with self._lock:
             order, step, self._order = self._order, self._step, None
@@ -354,14 +354,18 @@ class UrArm:
     def _stop_now(self) -> None:
         try:
             if self._control.isProgramRunning():
-                self._end_force()
-                self._control.stopJ(_STOP, True)
+                try:
+                    self._end_force()
+                finally:
+                    self._control.stopJ(_STOP, True)
             else:
                 # The arm has stopped with its program, and force mode ended.
                 self._forced, self._force_tcp = False, np.zeros(3)
-        except (RuntimeError, OSError) as error:
+        except (DeviceError, RuntimeError, OSError) as error:
             with self._lock:
                 self._fail(str(error))
+                # Until it is taken, and without a sign of life meanwhile.
+                self._halt = True
 
     def _fail(self, fault: str) -> None:
         """Stop with a fault: the controller would go on with its last command."""
@@ -455,8 +459,9 @@ class UrArm:
     def _end_force(self) -> None:
         self._force_tcp = np.zeros(3)
         if self._forced:
+            if not self._control.forceModeStop():
+                raise DeviceError("the controller does not end its force mode")
             self._forced = False
-            self._control.forceModeStop()
 
 
 _PORT = 30004
