@@ -17,6 +17,7 @@ from elastocal.studio.recorded import RunView, find_runs
 from elastocal.studio.springs import _caveats
 from elastocal.studio.trials import compare_techniques, survey_reach
 from elastocal.studio.worker import Outbox, Worker, WorkState
+from elastocal.wording import in_words
 from elastocal.workflows.check import describe_file
 from elastocal.workflows.studio import _PageOperator
 from support.recorded_runs import record_run
@@ -73,7 +74,7 @@ def test_the_deflection_is_that_of_the_model_at_the_tool(view):
 def test_margins_are_those_of_planning(view):
     plain = view.at(view.cell.home)
     names = [each.name for each in plain.checks]
-    assert names == [check.name for check in view.builder.solver.checks.all]
+    assert names == [in_words(check.name) for check in view.builder.solver.checks.all]
     assert plain.joints[0].margin == "1500.0 mm"
     bent = np.array(view.cell.home)
     bent[5] = view.cell.robot.limits.upper[5] - np.radians(1.0)

@@ -68,7 +68,7 @@ def test_sigmas_are_those_of_the_means_of_the_samples(derived):
 
 def test_provenance_names_run_version_and_seed(derived):
     said = derived.dataset.provenance
-    assert "run run" in said
+    assert "folder run" in said
     assert "elastocal 0.1.0" in said
     assert "seed 7" in said
 

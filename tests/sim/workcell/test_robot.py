@@ -166,8 +166,11 @@ def test_upright_is_where_the_upper_arm_points_up():
     )
 
 
-_STANDING = {"IRB": (0, 0, 0, 0, 45, 0), "R-2": (0, 0, 0, 0, 45, 0), "RX1": (0, 0, 90, 0, 45, 0),
-             "UR1": (0, -90, 90, -90, -90, 0), "UR2": (0, -90, 90, -90, -90, 0)}  # fmt: skip
+_UPRIGHT, _BENT = (0, 0, 0, 0, 45, 0), (0, -90, 90, -90, -90, 0)
+_STANDING = {
+    "BXP": _UPRIGHT, "IRB": _UPRIGHT, "R-2": _UPRIGHT, "RX1": (0, 0, 90, 0, 45, 0),
+    "UR1": _BENT, "UR2": _BENT,
+}  # fmt: skip
 """Posture in deg of the arms that are no KUKA, by the beginning of their names."""
 
 
