@@ -23,7 +23,7 @@ def test_a_demo_says_what_it_does_and_what_came_of_it():
         assert chapter.line in told
     table = json.loads((folder / "process/table.json").read_text())
     (line,) = table["lines"]
-    assert f"-{100 * line['reduction']['mean']:.1f} %" in told
+    assert f"-{100 * line['reduction']['mean']:.1f}%" in told
     assert str(folder / "report.html") in told
 
 

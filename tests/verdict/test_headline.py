@@ -29,7 +29,7 @@ def test_the_effect_is_that_of_the_simulated_process(parts):
     line = parts.process.table.lines[-1]
     effect = production_effect(parts)
     assert effect.figures == f"{1e3 * line.before.mean:.3f} mm → {1e3 * line.after.mean:.3f} mm"
-    assert f"{-100 * line.reduction.mean:+.1f} %" in effect.rest
+    assert f"{-100 * line.reduction.mean:+.1f}%" in effect.rest
     assert effect.where == "On the process path, in simulation"
 
 

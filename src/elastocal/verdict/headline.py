@@ -69,7 +69,7 @@ def production_effect(evidence: Evidence) -> ProductionEffect | None:
             phrase("{before} → {after}", before=mm(before.mean), after=mm(after.mean)),
             phrase(
                 "mean deviation without and with correction ({change}); largest {before} → {after}",
-                change=f"{-100.0 * line.reduction.mean:+.1f} %",
+                change=f"{-100.0 * line.reduction.mean:+.1f}%",
                 before=mm(before.max),
                 after=mm(after.max),
             ),
