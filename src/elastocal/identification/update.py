@@ -216,9 +216,11 @@ def update_springs(
     check_joints(model.robot, readings)
     measured = _centred(readings.deflection, course)
     blocks = _centred(displacement_blocks(model, readings, marker_offset), course)
-    _require_read_as_stated(calibrated, readings, course, marker_offset)
+    predicted = blocks @ c
+    if _left(measured, predicted) > POOR_FIT:
+        _require_read_as_stated(calibrated, readings, course, marker_offset)
     L = draws_factor(calibrated.draws)
-    rows = _Rows(blocks @ L, measured - blocks @ c, course)
+    rows = _Rows(blocks @ L, measured - predicted, course)
     z, weight = rows.moved()
     before, after = np.zeros((2, len(courses), 1))
     for number in range(len(courses)):
@@ -229,7 +231,7 @@ def update_springs(
         after[number] = np.linalg.norm(rows.r[own] - move, axis=1).mean()
     gain = paired_difference(before, after, Overlap.leaving_one_out(len(courses)))
     count = np.bincount(course)
-    ratio = _ratio(measured, blocks @ c)
+    ratio = _ratio(measured, predicted)
     known = SpringUpdate(
         readings=len(readings),
         courses=courses,
@@ -238,10 +240,8 @@ def update_springs(
         farthest=float(np.abs(z).max()),
         ratio=ratio,
     )
-    size = max(float(np.linalg.norm(measured, axis=1).mean()), np.finfo(float).tiny)
-    refusal = _refusal(
-        known.after / size, ratio, float(gain.mean[0]), float(gain.standard_error[0])
-    )
+    left = known.after / _mean_length(measured)
+    refusal = _refusal(left, ratio, float(gain.mean[0]), float(gain.standard_error[0]))
     if refusal is not None:
         return calibrated, replace(known, farthest=0.0, refusal=refusal)
     draws = _draws(calibrated, rows, L, weight, rng)
@@ -273,13 +273,23 @@ def _ratio(measured: FloatArray, predicted: FloatArray) -> float:
     return float((measured * predicted).sum()) / square if square > 0.0 else 0.0
 
 
+def _left(measured: FloatArray, predicted: FloatArray) -> float:
+    """Return the part of deflections that predictions leave unexplained."""
+    return float(np.linalg.norm(measured - predicted, axis=1).mean()) / _mean_length(measured)
+
+
+def _mean_length(deflections: FloatArray) -> float:
+    """Return their mean length, to divide by."""
+    return max(float(np.linalg.norm(deflections, axis=1).mean()), np.finfo(float).tiny)
+
+
 def _require_read_as_stated(
     calibrated: CalibratedModel,
     readings: Readings,
     course: IndexArray,
     marker_offset: ArrayLike | None,
 ) -> None:
-    """Refuse production that the model explains only with a sign, frame or unit read otherwise.
+    """Refuse production that is explained poorly as stated, and well with something read otherwise.
 
     Raises
     ------
@@ -292,18 +302,11 @@ def _require_read_as_stated(
         blocks = displacement_blocks(model, stated, marker_offset)
         return _centred(stated.deflection, course), _centred(blocks @ c, course)
 
-    def left(measured: FloatArray, predicted: FloatArray) -> float:
-        off = float(np.linalg.norm(measured - predicted, axis=1).mean())
-        size = float(np.linalg.norm(measured, axis=1).mean())
-        return off / max(size, np.finfo(float).tiny)
-
-    measured, predicted = differ(readings)
-    stated = left(measured, predicted)
-    if stated <= POOR_FIT:
-        return
     sought = with_references(model.robot, readings)
+    measured, predicted = differ(sought)
+    stated = _left(measured, predicted)
     found = [
-        (left(*differ(mistake.undo(model.robot, sought))), mistake.message)
+        (_left(*differ(mistake.undo(model.robot, sought))), mistake.message)
         for mistake in mistakes_of(model.robot)
     ]
     ratio = _ratio(measured, predicted)
@@ -312,7 +315,7 @@ def _require_read_as_stated(
             f"production deflects {ratio:.3g} times as much as its forces say: another unit of"
             " force or displacement"
         )
-        found.append((left(measured, ratio * predicted), message))
+        found.append((_left(measured, ratio * predicted), message))
     best, message = min(found)
     if best <= min(LEFT_BY_UNDOING * stated, POOR_FIT):
         raise ConventionError(
