@@ -21,7 +21,7 @@ from elastocal.drivers import rtde
 from elastocal.sim.wire.rtde import PORTS
 from support import live_bench
 from support.cli import ENTRY, PATIENCE
-from support.live_on_wire import free
+from support.ports import free
 from support.run_cells import PlannedCell, planned_cell
 from support.ur_client import UrClient
 

@@ -5,13 +5,8 @@ import socket
 import pytest
 
 from elastocal import workflows
+from support.ports import free
 from support.simulated import QUIET, example_cell
-
-
-def free(kind):
-    with socket.socket(socket.AF_INET, kind) as line:
-        line.bind(("127.0.0.1", 0))
-        return line.getsockname()[1]
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from elastocal.cell import WallClock
 from elastocal.sim.wire import LiveCell
 from elastocal.sim.wire._rsi_messages import EthernetConfig
 from elastocal.sim.wire.rsi import RsiContext, RsiServer, corrected_program
+from support.ports import free
 from support.simulated import QUIET, example_cell
 
 RSIPI = pytest.importorskip("RSIPI", reason="rsipi is not installed")
@@ -29,9 +30,7 @@ def until(holds, seconds=20.0):
 @pytest.mark.parametrize("context", ["basic", "joints", "stop"])
 def test_its_client_reads_the_pose_and_corrects_it(context, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # it writes logs where it stands
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free(socket.SOCK_DGRAM)
     text = Path(RSIPI.context(context)).read_text("utf-8-sig")
     path = tmp_path / "ethernet.xml"
     path.write_text(text.replace("64000", str(port)).replace("10.10.10.10", "127.0.0.1"))

@@ -27,8 +27,8 @@ from elastocal.sim.wire.live_cell import TruePress
 from elastocal.sim.wire.rsi import RsiContext, RsiServer, rsi_server
 from elastocal.workflows import _operator_and_devices
 from elastocal.workflows._operator_and_devices import Supervision, Unattended
-from support.live_on_wire import free
 from support.paced_clock import KilledError, PacedClock
+from support.ports import free
 from support.run_cells import PlannedCell, planned_cell
 from support.wire_faults import (
     Begun,

@@ -13,15 +13,10 @@ from elastocal.sim.wire import LiveCell, Told, wire_servers
 from elastocal.sim.wire.net_ft import NetFtServer
 from elastocal.sim.wire.rsi import IPOC_START, RsiContext, RsiServer, corrected_program, rsi_server
 from support import live_bench
+from support.ports import free
 from support.simulated import QUIET, example_cell
 
 TIMEOUT = 100
-
-
-def free(kind: socket.SocketKind) -> int:
-    with socket.socket(socket.AF_INET, kind) as line:
-        line.bind(("127.0.0.1", 0))
-        return line.getsockname()[1]
 
 
 @dataclass

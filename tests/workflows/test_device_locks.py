@@ -17,7 +17,8 @@ from elastocal.errors import DeviceError
 from elastocal.sim.wire.net_ft import NetFtServer
 from elastocal.workflows._operator_and_devices import rig_of
 from support.cli import elastocal
-from support.live_on_wire import LiveFiles, free, served
+from support.live_on_wire import LiveFiles, served
+from support.ports import free
 from support.run_cells import planned_cell
 from support.simulated import example_cell
 from support.stations_on_wire import eventually

@@ -22,7 +22,7 @@ from elastocal.workflows._operator_and_devices import rig_of
 from support import fault_matrix
 from support.cli import elastocal
 from support.kuka_peer import KukaPeer
-from support.live_on_wire import free
+from support.ports import free
 from support.run_cells import PlannedCell
 from support.simulated import example_cell
 from support.ur_client import UrClient
