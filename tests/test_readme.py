@@ -8,6 +8,7 @@ import runpy
 import shlex
 import shutil
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import get_args
 
@@ -173,11 +174,14 @@ def test_the_files_that_the_readme_links_to_exist():
     assert not [link for link in links if not (ROOT / link).exists()]
 
 
-def messages() -> list[str]:
+@cache
+def messages() -> set[str]:
     """Return every text of the source, ``…`` in place of what is filled in."""
-    found = []
+    found = set()
     for path in (ROOT / "src").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.JoinedStr | ast.Constant):
+                continue
             parts = node.values if isinstance(node, ast.JoinedStr) else [node]
             text = "".join(
                 part.value
@@ -185,7 +189,7 @@ def messages() -> list[str]:
                 else "…"
                 for part in parts
             )
-            found += [text, re.sub(r"\{\w+\}", "…", text)]  # of f-strings, and of phrases
+            found |= {text, re.sub(r"\{\w+\}", "…", text)}  # of f-strings, and of phrases
     return found
 
 

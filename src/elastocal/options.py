@@ -32,6 +32,8 @@ class Option:
     """Key of `CHOICES`, which help lists and a shell completes; or ``robot``: the catalogue's."""
     file: bool = False
     """Whether a file may be given in place of a choice."""
+    ends: tuple[str, ...] = ()
+    """Endings, in lower case, of which the name of a file to write must have one."""
     read: str = ""
     """Conversion of a text to the value: ``point``, ``direction``, ``numbers``, ``statements``,
     ``list`` (with commas), ``ratio``, ``tolerance``, or a dimension, such as ``length``, of a

@@ -159,4 +159,7 @@ def test_another_kind_of_file_is_refused_in_one_line(tmp_path, name):
     (tmp_path / name).write_text("x")
     reason = elastocal("tool", tmp_path / name, "--out", tmp_path / "t.json").reason
     assert "is not that of a table of postures (.csv), nor is it the folder of a run" in reason
-    assert "no such file" in elastocal("tool", tmp_path / "no.csv", "--out", tmp_path / "t").reason
+    assert (
+        "no such file"
+        in elastocal("tool", tmp_path / "no.csv", "--out", tmp_path / "t.json").reason
+    )

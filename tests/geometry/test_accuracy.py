@@ -166,7 +166,9 @@ def test_a_report_of_a_sound_arm_says_that_it_is_kept(tmp_path):
     assert "The nominal arm was kept" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("option", "name"), [("--report", "a.json"), ("--table", "a.xlsx")])
+@pytest.mark.parametrize(
+    ("option", "name"), [("--report", "a.json"), ("--table", "a.xlsx"), ("--out", "a.txt")]
+)
 def test_other_kinds_of_files_are_refused_before_the_work(tmp_path, option, name):
     command = ("geometry", "none.csv", "--robot", "KR 210 R2700-2", "--tcp", "flange")
     result = elastocal(*command, "--out", tmp_path / "model.json", option, tmp_path / name)

@@ -107,7 +107,7 @@ def test_a_dataset_needs_a_force_and_says_what_does_not(campaign):
 def test_what_cannot_be_positions_is_refused(campaign, tmp_path):
     folder, _ = campaign
     path = folder / "map.yaml"
-    with pytest.raises(FileAccessError, match=r"positions are a table \(.csv\)"):
+    with pytest.raises(FileAccessError, match=r"a\.nc: its name must end in \.csv"):
         ec.import_positions(logs(folder), map=path, out=tmp_path / "a.nc")
     few = tmp_path / "arm.csv"
     rows = (folder / "arm.csv").read_text(encoding="utf-8").splitlines()

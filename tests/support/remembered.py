@@ -1,8 +1,8 @@
 """What reports and ``verify`` make again is made once in a process of the suite, per content.
 
-A hundred tests damage one file each of the same run, and every one derives the run and fits its
-readings again: seconds of work from the same bytes. Keys are the bytes, so that whatever a test
-has changed is made anew.
+A hundred tests damage one file each of the same run, and every one derives the run, fits its
+readings and draws its figures again: seconds of work from the same bytes. Keys are the bytes, so
+that whatever a test has changed is made anew.
 """
 
 from collections.abc import Callable
@@ -13,16 +13,18 @@ import joblib
 import pytest
 
 from elastocal.procedure import RunFolder
+from elastocal.report.pages import templating
 from elastocal.verdict import chain, gather
 from support.kept import content_hash
 
 
 def remember(patch: pytest.MonkeyPatch) -> None:
-    """Let the verdict's derivations and fits be remembered until the patch is undone."""
+    """Let derivations, fits and figures of reports be remembered until the patch is undone."""
     patch.setattr(chain, "derive_run", _remembered(chain.derive_run, _run_key))
     patch.setattr(
         gather, "reproduce_calibration", _remembered(gather.reproduce_calibration, joblib.hash)
     )
+    patch.setattr(templating, "themed_svg", _remembered(templating.themed_svg, _figure_key))
 
 
 def _remembered(make: Callable[..., Any], key: Callable[[Any], str]) -> Callable[..., Any]:
@@ -44,3 +46,9 @@ def _run_key(given: tuple[Any, ...]) -> str:
     journal = folder.journal.read_bytes() if folder.journal.is_file() else b""
     hashes = [content_hash(part) for part in parts]
     return str(joblib.hash((folder.path.name, journal, hashes, given[1:])))
+
+
+def _figure_key(given: tuple[Any, ...]) -> str:
+    """Return the hash of what is drawn: the function, what it is given, and the language."""
+    draw, say = given
+    return str(joblib.hash((draw.func, draw.args, draw.keywords, say and say.__self__.code)))

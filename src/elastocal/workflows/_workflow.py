@@ -24,8 +24,9 @@ from typing import (
     overload,
 )
 
-from elastocal.errors import nearest
+from elastocal.errors import FileAccessError, nearest
 from elastocal.files import remove_leftovers, require_place
+from elastocal.options import settings_fields
 from elastocal.outputs import OutputRule, ruled
 from elastocal.progress import Progress, silent
 from elastocal.workflows._documented import documented
@@ -97,6 +98,7 @@ def workflow(
                 record=written[0] if record else None,
             )
             with ruled(rule, (path for paths in files.values() for path in paths), written):
+                _require_endings(chosen)
                 return function(chosen, *(hears or (progress,)))
 
         signature = _signature(function, fields, by_place)
@@ -173,6 +175,15 @@ def _require_known(function: str, options: Collection[str], fields: Collection[s
     for name in options:
         if name not in fields:
             raise TypeError(f"{function}() has no option {name!r}{nearest(name, fields)}")
+
+
+def _require_endings(settings: Any) -> None:
+    """Refuse names of files to write that say another kind, before the work."""
+    kind = type(settings)
+    for each in settings_fields(kind.__module__, kind.__name__):
+        path, ends = getattr(settings, each.name), each.option.ends
+        if ends and path is not None and Path(path).suffix.lower() not in ends:
+            raise FileAccessError(f"{each.flag} {path}: its name must end in {' or '.join(ends)}")
 
 
 def _places(settings: Any) -> dict[str, list[Path]]:

@@ -70,7 +70,9 @@ class CalibrateSettings(FitSettings):
     )  # type: ignore[assignment]
     """Spring layout: a name, or a YAML file; ``auto``: the model that the readings carry. In Python
     also springs."""
-    out: Annotated[Path | None, Option(required=True, help="Model file to write.")] = None
+    out: Annotated[
+        Path | None, Option(required=True, ends=(".json",), help="Model file (.json) to write.")
+    ] = None
     """Model file to write; none: the result is only returned."""
     robot: Annotated[str | None, Option(choices="robot")] = None
     """URDF file or catalogue name; by default the dataset's own."""

@@ -42,7 +42,7 @@ class CompareSettings:
         ),
     ] = None
     """Largest accepted change of deflection at the rows, in m."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(ends=(".json",))] = None
     """Comparison file to write, ``.json``."""
     figure: Path | None = None
     """Figure to write: ``.svg``, ``.png`` or ``.pdf``."""

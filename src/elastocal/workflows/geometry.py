@@ -10,7 +10,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.blocks import Block
-from elastocal.errors import FileAccessError, GeometryError, present
+from elastocal.errors import GeometryError, present
 from elastocal.files import write_text
 from elastocal.findings import Finding
 from elastocal.geometry import (
@@ -61,13 +61,13 @@ class GeometrySettings:
     """Link that carries the markers."""
     map: Annotated[Path | None, Option(metavar="MAP.yaml")] = None
     """Names and units of the columns, where they are not those of elastocal; also of ``test``."""
-    out: Annotated[Path | None, Option(required=True, help="Model file (.json) to write.")] = None
-    """Model file to write; none: the model is only returned."""
-    urdf: Path | None = None
+    out: Annotated[Path | None, Option(required=True, ends=(".json",))] = None
+    """Model file to write, ``.json``; none: the model is only returned."""
+    urdf: Annotated[Path | None, Option(ends=(".urdf", ".xml"))] = None
     """Calibrated URDF to write: places and zeros of joints, fitted without what it cannot hold."""
-    report_file: Annotated[Path | None, Option("--report")] = None
+    report_file: Annotated[Path | None, Option("--report", ends=(".html", ".htm"))] = None
     """Report to write, ``.html``."""
-    table: Path | None = None
+    table: Annotated[Path | None, Option(ends=(".csv",))] = None
     """Table of links as drawn and as built to write, ``.csv``, of the arm of ``--urdf``."""
     markers: Annotated[tuple[str, ...], Option("--marker")] = ()
     """Position of each marker on the tool, ``"x, y, z"`` in the tcp with units, where known: an
@@ -175,7 +175,6 @@ def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     >>> round(float(np.degrees(found.model.parameters[0].value)), 3)
     0.2
     """
-    _check_suffixes(settings)
     language = language_of(settings.language)
     path = Path(settings.positions)
     robot = find_robot(settings.robot, settings.tcp, None)
@@ -216,16 +215,6 @@ def _known_markers(settings: GeometrySettings, measured: int) -> FloatArray | No
     known = np.array([parse_point(each) for each in settings.markers])
     require_as_many(known, measured)
     return known
-
-
-def _check_suffixes(settings: GeometrySettings) -> None:
-    """Refuse names of files that say another kind, before the work."""
-    for name, path, suffix in (
-        ("report", settings.report_file, ".html"),
-        ("table", settings.table, ".csv"),
-    ):
-        if path is not None and path.suffix.lower() != suffix:
-            raise FileAccessError(f"--{name} {path}: its name must end in {suffix}")
 
 
 def _require_expressible(model: GeometryModel) -> None:

@@ -35,7 +35,7 @@ class ImportLogsSettings:
     """CSV or text, Excel, MCAP, ROS 1 and 2 bags; one or several."""
     map: Path
     """Map of their columns."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(ends=(".nc", ".csv"))] = None
     """Dataset to write (.nc or .csv); none: it is only returned."""
     picture: Path | None = None
     """Figure of the merged time lines (.png, .svg, .pdf); by default beside the dataset."""
@@ -170,7 +170,7 @@ class ImportPositionsSettings:
     """As for `import_logs`; none needs to hold a force."""
     map: Path
     """Map of their columns."""
-    out: Path | None = None
+    out: Annotated[Path | None, Option(ends=(".csv",))] = None
     """Table to write (.csv); none: it is only returned."""
     force: bool = False
     """Replace a file that is no former output of this command."""
@@ -239,8 +239,6 @@ def import_positions(
         If a file cannot be read or written, or its name says another kind.
     """
     files, path = _files(settings.logs), Path(settings.map)
-    if settings.out is not None and settings.out.suffix.lower() != ".csv":
-        raise FileAccessError(f"--out {settings.out}: positions are a table (.csv)")
     log_map = foreign.read_map(path)
     found = foreign.import_positions(log_map, foreign.site(path, log_map), files, progress)
     if settings.out is not None:

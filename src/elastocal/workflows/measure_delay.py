@@ -43,7 +43,7 @@ class MeasureDelaySettings:
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``, whose arm is a KUKA in mode ``contact``."""
-    out: Annotated[str | PathLike[str], Option(metavar="RECORD.json")]
+    out: Annotated[str | PathLike[str], Option(metavar="RECORD.json", ends=(".json",))]
     """Commissioning record, ``.json``."""
     amplitude: str = "0.5 mm"
     """Amplitude of the movement about the tool's present position, with its unit."""

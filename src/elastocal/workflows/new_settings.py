@@ -45,7 +45,9 @@ class NewSettings:
     `filled` states the guesses.
     """
 
-    out: Annotated[str | PathLike[str], Option(metavar="CELL.yaml")] = "cell.yaml"
+    out: Annotated[str | PathLike[str], Option(metavar="CELL.yaml", ends=(".yaml", ".yml"))] = (
+        "cell.yaml"
+    )
     """Cell file to write."""
     robot: Annotated[str | None, Option(choices="robot")] = None
     """Name in the catalogue, or a URDF file."""

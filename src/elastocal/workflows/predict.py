@@ -52,7 +52,7 @@ class PredictSettings(NewTool, ArmAsBuilt):
     rows: Annotated[str | PathLike[str] | Dataset | Columns, Option(argument=True)]
     """CSV with joint columns, ``force_x[N] …`` and optionally ``moment_x[N*m] …`` and ``visit``; in
     Python also such columns by their headings (a dictionary, a data frame), or a dataset."""
-    out: Annotated[Path | None, Option(required=True, help="CSV to write.")] = None
+    out: Annotated[Path | None, Option(required=True, ends=(".csv",), help="CSV to write.")] = None
     """CSV to write: the rows with their deflections and intervals."""
     force: bool = False
     """Replace a file that is no former output of this command."""

@@ -46,7 +46,7 @@ class ReportSettings:
 
     run: Annotated[str | PathLike[str], Option(argument=True, metavar="RUN")]
     """Folder of a run, a folder that holds one, or a model file."""
-    out: Annotated[str | PathLike[str], Option(metavar="REPORT.html")]
+    out: Annotated[str | PathLike[str], Option(metavar="REPORT.html", ends=(".html", ".htm"))]
     """HTML file to write."""
     model: Path | None = None
     """Model file; by default ``model.json`` beside the run."""
@@ -183,7 +183,7 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
         If a part that was named cannot be used, or the key.
     """
     out = Path(settings.out)
-    _require_page(out)
+    require_place(out)
     paper = out.with_suffix(".pdf") if settings.pdf else None
     tables = out.with_suffix(".xlsx") if settings.xlsx else None
     _require_free((out, paper, tables), settings.force)
@@ -244,14 +244,6 @@ def _figures(
         unseen=unseen,
         missing=tuple(each.name for each in evidence.missing),
     )
-
-
-def _require_page(out: Path) -> None:
-    """Refuse an unusable path of a report before the work, not after it."""
-    if out.suffix.lower() not in (".html", ".htm"):
-        # Any other name could be that of a model.
-        raise FileAccessError(f"--out {out}: the report is a page, its name must end in .html")
-    require_place(out)
 
 
 def _require_free(places: tuple[Path | None, ...], force: bool) -> None:

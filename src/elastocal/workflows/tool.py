@@ -40,7 +40,9 @@ class ToolSettings:
 
     postures: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV of postures with raw wrenches, or the folder of a run."""
-    out: Annotated[Path | None, Option(required=True, help="Tool file (.json) to write.")] = None
+    out: Annotated[
+        Path | None, Option(required=True, ends=(".json",), help="Tool file (.json) to write.")
+    ] = None
     """Tool file to write; none: the result is only returned."""
     robot: Annotated[str | None, Option(choices="robot")] = None
     """URDF file, catalogue name or model file, for a CSV with joints."""

@@ -36,7 +36,7 @@ class TouchSettings:
     """Cell file, ``.yaml``."""
     cold: Annotated[Path, Option(metavar="RUN")]
     """Folder of the cold touches, of `run --touch cold`; the same points are touched again."""
-    out: Annotated[Path, Option(metavar="STATE.json")]
+    out: Annotated[Path, Option(metavar="STATE.json", ends=(".json",))]
     """File to write the state into."""
     warm: Annotated[Path | None, Option(metavar="RUN")] = None
     """Folder of the warm touches; a run that is in it already is read, not made again. By default
