@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
@@ -171,6 +172,10 @@ def test_nothing_moves_where_the_cold_run_is_of_no_use(touched, tmp_path):
         assert not (tmp_path / "v-run").exists()
 
 
+def of_event(folder, event):
+    return [each for each in read_journal(folder / "journal.jsonl") if each.event is event]
+
+
 def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(touched, tmp_path):
     folder, made, _ = touched
     half, files = copied(folder / "state-run", tmp_path / "half", 4), {"cold": folder / "cold"}
@@ -179,6 +184,16 @@ def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(touched, tm
         touch(made.cell, **files)
     assert not (tmp_path / "w.json").exists()
     assert len(touch(made.cell, **files, resume=True, confirmed=True).points) == POSES
+    found = read_touches(folder / "cold", half)
+    assert sorted(found.sessions[:, 1].tolist()) == [0] * 4 + [1] * 4
+    assert not found.sessions[:, 0].any()
+    # The simulated cell's clock runs ahead of the wall's; here it is gone on with a day later.
+    journal, (resumed,) = half / "journal.jsonl", of_event(half, Event.RESUME)
+    began = datetime.fromisoformat(of_event(half, Event.START)[0].run.started)
+    later = (began + timedelta(days=1)).isoformat()
+    journal.write_text(journal.read_text().replace(resumed.text, later))
+    found = read_touches(folder / "cold", half)
+    assert 86400.0 - 3600.0 < found.pause < 86400.0
 
 
 def test_a_warm_run_that_a_fault_has_ended_is_not_taken_for_all_of_it(touched, tmp_path):
