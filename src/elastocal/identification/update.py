@@ -217,7 +217,7 @@ def update_springs(
     measured = _centred(readings.deflection, course)
     blocks = _centred(displacement_blocks(model, readings, marker_offset), course)
     predicted = blocks @ c
-    if _left(measured, predicted) > POOR_FIT:
+    if not _left(measured, predicted) <= POOR_FIT:
         _require_read_as_stated(calibrated, readings, course, marker_offset)
     L = draws_factor(calibrated.draws)
     rows = _Rows(blocks @ L, measured - predicted, course)
