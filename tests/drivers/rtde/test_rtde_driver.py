@@ -201,6 +201,32 @@ def test_a_protective_stop_ends_the_press_for_good(pressing):
     assert arm.state().motion is Motion.STOPPED
 
 
+def test_what_was_felt_before_the_new_zero_is_no_contact(cell):
+    """A loaded machine hears of the zero late: the newest sample may be of before it."""
+    controller = Controller(cell)
+
+    def zero():
+        controller.force = 40.0
+        time.sleep(0.2)
+        controller.deaf = True
+        time.sleep(0.05)
+        controller.force = 0.0
+
+    controller.zeroFtSensor = zero
+    devices = connect(cell, controller, "arm")
+    try:
+        devices.arm.arming = Arming.of(cell)
+        devices.arm.enable()
+        devices.arm.approach(np.array([0.0, 0.0, -1.0]), 0.05, 0.005, 15.0)
+        until(lambda: "forceMode" in controller.said)
+        time.sleep(0.2)
+        controller.deaf = False
+        time.sleep(0.1)
+        assert devices.arm.state().motion is Motion.APPROACHING
+    finally:
+        devices.close()
+
+
 def drop(controller):
     controller.force = 1.3 * 1000.0
 

@@ -37,7 +37,7 @@ from elastocal.drivers.rtde.line import UrLine, UrSample, UrSensor, pose_of_T
 from elastocal.errors import DeviceError
 
 _ZEROED = 0.05
-"""Time after the order in which the sensor may still show its old zero, in s."""
+"""Time after the order has been taken in which the sensor may still show its old zero, in s."""
 _FELT = 0.8
 """Part of the contact force at which the approach has ended."""
 
@@ -50,6 +50,8 @@ class Guard:
     distance: float
     force: float
     start: UrSample
+    zeroed: float
+    """When the controller had taken the force for zero, in s of the rig's clock."""
 
     def gone(self, now: UrSample) -> float:
         """Return the distance that the tool has moved, in m."""
@@ -57,7 +59,7 @@ class Guard:
 
     def felt(self, now: UrSample) -> bool:
         """Return whether the contact force is there; what came before the new zero is not asked."""
-        fresh = now.time > self.start.time + _ZEROED
+        fresh = now.time > self.zeroed + _ZEROED
         return fresh and float(-now.force_base @ self.direction) >= _FELT * self.force
 
 
@@ -252,7 +254,7 @@ class UrArm:
             if not np.isfinite(contact_force):
                 return self._line_by(sample, distance * direction, speed)
             self._control.zeroFtSensor()
-            goal = Guard(direction, distance, contact_force, sample)
+            goal = Guard(direction, distance, contact_force, sample, self._clock.now())
             guarded = self._pressed_way if speed <= _FORCE_MODE_SPEED else self._watched_way
             return guarded(goal, speed)
 
