@@ -19,7 +19,7 @@ production is another arm's or is read wrongly, and nothing is learnt from it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -94,6 +94,12 @@ class SpringUpdate:
     """Measured over predicted deflection, counted so too, by least squares; None in older files."""
     refusal: Finding | None = None
     """Why the springs were left as they were; None where they were moved, and in older files."""
+    made_from: dict[str, str] = field(default_factory=dict)
+    """SHA-256 of what each dataset says that has moved the springs, by its file, those of earlier
+    updates too; older files have them among those of the calibration."""
+    calibrated: tuple[float, ...] | None = None
+    """Compliances of the calibration itself, before the first update that moved them, in
+    rad/(N·m) or m/N; None: they were never moved, or by an older version."""
 
     @property
     def taken(self) -> bool:
