@@ -43,3 +43,11 @@ def test_a_force_that_grows_slowly_is_none():
 def test_a_limit_of_nothing_is_refused():
     with pytest.raises(DeviceError, match="above 0 N"):
         CollisionWatch(np.zeros(3), 0.0)
+
+
+@pytest.mark.parametrize("at", [1, 5])
+def test_a_force_that_is_no_number_is_no_free_move(at):
+    watch = CollisionWatch(np.zeros(3), 100.0, 400.0)
+    for k in range(at):
+        assert watch.look(CYCLE * k, np.zeros(3), np.eye(3)) is None
+    assert watch.look(CYCLE * at, np.array([0.0, np.nan, 0.0]), np.eye(3)) is not None

@@ -25,7 +25,7 @@ def model(tmp_path_factory):
     T[2, 3] = 0.4
     urdf = with_tool(catalogue.urdf("KR 120 R2700-2"), "flange", "tcp", T)
     path = tmp_path_factory.mktemp("model") / "model.json"
-    write_model(path, calibrated(Robot.from_urdf(urdf, "tcp")))
+    write_model(path, calibrated(Robot.from_urdf(urdf, "tcp")), made_up_summary())
     return path
 
 
@@ -144,4 +144,13 @@ def test_a_model_that_leaves_more_than_half_unexplained_is_refused(tmp_path, mod
     result = elastocal("export", bad, "--c", tmp_path / "c")
     assert result.code == 1
     assert "leaves 70% of the deflection unexplained" in result.reason
+    assert not (tmp_path / "c").exists()
+
+
+def test_a_model_that_does_not_say_how_much_it_leaves_unexplained_is_refused(tmp_path, model):
+    silent = shutil.copy(model, tmp_path / "silent.json")
+    edit(silent, lambda data: data.pop("calibration"))
+    result = elastocal("export", silent, "--c", tmp_path / "c")
+    assert result.code == 1
+    assert "does not say how much of the deflection it leaves unexplained" in result.reason
     assert not (tmp_path / "c").exists()

@@ -27,6 +27,7 @@ from support.paths import (
     write_csv,
 )
 from support.simulated import example_cell
+from support.summaries import made_up_summary
 
 LONGER = "0 mm, 0 mm, 100 mm, 0 deg, 0 deg, 0 deg"
 SHORTER = "0 mm, 0 mm, -100 mm, 0 deg, 0 deg, 0 deg"
@@ -41,7 +42,7 @@ DEFLECTION = tuple(f"deflection_{axis}[m]" for axis in "xyz")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("new_tool")
-    write_model(folder / "model.json", calibrated())
+    write_model(folder / "model.json", calibrated(), made_up_summary())
     force = force_columns(np.tile(FORCE_TCP, (9, 1)), "force_tcp_")
     write_csv(folder / "path.csv", euler_columns(COURSE) | force)
     write_csv(folder / "rows.csv", joint_columns(Q) | force_columns(FORCE))

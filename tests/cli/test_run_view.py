@@ -5,6 +5,7 @@ import queue
 import signal
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
@@ -77,6 +78,41 @@ def test_what_is_gone_is_left_alone(capfd, terminal):
     # Standard output is still there for data.
     print("data")
     assert capfd.readouterr().out == "data\n"
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+@pytest.mark.parametrize("show", [run_view.following_live, run_view.following_devices])
+def test_a_terminal_that_takes_nothing_does_not_make_the_arm_wait(monkeypatch, terminal, show):
+    """`live` ends after its duration, and `watch` does, whoever has stopped its terminal."""
+    monkeypatch.setattr(run_view, "PATIENCE", 0.01)
+    file, told = Clogged(), []
+    given = SimpleNamespace(seconds=99.0, sentence=lambda: "12 s", figures=FOUND)
+
+    def work():
+        with show(Console(file=file, force_terminal=terminal)) as tell:
+            for _ in range(100):
+                tell(given)
+                told.append(time.monotonic())
+
+    worker = threading.Thread(target=work, daemon=True)
+    worker.start()
+    worker.join(10.0)
+    assert not worker.is_alive()
+    assert len(told) == 100
+    file.clear.set()
+
+
+FOUND = SimpleNamespace(
+    devices=[SimpleNamespace(problem="", kind="arm", device="x", cells=lambda: ["-"])]
+)
+
+
+def test_live_says_a_line_each_ten_seconds_where_no_terminal_is():
+    text = io.StringIO()
+    with run_view.following_live(Console(file=text)) as tell:
+        for k in range(50):
+            tell(SimpleNamespace(seconds=0.5 * k, sentence=lambda k=k: f"{0.5 * k} s"))
+    assert text.getvalue().split("\n") == ["0.0 s", "10.0 s", "20.0 s", ""]
 
 
 class Answers(io.StringIO):

@@ -229,3 +229,32 @@ def test_the_compensator_takes_growth_out_with_no_force_and_within_its_limit():
         step, found = compensator.step(step, reading)
     assert np.linalg.norm(far.shift(robot, q)) > settings.limits.correction
     assert np.linalg.norm(found.correction) <= settings.limits.correction * (1 + 1e-12)
+
+
+def in_two_sessions(first: np.ndarray, second: np.ndarray, at: int, seed: int = 0) -> Touches:
+    """Return touches whose arm has these shares before a run was gone on with, and after it."""
+    before, after = (touched(grown(arm(), shares), seed=seed) for shares in (first, second))
+    late = np.arange(len(before.pose)) >= at
+    shift = np.where(late[:, None], after.shift, before.shift)
+    sessions = np.stack([np.zeros(len(late), int), late.astype(int)], axis=1)
+    return replace(before, shift=shift, by_contact=-shift[:, 0], sessions=sessions)
+
+
+@pytest.mark.parametrize("at", [3, 6, 10])
+def test_touches_of_two_warmths_make_no_state(at):
+    """A warm run is stopped, and gone on with when the arm has cooled."""
+    warm, cold = np.full(6, 40e-6), np.zeros(6)
+    with pytest.raises(CompensationError, match=r"differ by 0\.\d+ mm: the arm was not equally"):
+        state_of(in_two_sessions(warm, cold, at))
+
+
+def test_a_run_that_was_gone_on_with_at_once_is_one_state():
+    same, refused = np.random.default_rng(1).uniform(10e-6, 30e-6, 6), 0
+    for seed in range(60):
+        try:
+            state_of(in_two_sessions(same, same, 1 + seed % 11, seed))
+        except CompensationError:
+            refused += 1
+    assert refused <= 2
+    paused = replace(in_two_sessions(same, same, 5), pause=5400.0)
+    assert any("paused for 90 min" in str(each) for each in state_of(paused).findings)

@@ -33,6 +33,16 @@ def test_offset_and_drift_are_found_through_latencies(drift):
     assert error[6000:].std() < 0.1e-3
 
 
+@pytest.mark.parametrize("before", [0, 5])
+@pytest.mark.parametrize("stamp", [np.nan, np.inf, -np.inf])
+def test_a_time_that_is_no_number_is_refused_and_changes_nothing(before, stamp):
+    clock = DeviceClock("adapter")
+    run(clock, 0.1 * np.arange(before), 0.1 * np.arange(before))
+    with pytest.raises(DeviceError, match="adapter: its time is"):
+        clock.rig_time(stamp, 1.0)
+    assert clock.rig_time(1.0, 1.0) == 1.0
+
+
 def test_times_go_forward_and_are_never_ahead_of_the_arrival():
     rng = np.random.default_rng(5)
     true = np.arange(0.0, 60.0, 0.02)

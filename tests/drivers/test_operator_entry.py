@@ -1,5 +1,6 @@
 """Readings that a person types."""
 
+import os
 import queue
 import threading
 
@@ -159,3 +160,16 @@ def test_lines_appended_to_a_file_are_readings(clock, tmp_path):
 def test_a_procedure_that_leaves_a_person_no_time_is_refused(clock):
     with pytest.raises(DeviceError, match=r"procedure.beam_timeout is 5 s: a person"):
         connect(DRIVER, example_cell(), clock)
+
+
+def test_where_nobody_can_type_it_is_refused_before_anything_moves(clock, tmp_path, monkeypatch):
+    """The studio runs an arm in a process of its own, whose standard input is empty."""
+    patient = example_cell("afp", procedure={"beam_timeout": "120 s"})
+    with open(os.devnull, encoding="utf-8") as nobody:  # noqa: PTH123 - it is no file of ours
+        monkeypatch.setattr("sys.stdin", nobody)
+        with pytest.raises(DeviceError, match=r"nobody can type points here.*\(key 'file'\)"):
+            connect(DRIVER, patient, clock)
+        connect(DRIVER, patient, clock, file=str(tmp_path / "points.txt")).close()
+    with (tmp_path / "typed").open("w+", encoding="utf-8") as piped:
+        monkeypatch.setattr("sys.stdin", piped)
+        connect(DRIVER, patient, clock).close()

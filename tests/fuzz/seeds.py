@@ -35,6 +35,7 @@ from support.compensated import calibrated
 from support.foreign_bags import write_bag
 from support.measured_arms import measure, write_positions
 from support.sealed import edit
+from support.summaries import made_up_summary
 
 
 @dataclass(frozen=True)
@@ -575,7 +576,7 @@ def _write_geometry(folder: Path) -> None:
         *("geometry", folder / "positions.csv", "--robot", folder / "arm.urdf", "--tcp", "flange"),
         *("--draws", 40, "--out", folder / "geometry.json"),
     )
-    write_model(folder / "arm.json", calibrated(robot))
+    write_model(folder / "arm.json", calibrated(robot), made_up_summary())
     heads = [f"{name}[rad]" for name in robot.joint_names] + [f"force_{a}[N]" for a in "xyz"]
     (folder / "arm.csv").write_text(f"{','.join(heads)}\n0,-1,1,0,0.5,0,0,0,-500\n")
     write_json(

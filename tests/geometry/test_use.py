@@ -25,6 +25,7 @@ from support.cli import elastocal
 from support.compensated import calibrated
 from support.demos import finished_demo
 from support.measured_arms import MARKERS, Measured, measure, weight_torque, write_positions
+from support.summaries import made_up_summary
 
 
 def kuka() -> Robot:
@@ -118,7 +119,7 @@ def test_predict_and_compensate_take_the_geometry(tmp_path):
     arm = ("--robot", "KR 210 R2700-2", "--tcp", robot.tip, "--draws", 40)
     shown = elastocal("geometry", positions, *arm, *markers, "--out", geometry)
     assert "mm from where it is described" in shown.err
-    write_model(model, calibrated(robot))
+    write_model(model, calibrated(robot), made_up_summary())
     names = [f"{name}[rad]" for name in robot.joint_names]
     heads = ",".join([*names, *(f"force_{axis}[N]" for axis in "xyz")])
     rows = tmp_path / "rows.csv"
@@ -148,7 +149,7 @@ def test_angles_that_no_function_was_measured_at_are_named_by_every_command(tmp_
     joint, none = robot.joint_names[1], np.zeros(2)
     function = JointFunction(joint, none, none, none, none, 8, 0.0, True, ((-0.5, 0.5),))
     write_json(geometry, replace(fitted(measured), functions=(function,)))
-    write_model(model, calibrated(robot))
+    write_model(model, calibrated(robot), made_up_summary())
     names = [f"{name}[rad]" for name in robot.joint_names]
     heads = ",".join([*names, *(f"force_{axis}[N]" for axis in "xyz")])
     rows, loaded = tmp_path / "rows.csv", "1,0,0.5,0,0,0,-500"

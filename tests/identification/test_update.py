@@ -8,7 +8,8 @@ import pytest
 
 from elastocal.dataset import read, write
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
-from elastocal.identification import calibrate, update_springs
+from elastocal.identification import CalibrateResult, calibrate, update_springs
+from elastocal.records import read_json
 from elastocal.workflows import calibrate as calibrate_files
 from support import problems
 from support.cells import Cell, linear_truth, unseen
@@ -189,8 +190,10 @@ class TestTheCommand:
             [files / "monday.nc", files / "tuesday.nc"], update=files / "model.json"
         )
         assert result.update.courses == ("monday", "tuesday")
-        assert "updated by" in result.provenance
-        assert len(result.made_from) == 3
+        # They changed nothing, so that they count when there are more.
+        assert not result.update.taken
+        assert [name.rsplit("/", 1)[-1] for name in result.made_from] == ["old.nc"]
+        assert result.update.made_from == {}
         assert "left-out courses" in str(result)
         done = elastocal(
             *("calibrate", files / "monday.nc", files / "tuesday.nc", "--update"),
@@ -219,10 +222,31 @@ class TestTheCommand:
     def test_readings_that_have_made_the_model_do_not_count_twice(self, files):
         with pytest.raises(IdentificationError, match="was made from these readings already"):
             calibrate_files([files / "monday.nc", files / "old.nc"], update=files / "model.json")
-        days = [files / "monday.nc", files / "tuesday.nc"]
-        calibrate_files(days, update=files / "model.json", out=files / "once.json")
+
+    def test_production_that_moved_the_springs_is_kept_apart_and_counts_once(self, files):
+        """A report makes the calibration again, from what that was made from alone."""
+        worn = []
+        for day, seed in enumerate((1, 2, 3)):
+            dataset = Cell(linear_truth(), poses=12, seed=seed).measure()
+            deflected = dataset.marker_displacement - dataset.controller_displacement
+            there = dataset.marker_displacement + 0.1 * deflected
+            write(replace(dataset, marker_displacement=there), files / f"worn{day}.nc")
+            worn.append(files / f"worn{day}.nc")
+        before, once = read_json(files / "model.json", CalibrateResult), files / "once.json"
+        result = calibrate_files(worn, update=files / "model.json", out=once)
+        assert result.update.taken
+        assert "updated by" in result.provenance
+        assert result.made_from == before.made_from
+        assert [*result.update.made_from] == [str(each) for each in worn]
         with pytest.raises(IdentificationError, match=r"once\.json was made from these readings"):
-            calibrate_files(days, update=files / "once.json")
+            calibrate_files(worn[1:], update=once)
+        # What changes nothing afterwards leaves them counted.
+        days = [files / "monday.nc", files / "tuesday.nc"]
+        again = calibrate_files(days, update=once)
+        assert [*result.update.made_from][:3] == [*again.update.made_from][:3]
+        assert again.made_from == before.made_from
+        for each in (result, again):
+            assert each.update.calibrated == tuple(before.compliance.tolist())
 
     @pytest.mark.parametrize(
         ("link", "message"),

@@ -44,7 +44,7 @@ class KukaPeer:
     number: int = 0
     q: np.ndarray = field(init=False)
     fault: set[str] = field(default_factory=set)
-    """``deaf``: takes no orders; ``brakes``: gives moves up."""
+    """``deaf``: takes no orders; ``brakes``: gives moves up; ``rides``: takes no move back."""
     answers: list[str] = field(default_factory=list)
     bias: np.ndarray = field(default_factory=lambda: np.array([12.0, -7.0, 3.0]))
     knock: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -152,7 +152,7 @@ class KukaPeer:
         way = self.target - self.q
         most = 0.01 * self.percent * self.speed * self.cycle
         done = float(np.abs(way).max()) <= most
-        braked = order != 2 or "brakes" in self.fault
+        braked = (order != 2 and "rides" not in self.fault) or "brakes" in self.fault
         if not braked:
             self.q = self.target if done else self.q + way * (most / np.abs(way).max())
         self.T_programmed = self.T

@@ -28,6 +28,7 @@ from elastocal.workflows.live import LiveResult
 from support import compensated
 from support.plugged import describe
 from support.simulated import example_cell
+from support.summaries import made_up_summary
 
 CYCLE = 0.004
 _PAUSE = 2e-4
@@ -148,7 +149,7 @@ def write_cell(
 
 def write_model_of(cell: Path, path: Path) -> Path:
     """Write a made-up model of a cell's robot; return its file."""
-    write_model(path, compensated.calibrated(load_cell(cell).robot))
+    write_model(path, compensated.calibrated(load_cell(cell).robot), made_up_summary())
     return path
 
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
@@ -171,7 +172,9 @@ def test_nothing_moves_where_the_cold_run_is_of_no_use(touched, tmp_path):
         assert not (tmp_path / "v-run").exists()
 
 
-def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(touched, tmp_path):
+def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(
+    touched, tmp_path, monkeypatch
+):
     folder, made, _ = touched
     half, files = copied(folder / "state-run", tmp_path / "half", 4), {"cold": folder / "cold"}
     files |= {"warm": half, "out": tmp_path / "w.json"}
@@ -179,6 +182,30 @@ def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(touched, tm
         touch(made.cell, **files)
     assert not (tmp_path / "w.json").exists()
     assert len(touch(made.cell, **files, resume=True, confirmed=True).points) == POSES
+    found = read_touches(folder / "cold", half)
+    assert sorted(found.sessions[:, 1].tolist()) == [0] * 4 + [1] * 4
+    assert not found.sessions[:, 0].any()
+    # The simulated cell's clock runs ahead of the wall's.
+    assert found.pause == 0.0
+    read_run = touches_module.read_run
+
+    def read_a_day_later(path):
+        """Return the run as if it had been gone on with a day after it began."""
+        run = read_run(path)
+        later = (datetime.fromisoformat(run.record.started) + timedelta(days=1)).isoformat()
+        entries = (
+            replace_text(each, later) if each.event is Event.RESUME else each
+            for each in run.entries
+        )
+        return replace(run, entries=tuple(entries))
+
+    def replace_text(entry, text):
+        datetime.fromisoformat(entry.text)
+        return entry.model_copy(update={"text": text})
+
+    monkeypatch.setattr(touches_module, "read_run", read_a_day_later)
+    found = read_touches(folder / "cold", half)
+    assert 86400.0 - 3600.0 < found.pause < 86400.0
 
 
 def test_a_warm_run_that_a_fault_has_ended_is_not_taken_for_all_of_it(touched, tmp_path):

@@ -44,6 +44,7 @@ from .certificate import (
 )
 from .collision import CollisionWatch as CollisionWatch
 from .devices import (
+    UNWATCHED as UNWATCHED,
     ArmState as ArmState,
     AskedMetrology as AskedMetrology,
     BeamState as BeamState,

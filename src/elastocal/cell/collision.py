@@ -76,13 +76,13 @@ class CollisionWatch:
             self._rest.popleft()
         self._rest.append((time, rest))
         change = float(np.linalg.norm(rest - self._rest[0][1]))
-        if change > self._limit:
+        if not change <= self._limit:
             return (
                 f"the force changed by {change:.0f} N within {1e3 * self._window:.0f} ms"
                 f" while moving freely, limit {self._limit:.0f} N"
             )
         grown = float(np.linalg.norm(rest - self._first))
-        if grown > self._largest:
+        if not grown <= self._largest:
             return (
                 f"the force is {grown:.0f} N off the tool's weight while moving freely,"
                 f" limit {self._largest:.0f} N"

@@ -77,11 +77,17 @@ class ArmState:
     that has none. None: the arm has none at all."""
 
 
+UNWATCHED = 5.0
+"""Time without a call of `RobotArm.state` after which an arm that presses, or moves to a surface,
+stands still with a fault, in s: whoever supervises it hangs, on a disk or in a debugger."""
+
+
 class RobotArm(Protocol):
     """An arm with a guarded approach and force control at the tool.
 
     Contract: no command moves anything before `enable`; a command that is not allowed in the
-    present state raises `DeviceError`; `stop` is allowed in every state and any number of times.
+    present state raises `DeviceError`; `stop` is allowed in every state and any number of times;
+    `approach` and `hold` end with a fault where nobody asks for the `state`; see `UNWATCHED`.
     """
 
     @property

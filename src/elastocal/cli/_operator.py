@@ -13,9 +13,9 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
-from typing import Self
+from typing import Generic, TypeVar
 
 import typer
 from rich.console import Console, RenderableType
@@ -71,16 +71,27 @@ def watching(console: Console, count: int) -> Iterator[Callable[[Progress], None
     count : int
         Number of poses.
     """
-    screen = _Terminal(console, count) if console.is_terminal else _Lines(console)
-    screen.start()
-    try:
-        yield screen.tell
-    finally:
-        screen.close()
+    with _Terminal(console, count) if console.is_terminal else _Lines(console) as tell:
+        yield tell
 
 
-class _Screen(threading.Thread, abc.ABC):
-    """Writes reports that wait to be written.
+def following_live(console: Console) -> AbstractContextManager[Callable[[LiveReport], None]]:
+    """Show how a live compensation is going, as `watching` does: a line each 10 s elsewhere."""
+    return _LiveTerminal(console, 1) if console.is_terminal else _LiveLines(console, 1000)
+
+
+def following_devices(console: Console) -> AbstractContextManager[Callable[[WatchResult], None]]:
+    """Show the devices of a cell, as `watching` does; nothing where there is no terminal."""
+    if not console.is_terminal:
+        return contextlib.nullcontext(lambda _: None)
+    return _DevicesTable(console, 1)
+
+
+Report = TypeVar("Report")
+
+
+class _Screen(threading.Thread, abc.ABC, Generic[Report]):
+    """Writes reports that wait to be written; entered, it gives the function that takes them.
 
     Parameters
     ----------
@@ -91,17 +102,21 @@ class _Screen(threading.Thread, abc.ABC):
     """
 
     def __init__(self, console: Console, most: int) -> None:
-        super().__init__(name="view of the run", daemon=True)
+        super().__init__(name="view", daemon=True)
         self._console = console
-        self._waiting: deque[Progress] = deque(maxlen=most)
+        self._waiting: deque[Report] = deque(maxlen=most)
         self._news, self._closed = threading.Event(), False
 
-    def tell(self, step: Progress) -> None:
-        """Take a report; called by the run."""
-        self._waiting.append(step)
+    def tell(self, report: Report) -> None:
+        """Take a report; it returns at once."""
+        self._waiting.append(report)
         self._news.set()
 
-    def close(self) -> None:
+    def __enter__(self) -> Callable[[Report], None]:
+        self.start()
+        return self.tell
+
+    def __exit__(self, *_: object) -> None:
         """Write what waits, if that can be done within `PATIENCE`."""
         self._closed = True
         self._news.set()
@@ -117,10 +132,10 @@ class _Screen(threading.Thread, abc.ABC):
 
     def write(self) -> None:
         """Write reports until closed."""
-        for step in self.reports():
-            self.show(step)
+        for report in self.reports():
+            self.show(report)
 
-    def reports(self) -> Iterator[Progress]:
+    def reports(self) -> Iterator[Report]:
         """Yield reports until closed."""
         while True:
             self._news.wait()
@@ -132,42 +147,85 @@ class _Screen(threading.Thread, abc.ABC):
                 return
 
     @abc.abstractmethod
-    def show(self, step: Progress) -> None:
+    def show(self, report: Report) -> None:
         """Write one report."""
 
 
-class _Terminal(_Screen):
+class _InPlace(_Screen[Report]):
+    """Something that changes in place."""
+
+    def write(self) -> None:
+        self._live = Live(console=self._console, transient=True, auto_refresh=False)
+        with self._live:
+            super().write()
+
+    def show(self, report: Report) -> None:
+        self._live.update(self.shown(report), refresh=True)
+        time.sleep(0.0 if self._closed else REFRESH)
+
+    @abc.abstractmethod
+    def shown(self, report: Report) -> RenderableType:
+        """Return what a report looks like."""
+
+
+class _Terminal(_InPlace[Progress]):
     """One line that changes."""
 
     def __init__(self, console: Console, count: int) -> None:
         super().__init__(console, most=1)
-        self._count, self._live = count, Live(console=console, transient=True, auto_refresh=False)
+        self._count = count
 
-    def write(self) -> None:
-        with self._live:
-            super().write()
-
-    def show(self, step: Progress) -> None:
-        done = step.number if step.pose is None else step.number - 1
-        line = Text(f"{_bar(done, self._count)} {progress_text(step)}")
-        self._live.update(line, refresh=True)
-        time.sleep(0.0 if self._closed else REFRESH)
+    def shown(self, report: Progress) -> Text:
+        done = report.number if report.pose is None else report.number - 1
+        return Text(f"{_bar(done, self._count)} {progress_text(report)}")
 
 
-class _Lines(_Screen):
+class _Lines(_Screen[Progress]):
     """A line whenever another pose is begun."""
 
     def __init__(self, console: Console) -> None:
         super().__init__(console, most=1000)
         self._last: tuple[int | None, int] | None = None
 
-    def tell(self, step: Progress) -> None:
-        if (step.pose, step.attempt) != self._last:
-            self._last = (step.pose, step.attempt)
-            super().tell(step)
+    def tell(self, report: Progress) -> None:
+        if (report.pose, report.attempt) != self._last:
+            self._last = (report.pose, report.attempt)
+            super().tell(report)
 
-    def show(self, step: Progress) -> None:
-        self._console.print(progress_text(step), soft_wrap=True)
+    def show(self, report: Progress) -> None:
+        self._console.print(progress_text(report), soft_wrap=True)
+
+
+class _LiveTerminal(_InPlace[LiveReport]):
+    """One line that changes."""
+
+    def shown(self, report: LiveReport) -> Text:
+        return Text(report.sentence())
+
+
+class _LiveLines(_Screen[LiveReport]):
+    """A line each 10 s."""
+
+    _last = -math.inf
+
+    def tell(self, report: LiveReport) -> None:
+        if report.seconds >= self._last + _LIVE_LINES:
+            self._last = report.seconds
+            super().tell(report)
+
+    def show(self, report: LiveReport) -> None:
+        self._console.print(report.sentence(), soft_wrap=True)
+
+
+class _DevicesTable(_InPlace[WatchResult]):
+    """A table that changes."""
+
+    def shown(self, report: WatchResult) -> Table:
+        table = Table("device", *DeviceReading.COLUMNS, expand=True)
+        for each in report.figures.devices:
+            mark = output.red("●") if each.problem else output.green("●")
+            table.add_row(f"{mark} {each.kind} {each.device}", *each.cells())
+        return table
 
 
 def _leave_off() -> None:
@@ -333,58 +391,3 @@ def stack_by_hand(console: Console, stack: Callable[[int], None]) -> None:
     if sys.stdin.isatty():
         console.print(how)
         threading.Thread(target=listen, name="disks", daemon=True).start()
-
-
-class _View:
-    """Shows something that changes in place, where there is a terminal; one that is gone is left.
-
-    Parameters
-    ----------
-    console : Console
-        Where the person looks.
-    """
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._live = Live(console=console, transient=True, auto_refresh=False)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        with contextlib.suppress(OSError, ValueError):
-            self._live.stop()
-
-    def _update(self, shown: RenderableType) -> None:
-        self._live.start()
-        self._live.update(shown, refresh=True)
-
-
-class LiveView(_View):
-    """Shows how a live compensation is going: a line that changes, a line each 10 s elsewhere."""
-
-    _shown = -math.inf
-
-    def tell(self, report: LiveReport) -> None:
-        """Show a report."""
-        with contextlib.suppress(OSError, ValueError):
-            if self._console.is_terminal:
-                self._update(Text(report.sentence()))
-            elif report.seconds >= self._shown + _LIVE_LINES:
-                self._shown = report.seconds
-                self._console.print(report.sentence(), soft_wrap=True)
-
-
-class DevicesView(_View):
-    """Shows the devices of a cell as a table that changes; nothing where there is no terminal."""
-
-    def tell(self, result: WatchResult) -> None:
-        """Show the devices."""
-        if not self._console.is_terminal:
-            return
-        table = Table("device", *DeviceReading.COLUMNS, expand=True)
-        for each in result.figures.devices:
-            mark = output.red("●") if each.problem else output.green("●")
-            table.add_row(f"{mark} {each.kind} {each.device}", *each.cells())
-        with contextlib.suppress(OSError, ValueError):
-            self._update(table)

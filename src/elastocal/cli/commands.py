@@ -196,11 +196,11 @@ def _check(given: Given) -> None:
 
 @command("Prepare")
 def _watch(given: Given) -> None:
-    from elastocal.cli._operator import DevicesView, interruption
+    from elastocal.cli._operator import following_devices, interruption
     from elastocal.errors import DeviceError
 
-    with interruption() as interrupted, DevicesView(output.console()) as view:
-        result = workflows.watch(**given.settings, show=view.tell, interrupted=interrupted)
+    with interruption() as interrupted, following_devices(output.console()) as tell:
+        result = workflows.watch(**given.settings, show=tell, interrupted=interrupted)
         ended = not interrupted()
     _show(given, result.figures, result.show())
     if ended and result.problem is not None:
@@ -538,15 +538,15 @@ def _compensate(given: Given) -> None:
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
 def _live(given: Given) -> None:
-    from elastocal.cli._operator import LiveView, interruption
+    from elastocal.cli._operator import following_live, interruption
     from elastocal.errors import DeviceError
 
     screen = output.console()
-    with interruption() as interrupted, LiveView(screen) as view:
+    with interruption() as interrupted, following_live(screen) as tell:
         result = workflows.live(
             **given.settings,
             **_only_tool(given),
-            report=view.tell,
+            report=tell,
             warn=lambda text: output.print_remarks(screen, "warning", [text]),
             interrupted=interrupted,
         )

@@ -22,9 +22,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
+from scipy.special import fdtrc, stdtrit
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, IndexArray
 from elastocal.blocks import Block, Facts, Row, Table
 from elastocal.errors import CompensationError
 from elastocal.findings import Finding, Grade, Kind, as_number
@@ -50,6 +50,10 @@ _ROUNDS = 5
 _DIFFERENT = 0.1e-3
 """Difference between tracker and tooling along the normal that is said, in m."""
 _LEVEL = 0.975
+_MIXED = 0.01
+"""Risk that touches of one warmth, taken in several sessions, are called touches of two."""
+_PAUSE = 600.0
+"""Pause between two sessions that is said, in s: minutes change little of an arm's warmth."""
 _OLD = 12.0
 """Age from which a state is warned of, in h: a shift and half of another."""
 
@@ -67,6 +71,12 @@ WITNESSES = Kind(
     " them has moved",
     advice="Look whether the tracker's stand or the tooling was moved, and touch cold again.",
     shown={"contact": _mm, "tracker": _mm},
+)
+PAUSED = Kind(
+    "arm.touches-paused",
+    "a run of touches paused for {minutes} min, in which the arm cools or warms",
+    advice="Touch again without a pause.",
+    shown={"minutes": as_number(".0f")},
 )
 LOST_TOUCHES = Kind("arm.touches-lost", "not touched in both runs: pose {poses}")
 
@@ -235,9 +245,9 @@ class _Fit:
     """Estimate of share and offset from some touches."""
 
     x: FloatArray
-    """Share, and offset in m, shape (4,)."""
+    """Share, and offset in m, shape (4,); then the further offset of each later session."""
     covariance: FloatArray
-    """Shape (4, 4), for the noise that was found."""
+    """Of these, for the noise that was found."""
     sigma: float
     """Noise of a component, in m."""
     free: float
@@ -249,11 +259,21 @@ class _Fit:
         return float(stdtrit(self.free, _LEVEL))
 
 
-def _fitted(lever: FloatArray, shift: FloatArray) -> _Fit:
-    """Return share and offset of touches with levers and shifts, both (touch, 3), in m."""
-    A = np.concatenate([lever[..., None], np.tile(np.eye(3), (len(lever), 1, 1))], axis=2)
-    A, d = A.reshape(-1, 4), shift.ravel()
-    prior = np.diag(1.0 / np.array([_SHARE_PRIOR, *[_OFFSET_PRIOR] * 3]) ** 2)
+def _fitted(lever: FloatArray, shift: FloatArray, later: FloatArray | None = None) -> _Fit:
+    """Return share and offset of touches with levers and shifts, both (touch, 3), in m.
+
+    Parameters
+    ----------
+    later : ndarray, optional
+        Whether each touch is of each session but the first, shape (touch, session): each has an
+        offset of its own then, which follows in the estimate.
+    """
+    later = np.empty((len(lever), 0)) if later is None else later
+    shared = np.concatenate([np.ones((len(lever), 1)), later], axis=1)
+    offsets = np.einsum("ts,ij->tisj", shared, np.eye(3)).reshape(len(lever), 3, -1)
+    A = np.concatenate([lever[..., None], offsets], axis=2)
+    A, d = A.reshape(-1, A.shape[2]), shift.ravel()
+    prior = np.diag(1.0 / np.array([_SHARE_PRIOR, *[_OFFSET_PRIOR] * (A.shape[1] - 1)]) ** 2)
     sigma, free = _NOISE, _NOISE_WORTH
     for _ in range(_ROUNDS):
         covariance = np.linalg.inv(A.T @ A / sigma**2 + prior)
@@ -286,6 +306,10 @@ class Touches:
     """The shift along the normal by the tooling, shape (touch,), in m."""
     lost: tuple[int, ...] = ()
     """Poses that were not touched in both runs."""
+    sessions: IndexArray | None = None
+    """Sessions of the cold and of the warm run, shape (touch, 2); None: each run was one."""
+    pause: float = 0.0
+    """Longest pause between two sessions, in s."""
 
 
 def arm_growth(
@@ -311,7 +335,8 @@ def arm_growth(
     Raises
     ------
     CompensationError
-        If there are too few touches, or they say what is no arm's growth.
+        If there are too few touches, they say what is no arm's growth, or they are of several
+        warmths.
     """
     count = len(touches.pose)
     if count < LEAST_TOUCHES:
@@ -322,6 +347,7 @@ def arm_growth(
     _require_possible(0.0, np.median(touches.shift, axis=0), "the touches say")
     tool = robot.forward(touches.q)[:, :3, 3]
     lever = tool - robot.foot(touches.q)
+    _require_one_warmth(lever, touches)
     fit = _fitted(lever, touches.shift)
     others = (np.flatnonzero(np.arange(count) != row) for row in range(count))
     left = np.array(
@@ -338,6 +364,7 @@ def arm_growth(
         *([] if used.any() else [USELESS(with_state=held_out, without=without)]),
         *_witnesses(touches, fit),
         *([LOST_TOUCHES(poses=list(touches.lost))] if touches.lost else []),
+        *([] if touches.pause <= _PAUSE else [PAUSED(minutes=touches.pause / 60.0)]),
     ]
     cold, warm, seconds = times
     return ArmGrowth(
@@ -362,6 +389,36 @@ def arm_growth(
     )
 
 
+def _require_one_warmth(lever: FloatArray, touches: Touches) -> None:
+    """Refuse touches of several sessions between which the arm has grown or shrunk.
+
+    Offsets of the later sessions, beside one share and offset of all, are tested against none (F
+    test of a linear hypothesis; Seber and Lee, "Linear Regression Analysis", section 4.3).
+
+    Raises
+    ------
+    CompensationError
+        With the largest of these offsets.
+    """
+    if touches.sessions is None:
+        return
+    kinds, number = np.unique(touches.sessions, axis=0, return_inverse=True)
+    count = len(kinds) - 1
+    if not count:
+        return
+    later = np.equal.outer(number.ravel(), np.arange(1, count + 1)).astype(float)
+    fit = _fitted(lever, touches.shift, later)
+    apart, covariance = fit.x[4:], fit.covariance[4:, 4:]
+    ratio = float(apart @ np.linalg.solve(covariance, apart)) / len(apart)
+    if not fdtrc(len(apart), fit.free, ratio) >= _MIXED:
+        away = float(np.linalg.norm(apart.reshape(-1, 3), axis=1).max())
+        raise CompensationError(
+            "the touches before a run was gone on with (--resume) and after it differ by"
+            f" {quantity(away, 'mm', '.3f')}: the arm was not equally warm; touch again in one"
+            " session, in another folder"
+        )
+
+
 def _half_width(fit: _Fit, lever: FloatArray) -> float:
     """Return half the 95 % interval of the most uncertain component at some levers, in m."""
     rows = np.concatenate([lever[..., None], np.tile(np.eye(3), (len(lever), 1, 1))], axis=2)
@@ -374,7 +431,7 @@ def _witnesses(touches: Touches, fit: _Fit) -> Iterator[Finding]:
     tracker = np.einsum("ti,ti->t", touches.normal, touches.shift)
     apart = touches.by_contact - tracker
     half = fit.factor * np.sqrt(2.0 * fit.sigma**2 / len(apart))
-    if abs(float(apart.mean())) > max(half, _DIFFERENT):
+    if not abs(float(apart.mean())) <= max(half, _DIFFERENT):
         yield WITNESSES(contact=float(touches.by_contact.mean()), tracker=float(tracker.mean()))
 
 

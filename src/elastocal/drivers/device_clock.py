@@ -10,6 +10,7 @@ came late does not tilt it. The line then is the highest one that no sample lies
 time is never later than the arrival. The offset contains the shortest latency from the device.
 """
 
+import math
 from collections import deque
 
 import numpy as np
@@ -77,6 +78,8 @@ class DeviceClock:
         DeviceError
             If the device's clock goes back, leaps, or does not count seconds.
         """
+        if not math.isfinite(stamp):
+            raise DeviceError(f"{self._source}: its time is {stamp}")
         if self._window is None:
             self._first = self._newest = stamp
             self._begin(stamp, arrival)

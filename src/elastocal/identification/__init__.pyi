@@ -184,6 +184,7 @@ from .uncertainty import (
     widening_factor as widening_factor,
 )
 from .update import (
+    SpringUpdate as SpringUpdate,
     draws_factor as draws_factor,
     update_springs as update_springs,
 )

@@ -379,7 +379,7 @@ def _widening(
     figures = [(each.difference, each.standard_error, each.apart) for each in open_to_choice]
     moved = doubt(*np.array(figures).reshape(-1, 3).T)
     by *= doubt_factor(problem, compliance, stretched, moved)
-    if unexplained > MOST_UNEXPLAINED:
+    if not unexplained <= MOST_UNEXPLAINED:
         return max(by, distrust_factor(problem, compliance, draws, held_out))
     return by
 
@@ -483,7 +483,7 @@ def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> 
     if missing > 0:
         warnings.append(NOT_DETERMINED(rank=calibrated.observability.rank, reach=reach))
     left = calibrated.unexplained
-    if left > MOST_UNEXPLAINED:
+    if not left <= MOST_UNEXPLAINED:
         warnings.append((UNFIT if left < 1.0 else WORSE_THAN_NONE)(left=left))
     return warnings
 

@@ -19,7 +19,7 @@ production is another arm's or is read wrongly, and nothing is learnt from it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -94,6 +94,12 @@ class SpringUpdate:
     """Measured over predicted deflection, counted so too, by least squares; None in older files."""
     refusal: Finding | None = None
     """Why the springs were left as they were; None where they were moved, and in older files."""
+    made_from: dict[str, str] = field(default_factory=dict)
+    """SHA-256 of what each dataset says that has moved the springs, by its file, those of earlier
+    updates too; older files have them among those of the calibration."""
+    calibrated: tuple[float, ...] | None = None
+    """Compliances of the calibration itself, before the first update that moved them, in
+    rad/(N·m) or m/N; None: they were never moved, or by an older version."""
 
     @property
     def taken(self) -> bool:
@@ -217,7 +223,7 @@ def update_springs(
     measured = _centred(readings.deflection, course)
     blocks = _centred(displacement_blocks(model, readings, marker_offset), course)
     predicted = blocks @ c
-    if _left(measured, predicted) > POOR_FIT:
+    if not _left(measured, predicted) <= POOR_FIT:
         _require_read_as_stated(calibrated, readings, course, marker_offset)
     L = draws_factor(calibrated.draws)
     rows = _Rows(blocks @ L, measured - predicted, course)

@@ -9,7 +9,6 @@ import multiprocessing
 import signal
 import sys
 import threading
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -19,8 +18,6 @@ from types import FrameType
 from elastocal.errors import ElastocalError, ProcedureError, present
 from elastocal.results import brief_repr
 
-_MOST_WAITING = 100
-"""Messages that wait for a studio that does not read; older ones are dropped."""
 _GRACE = 5.0
 """Time in which a stopped worker may clean up, in s."""
 _ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
@@ -59,10 +56,24 @@ class WorkNews:
     """Why it failed or stopped."""
 
 
+@dataclass(frozen=True)
+class _Message:
+    """A message on its way to the studio."""
+
+    said: tuple[object, ...]
+    """Its kind, and what it says."""
+    is_sample: bool = False
+
+    def replaces(self, other: "_Message") -> bool:
+        """Return whether another one, which waits, need not be sent any more."""
+        return self.is_sample and other.is_sample and self.said[0] == other.said[0]
+
+
 class Outbox:
     """The worker's line to the studio.
 
     A thread of its own writes: a studio that reads nothing must not keep an arm from being watched.
+    For such a studio a newer sample takes the place of one that waits; all else waits for it.
 
     Parameters
     ----------
@@ -73,7 +84,8 @@ class Outbox:
     def __init__(self, line: "Connection[object, object]") -> None:
         self._line, self._stopped, self._answered = line, False, 0
         self._stage: tuple[str, int, int] | None = None
-        self._waiting: deque[tuple[object, ...]] = deque(maxlen=_MOST_WAITING)
+        self._waiting: list[_Message] = []
+        self._lock = threading.Lock()
         self._news, self._closed = threading.Event(), False
         self._writer = threading.Thread(target=self._write, name="outbox", daemon=True)
         self._writer.start()
@@ -82,21 +94,27 @@ class Outbox:
         """Report the progress of a stage; it is an `elastocal.progress.Progress`."""
         if (stage, done, total) != self._stage:
             self._stage = (stage, done, total)
-            self._put(("progress", *self._stage))
+            self._put(_Message(("progress", *self._stage), is_sample=True))
+
+    def sample(self, live: Data) -> None:
+        """Report how things are now, which a newer sample makes obsolete."""
+        self._put(_Message(("live", live), is_sample=True))
 
     def tell(self, live: Data) -> None:
-        """Report other news of the work."""
-        self._put(("live", live))
+        """Report what must be known, such as a question; it is never dropped."""
+        self._put(_Message(("live", live)))
 
     def close(self, last: tuple[object, ...]) -> None:
         """Send the last message after all others, and end."""
-        self._waiting.append(last)
+        self._put(_Message(last))
         self._closed = True
         self._news.set()
         self._writer.join()
 
-    def _put(self, message: tuple[object, ...]) -> None:
-        self._waiting.append(message)
+    def _put(self, message: "_Message") -> None:
+        with self._lock:
+            self._waiting = [each for each in self._waiting if not message.replaces(each)]
+            self._waiting.append(message)
         self._news.set()
 
     def _write(self) -> None:
@@ -106,8 +124,12 @@ class Outbox:
                 self._news.wait()
                 self._news.clear()
                 closed = self._closed
-                while self._waiting:
-                    self._line.send(self._waiting.popleft())
+                while (message := self._oldest()) is not None:
+                    self._line.send(message.said)
+
+    def _oldest(self) -> "_Message | None":
+        with self._lock:
+            return self._waiting.pop(0) if self._waiting else None
 
     def stop(self) -> None:
         """Take note that the work is to stop."""

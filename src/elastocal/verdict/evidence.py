@@ -6,7 +6,7 @@ figure; only the origins stated in the files show that it does not belong to the
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +26,7 @@ from elastocal.identification import (
     PredictionDoubt,
     ProductionCoverage,
     Reproduction,
+    SpringUpdate,
     UnseenErrors,
 )
 from elastocal.identification.recertification import CompareSummary
@@ -101,6 +102,16 @@ class ModelEvidence:
     """Hash of the file."""
     made_from: Mapping[str, str] = field(default_factory=dict)
     """Hash of what each dataset says that it was made from, by its file."""
+    update: SpringUpdate | None = None
+    """Update of its springs by tracked production; None: they are those of the calibration."""
+
+    @property
+    def as_calibrated(self) -> CalibratedModel:
+        """The model with the springs of the calibration, before any update."""
+        own = None if self.update is None else self.update.calibrated
+        if own is None or len(own) != len(self.model.compliance):
+            return self.model
+        return replace(self.model, compliance=np.array(own))
 
 
 @dataclass(frozen=True, eq=False)

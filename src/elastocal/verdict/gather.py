@@ -277,7 +277,7 @@ def _with_model(evidence: Evidence, reader: PartReader, options: EvidenceOptions
     measured = present(evidence.calibrated_from, "readings")
     try:
         reproduction = reproduce_calibration(
-            calibrated.model, calibrated.figures, _as_calibrated(measured, calibrated)
+            calibrated.as_calibrated, calibrated.figures, _as_calibrated(measured, calibrated)
         )
     except ElastocalError as error:
         reason = " ".join(str(error).split())
@@ -335,7 +335,9 @@ def _calibrated(path: Path, dataset: Dataset | None) -> ModelEvidence:
     result = read_json(path, CalibrateResult)
     check_model(result.calibrated, dataset, path)
     hashes = result.robot.urdf_sha256, file_sha256(path)
-    return ModelEvidence(result.calibrated, result.calibration, *hashes, result.made_from)
+    return ModelEvidence(
+        result.calibrated, result.calibration, *hashes, result.made_from, result.update
+    )
 
 
 def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions) -> Evidence:

@@ -209,7 +209,7 @@ def _steps(evidence: Evidence, held: Sequence[Finding]) -> Iterator[Finding]:
     if unseen is None or figures is None:
         yield REPEAT_CALIBRATION(error=figures.held_out.max if figures else 0.0)
         return
-    if figures.unexplained > MOST_UNEXPLAINED:
+    if not figures.unexplained <= MOST_UNEXPLAINED:
         yield _useless(evidence, figures.unexplained)
     missing = [each for each in held if each.kind.startswith("verdict.run-partial")]
     for each in missing:

@@ -79,7 +79,7 @@ def judge(evidence: Evidence, findings: Sequence[Finding], advice: Sequence[str]
     all_advice = dict.fromkeys((*(each.advice for each in findings if each.advice), *advice))
     light, own = _light(evidence, unseen, tolerance, bool(held))
     left = evidence.figures.unexplained if evidence.figures is not None else 0.0
-    useless = left > MOST_UNEXPLAINED
+    useless = not left <= MOST_UNEXPLAINED
     if useless:
         left_over = phrase(
             "the model leaves {share} of the deflection unexplained at poses left out of the fit",

@@ -4,6 +4,7 @@ The module also checks that a model fits the cell, and its coverage.
 """
 
 import contextlib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -385,9 +386,14 @@ def require_model_of_arm(calibrated: CalibratedModel, name: str) -> None:
     Raises
     ------
     CompensationError
-        With how much.
+        With how much, or that the model does not say.
     """
-    if calibrated.unexplained > MOST_UNEXPLAINED:
+    if math.isnan(calibrated.unexplained):
+        raise CompensationError(
+            f"{name} does not say how much of the deflection it leaves unexplained at left-out"
+            " poses: calibrate again"
+        )
+    if not calibrated.unexplained <= MOST_UNEXPLAINED:
         raise CompensationError(
             f"{name} leaves {calibrated.unexplained:.0%} of the deflection unexplained at left-out"
             f" poses, at most {MOST_UNEXPLAINED:.0%} is allowed: it is no model of this arm"

@@ -243,14 +243,28 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
     marker = measured.marker if settings.marker is None else settings.marker
     rng = np.random.default_rng(settings.seed)
     moved, worth = update_springs(calibrated, readings, rng, marker)
-    result = replace(
-        before,
-        compliance=moved.compliance,
-        draws=moved.draws,
-        update=worth,
-        provenance=f"{before.provenance}; updated by {source}",
-        made_from=before.made_from | made_from,
-    )
+    # Not among what the calibration was made from: its figures, which a report makes again, are of
+    # that alone.
+    last = before.update
+    earlier, own = ({}, None) if last is None else (last.made_from, last.calibrated)
+    if not worth.taken:
+        worth = replace(worth, made_from=earlier, calibrated=own)
+        result = replace(before, update=worth)
+    else:
+        figures = before.calibration
+        result = replace(
+            before,
+            compliance=moved.compliance,
+            draws=moved.draws,
+            # What was said of production was of the springs as they were.
+            calibration=None if figures is None else replace(figures, doubt=None),
+            update=replace(
+                worth,
+                made_from=earlier | made_from,
+                calibrated=own or tuple(before.compliance.tolist()),
+            ),
+            provenance=f"{before.provenance}; updated by {source}",
+        )
     if settings.out is not None:
         write_json(settings.out, result)
     return result
@@ -258,8 +272,10 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
 
 def _require_new(made_from: dict[str, str], before: CalibrateResult, file: Path) -> None:
     """Refuse readings that have made a model already: counted twice, they look twice as sure."""
+    updated = {} if before.update is None else before.update.made_from
+    seen = {*before.made_from.values(), *updated.values()}
     for path, said in made_from.items():
-        if said in before.made_from.values():
+        if said in seen:
             raise IdentificationError(
                 f"{path}: {file} was made from these readings already: production is wanted that"
                 " it has not seen"

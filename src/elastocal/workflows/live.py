@@ -73,7 +73,7 @@ class LiveSettings(NewTool, TouchedArm):
     force: bool = False
     """Replace files in the folder."""
     report: Callable[[LiveReport], None] = lambda _report: None
-    """Called twice a second."""
+    """Called twice a second; the duration waits for it."""
     warn: Callable[[str], None] = lambda _text: None
     """Called with each warning, before the first cycle."""
     interrupted: Callable[[], bool] = lambda: False

@@ -361,7 +361,7 @@ def run(settings: RunSettings, progress: Progress) -> RunResult:
                     record = _identified(job, settings.operator)
                     journal.write(devices.clock.now(), Event.START, run=record)
                 else:
-                    journal.write(devices.clock.now(), Event.RESUME)
+                    journal.write(devices.clock.now(), Event.RESUME, text=_now())
                 told = settings.operator, progress, watch
                 result = _carry_out(job, session, devices, journal, *told)
     if job.key is not None:

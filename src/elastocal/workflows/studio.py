@@ -232,7 +232,7 @@ def _watch(cell: Path, outbox: Outbox) -> Data:
             for each in result.figures.devices
             for cells in [each.cells()]
         ]
-        outbox.tell({"columns": DeviceReading.COLUMNS, "devices": rows})
+        outbox.sample({"columns": DeviceReading.COLUMNS, "devices": rows})
 
     watch(cell, show=show, interrupted=outbox.stopped)
     return {}
@@ -291,7 +291,7 @@ class _PageOperator(Unattended):
         if now - self._shown_at < _PAUSE:
             return
         self._shown_at = now
-        self._outbox.tell(self._figures(step))
+        self._outbox.sample(self._figures(step))
         if self._rate > 0.0:
             # The simulated clock waits for nothing, so that nothing is late by this.
             began, showed = self._begun = self._begun or (now, step.time)

@@ -90,6 +90,8 @@ def touch(settings: TouchSettings, progress: Progress) -> ArmGrowth:
         found.normal,
         found.by_contact,
         found.lost,
+        found.sessions,
+        found.pause,
     )
     state = arm_growth(
         found.cell.robot,

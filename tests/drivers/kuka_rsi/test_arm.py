@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from elastocal.cell import Motion, RigContext, SensorStatus
+from elastocal.cell import UNWATCHED, Motion, RigContext, SensorStatus
 from elastocal.drivers.kuka_rsi import DRIVER, KukaArm, RsiSettings
 from elastocal.drivers.kuka_rsi.driver import connect_arm
 from elastocal.drivers.kuka_rsi.messages import read_rob
@@ -248,6 +248,85 @@ class TestContact:
         bench.arm.retract(bench.place.normal, 0.02, 0.02)
         assert bench.wait(Motion.IDLE).in_contact is None
         assert np.linalg.norm(bench.force_tcp) == 0.0
+
+    def test_a_press_that_nobody_looks_at_any_more_is_left_for_position_control(self, bench):
+        """Whoever supervises it hangs, on a disk that is gone or in a debugger."""
+        bench.touch()
+        bench.arm.hold(PRESS, 500.0)
+        bench.clock.sleep(UNWATCHED - 0.5)
+        assert bench.arm.state().motion is Motion.HOLDING
+        bench.clock.sleep(UNWATCHED + 0.1)
+        standing = bench.peer.q.copy()
+        bench.peer.knock = np.array([0.0, 0.0, 200.0])
+        bench.clock.sleep(0.5)
+        np.testing.assert_array_equal(bench.peer.q, standing)
+        state = bench.arm.state()
+        assert (state.motion, state.fault) == (
+            Motion.IDLE,
+            "nobody has asked how the arm stands for 5 s",
+        )
+        bench.arm.retract(bench.place.normal, 0.02, 0.02)
+        assert bench.wait(Motion.IDLE).motion is Motion.IDLE
+
+    def test_a_retract_that_presses_stops(self, bench):
+        """Towards another surface: nothing else of the driver looks at the force then."""
+        bench.ready()
+        _, normal = bench.peer.surface
+        bench.peer.surface = (bench.peer.T[:3, 3] + 0.01 * normal, -normal)
+        bench.arm.retract(normal, 0.03, 0.05)
+        state = bench.wait(Motion.STOPPED, Motion.IDLE)
+        assert "press on the tool while it retracts, limit" in state.fault
+        pressing = np.linalg.norm(bench.force_tcp)
+        assert pressing < 1.2 * bench.arm.bounds.force + 1e6 * 0.05 * 0.06
+        bench.clock.sleep(0.5)
+        assert np.linalg.norm(bench.force_tcp) == pytest.approx(pressing)
+
+    def test_a_mistake_of_ours_in_a_press_is_a_fault_and_the_tool_comes_off(
+        self, bench, monkeypatch
+    ):
+        bench.touch()
+        bench.arm.hold(PRESS, 500.0)
+        bench.clock.sleep(0.2)
+        with monkeypatch.context() as broken:
+            broken.setattr(type(bench.arm.law), "speed", lambda *_: 1 / 0)
+            bench.clock.sleep(0.1)
+        state = bench.arm.state()
+        assert (state.motion, state.fault) == (
+            Motion.IDLE,
+            "ZeroDivisionError('division by zero')",
+        )
+        bench.arm.retract(bench.place.normal, 0.02, 0.02)
+        bench.wait(Motion.IDLE)
+        assert np.linalg.norm(bench.force_tcp) == 0.0
+
+    def test_a_move_is_not_gone_on_with_where_no_collision_can_be_felt(self, bench):
+        bench.arm.enable()
+        bench.arm.move_joints(bench.place.q_approach, 0.05)
+        bench.clock.sleep(0.3)
+        bench.feed.silent = True
+        state = bench.wait(Motion.STOPPED)
+        assert "force sensor silent for 1.0" in state.fault
+        bench.clock.sleep(0.1)
+        assert bench.peer.state in (1, 5)
+
+    def test_a_program_that_does_not_brake_is_answered_no_more(self, bench):
+        """The controller then stops by its Timeout."""
+        bench.arm.enable()
+        bench.arm.move_joints(bench.place.q_approach, 0.02)
+        bench.clock.sleep(0.3)
+        bench.peer.fault = {"rides"}
+        bench.arm.stop()
+        bench.clock.sleep(0.9)
+        assert not bench.peer.dropped
+        bench.clock.sleep(0.5)
+        assert bench.peer.state == 3
+        assert bench.peer.dropped * bench.peer.cycle == pytest.approx(0.4, abs=0.03)
+        assert "does not brake its PTP within 1 s" in bench.arm.state().fault
+        bench.peer.fault = set()
+        bench.peer.state = 1
+        bench.clock.sleep(0.1)
+        bench.arm.enable()
+        assert bench.wait(Motion.IDLE).fault is None
 
     def test_a_blow_while_it_moves_freely_stops_it(self, bench):
         bench.arm.enable()

@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.cell import LOOPBACK, Arming, Motion, RigContext, WallClock, load_cell
 from elastocal.cell.examples import write_example
-from elastocal.drivers.rtde import DRIVER
+from elastocal.drivers.rtde import DRIVER, driver
 from elastocal.drivers.rtde.driver import RtdeDriver, RtdeSettings
 from elastocal.drivers.rtde.line import UrLine, pose_of_T
 from elastocal.errors import DeviceError
@@ -199,6 +199,77 @@ def test_a_protective_stop_ends_the_press_for_good(pressing):
     time.sleep(0.1)
     assert "forceMode" not in controller.said[said:]
     assert arm.state().motion is Motion.STOPPED
+
+
+def test_what_was_felt_before_the_new_zero_is_no_contact(cell):
+    """A loaded machine hears of the zero late: the newest sample may be of before it."""
+    controller = Controller(cell)
+
+    def zero():
+        controller.force = 40.0
+        time.sleep(0.2)
+        controller.deaf = True
+        time.sleep(0.05)
+        controller.force = 0.0
+
+    controller.zeroFtSensor = zero
+    devices = connect(cell, controller, "arm")
+    try:
+        devices.arm.arming = Arming.of(cell)
+        devices.arm.enable()
+        devices.arm.approach(np.array([0.0, 0.0, -1.0]), 0.05, 0.005, 15.0)
+        until(lambda: "forceMode" in controller.said)
+        time.sleep(0.2)
+        controller.deaf = False
+        time.sleep(0.1)
+        assert devices.arm.state().motion is Motion.APPROACHING
+    finally:
+        devices.close()
+
+
+def drop(controller):
+    controller.force = 1.3 * 1000.0
+
+
+def slide(controller):
+    controller.pose = [*controller.pose[:2], controller.pose[2] - 0.02, *controller.pose[3:]]
+
+
+def garble(controller):
+    controller.q = [float("nan"), *controller.q[1:]]
+
+
+def fault(controller):
+    controller.modes = 7, 3
+
+
+@pytest.mark.parametrize("wrong", [drop, slide, garble, fault])
+def test_a_press_that_goes_wrong_ends_though_nobody_looks(pressing, wrong):
+    """Whoever supervises it may hang."""
+    controller, arm = pressing
+    wrong(controller)
+    until(lambda: "stopJ" in controller.said)
+    assert controller.said.index("forceModeStop") < controller.said.index("stopJ")
+    said = len(controller.said)
+    time.sleep(0.1)
+    assert "forceMode" not in controller.said[said:]
+    if wrong is not garble:
+        reasons = {
+            drop: "force limit exceeded: 1300 N",
+            slide: "the tool went 20.0 mm from where it touched, limit",
+            fault: "protective stop",
+        }
+        assert reasons[wrong] in arm.state().fault
+
+
+def test_a_press_that_nobody_looks_at_any_more_ends(pressing, monkeypatch):
+    controller, arm = pressing
+    monkeypatch.setattr(driver, "UNWATCHED", 0.3)
+    for _ in range(10):
+        assert arm.state().motion is Motion.HOLDING
+        time.sleep(0.05)
+    until(lambda: "stopJ" in controller.said)
+    assert "nobody has asked how the arm stands" in arm.state().fault
 
 
 @pytest.mark.parametrize("name", ["forceModeStop", "stopJ"])

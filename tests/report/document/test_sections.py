@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.cell import Limits
 from elastocal.compensation.process import PAPER
-from elastocal.identification import CalibrationSummary, describe
+from elastocal.identification import CalibrationSummary, SpringUpdate, describe
 from elastocal.procedure import Event, RunSummary
 from elastocal.procedure.derive.derivation import MOVED
 from elastocal.records import from_data, to_data
@@ -255,6 +255,21 @@ def test_axial_springs_alone_are_advised_to_be_compared_with_more(parts):
     found = replace(parts, calibrated=replace(parts.calibrated, model=smaller))
     (told,) = [each for each in compliance_findings(found) if each.advice]
     assert "--springs bearing" in told.advice
+
+
+def test_springs_that_production_has_moved_since_hold_back(parts):
+    update = SpringUpdate(
+        readings=180, courses=("monday",), before=1e-4, after=8e-5, farthest=1.0, ratio=1.1
+    )
+    assert not findings(compliance_findings, parts)
+    moved_by = replace(update, calibrated=(1e-6,))
+    # What a later update has left as it was does not take an earlier one back.
+    for each, count in ((moved_by, 1), (replace(moved_by, farthest=0.0), 1), (update, 0)):
+        moved = replace(parts, calibrated=replace(parts.calibrated, update=each))
+        told = findings(compliance_findings, moved)
+        assert len([text for text in told if "errors are those of the springs before" in text]) == (
+            count
+        )
 
 
 def test_more_springs_that_predict_worse_hold_back(parts):

@@ -26,6 +26,7 @@ import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import (
+    UNWATCHED,
     Arming,
     ArmState,
     Cell,
@@ -43,6 +44,7 @@ from elastocal.drivers.kuka_rsi.link import (
     AMISS,
     ANSWERS,
     EXACT,
+    SURPRISES,
     Cycle,
     Motion,
     Pace,
@@ -58,7 +60,7 @@ from elastocal.drivers.kuka_rsi.messages import (
     RobMessage,
     SenMessage,
 )
-from elastocal.drivers.kuka_rsi.motions import ContactGuard, Press
+from elastocal.drivers.kuka_rsi.motions import ContactGuard, LeavingGuard, Press
 from elastocal.drivers.kuka_rsi.posture import PostureReader
 from elastocal.drivers.kuka_rsi.settings import Bounds, RsiSettings, bounds_of
 from elastocal.errors import DeviceError, present
@@ -324,11 +326,16 @@ def feeling(
 
 _EDGE_AGAIN = 25
 """Cycles for which a program stays guided against its order before STOP rises again."""
+_BRAKES = 1.0
+"""Time within which a program takes a ``PTP`` back, in s; one that does not is answered no more,
+and the controller stops by its ``Timeout``."""
 _RESTING = (MotionState.DISARMED, MotionState.STOPPED)
 _STANDING = (MotionState.IDLE,)
 _FORCED = (MotionState.IDLE, MotionState.HOLDING, MotionState.RELEASING)
 _AWAY = ("release", "retract")
 """Commands that lead away from the surface: allowed with a fault, and without a force."""
+_TOWARD = (MotionState.APPROACHING, MotionState.HOLDING)
+"""States in which the tool is pushed at a surface."""
 _BY_FORCE = (MotionState.APPROACHING, MotionState.HOLDING, MotionState.RELEASING)
 """States that end in position control where they fail: from there the tool can be retracted."""
 
@@ -378,7 +385,9 @@ class KukaArm:
         self._running: Motion | None = None
         self._number = 0
         self._contact = ContactMemory()
-        self._disobeyed = 0
+        self._disobeyed = self._unbraked = 0
+        self._watched_at = -math.inf
+        """When the state was asked for last, or a command given."""
         self.link: RsiLink | None = None
         """Line to the controller; its failure is raised at the next call."""
         self.arming = Arming()
@@ -389,7 +398,8 @@ class KukaArm:
         self._require_link()
         with self._lock:
             cycle = self._newest()
-            silent = self._clock.now() - cycle.time
+            self._watched_at = self._clock.now()
+            silent = self._watched_at - cycle.time
             patience = SILENT if self._task is None else self._task.silence
             if silent > patience and self._state not in _RESTING:
                 counts = "" if self.link is None else self.link.statistics().sentence()
@@ -520,7 +530,11 @@ class KukaArm:
                 self._rules.require_away(direction, touched.direction)
             way = distance * direction
             self._rules.require_room("retract", self._newest().offset + way, speed)
-            motion = partial(motions.retract, way=way, speed=speed, pace=self._pace)
+            guard = None
+            if self._reader is not None:
+                limits = (self.bounds.force, self._settings.collision_force)
+                guard = LeavingGuard.of(self._reader, *limits)
+            motion = partial(motions.retract, way=way, speed=speed, pace=self._pace, guard=guard)
             left = partial(self._contact.retracted, self._reader)
             self._start(_Task(MotionState.RETRACTING, motion, lambda _: left()))
 
@@ -556,9 +570,23 @@ class KukaArm:
                 return None
             self._look(cycle, arrival)
             step = self._next(cycle)
+            if self._rides_on(cycle, step):
+                return None
             disobeys = step.order is not Order.GUIDE and cycle.state == ProgramState.GUIDED
             self._disobeyed = self._disobeyed + 1 if disobeys else 0
             return self._message(step)
+
+    def _rides_on(self, cycle: Cycle, step: Step) -> bool:
+        """Return whether a ``PTP`` goes on though the order to hold was given long ago."""
+        rides = step.order is Order.HOLD and cycle.state == ProgramState.MOVING
+        self._unbraked = self._unbraked + 1 if rides else 0
+        if self._unbraked * self._pace.cycle <= _BRAKES:
+            return False
+        self._break_down(
+            f"the program on the controller does not brake its PTP within {_BRAKES:g} s: it is"
+            " answered no more, so that the controller stops by its Timeout"
+        )
+        return True
 
     def _next(self, cycle: Cycle) -> Step:
         """Return the next step of what is being carried out."""
@@ -581,12 +609,12 @@ class KukaArm:
             if task.done is not None:
                 task.done(cycle)
             return Step()
-        except DeviceError as error:
+        except SURPRISES as error:
+            fault = str(error) if isinstance(error, DeviceError) else repr(error)
             if self._state not in _BY_FORCE:
-                self._break_down(str(error))
+                self._break_down(fault)
                 return Step(order=Order.HOLD)
-            self._fault = str(error)
-            self._drop(MotionState.IDLE)
+            self._stand(fault)
             return Step()
 
     def _look(self, cycle: Cycle, arrival: Arrival) -> None:
@@ -600,8 +628,13 @@ class KukaArm:
             self._break_down("IPOC has jumped: the controller's program was started anew")
         elif cycle.state in OUT:
             self._break_down("the program elcal_run on the controller is not in its loop any more")
+        elif self._state in _TOWARD and not cycle.time - self._watched_at <= UNWATCHED:
+            self._stand(f"nobody has asked how the arm stands for {UNWATCHED:g} s")
         elif self._state is MotionState.MOVING and self._watch is not None:
             reader = self._sensed()
+            if (blind := reader.problem()) is not None:
+                self._break_down(f"{blind}: a collision would not be felt")
+                return
             R_base_sensor = cycle.T_base_tcp[:3, :3] @ reader.R_tcp_sensor
             hit = self._watch.look(cycle.time, reader.raw, R_base_sensor)
             if hit is not None:
@@ -616,6 +649,7 @@ class KukaArm:
 
     def _start(self, task: _Task) -> None:
         self._task, self._running, self._state = task, None, task.state
+        self._watched_at = self._clock.now()
         if self._watch is not None:
             self._watch.restart()
 
@@ -623,6 +657,11 @@ class KukaArm:
         """Stop where the arm is."""
         self._task = self._running = None
         self._state = state
+
+    def _stand(self, fault: str) -> None:
+        """Leave force control for position control; from there the tool can be retracted."""
+        self._fault = fault
+        self._drop(MotionState.IDLE)
 
     def _break_down(self, fault: str) -> None:
         if self._state is not MotionState.DISARMED:

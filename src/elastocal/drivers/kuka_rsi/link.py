@@ -272,7 +272,7 @@ _STAMP, _STAMPED = 35, struct.Struct("@qq")
 _OLDEST = 1.0
 """Age of a kernel stamp, in s, above which it is ignored: the wall clock was set meanwhile."""
 _NAME = "kuka_rsi: "
-_SURPRISES = (ElastocalError, ArithmeticError, LookupError, TypeError, ValueError, OSError)
+SURPRISES = (ElastocalError, ArithmeticError, LookupError, TypeError, ValueError, OSError)
 """Exceptions of a handler that cost one answer but do not end the thread."""
 _Arrived = tuple[bytes, tuple[str, int], float]
 """A datagram, its sender, and how long it had waited, in s."""
@@ -467,7 +467,7 @@ class RsiLink:
         counts.jumps += arrival is Arrival.JUMPED
         try:
             reply = self._handler.step(message, arrival, self._clock.now())
-        except _SURPRISES as error:
+        except SURPRISES as error:
             # Without an answer the controller keeps an absolute correction, adds no relative one,
             # and stops by its Timeout if it goes on so. The thread goes on.
             why = str(error) if isinstance(error, ElastocalError) else repr(error)

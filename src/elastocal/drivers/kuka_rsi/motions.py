@@ -6,6 +6,7 @@ end at standstill. At their end the true motion, RIst minus RSol, is compared wi
 lost answer loses its part of the motion.
 """
 
+import contextlib
 import math
 from collections import deque
 from collections.abc import Callable
@@ -115,10 +116,25 @@ def _zeroed(cycle: Cycle, reader: ForceReader) -> Phase:
     return cycle
 
 
-def retract(cycle: Cycle, way: FloatArray, speed: float, pace: Pace) -> Motion:
-    """Yield the steps of a straight move that nothing stops; see `approach`."""
+def retract(
+    cycle: Cycle, way: FloatArray, speed: float, pace: Pace, guard: "LeavingGuard | None"
+) -> Motion:
+    """Yield the steps of a straight move away from a surface; see `approach`.
+
+    Parameters
+    ----------
+    guard : LeavingGuard, optional
+        Watches the force; None: there is no sensor.
+    """
     cycle = yield from guided(cycle)
-    yield from _shift(cycle, cycle.offset + way, speed, pace)
+    steps = _shift(cycle, cycle.offset + way, speed, pace)
+    step = next(steps)
+    with contextlib.suppress(StopIteration):
+        while True:
+            cycle = yield step
+            if guard is not None:
+                guard.look()
+            step = steps.send(cycle)
 
 
 def take_back(cycle: Cycle, guard: "ContactGuard", speed: float, pace: Pace) -> Motion:
@@ -188,6 +204,48 @@ class ContactGuard:
             against = float(-force_base @ self.direction)
         self.felt |= against >= self.contact_force
         return self.felt
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
+class LeavingGuard:
+    """Ends a retract that presses: against something else, or the other way.
+
+    Without a force the tool must be able to leave, so that only a force that is known counts.
+    """
+
+    reader: ForceReader
+    most: float
+    """Force that ends it, in N."""
+
+    @classmethod
+    def of(cls, reader: ForceReader, limit: float, growth: float) -> "LeavingGuard":
+        """Return the guard of a retract that begins now, with the force of the press.
+
+        Parameters
+        ----------
+        reader : ForceReader
+            The force.
+        limit : float
+            Force limit, in N.
+        growth : float
+            By which a force beyond the limit may grow, in N.
+        """
+        return cls(reader, max(limit, float(np.linalg.norm(reader.quick_force_tcp)) + growth))
+
+    def look(self) -> None:
+        """Refuse a force that is too large.
+
+        Raises
+        ------
+        DeviceError
+            With both.
+        """
+        size = float(np.linalg.norm(self.reader.quick_force_tcp))
+        if not (self.reader.hesitates or size <= self.most):
+            raise DeviceError(
+                f"{size:.0f} N press on the tool while it retracts, limit {self.most:.0f} N"
+            )
 
 
 @brief_repr

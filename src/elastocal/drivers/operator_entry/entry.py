@@ -6,6 +6,7 @@ appended to a watched file. The point then remains until the next request.
 """
 
 import math
+import os
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -226,6 +227,14 @@ def appended_lines(path: Path, done: threading.Event) -> Iterator[str]:
         yield from (line.decode("utf-8", errors="replace") for line in whole)
 
 
+def _is_empty(stream: TextIO) -> bool:
+    """Return whether a stream is the one of a program without a terminal, which never has lines."""
+    try:
+        return os.path.samestat(os.fstat(stream.fileno()), Path(os.devnull).stat())
+    except (OSError, ValueError):  # no file at all, or a closed one
+        return False
+
+
 def _to_person(text: str, stream: TextIO | None = None) -> None:
     print(text, file=stream or sys.stderr, flush=True)
 
@@ -248,7 +257,7 @@ class OperatorEntryDriver:
         Raises
         ------
         DeviceError
-            If the procedure leaves too little time to answer.
+            If the procedure leaves too little time to answer, or nobody can type.
         """
         settings = of_kind(wanted["metrology"], OperatorEntrySettings, "settings")
         given = cell.file.procedure.beam_timeout
@@ -256,6 +265,11 @@ class OperatorEntryDriver:
             raise DeviceError(
                 f"{cell.path}: procedure.beam_timeout is {given:g} s: a person who reads and types"
                 f" a point needs {LEAST_BEAM_TIMEOUT:g} s and more"
+            )
+        if settings.file is None and not context.watches and _is_empty(sys.stdin):
+            raise DeviceError(
+                f"{cell.path}: devices.metrology: nobody can type points here, as in the studio:"
+                " run it at a terminal, or name a file that points are appended to (key 'file')"
             )
         done = threading.Event()
         lines: Iterator[str] = iter(sys.stdin)

@@ -9,6 +9,7 @@ new force each cycle. All commands go out from one thread, which no caller waits
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated
@@ -19,6 +20,7 @@ from pydantic import Field, FiniteFloat
 from elastocal.arrays import FloatArray
 from elastocal.cell import (
     LOOPBACK,
+    UNWATCHED,
     Arming,
     ArmState,
     Cell,
@@ -35,7 +37,7 @@ from elastocal.drivers.rtde.line import UrLine, UrSample, UrSensor, pose_of_T
 from elastocal.errors import DeviceError
 
 _ZEROED = 0.05
-"""Time after the order in which the sensor may still show its old zero, in s."""
+"""Time after the order has been taken in which the sensor may still show its old zero, in s."""
 _FELT = 0.8
 """Part of the contact force at which the approach has ended."""
 
@@ -48,6 +50,8 @@ class Guard:
     distance: float
     force: float
     start: UrSample
+    zeroed: float
+    """When the controller had taken the force for zero, in s of the rig's clock."""
 
     def gone(self, now: UrSample) -> float:
         """Return the distance that the tool has moved, in m."""
@@ -55,7 +59,7 @@ class Guard:
 
     def felt(self, now: UrSample) -> bool:
         """Return whether the contact force is there; what came before the new zero is not asked."""
-        fresh = now.time > self.start.time + _ZEROED
+        fresh = now.time > self.zeroed + _ZEROED
         return fresh and float(-now.force_base @ self.direction) >= _FELT * self.force
 
 
@@ -89,11 +93,15 @@ _SIDEWAYS, _TURN = 0.01, 0.05
 """Largest motion of the other axes in force mode, in m and rad."""
 _PRESS_SPEED = 0.02
 """Fastest motion along a force that is held, in m/s."""
+_LAST_RESORT = 1.2
+"""Part of the force limit beyond which the arm stops: whoever supervises it stops it before."""
 _SETTLED = 5
 """Cycles that a motion must be said to be over: the controller's word comes a cycle late."""
 _RESTING = (Motion.DISARMED, Motion.STOPPED)
 _STANDING = (Motion.IDLE,)
 _FORCED = (Motion.IDLE, Motion.HOLDING, Motion.RELEASING)
+_TOWARD = (Motion.APPROACHING, Motion.HOLDING)
+"""States in which the tool is pushed at a surface."""
 
 _Step = Callable[[UrSample], Motion | None]
 """One cycle of a command: None while it goes on, else what the arm does after it."""
@@ -138,6 +146,10 @@ class UrArm:
         self._motion = Motion.DISARMED
         self._touched: bool | None = None
         """None: no contact was detected or left since the connection."""
+        self._touched_at = np.zeros(3)
+        """Tool there, base, shape (3,), in m."""
+        self._watched_at = -np.inf
+        """When the state was asked for last, or a command given, in s of the wall."""
         self._into = np.zeros(3)
         """Direction of the last approach, base, shape (3,)."""
         self._forced = False
@@ -162,6 +174,7 @@ class UrArm:
         """Return the newest state; see `RobotArm.state`."""
         sample = self._line.sample()
         with self._lock:
+            self._watched_at = time.monotonic()
             if self._fault is None and sample.fault is not None:
                 self._fail(sample.fault)
             return ArmState(
@@ -241,7 +254,7 @@ class UrArm:
             if not np.isfinite(contact_force):
                 return self._line_by(sample, distance * direction, speed)
             self._control.zeroFtSensor()
-            goal = Guard(direction, distance, contact_force, sample)
+            goal = Guard(direction, distance, contact_force, sample, self._clock.now())
             guarded = self._pressed_way if speed <= _FORCE_MODE_SPEED else self._watched_way
             return guarded(goal, speed)
 
@@ -306,6 +319,7 @@ class UrArm:
                     f" {allowed})"
                 )
             self._order, self._motion = order, order.motion
+            self._watched_at = time.monotonic()
 
     # -- the thread ---------------------------------------------------------------------------
 
@@ -329,6 +343,7 @@ class UrArm:
             return
         self._give_sign_of_life()
         sample = self._line.sample()
+        self._require_well(sample)
         with self._lock:
             order, step, self._order = self._order, self._step, None
         if order is not None:
@@ -340,6 +355,36 @@ class UrArm:
             self._step = step if after is None else None
             if after is not None:
                 self._motion = after
+
+    def _require_well(self, sample: UrSample) -> None:
+        """Refuse to go on with a controller that is at fault, or with a push that went wrong.
+
+        Raises
+        ------
+        DeviceError
+            With what is wrong.
+        """
+        with self._lock:
+            motion, watched_at = self._motion, self._watched_at
+        if motion in _RESTING:
+            return
+        if sample.fault is not None:
+            raise DeviceError(sample.fault)
+        if motion in _TOWARD and not time.monotonic() - watched_at <= UNWATCHED:
+            raise DeviceError(f"nobody has asked how the arm stands for {UNWATCHED:g} s")
+        if not (self._forced and motion in _TOWARD):
+            return
+        size, most = float(np.linalg.norm(sample.force_base)), self._cell.force_limit
+        if not size <= _LAST_RESORT * most:
+            raise DeviceError(
+                f"force limit exceeded: {size:.0f} N, limit {_LAST_RESORT * most:.0f} N"
+            )
+        limit = self._cell.file.procedure.travel_limit
+        went = float(np.linalg.norm(sample.T_base_tcp[:3, 3] - self._touched_at))
+        if self._touched and not went <= limit:
+            raise DeviceError(
+                f"the tool went {1e3 * went:.1f} mm from where it touched, limit {1e3 * limit:g} mm"
+            )
 
     def _give_sign_of_life(self) -> None:
         if not self._control.isProgramRunning():
@@ -385,7 +430,7 @@ class UrArm:
             if not (felt or goal.gone(now) >= goal.distance):
                 return None
             self._end_force()
-            self._touched = felt
+            self._touched, self._touched_at = felt, now.T_base_tcp[:3, 3]
             return Motion.IDLE
 
         return step
@@ -398,7 +443,7 @@ class UrArm:
             if not goal.felt(now):
                 return arrival(now)
             self._control.stopJ(_STOP, True)
-            self._touched = True
+            self._touched, self._touched_at = True, now.T_base_tcp[:3, 3]
             return Motion.IDLE
 
         return step

@@ -186,11 +186,15 @@ class UrLine:
         taken = self._stamps.rig_time(stamp, self._clock.now())
         raw = np.array(receive.getFtRawWrench())
         wrench = WrenchSample(taken, raw[:3], raw[3:], SensorStatus.OK)
+        q, pose = np.array(receive.getActualQ()), receive.getActualTCPPose()
+        force = np.array(receive.getActualTCPForce()[:3])
+        if not np.isfinite([*q, *pose, *force]).all():
+            raise DeviceError("it sends numbers that are not finite")
         sample = UrSample(
             time=taken,
-            q=np.array(receive.getActualQ()),
-            T_base_tcp=T_of_pose(receive.getActualTCPPose()),
-            force_base=np.array(receive.getActualTCPForce()[:3]),
+            q=q,
+            T_base_tcp=T_of_pose(pose),
+            force_base=force,
             fault=_fault(receive.getRobotMode(), receive.getSafetyMode()),
         )
         with self._lock:

@@ -12,8 +12,10 @@ registration of its own would take a part of the growth up. The tooling itself i
 along its normal ``n``: where it stands still, in contact ``n . d = -n . (x_warm - x_cold)``.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +32,7 @@ from elastocal.procedure.derive.readings import (
     ToolState,
     marker_readings,
 )
-from elastocal.procedure.record import ReadingStatus, RunRecord
+from elastocal.procedure.record import Event, ReadingStatus, RunRecord
 from elastocal.procedure.registration import Registration, register
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
@@ -59,6 +61,11 @@ class TouchedShifts:
     """Duration of the warm touches, from the first entry of the journal to the last."""
     lost: tuple[int, ...]
     """Poses of the plan that were not touched in both runs."""
+    sessions: IndexArray
+    """Sessions of the cold and of the warm run in which a point was touched, from 0, shape
+    (touch, 2)."""
+    pause: float
+    """Longest pause of a run that was gone on with, in s; 0: none was, or none is known."""
 
 
 def read_touches(cold: Path, warm: Path) -> TouchedShifts:
@@ -92,6 +99,7 @@ def read_touches(cold: Path, warm: Path) -> TouchedShifts:
             rows += [] if pair is None else [(pose.pose, *pair)]
     if not rows:
         raise ProcedureError(f"{warm}: no pose was touched in both runs")
+    sessions = [_sessions(run) for run in (before, after)]
     touched, q, shift, moved = (np.array(column) for column in zip(*rows, strict=True))
     normal = np.array([before.plan.poses[number].normal for number in touched.tolist()])
     return TouchedShifts(
@@ -106,7 +114,32 @@ def read_touches(cold: Path, warm: Path) -> TouchedShifts:
         after.record,
         after.entries[-1].time - after.entries[0].time,
         tuple(each.id for each in before.plan.poses if each.id not in touched),
+        np.array([[of_pose[pose] for of_pose in sessions] for pose in touched.tolist()]),
+        max(_longest_pause(run) for run in (before, after)),
     )
+
+
+def _sessions(run: CommittedRun) -> dict[int, int]:
+    """Return the number of the session in which each pose was committed, from 0."""
+    found, number = {}, 0
+    for entry in run.entries:
+        number += entry.event is Event.RESUME
+        if entry.event is Event.COMMIT and entry.pose is not None:
+            found[entry.pose] = number
+    return found
+
+
+def _longest_pause(run: CommittedRun) -> float:
+    """Return the longest time between two sessions of a run, in s of the wall; 0: not known."""
+    longest, began, first = 0.0, run.record.started, run.entries[0].time
+    for before, entry in itertools.pairwise(run.entries):
+        if entry.event is Event.RESUME:
+            # Older journals do not say when.
+            if began and entry.text:
+                apart = datetime.fromisoformat(entry.text) - datetime.fromisoformat(began)
+                longest = max(longest, apart.total_seconds() - (before.time - first))
+            began, first = entry.text, entry.time
+    return longest
 
 
 @brief_repr

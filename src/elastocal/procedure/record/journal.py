@@ -125,7 +125,8 @@ class Entry(StrictModel):
     """Joint positions of a move in rad or m; name of the load case of a hold; distance of a
     straight motion in m."""
     text: str = ""
-    """Text for people: what went wrong, or the origin of a reading."""
+    """Text for people: what went wrong, the origin of a reading, or when a run was gone on with,
+    ISO 8601, UTC."""
     run: RunRecord | None = None
     log: PoseLog | None = None
     streams_sha256: str | None = None

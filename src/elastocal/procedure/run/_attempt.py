@@ -212,7 +212,7 @@ def approach_by(a: Attempt, distance: float, speed: float, most: float = np.inf)
 
     def done(seen: Snapshot) -> bool:
         touched = is_idle(seen.arm) and bool(seen.arm.in_contact)
-        return touched or has_gone(seen.arm, start, distance) or largest_force(seen) > most
+        return touched or has_gone(seen.arm, start, distance) or not largest_force(seen) <= most
 
     limit = 2.0 * distance / speed + procedure.timeout
     with s.actuation(Action.APPROACH, (distance,)):

@@ -128,7 +128,7 @@ def near(a: Attempt) -> StepResult:
     distance = a.line.height(seen.arm.T_base_tcp) - a.settings.near_contact
     most = procedure.contact_force + a.noise
     seen = approach_by(a, distance, procedure.approach_speed, most)
-    if seen.arm.in_contact or largest_force(seen) > most:
+    if seen.arm.in_contact or not largest_force(seen) <= most:
         height = a.line.height(seen.arm.T_base_tcp)
         raise FaultError(Fault.CONTACT_EARLY, f"{height * 1e3:.1f} mm before the expected contact")
     return StepResult.GOOD
@@ -741,7 +741,7 @@ class Runner:
             return
         beyond = self._supervisor.beyond_weight()
         pressing = 0.0 if beyond is None else float(np.linalg.norm(beyond))
-        if pressing > load.tolerance:
+        if not pressing <= load.tolerance:
             raise FaultError(
                 Fault.IN_CONTACT,
                 f"{pressing:.0f} N press on the tool beyond its weight, at most"
