@@ -249,13 +249,6 @@ def _label(name: str) -> str:
 def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: ARG001 - an instant
     """Validate a file and say what it holds.
 
-    Parameters
-    ----------
-    settings : CheckSettings
-        Or its ``file``.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     SchemaError

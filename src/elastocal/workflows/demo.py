@@ -174,13 +174,6 @@ class DemoResult(Result):
 def demo(settings: DemoSettings, progress: Progress) -> DemoResult:
     """Show the whole story on a simulated cell: from an empty folder to a signed-off report.
 
-    Parameters
-    ----------
-    settings : DemoSettings
-        Or its ``kind``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     SchemaError

@@ -148,13 +148,6 @@ class PlanFigures:
 def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     """Choose calibration poses on the tooling, check them, and put them in order.
 
-    Parameters
-    ----------
-    settings : PlanSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     PlanningError
@@ -368,13 +361,6 @@ class PlanPositionsSettings:
 @workflow(PlanPositionsSettings)
 def plan_positions(settings: PlanPositionsSettings, progress: Progress) -> PositionPlan:
     """Choose poses in free space that determine the geometry of the arm best; write plan and table.
-
-    Parameters
-    ----------
-    settings : PlanPositionsSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
 
     Raises
     ------

@@ -410,13 +410,6 @@ def simulate_process(
 ) -> SimulateProcessResult:
     """Run a process on the simulated cell without and with correction: how much is left.
 
-    Parameters
-    ----------
-    settings : SimulateProcessSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     CompensationError
