@@ -12,7 +12,7 @@ from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
 from elastocal import __version__
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray, triple
 from elastocal.cell import TRACKER, Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
 from elastocal.findings import Finding, Kind, as_number
@@ -49,7 +49,6 @@ from elastocal.planning.plan_result import (
     PoseRecord,
     RobotRecord,
     SearchRecord,
-    Vector,
 )
 from elastocal.planning.pool import REACH_ADVICE, Pool, SampledPool, sample_pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
@@ -475,7 +474,7 @@ def _contact(cell: Cell) -> ContactRecord:
         axis_override=cell.file.motion.override,
         contact_speed=cell.file.motion.contact_speed,
         straight_time=straight_time(cell),
-        load_cases={name: _vector(force) for name, force in cell.file.presses.items()},
+        load_cases={name: triple(force) for name, force in cell.file.presses.items()},
     )
 
 
@@ -518,9 +517,9 @@ def _pose(
         candidate=candidate,
         joints=tuple(posture.q[0].tolist()),
         approach_joints=tuple(posture.q_approach[0].tolist()),
-        tcp_position=_vector(T[:3, 3]),
+        tcp_position=triple(T[:3, 3]),
         tcp_quaternion=(float(x), float(y), float(z), float(w)),
-        normal=_vector(posture.normal[0]),
+        normal=triple(posture.normal[0]),
         seen_by=seen_by,
         contact_time=contact_time(choice.cell),
         # JSON has no infinity: a check that cannot refuse is left out.
@@ -619,8 +618,3 @@ def _pool_data(choice: _Choice, sampled: FloatArray) -> PoolData:
         refused_by=pool.refused_by,
         refusal_names=pool.refusals,
     )
-
-
-def _vector(values: FloatArray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.random import Generator
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.cell import TRACKER, Cell, without_tracker
+from elastocal.cell import Cell, without_tracker
 from elastocal.errors import PlanningError
 from elastocal.findings import Finding, Kind
 from elastocal.planning.checks import Margins, check_margins
@@ -210,7 +210,7 @@ def doubled_findings(cell: Cell, found: DoubledPlaces | None, wanted: int) -> tu
 
 def as_planned(cell: Cell, plan: PlanResult) -> Cell:
     """Return the cell that a plan is carried out in: without tracker where the plan has none."""
-    return without_tracker(cell) if TRACKER in plan.without else cell
+    return cell if plan.tracked else without_tracker(cell)
 
 
 def require_doubled(cell: Cell, doubled: int | None, poses: int) -> int:
