@@ -208,9 +208,8 @@ def _planned(
 ) -> planning.PlanAndPool:
     """Return a plan of its own, or one of poses that add to a run, with what they bring."""
     if settings.without is not None:
-        untracked = planning.Untracked(settings.doubled)
-        bare = without_tracker(cell)
-        return planning.make_plan(bare, other, settings.jobs, progress, untracked=untracked)
+        cell, variant = without_tracker(cell), planning.Untracked(settings.doubled)
+        return planning.make_plan(cell, other, settings.jobs, progress, variant)
     if added is None:
         return planning.make_plan(cell, other, settings.jobs, progress)
     to = planning.AddedTo(added.joint_position, added.beside)
