@@ -378,7 +378,7 @@ class SimulateProcessSettings(NewTool):
         ),
     ] = ()
     """Further shares of the force to run the same courses under; see `process.at_load`."""
-    tools: tuple[Path, ...] = ()
+    tools: Annotated[tuple[Path, ...], Option("--tool")] = ()
     """Tool files; as ``models``. None: the cell's tool, and a sensor zeroed in the air."""
     arm_states: Annotated[tuple[Path, ...], Option("--arm-state", metavar="STATE.json")] = ()
     """States of the arm by `touch`; as ``models``. None: the arm counts as when it was cold."""
