@@ -71,3 +71,19 @@ _WORDS = {"f8": "a finite number", "i8": "a whole number", "?": "true or false"}
 FloatArray = Annotated[NDArray[np.float64], _ArrayField("f8")]
 IndexArray = Annotated[NDArray[np.intp], _ArrayField("i8")]
 BoolArray = Annotated[NDArray[np.bool_], _ArrayField("?")]
+
+Triple = tuple[float, float, float]
+"""A vector of three in a record, whose file holds plain numbers."""
+
+
+def triple(vector: FloatArray) -> Triple:
+    """Return a vector, shape (3,), as plain numbers."""
+    x, y, z = map(float, vector)
+    return x, y, z
+
+
+def longest_run(values: FloatArray) -> slice:
+    """Return the most rows, one after the other, that hold the same number."""
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]])
+    longest = int(np.argmax(np.diff(ends)))
+    return slice(int(ends[longest]), int(ends[longest + 1]))

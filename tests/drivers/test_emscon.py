@@ -15,7 +15,8 @@ from elastocal.sim.wire import LiveCell, Told
 from elastocal.sim.wire.emscon import EmsconServer
 from elastocal.sim.workcell import SimClock
 from support.simulated import QUIET, example_cell
-from support.stations_on_wire import connect, eventually, read_until
+from support.stations_on_wire import connect, read_until
+from support.waiting import until
 
 QUICK = {"silence": "1 s", "patience": "1000 s"}
 
@@ -82,11 +83,11 @@ def test_a_tracker_that_is_only_watched_is_not_initialised_and_says_so(clock, li
     def shown():
         return found.readings()[0]
 
-    eventually(lambda: "the tracker is not initialised" in shown().state)
+    until(lambda: "the tracker is not initialised" in shown().state)
     assert shown().heard
     assert not server._initialized
     server._initialized = True  # by the maker's own program
-    eventually(lambda: (clock.sleep(0.02), shown().state == "locked")[1])
+    until(lambda: (clock.sleep(0.02), shown().state == "locked")[1])
     assert shown().offset is not None
 
 
@@ -251,7 +252,7 @@ def test_a_tracker_that_stays_in_mm_is_found(clock, server, opened):
 
 def test_a_second_program_is_told_of_the_first(clock, server, opened):
     with socket.create_connection(("127.0.0.1", server.ports["tcp"])):
-        eventually(lambda: len(server.peers) == 1)
+        until(lambda: len(server.peers) == 1)
         assert "another program holds the tracker" in refused(
             connected(clock, opened, server), clock
         )

@@ -13,7 +13,8 @@ from elastocal.drivers.operator_entry.entry import OperatorEntry, appended_lines
 from elastocal.errors import DeviceError
 from elastocal.sim.workcell import SimClock
 from support.simulated import example_cell
-from support.stations_on_wire import connect, eventually
+from support.stations_on_wire import connect
+from support.waiting import until
 
 WANTED = "pose 3, north"
 
@@ -27,7 +28,7 @@ class Person:
     def types(self, line):
         count = len(self.heard)
         self.lines.put(line)
-        eventually(lambda: len(self.heard) > count)
+        until(lambda: len(self.heard) > count)
 
     def __iter__(self):
         return iter(self.lines.get, None)
@@ -117,7 +118,7 @@ def test_what_is_typed_before_the_first_question_is_left_to_others(clock):
     metrology.read()
     assert taken == []
     metrology.ask(WANTED)
-    eventually(lambda: len(taken) == 2)
+    until(lambda: len(taken) == 2)
 
 
 def test_an_operator_who_does_not_come_ends_the_run(clock, person):
@@ -145,7 +146,7 @@ def test_lines_appended_to_a_file_are_readings(clock, tmp_path):
     reader = threading.Thread(target=lambda: found.extend([next(lines), next(lines)]))
     reader.start()
     # The file is looked at when the thread begins: what is appended before is old.
-    eventually(lambda: (lines.gi_frame is not None and lines.gi_running) or reader.is_alive())
+    until(lambda: (lines.gi_frame is not None and lines.gi_running) or reader.is_alive())
     threading.Event().wait(0.2)
     with path.open("a") as file:
         file.write("1 2 3\n4 5")

@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ import pytest
 from elastocal import workflows
 from support.exported import SANITIZED, needs_gcc
 from support.live_on_wire import LiveFiles, served
+from support.waiting import until
 
 SPEED = 0.003
 """Fastest correction, in m/s."""
@@ -23,13 +23,6 @@ PATIENCE = 40.0
 ROUNDED = 2e-6
 """What six decimals may add to it, in mm."""
 WRAP = 2**32
-
-
-def until(holds):
-    end = time.monotonic() + PATIENCE
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def largest_steps(taken):

@@ -17,7 +17,7 @@ from elastocal.codec import read_codec
 from elastocal.dataset import read
 from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
-from elastocal.planning.untracked import TURN, doubled_findings, joined_moves, require_doubled
+from elastocal.planning.untracked import TURN, doubled_findings, require_doubled
 from elastocal.sim.workcell._contact import ContactLaw, PlaceSpread
 from elastocal.workflows._operator_and_devices import Supervision, Unattended
 from support import drivers
@@ -261,12 +261,3 @@ def test_a_cell_without_disks_to_stack_says_so(story):
     with pytest.raises(ElastocalError, match="no disk to stack"):
         require_doubled(tip, 4, 6)
     assert require_doubled(tip, 0, 6) == 0
-
-
-def test_the_round_with_two_disks_begins_where_the_first_ends(story):
-    plan = read_plan(story / "plan")
-    back = replace(plan.moves[6], end=None, via=())
-    out = replace(plan.moves[6], start=None, via=())
-    joined = joined_moves((*plan.moves[:6], back), (out,), plan.robot.home)
-    assert joined[6].via == (plan.robot.home,)
-    assert (joined[6].start, joined[6].end) == (5, 6)

@@ -7,7 +7,6 @@ equilibrium knows no column of the estimator. No two places are equally stiff, t
 positions are off by some micrometres, and the tip creeps sideways from press to press.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,12 +150,3 @@ class _Place:
         T = self.arm.rigid(q)
         T[:3, 3] += self.plate.stop * self.rng.standard_normal(3)
         return self.arm.joints_at(T, q)
-
-
-def known_contact(plate: Plate, error: Sequence[float] = (0.0, 0.0)) -> str:
-    """Return a contact file that states the stiffnesses, off by shares of themselves."""
-    normal, lateral = plate.normal * (1.0 + error[0]), plate.lateral * (1.0 + error[1])
-    return (
-        f'contact: {{normal: "{normal / 1e6:.6g} N/um", lateral: "{lateral / 1e6:.6g} N/um",'
-        ' uncertainty: "30 %"}\n'
-    )

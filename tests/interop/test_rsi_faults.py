@@ -1,7 +1,5 @@
 """Faults of the simulated controller, and what the driver's end of the line makes of them."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -12,8 +10,8 @@ from elastocal.drivers.kuka_rsi.driver import connect_arm
 from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.sim.wire import LiveCell, Told
 from elastocal.sim.wire.rsi import RsiContext, rsi_server
-from support.cli import PATIENCE
 from support.simulated import QUIET, example_cell, places
+from support.waiting import until
 
 BOUNDS = Bounds(
     correction=2e-3, poscorr=5e-3, monitor=6e-3, turn=0.1, speed=0.05, force=1e3, travel=0.01
@@ -24,13 +22,6 @@ CYCLES = 40
 class Nothing:
     def correction(self, _message, _now, _effect):
         return np.zeros(3)
-
-
-def until(holds, seconds=PATIENCE):
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def exchanged(*faults, cycles=CYCLES):

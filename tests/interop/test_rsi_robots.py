@@ -20,6 +20,7 @@ from elastocal.drivers.kuka_rsi.link import LinkAddress, RsiLink
 from elastocal.sim.wire._rsi_messages import EthernetConfig
 from support.cli import PATIENCE
 from support.simulated import example_cell
+from support.waiting import until
 
 WANTED = np.array([0.5e-3, -0.2e-3, 0.1e-3])
 BOUNDS = Bounds(
@@ -54,13 +55,6 @@ def linked():
     yield start
     for link in opened:
         link.close()
-
-
-def until(holds, seconds=PATIENCE):
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def test_a_plain_robot_that_counts_by_one_loses_nothing(linked):

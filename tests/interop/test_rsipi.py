@@ -4,7 +4,6 @@ It is no dependency: ``pip install --no-deps --target DIR rsipi`` and ``PYTHONPA
 """
 
 import socket
-import time
 from pathlib import Path
 
 import pytest
@@ -15,15 +14,9 @@ from elastocal.sim.wire._rsi_messages import EthernetConfig
 from elastocal.sim.wire.rsi import RsiContext, RsiServer, corrected_program
 from support.ports import free
 from support.simulated import QUIET, example_cell
+from support.waiting import until
 
 RSIPI = pytest.importorskip("RSIPI", reason="rsipi is not installed")
-
-
-def until(holds, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 @pytest.mark.slow

@@ -186,7 +186,3 @@ def sounds(count: int, seed: int = 0) -> list[Sound]:
             )
         )
     return found
-
-
-def with_readings(made: Made, **changes: object) -> Made:
-    return replace(made, readings=replace(made.readings, **changes))

@@ -247,7 +247,6 @@ def _shared(logs: Logs, late: float) -> Logs:
 
 
 _TRACKER, _FORCE = ("position",), ("force", "moment")
-_DECIMALS = "cannot read|number|decimal|column"
 
 LOG_MISTAKES = (
     LogMistake("joints in rad for deg", ("limits",), _map("A6], unit: deg", "A6], unit: rad")),

@@ -30,12 +30,3 @@ def read_until(
             clock.sleep(_STEP)
         time.sleep(_PAUSE)
     raise AssertionError(f"never as wanted; last: {block.beam}, {len(block)} points, {block.note}")
-
-
-def eventually(happens: Callable[[], bool]) -> None:
-    """Wait until something happens that depends on threads alone."""
-    for _ in range(_TRIES):
-        if happens():
-            return
-        time.sleep(_PAUSE)
-    raise AssertionError("it never happens")

@@ -21,7 +21,7 @@ from support.live_on_wire import LiveFiles, served
 from support.ports import free
 from support.run_cells import planned_cell
 from support.simulated import example_cell
-from support.stations_on_wire import eventually
+from support.waiting import until
 
 UDP, TCP = socket.SOCK_DGRAM, socket.SOCK_STREAM
 BOX = {"driver": "net_ft", "address": "10.11.12.13"}
@@ -172,7 +172,7 @@ def test_a_live_compensation_goes_on_while_others_are_refused(tmp_path, planned,
             files.cell, model=files.model, tool=files.tool, arm=True, duration=3.0, report=report
         )
         # The last datagram may still be on its way to the box.
-        eventually(lambda: len(asked_of_box) >= 2)
+        until(lambda: len(asked_of_box) >= 2)
     assert (found.problem, found.line.jumps, found.line.foreign) == (None, 0, 0)
     assert len(asked_of_box) == 2  # for the stream, and at the end for silence
     assert [each.reason.count("is in use by elastocal live") for each in refused] == [1, 1, 1]

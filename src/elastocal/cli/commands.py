@@ -8,6 +8,7 @@ import sys
 import webbrowser
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -101,6 +102,37 @@ def _worked(work: Callable[..., Any], given: Given, **more: Any) -> Any:
     """Return the result of long work, whose progress is shown."""
     with output.progress_bars() as progress:
         return work(progress=progress, **given.settings, **more)
+
+
+def plain(
+    group: str,
+    name: str,
+    figures: Callable[[Any], object] = lambda result: result,
+    *,
+    module: str = "",
+    slow: bool = False,
+) -> None:
+    """Make a command that shows what the workflow of its name returns, and nothing else.
+
+    Parameters
+    ----------
+    group, name : str
+        Where help lists it, and the workflow.
+    figures : callable, optional
+        What of the result ``--json`` prints; by default all of it.
+    module : str, optional
+        Module of the settings.
+    slow : bool
+        Whether its progress is shown.
+    """
+
+    def run(given: Given) -> None:
+        work = getattr(workflows, name)
+        result = _worked(work, given) if slow else work(**given.settings)
+        _show(given, figures(result), result.show())
+
+    run.__name__ = name
+    command(group, module=module)(run)
 
 
 @dataclass(frozen=True)
@@ -382,10 +414,7 @@ def _simulate(given: Given) -> None:
     workflows.simulate(**given.settings, meanwhile=show)
 
 
-@command("Measure")
-def _krc_config(given: Given) -> None:
-    result = workflows.krc_config(**given.settings)
-    _show(given, result, result.show())
+plain("Measure", "krc_config")
 
 
 @command("Measure")
@@ -460,10 +489,7 @@ def _ask(question: str) -> str:
     return answer
 
 
-@command("Identify")
-def _tool(given: Given) -> None:
-    result = workflows.tool(**given.settings)
-    _show(given, _as_file(result), result.show())
+plain("Identify", "tool", _as_file)
 
 
 @command("Identify")
@@ -478,10 +504,7 @@ def _geometry(given: Given) -> None:
     _show(given, figures | more, result.show())
 
 
-@command("Identify")
-def _calibrate(given: Given) -> None:
-    result = workflows.calibrate(**given.settings)
-    _show(given, result.calibration, result.show())
+plain("Identify", "calibrate", attrgetter("calibration"))
 
 
 @command("Identify")
@@ -524,16 +547,10 @@ def _only_tool(given: Given) -> dict[str, Any]:
     return {"tool": files[0] if files else None, "tool_frame": frame}
 
 
-@command("Use")
-def _predict(given: Given) -> None:
-    result = workflows.predict(**given.settings)
-    _show(given, result.summary, result.show())
+plain("Use", "predict", attrgetter("summary"))
 
 
-@command("Use")
-def _compensate(given: Given) -> None:
-    result = _worked(workflows.compensate, given)
-    _show(given, result, result.show())
+plain("Use", "compensate", slow=True)
 
 
 @command("Use", more=_ToolOrFile, hidden=_TOOL)
@@ -580,28 +597,16 @@ _PAIR = f"{workflows.__name__}.two_robots"
 """Module of the commands for two robots."""
 
 
-@command("Two robots", module=_PAIR, settings="PlanPairSettings")
-def _plan_pair(given: Given) -> None:
-    result = workflows.plan_pair(**given.settings)
-    _show(given, _as_file(result), result.show())
+plain("Two robots", "plan_pair", _as_file, module=_PAIR)
 
 
-@command("Two robots", module=_PAIR, settings="SimulatePairSettings")
-def _simulate_pair(given: Given) -> None:
-    result = workflows.simulate_pair(**given.settings)
-    _show(given, result, result.show())
+plain("Two robots", "simulate_pair", module=_PAIR)
 
 
-@command("Two robots", module=_PAIR, settings="CalibratePairSettings")
-def _calibrate_pair(given: Given) -> None:
-    result = workflows.calibrate_pair(**given.settings)
-    _show(given, _as_file(result), result.show())
+plain("Two robots", "calibrate_pair", _as_file, module=_PAIR)
 
 
-@command("Two robots", module=_PAIR, settings="CompensatePairSettings")
-def _compensate_pair(given: Given) -> None:
-    result = workflows.compensate_pair(**given.settings)
-    _show(given, _as_file(result), result.show())
+plain("Two robots", "compensate_pair", _as_file, module=_PAIR)
 
 
 @command("Judge and hand over")

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import fdtrc, stdtrit
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray, Triple, triple
 from elastocal.blocks import Block, Facts, Row, Table
 from elastocal.errors import CompensationError
 from elastocal.findings import Finding, Grade, Kind, as_number
@@ -34,8 +34,6 @@ from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot, link_gap, of_one_arm, refusals_naming, same_joints
 from elastocal.units import quantity
 from elastocal.wording import mm, phrase, phrases
-
-Vector = tuple[float, float, float]
 
 LEAST_TOUCHES = 3
 """Fewer touches leave nothing to judge a state by."""
@@ -88,9 +86,9 @@ class TouchedPoint:
 
     pose: int
     """Id in the plan of the touches."""
-    tcp_position: Vector
+    tcp_position: Triple
     """In base, in m."""
-    shift: Vector
+    shift: Triple
     """Displacement of the tool relative to its controller, in base, in m."""
     left: float
     """Distance in m from what the other touches predict."""
@@ -110,11 +108,11 @@ class ArmGrowth(Result):
     """Duration of the warm touches, in s."""
     share: float
     """Thermal share, m of growth for each m between foot and tool; 0 where it is not used."""
-    offset: Vector
+    offset: Triple
     """In base, in m; 0 where it is not used."""
     share_half_width: float
     """Half of its 95 % interval."""
-    offset_half_width: Vector
+    offset_half_width: Triple
     """Half of its 95 % intervals, in m."""
     points: tuple[TouchedPoint, ...]
     noise: float
@@ -374,11 +372,11 @@ def arm_growth(
         warm=warm,
         seconds=seconds,
         share=float(used[0]),
-        offset=_vector(used[1:]),
+        offset=triple(used[1:]),
         share_half_width=float(half[0]),
-        offset_half_width=_vector(half[1:]),
+        offset_half_width=triple(half[1:]),
         points=tuple(
-            TouchedPoint(pose, _vector(at), _vector(shift), float(np.linalg.norm(off)))
+            TouchedPoint(pose, triple(at), triple(shift), float(np.linalg.norm(off)))
             for pose, at, shift, off in zip(touches.pose, tool, touches.shift, left, strict=True)
         ),
         noise=fit.sigma,
@@ -453,11 +451,6 @@ def _date(text: str) -> datetime | None:
     except ValueError:
         return None
     return None if found.tzinfo is None else found
-
-
-def _vector(values: FloatArray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
 
 
 def read_arm_growth(path: Path, robot: Robot) -> ArmGrowth:

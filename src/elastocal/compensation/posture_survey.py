@@ -32,7 +32,12 @@ from elastocal.errors import PathError
 from elastocal.identification import CalibratedModel, interval
 from elastocal.planning import cell_surface, collision_scene
 from elastocal.results import brief_repr
-from elastocal.robot import Robot, characteristic_length, smallest_singular_value
+from elastocal.robot import (
+    Robot,
+    T_from_xyzabc,
+    characteristic_length,
+    smallest_singular_value,
+)
 from elastocal.robot.inverse import InverseKinematics
 
 """Rows of a path that are read at a time."""
@@ -309,19 +314,10 @@ def survey_postures(
     return PostureSurvey(grid, q, stiffness, refused)
 
 
-def _spun(T_base_tcp: FloatArray, spins: FloatArray) -> FloatArray:
-    """Return a pose turned about its z axis, shape (spin, 4, 4)."""
-    turn = np.tile(np.eye(4), (len(spins), 1, 1))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(spins)
-    turn[:, 1, 0] = np.sin(spins)
-    turn[:, 0, 1] = -turn[:, 1, 0]
-    return T_base_tcp @ turn
-
-
 def _postures(solver: InverseKinematics, T: FloatArray, grid: PostureGrid) -> FloatArray:
     """Return the branches of a station, shape (spin, external, branch, joint)."""
     spins, externals = len(grid.spins), len(grid.external)
-    poses = np.repeat(_spun(T, grid.spins), externals, axis=0)
+    poses = np.repeat(T @ T_from_xyzabc(0, 0, 0, grid.spins, 0, 0), externals, axis=0)
     external = np.tile(grid.external, (spins, 1))
     found = solver.solve_many(poses, external).q
     return found.reshape(spins, externals, *found.shape[1:])

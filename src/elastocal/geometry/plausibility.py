@@ -21,7 +21,7 @@ from itertools import combinations, islice, permutations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, longest_run
 from elastocal.errors import GeometryError, RobotError
 from elastocal.geometry.arm import arm_length
 from elastocal.geometry.ladder import GeometryLadder, climb
@@ -630,11 +630,7 @@ def _still_columns(problem: GeometryProblem) -> Iterator[str]:
         name = f"marker{marker + 1}" if data.markers.shape[1] > 1 else "marker"
         columns |= {f"{name}_{axis}": each for axis, each in zip(AXES, values, strict=True)}
     for name, values in columns.items():
-        longest = _longest_run(values)
+        run = longest_run(values)
+        longest = run.stop - run.start
         if longest >= _STILL * len(data):
             yield f"{name} (in {counted(longest, 'row')} of {len(data)})"
-
-
-def _longest_run(values: FloatArray) -> int:
-    changes = np.flatnonzero(np.diff(values) != 0.0) + 1
-    return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())

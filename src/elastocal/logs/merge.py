@@ -21,7 +21,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, longest_run
 from elastocal.compensation.conditioning import (
     SENSOR_TURNED,
     StaticPostures,
@@ -129,7 +129,7 @@ def _still_joints(log: LogStreams, arm: ArmStream, robot: Robot) -> Iterator[str
     turning = np.flatnonzero(robot.revolute).tolist()
     if not turning or not len(arm.q):
         return
-    runs = {joint: _longest_run(arm.q[:, joint]) for joint in turning}
+    runs = {joint: longest_run(arm.q[:, joint]) for joint in turning}
     for joint, run in runs.items():
         others = [other for other in turning if other != joint]
         rest = np.delete(arm.q[:, joint], np.r_[run])
@@ -145,16 +145,9 @@ def _still_joints(log: LogStreams, arm: ArmStream, robot: Robot) -> Iterator[str
             )
 
 
-def _longest_run(values: FloatArray) -> slice:
-    """Return the most rows, one after the other, that hold the same number."""
-    ends = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]])
-    longest = int(np.argmax(np.diff(ends)))
-    return slice(int(ends[longest]), int(ends[longest + 1]))
-
-
 def _still_columns(log: LogStreams, names: Sequence[str], values: FloatArray) -> Iterator[str]:
     """Yield columns that hold the same number in many rows one after the other."""
-    same = _longest_run(np.cumsum((np.diff(values, axis=0, prepend=values[:1]) != 0).any(axis=1)))
+    same = longest_run(np.cumsum((np.diff(values, axis=0, prepend=values[:1]) != 0).any(axis=1)))
     if same.stop - same.start >= _STILL * len(values):
         yield (
             f"{log.entry.log}: columns {listed([repr(name) for name in names])} hold the same"
@@ -163,7 +156,7 @@ def _still_columns(log: LogStreams, names: Sequence[str], values: FloatArray) ->
         )
         return
     for name, column in zip(names, values.T, strict=True):
-        run = _longest_run(column)
+        run = longest_run(column)
         count = run.stop - run.start
         if count >= _STILL * len(column) and np.ptp(values[run], axis=0).any():
             yield (

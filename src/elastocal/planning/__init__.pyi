@@ -5,9 +5,7 @@ from .more import (
 )
 from .plan import (
     PlanAndPool as PlanAndPool,
-    Untracked as Untracked,
     make_plan as make_plan,
-    move_records as move_records,
     require_loads_possible_anywhere as require_loads_possible_anywhere,
     require_possible_search as require_possible_search,
     robot_record as robot_record,
@@ -47,6 +45,7 @@ from .production import (
     ProductionRecord as ProductionRecord,
     plan_coverage as plan_coverage,
 )
+from .rounds import move_records as move_records
 from .scene import (
     CollisionScene as CollisionScene,
     cell_surface as cell_surface,
@@ -59,4 +58,4 @@ from .show import (
     key_figures as key_figures,
     spreads as spreads,
 )
-from .untracked import as_planned as as_planned
+from .untracked import Untracked as Untracked, as_planned as as_planned

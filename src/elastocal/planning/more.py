@@ -10,12 +10,13 @@ extrapolation, which no number of poses elsewhere changes.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.cell import Cell
 from elastocal.errors import PlanningError, present
 from elastocal.identification import posture_reach
-from elastocal.planning.pool import NearProduction
+from elastocal.planning.pool import NearProduction, SampledPool
 from elastocal.planning.pool_file import PoolData
 from elastocal.planning.postures import Postures
 from elastocal.planning.search import (
@@ -26,7 +27,8 @@ from elastocal.planning.search import (
     best_addition,
     build_information,
 )
-from elastocal.planning.search_pool import judging_model, pose_rows, process_rows
+from elastocal.planning.search_pool import SearchPool, judging_model, pose_rows, process_rows
+from elastocal.planning.variant import PlanVariant
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
@@ -54,19 +56,27 @@ class Additions:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
-class AddedTo:
+class AddedTo(PlanVariant):
     """Measured poses to which a plan adds."""
 
     joint_position: FloatArray
     """In contact, shape (pose, joint), in rad or m."""
     beside: FloatArray
     """Those that each get a neighbour, shape (pose, joint)."""
+    complete = False
 
-    def best(self, cell: Cell, postures: Postures, left: IndexArray) -> Selection:
+    def choose(
+        self,
+        cell: Cell,
+        search_pool: SearchPool,  # noqa: ARG002 - of the plain plan
+        sampled: SampledPool,
+        left: IndexArray,
+        rng: Generator,  # noqa: ARG002 - nothing is drawn
+    ) -> Selection:
         """Return as many poses as the cell file asks for; see `best_additions`."""
         count = present(cell.file.search.poses, "search.poses")
         measured, beside = self.joint_position, self.beside
-        found = best_additions(cell, postures, measured, count, left, beside)
+        found = best_additions(cell, sampled.pool.postures, measured, count, left, beside)
         return Selection(found.order, _SEARCH, {SHARE: found.share})
 
 

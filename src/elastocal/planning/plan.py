@@ -12,8 +12,8 @@ from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
 from elastocal import __version__
-from elastocal.arrays import FloatArray, IndexArray
-from elastocal.cell import TRACKER, Cell, contact_time, fingerprint, straight_time
+from elastocal.arrays import FloatArray, IndexArray, triple
+from elastocal.cell import Cell, contact_time, fingerprint, straight_time
 from elastocal.errors import PlanningError
 from elastocal.findings import Finding, Kind, as_number
 from elastocal.parallel import one_blas_thread
@@ -28,10 +28,9 @@ from elastocal.planning.checks import (
     station_shortage,
     unseen_bumps,
 )
-from elastocal.planning.more import SHARE, AddedTo
+from elastocal.planning.more import SHARE
 from elastocal.planning.motion import (
     Mover,
-    Route,
     clear_retreats,
     mover_for,
     plan_route,
@@ -43,18 +42,17 @@ from elastocal.planning.plan_result import (
     CheckRecord,
     ComparisonRecord,
     ContactRecord,
-    MoveRecord,
     PlanResult,
     PoolRecord,
     PoseRecord,
     RobotRecord,
     SearchRecord,
-    Vector,
 )
 from elastocal.planning.pool import REACH_ADVICE, Pool, SampledPool, sample_pool
 from elastocal.planning.pool_file import NOT_CHOSEN, PoolData
 from elastocal.planning.postures import Postures
 from elastocal.planning.production import production_findings
+from elastocal.planning.rounds import Round, joined_moves
 from elastocal.planning.scene import (
     cell_surface,
     collision_scene,
@@ -69,14 +67,7 @@ from elastocal.planning.surface import (
     sample_uniform,
     tiny_finding,
 )
-from elastocal.planning.untracked import (
-    DoubledPlaces,
-    doubled_findings,
-    doubled_places,
-    joined_moves,
-    require_doubled,
-    turned_pool,
-)
+from elastocal.planning.variant import PlanVariant
 from elastocal.progress import Progress, silent
 from elastocal.robot import has_wrist
 
@@ -221,27 +212,16 @@ class _Choice:
     search_pool: SearchPool
     selection: Selection
     """Numbers in the pool, in search order."""
-    route: Route
-    """Numbers in the selection, in visiting order."""
-    doubled: DoubledPlaces | None = None
-    """Those that are visited once more, on two disks."""
+    rounds: tuple[Round, ...]
+    """The first goes through all poses; others repeat some."""
 
     @property
     def place(self) -> IndexArray:
         """Place of each chosen pose in the visiting order, shape (pose,), in search order."""
-        return np.argsort(self.route.order)
+        return np.argsort(self.rounds[0].order)
 
 
-_TURNS = 1
-"""What the turns of tools are drawn for, beside the seed: other plans draw as they did."""
-
-
-@dataclass(frozen=True)
-class Untracked:
-    """A plan whose readings no tracker takes."""
-
-    doubled: int | None = None
-    """Places that are pressed on two disks as well; None: as many as suffice."""
+_PLAIN = PlanVariant()
 
 
 @one_blas_thread()
@@ -250,8 +230,7 @@ def make_plan(
     compare: str | None = None,
     jobs: int | None = None,
     progress: Progress = silent,
-    added_to: AddedTo | None = None,
-    untracked: Untracked | None = None,
+    variant: PlanVariant = _PLAIN,
 ) -> PlanAndPool:
     """Return the calibration poses of a cell, checked and in visiting order.
 
@@ -267,10 +246,8 @@ def make_plan(
     progress : callable, optional
         Hears the stage (``surface``, ``candidates``, ``search``, ``visiting order``), what is done
         of it and how much there is.
-    added_to : AddedTo, optional
-        Measured poses, to which those are chosen that add most.
-    untracked : Untracked, optional
-        Plan for readings that no tracker takes; ``cell`` is `elastocal.cell.without_tracker`'s.
+    variant : PlanVariant, optional
+        What is done otherwise: `AddedTo` measured poses, or `Untracked`.
 
     Raises
     ------
@@ -291,39 +268,33 @@ def make_plan(
     progress(_SURFACE, 1, 1)
     sampled = sample_pool(cell, surface, for_points, jobs, progress)
     _require_enough(cell, sampled, findings)
-    if untracked is not None:
-        for_turns = np.random.default_rng([cell.file.search.seed, _TURNS])
-        sampled = turned_pool(cell, surface, sampled, for_turns)
+    sampled = variant.pool(cell, surface, sampled)
     progress(_SEARCH, 0, 1)
     search_pool = SearchPool.of(cell, surface, sampled)
-    selection, route = _choose(cell, search_pool, sampled, mover, for_search, progress, added_to)
-    wanted, doubled = 0, None
-    if untracked is not None:
-        wanted = require_doubled(cell, untracked.doubled, len(selection))
-        doubled = doubled_places(cell, surface, sampled, selection.order, mover, progress, wanted)
-    chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, route, doubled)
+    selection, first = _choose(cell, search_pool, sampled, mover, for_search, progress, variant)
+    further = variant.further_rounds(cell, surface, sampled, selection, mover, progress)
+    chosen = _Choice(cell, surface, sampled.pool, search_pool, selection, (first, *further))
     progress(_SEARCH, 1, 1)
-    # Of poses that only add to others it says nothing by itself.
-    production = None if added_to else search_pool.production(cell, selection.order)
+    production = search_pool.production(cell, selection.order) if variant.complete else None
     compared = None if other is None else _compared(cell, search_pool, other, selection, for_search)
-    notes = [*_notes(chosen), *([] if added_to else production_findings(cell, production))]
-    if untracked is not None:
-        notes += doubled_findings(cell, doubled, wanted)
+    notes = [*_notes(chosen)]
+    notes += production_findings(cell, production) if variant.complete else ()
+    notes += variant.findings(cell, chosen.rounds)
     plan = PlanResult(
         elastocal=__version__,
         cell=CellRecord(name=cell.name, file=str(cell.path), fingerprint=fingerprint(cell)),
         robot=robot_record(cell),
         contact=_contact(cell),
         poses=_poses(chosen),
-        moves=_moves(chosen),
+        moves=joined_moves(chosen.rounds, tuple(cell.home.tolist())),
         search=_search(chosen),
         comparison=compared,
         pool=_pool(sampled.pool),
         findings=(*findings, *notes),
         production=production,
-        without=() if untracked is None else (TRACKER,),
+        without=variant.without,
     )
-    share = float(selection.trace[SHARE][-1]) if added_to else 1.0
+    share = float(selection.trace[SHARE][-1]) if SHARE in selection.trace else 1.0
     return PlanAndPool(plan, _pool_data(chosen, sampled.points.position), surface, share)
 
 
@@ -365,22 +336,19 @@ def _choose(
     mover: Mover,
     rng: Generator,
     progress: Progress,
-    added_to: AddedTo | None,
-) -> tuple[Selection, Route]:
+    variant: PlanVariant,
+) -> tuple[Selection, Round]:
     """Return poses with free paths from HOME and on to the surface; replace others."""
     left: IndexArray = np.arange(len(search_pool.candidates))
     for _ in range(_REPLACEMENTS):
-        if added_to is None:
-            selection = search_pool.choose(cell, left, rng)
-        else:
-            selection = added_to.best(cell, sampled.pool.postures, left)
+        selection = variant.choose(cell, search_pool, sampled, left, rng)
         postures = sampled.pool.postures.take(selection.order)
         route = plan_route(cell.home, postures, mover, progress)
         blocked = np.union1d(
             route.unreachable, np.flatnonzero(~clear_retreats(cell, mover, postures))
         )
         if not len(blocked):
-            return selection, route
+            return selection, Round(np.arange(len(selection)), postures, route)
         left = np.setdiff1d(left, selection.order[blocked])
     raise PlanningError(
         f"no way without collision leads from HOME to {len(blocked)} of"
@@ -475,32 +443,20 @@ def _contact(cell: Cell) -> ContactRecord:
         axis_override=cell.file.motion.override,
         contact_speed=cell.file.motion.contact_speed,
         straight_time=straight_time(cell),
-        load_cases={name: _vector(force) for name, force in cell.file.presses.items()},
+        load_cases={name: triple(force) for name, force in cell.file.presses.items()},
     )
 
 
 def _poses(choice: _Choice) -> tuple[PoseRecord, ...]:
-    pool = choice.pool
-    order = choice.selection.order[choice.route.order]
     check = SightCheck.of(choice.cell, choice.surface)
-    seen_by = check.assigned(pool.postures.take(order)) if check else [None] * len(order)
-    single = pool.postures.take(order)
-    poses = [
-        _pose(choice, number, int(order[number]), single.take([number]), seen_by[number])
-        for number in range(len(order))
-    ]
-    if choice.doubled is not None:
-        again = choice.doubled
-        for number in again.route.order.tolist():
-            place = int(again.chosen[number])
-            pose = _pose(
-                choice,
-                len(poses),
-                int(choice.selection.order[place]),
-                again.postures.take([number]),
-                None,
-            )
-            poses.append(replace(pose, doubles=int(choice.place[place])))
+    poses: list[PoseRecord] = []
+    for lap, each in enumerate(choice.rounds):
+        postures = each.postures.take(each.route.order)
+        stations = check.assigned(postures) if check else [None] * len(postures)
+        for number, (chosen, station) in enumerate(zip(each.order.tolist(), stations, strict=True)):
+            candidate = int(choice.selection.order[chosen])
+            pose = _pose(choice, len(poses), candidate, postures.take([number]), station)
+            poses.append(replace(pose, doubles=int(choice.place[chosen]) if lap else None))
     return tuple(poses)
 
 
@@ -518,9 +474,9 @@ def _pose(
         candidate=candidate,
         joints=tuple(posture.q[0].tolist()),
         approach_joints=tuple(posture.q_approach[0].tolist()),
-        tcp_position=_vector(T[:3, 3]),
+        tcp_position=triple(T[:3, 3]),
         tcp_quaternion=(float(x), float(y), float(z), float(w)),
-        normal=_vector(posture.normal[0]),
+        normal=triple(posture.normal[0]),
         seen_by=seen_by,
         contact_time=contact_time(choice.cell),
         # JSON has no infinity: a check that cannot refuse is left out.
@@ -528,43 +484,11 @@ def _pose(
     )
 
 
-def _moves(choice: _Choice) -> tuple[MoveRecord, ...]:
-    """Return the moves of the round, and of that with two disks after it."""
-    moves = move_records(choice.route)
-    if choice.doubled is None:
-        return moves
-    first = len(choice.selection)
-    again = tuple(
-        replace(
-            each,
-            start=None if each.start is None else first + each.start,
-            end=None if each.end is None else first + each.end,
-        )
-        for each in move_records(choice.doubled.route)
-    )
-    return joined_moves(moves, again, tuple(choice.cell.home.tolist()))
-
-
-def move_records(route: Route) -> tuple[MoveRecord, ...]:
-    """Return the moves of a round, by the poses in visiting order."""
-    place = {int(chosen): number for number, chosen in enumerate(route.order)}
-    return tuple(
-        MoveRecord(
-            start=None if move.start is None else place[move.start],
-            end=None if move.end is None else place[move.end],
-            via=tuple(tuple(joints.tolist()) for joints in move.via),
-            duration=move.duration,
-        )
-        for move in route.moves
-    )
-
-
 def _search(choice: _Choice) -> SearchRecord:
     search, selection, pool = choice.cell.file.search, choice.selection, choice.search_pool
     spread = pool.spread(selection.order)
     has_process = choice.cell.process is not None
-    count = len(selection)
-    again = 0 if choice.doubled is None else len(choice.doubled.chosen)
+    visits = sum(len(each.chosen) for each in choice.rounds)
     return SearchRecord(
         name=selection.name,
         metric=search.metric,
@@ -574,7 +498,7 @@ def _search(choice: _Choice) -> SearchRecord:
         covering_radius=spread.covering_radius,
         lower_bound=selection.lower_bound if isinstance(selection, CoverSelection) else None,
         covered=None if search.d_max is None else spread.covering_radius <= search.d_max,
-        order=(*choice.place.tolist(), *range(count, count + again)),
+        order=(*choice.place.tolist(), *range(len(selection), visits)),
         spread=spread,
         process_unseen=pool.information.process_unseen if has_process else None,
     )
@@ -619,8 +543,3 @@ def _pool_data(choice: _Choice, sampled: FloatArray) -> PoolData:
         refused_by=pool.refused_by,
         refusal_names=pool.refusals,
     )
-
-
-def _vector(values: FloatArray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
 from elastocal.blocks import Block, Facts
-from elastocal.cell import Cell
+from elastocal.cell import TRACKER, Cell
 from elastocal.errors import PlanningError, SchemaError
 from elastocal.files import sha256, write_json
 from elastocal.findings import Finding, group_alike
@@ -259,6 +259,11 @@ class PlanResult(Result):
         stations = ", ".join(f"{name} {count}" for name, count in seen.items())
         notes = (("note", text) for text in group_alike(self.findings))
         yield Facts((*covered, *((("marker seen by", stations),) if seen else ()), *notes))
+
+    @property
+    def tracked(self) -> bool:
+        """Whether a tracker measures the presses."""
+        return TRACKER not in self.without
 
     @property
     def doubled(self) -> tuple[int, ...]:

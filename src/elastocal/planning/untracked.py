@@ -21,11 +21,14 @@ from elastocal.cell import TRACKER, Cell, without_tracker
 from elastocal.errors import PlanningError
 from elastocal.findings import Finding, Kind
 from elastocal.planning.checks import Margins, check_margins
-from elastocal.planning.motion import Mover, Route, clear_retreats, plan_route
-from elastocal.planning.plan_result import MoveRecord, PlanResult
+from elastocal.planning.motion import Mover, clear_retreats, plan_route
+from elastocal.planning.plan_result import PlanResult
 from elastocal.planning.pool import Pool, SampledPool, point_checks, robot_checks
 from elastocal.planning.postures import Postures
+from elastocal.planning.rounds import Round
+from elastocal.planning.search import Selection
 from elastocal.planning.surface import Surface
+from elastocal.planning.variant import PlanVariant
 from elastocal.progress import Progress
 from elastocal.robot.inverse import InverseKinematics, inverse_for
 
@@ -33,6 +36,8 @@ TURN = 1.0
 """Largest turn of a tool about the normal of the surface, in rad."""
 DOUBLED = 8
 """Places that are pressed on one and on two disks, where the cell has disks to stack."""
+_TURNS = 1
+"""What the turns of tools are drawn for, beside the seed: other plans draw as they did."""
 _FEWEST_DOUBLED = 4
 """From fewer places the compliance of a disk has no standard error."""
 
@@ -53,6 +58,39 @@ NORMAL_ALONE = Kind(
     " the contact is then not found, nor springs that only lateral loads show; add north, south,"
     " east and west to load_cases.cases",
 )
+
+
+@dataclass(frozen=True)
+class Untracked(PlanVariant):
+    """A plan whose readings no tracker takes, of a cell `elastocal.cell.without_tracker`."""
+
+    doubled: int | None = None
+    """Places that are pressed on two disks as well; None: as many as suffice."""
+    without = (TRACKER,)
+
+    def pool(self, cell: Cell, surface: Surface, sampled: SampledPool) -> SampledPool:
+        """Return the pool with its tools turned about the normal."""
+        rng = np.random.default_rng([cell.file.search.seed, _TURNS])
+        return turned_pool(cell, surface, sampled, rng)
+
+    def further_rounds(
+        self,
+        cell: Cell,
+        surface: Surface,
+        sampled: SampledPool,
+        selection: Selection,
+        mover: Mover,
+        progress: Progress,
+    ) -> tuple[Round, ...]:
+        """Return the round through the places that are pressed on two disks."""
+        wanted = require_doubled(cell, self.doubled, len(selection))
+        again = doubled_places(cell, surface, sampled, selection.order, mover, progress, wanted)
+        return () if again is None else (again,)
+
+    def findings(self, cell: Cell, rounds: Sequence[Round]) -> tuple[Finding, ...]:
+        """Return what is missing to tell the contact from the arm."""
+        wanted = require_doubled(cell, self.doubled, len(rounds[0].chosen))
+        return doubled_findings(cell, rounds[1] if rounds[1:] else None, wanted)
 
 
 def turned_pool(cell: Cell, surface: Surface, sampled: SampledPool, rng: Generator) -> SampledPool:
@@ -122,23 +160,6 @@ def _replaced(pool: Pool, at: IndexArray, postures: Postures, margins: Margins) 
     return replace(pool, postures=Postures(**merged), margins=replace(pool.margins, margin=margin))
 
 
-@dataclass(frozen=True, eq=False)
-class DoubledPlaces:
-    """Places that are visited once more, with two disks stacked, and the round through them."""
-
-    chosen: IndexArray
-    """Numbers in the selection, shape (place,)."""
-    postures: Postures
-    """With the tool a thickness farther off."""
-    route: Route
-    """Round from HOME and back; its order counts in ``chosen``."""
-
-    @property
-    def order(self) -> list[int]:
-        """Numbers in the selection, in visiting order."""
-        return [int(self.chosen[each]) for each in self.route.order]
-
-
 def doubled_places(
     cell: Cell,
     surface: Surface,
@@ -147,7 +168,7 @@ def doubled_places(
     mover: Mover,
     progress: Progress,
     wanted: int,
-) -> DoubledPlaces | None:
+) -> Round | None:
     """Return the places that are pressed on two disks as well: the first of the search that can.
 
     Parameters
@@ -161,8 +182,9 @@ def doubled_places(
 
     Returns
     -------
-    DoubledPlaces, optional
-        None where the cell has no disk to stack, or no place can be.
+    Round, optional
+        With the tool a thickness farther off; None where the cell has no disk to stack, or no
+        place can be.
     """
     thickness = cell.file.engagement.disk_thickness
     if thickness is None or wanted == 0:
@@ -181,7 +203,7 @@ def doubled_places(
         postures = raised.take(chosen)
         route = plan_route(cell.home, postures, mover, progress)
         if not len(route.unreachable):
-            return DoubledPlaces(chosen, postures, route)
+            return Round(chosen, postures, route)
         left = np.setdiff1d(left, chosen[route.unreachable], assume_unique=True)
     return None
 
@@ -194,7 +216,7 @@ def _where_reached(raised: Postures, single: Postures, reached: BoolArray) -> Po
     return Postures(raised.T_base_tcp, raised.normal, q, q_approach, raised.point)
 
 
-def doubled_findings(cell: Cell, found: DoubledPlaces | None, wanted: int) -> tuple[Finding, ...]:
+def doubled_findings(cell: Cell, found: Round | None, wanted: int) -> tuple[Finding, ...]:
     """Return remarks on what a plan without a tracker lacks."""
     lateral = np.abs(cell.file.load_cases.force_tcp[:, :2]).max() > 0.0
     notes = () if lateral else (NORMAL_ALONE(),)
@@ -210,7 +232,7 @@ def doubled_findings(cell: Cell, found: DoubledPlaces | None, wanted: int) -> tu
 
 def as_planned(cell: Cell, plan: PlanResult) -> Cell:
     """Return the cell that a plan is carried out in: without tracker where the plan has none."""
-    return without_tracker(cell) if TRACKER in plan.without else cell
+    return cell if plan.tracked else without_tracker(cell)
 
 
 def require_doubled(cell: Cell, doubled: int | None, poses: int) -> int:
@@ -231,24 +253,3 @@ def require_doubled(cell: Cell, doubled: int | None, poses: int) -> int:
     if not doubled <= poses:
         raise PlanningError(f"--doubled {doubled}: must be at most the {poses} poses")
     return doubled
-
-
-def joined_moves(
-    single: Sequence[MoveRecord],
-    doubled: Sequence[MoveRecord],
-    home: tuple[float, ...],
-) -> tuple[MoveRecord, ...]:
-    """Return the moves of two rounds, of which the second begins where the first ends, at HOME.
-
-    Parameters
-    ----------
-    single, doubled : sequence of MoveRecord
-        The poses of the second are numbered on from those of the first.
-    home : tuple of float
-        Joint positions of HOME, in rad or m.
-    """
-    back, out = single[-1], doubled[0]
-    over = MoveRecord(
-        back.start, out.end, (*back.via, home, *out.via), back.duration + out.duration
-    )
-    return (*single[:-1], over, *doubled[1:])

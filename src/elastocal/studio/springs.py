@@ -9,17 +9,13 @@ from elastocal.arrays import FloatArray
 from elastocal.cell import Cell
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibratedModel
+from elastocal.identification.mistakes import DRIVE, WIND_UP
 from elastocal.planning.surface import arm_reach
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.units import in_unit, quantity
 from elastocal.wording import mm
 
-_WIND_UP = 2e-3
-"""Angle by which a gear is assumed to wind up under the permissible torque of its joint, in rad:
-makers of gears for robots state 1 to 3 mrad."""
-_DRIVE = 4e7
-"""Stiffness of a linear drive, in N/m."""
 _MICROMETRES = 1e-6
 _NOT_CALIBRATED = {
     (False, True): "this posture was",
@@ -156,7 +152,7 @@ def calibrated_springs(calibrated: CalibratedModel, file: str) -> StudioSprings:
 def default_springs(cell: Cell) -> StudioSprings:
     """Return a spring a joint by rule of thumb, for a cell that is not calibrated yet.
 
-    A gear winds up by `_WIND_UP` under the torque that its joint may use; where that is not known,
+    A gear winds up by `WIND_UP` under the torque that its joint may use; where that is not known,
     under the largest load case at the arm's full reach. Good for comparing postures; the size may
     be wrong by a factor of three.
     """
@@ -165,10 +161,10 @@ def default_springs(cell: Cell) -> StudioSprings:
     torque = np.where(
         np.isfinite(cell.torque_limits), cell.torque_limits, largest * arm_reach(robot)
     )
-    stiffness = np.where(robot.revolute, torque / _WIND_UP, _DRIVE)
+    stiffness = np.where(robot.revolute, torque / WIND_UP, DRIVE)
     source = (
         "default springs, not calibrated: one a joint, whose gear winds up"
-        f" {quantity(_WIND_UP, 'mrad')} under the torque it may use. Sizes may be"
+        f" {quantity(WIND_UP, 'mrad')} under the torque it may use. Sizes may be"
         " wrong by a factor of 3"
     )
     return StudioSprings(ElasticModel(robot, layout(robot, "actuated")), 1.0 / stiffness, source)

@@ -22,7 +22,7 @@ from elastocal.errors import PlanningError
 from elastocal.planning.search import Candidates, technique
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.robot import Robot, inverse_transform, smallest_singular_value
+from elastocal.robot import Robot, T_from_xyzabc, inverse_transform, smallest_singular_value
 from elastocal.robot.inverse import inverse_for
 from elastocal.two_robots.cell import PairCell, PairLimits
 from elastocal.two_robots.presses import relative_blocks
@@ -32,6 +32,8 @@ _SAMPLES = 8
 """Points on each line between two joints by which the distance of the arms is measured."""
 _TRIES = 4
 """Pairs of postures that are tried at a meeting."""
+_FACING = np.diag([1.0, -1.0, -1.0, 1.0])
+"""A tip that points against another one."""
 
 
 @brief_repr
@@ -190,7 +192,8 @@ def meeting_pool(cell: PairCell, rng: np.random.Generator) -> Pool:
     """Return the meetings that pass every check, of as many places as the cell has tried."""
     count = cell.file.search.candidates
     T = _places(cell, count, rng)
-    turned = T @ _facing(rng.uniform(-np.pi, np.pi, count))
+    spin = rng.uniform(-np.pi, np.pi, count)
+    turned = T @ T_from_xyzabc(0, 0, 0, spin, 0, 0) @ _FACING
     poses = T, inverse_transform(cell.T_first_second) @ turned
     found = [
         inverse_for(robot).solve_many(own) for robot, own in zip(cell.robots, poses, strict=True)
@@ -237,16 +240,6 @@ def _places(cell: PairCell, count: int, rng: np.random.Generator) -> FloatArray:
     x = np.cross(z, rng.standard_normal((count, 3)))
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     T[:, :3, :3] = np.stack([x, np.cross(z, x), z], axis=2)
-    return T
-
-
-def _facing(spin: FloatArray) -> FloatArray:
-    """Return the second tcp in the first at a meeting: z turned round, spun about it."""
-    T = np.tile(np.eye(4), (len(spin), 1, 1))
-    cosine, sine, zero = np.cos(spin), np.sin(spin), np.zeros_like(spin)
-    T[:, :3, 0] = np.stack([cosine, sine, zero], axis=1)
-    T[:, :3, 1] = np.stack([sine, -cosine, zero], axis=1)
-    T[:, :3, 2] = (0.0, 0.0, -1.0)
     return T
 
 

@@ -36,7 +36,7 @@ __all__ = [
     "watch",
 ]  # the commands: what the package itself exports of these
 
-from ._live_session import LiveReport as LiveReport
+from ._live_session import LiveReport as LiveReport, LiveResult as LiveResult
 from ._operator_and_devices import (
     Supervision as Supervision,
     Unattended as Unattended,
@@ -111,7 +111,6 @@ from .krc_config import (
     krc_config as krc_config,
 )
 from .live import (
-    LiveResult as LiveResult,
     LiveSettings as LiveSettings,
     live as live,
     settings_within as settings_within,

@@ -8,12 +8,12 @@ from typing import Any
 
 from elastocal.options import OWN, REQUIRED, SettingsField, settings_fields
 
-_PARAMETERS = re.compile(r"Parameters\n-+\n.*?(?=\n\n[A-Z]\w+\n-+\n|\Z)", re.DOTALL)
+_SECTION = re.compile(r"\n\n(?=[A-Z]\w+\n-+\n)|\Z")
 _WIDTH = 96
 
 
 def documented(function: Callable[..., Any], settings: type) -> str:
-    """Return the docstring of a workflow with a parameter for every field of its settings.
+    """Return the docstring of a workflow, which has no parameters, with one for every field.
 
     Parameters
     ----------
@@ -37,10 +37,8 @@ def documented(function: Callable[..., Any], settings: type) -> str:
         "",
         *_returned(function, settings, first),
     ]
-    parameters = "\n".join(lines)
-    if _PARAMETERS.search(text):
-        return _PARAMETERS.sub(lambda _: parameters, text, count=1)
-    return f"{text}\n\n{parameters}"
+    parameters = "\n".join(["\n", *lines])
+    return _SECTION.sub(lambda found: parameters + found[0], text, count=1)
 
 
 def _entry(field: SettingsField) -> Iterator[str]:

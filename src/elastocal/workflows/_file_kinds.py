@@ -110,7 +110,7 @@ def plan_file(path: Path) -> FileDescription:
     """Describe a plan."""
     plan = planning.read_plan(path)
     return "plan", {
-        "schema": "elastocal.plan/2",
+        **schema_and(plan),
         "cell": plan.cell.name,
         "robot": plan.robot.name,
         "poses": len(plan.poses),
@@ -124,7 +124,7 @@ def pool_file(path: Path) -> FileDescription:
     """Describe a pool of candidates."""
     pool = planning.read_pool(path)
     return "pool of candidates", {
-        "schema": "elastocal.pool/1",
+        **schema_and(pool),
         "candidates": len(pool),
         "sampled": len(pool.sampled),
         "checks": list(pool.check_names),
@@ -175,7 +175,7 @@ def summary_file(path: Path) -> FileDescription:
     """Describe a summary of a run."""
     summary = procedure.read_summary(path)
     found = {"readings": summary.readings.counts, "warnings": len(summary.warnings)}
-    return "summary of a run", {"schema": schema_of(procedure.RunSummary)} | found
+    return "summary of a run", schema_and(summary) | found
 
 
 def springs_file(path: Path) -> FileDescription:
@@ -206,7 +206,7 @@ def geometry_file(path: Path) -> FileDescription:
     """Describe a calibrated geometry."""
     found = read_geometry(path)
     return "calibrated geometry", {
-        "schema": schema_of(type(found)),
+        **schema_and(found),
         "robot": found.robot.name,
         "positions": found.positions,
         "held_out_mean_m": found.held_out.chosen.mean,
@@ -217,7 +217,7 @@ def position_plan_file(path: Path) -> FileDescription:
     """Describe a plan of positions in free space."""
     found = read_json(path, PositionPlan)
     return "plan of positions", {
-        "schema": schema_of(type(found)),
+        **schema_and(found),
         "cell": found.cell.name,
         "poses": len(found.poses),
         **_picked(found, "technique", "errors"),
@@ -238,8 +238,7 @@ def model_file(path: Path) -> FileDescription:
 
 def tool_file(path: Path) -> FileDescription:
     """Describe a tool file."""
-    found = _picked(read_tool(path), "flange", "mass", "postures", "undetermined")
-    return "tool file", {"schema": "elastocal.tool/1"} | found
+    return "tool file", schema_and(read_tool(path), "flange", "mass", "postures", "undetermined")
 
 
 def compensator_file(path: Path) -> FileDescription:
@@ -258,7 +257,7 @@ def process_table(path: Path) -> FileDescription:
     table = read_table(path)
     last = table.lines[-1]
     return "simulated process", {
-        "schema": "elastocal.process/1",
+        **schema_and(table),
         "cell": table.cell,
         "process": table.process,
         "seeds": [run.seed for run in table.runs],
@@ -282,7 +281,7 @@ def record_file(
 
     def describe(path: Path) -> FileDescription:
         found: object = read_json(path, record())
-        return kind, {"schema": schema_of(type(found)), **_picked(found, *names)}
+        return kind, schema_and(found, *names)
 
     return describe
 
@@ -291,8 +290,7 @@ def commissioning_file(path: Path) -> FileDescription:
     """Describe the record of a delay from command to motion."""
     found = read_json(path, CommissioningRecord)
     return "commissioning record", {
-        "schema": "elastocal.commissioning/1",
-        **_picked(found, "cell", "robot", "controller", "made", "cycle", "delay"),
+        **schema_and(found, "cell", "robot", "controller", "made", "cycle", "delay"),
         "line": found.link.sentence(),
     }
 
@@ -301,8 +299,7 @@ def comparison_file(path: Path) -> FileDescription:
     """Describe a comparison of two calibrations."""
     found = read_json(path, CompareSummary)
     return "comparison of two calibrations", {
-        "schema": "elastocal.comparison/1",
-        "robot": found.robot,
+        **schema_and(found, "robot"),
         "compared": len(found.springs),
         "moved": list(found.moved),
         "rows": 0 if found.deflection is None else found.deflection.rows,
@@ -367,6 +364,11 @@ def study_record(path: Path) -> FileDescription:
         "median_error_m": {each.name: each.error_mean.median for each in found.conditions},
         "advice": found.advice or None,
     }
+
+
+def schema_and(found: object, *names: str) -> dict[str, object]:
+    """Return the schema of a record, and some attributes as they are called; tuples as lists."""
+    return {"schema": schema_of(type(found)), **_picked(found, *names)}
 
 
 def _picked(found: object, *names: str) -> dict[str, object]:

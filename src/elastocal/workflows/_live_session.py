@@ -44,6 +44,8 @@ from elastocal.compensation.online import (
 from elastocal.errors import CompensationError, DeviceError, ElastocalError, present
 from elastocal.identification import CalibratedModel
 from elastocal.procedure.run import ToolLoad
+from elastocal.records import record
+from elastocal.results import Result
 from elastocal.units import in_unit, quantity
 from elastocal.workflows._operator_and_devices import ReservedRig, Rig
 
@@ -112,6 +114,8 @@ class Prepared:
     """A live compensation before anything is connected: all of it has been checked."""
 
     cell: Cell
+    model: str
+    """Its name."""
     rig: Rig
     driver: PathDriver
     limits: PathLimits
@@ -126,20 +130,76 @@ class Prepared:
     """Where courses begin, and what the marker showed there; None: their offsets are not read."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LiveEnd:
-    """Result of a live compensation."""
+@record("elastocal.live/1")
+class LiveResult(Result):
+    """The record of a live compensation."""
 
-    ended: str
-    problem: str | None
+    cell: str
+    model: str
+    robot: str
+    started: str
+    """Date and time, UTC."""
     seconds: float
+    """Time from the controller's first message to the end, in s of wall time."""
+    ended: str
+    """Why it ended."""
+    problem: str | None
+    """Error that ended it; None: no error."""
+    limits: PathLimits
+    filter_delay: float
+    """Delay of a slow wrench by the filters, in s."""
+    tool: str
+    """The tool that the model is for, in words."""
     bias: tuple[float, ...] | None
+    """Bias that was taken at the beginning, in N and N·m; none: that of the tool file."""
     scheduling: str
+    """Scheduling of the loop's thread."""
     line: CycleStatistics
     loop: LiveCounts
     logged: int
+    """Cycles in the log."""
     dropped: int
+    """Cycles that it could not take."""
     notes: tuple[str, ...]
+    """Notes for the user."""
+
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Return the main facts, a label and a text each."""
+        loop, limits = self.loop, self.limits
+        longest = (
+            f"{in_unit(loop.largest_correction, 'mm'):.3f} of {quantity(limits.correction, 'mm')}"
+        )
+        step = in_unit(loop.largest_step, "mm")
+        return (
+            ("ended", f"{self.ended}, after {self.seconds:.1f} s"),
+            *((("problem", self.problem),) if self.problem else ()),
+            ("line", self.line.sentence()),
+            ("later than 7/8 of a cycle", f"{self.line.late_share:.3%}"),
+            (
+                "cycles",
+                f"{loop.cycles}: {loop.corrected} corrected, {loop.held} held, {loop.faded} faded",
+            ),
+            ("largest correction", f"{longest}, {step:.3g} mm in a cycle"),
+            (
+                "saturated",
+                f"{loop.limited} cycles by the limit, {loop.rate_limited} by the rate,"
+                f" {self.line.saturated} at the arm; sensor {loop.saturated}",
+            ),
+            *self._courses(),
+            ("scheduling", self.scheduling),
+            ("log", f"{self.logged} cycles, {self.dropped} dropped"),
+            *(("note", text) for text in self.notes),
+        )
+
+    def _courses(self) -> Iterator[tuple[str, str]]:
+        loop = self.loop
+        if loop.courses or loop.offsets_refused:
+            largest = quantity(loop.largest_offset, "mm", ".3f")
+            yield (
+                "courses",
+                f"{loop.courses} with an offset of their own, at most {largest};"
+                f" {loop.offsets_refused} offsets refused",
+            )
 
 
 @contextlib.contextmanager
@@ -224,7 +284,7 @@ class LiveSession:
         self._courses: CourseWatch | None = None
         self._missed_courses: list[str] = []
 
-    def run(self, log: Path | None, started: str = "") -> LiveEnd:
+    def run(self, log: Path | None, started: str) -> LiveResult:
         """Correct until it ends; the devices are closed whatever happens.
 
         Parameters
@@ -232,7 +292,7 @@ class LiveSession:
         log : Path or None
             File for the log.
         started : str
-            Date and time, for the log.
+            Date and time, UTC.
         """
         ready = self._ready
         clock = WallClock(rate=ready.cell.file.devices.clock_rate)
@@ -255,10 +315,17 @@ class LiveSession:
             opened.callback(arm.close)
             ended, problem, seconds = self._watch(arm, loop)
             line = arm.statistics()
-        return LiveEnd(
+        return LiveResult(
+            cell=ready.cell.name,
+            model=ready.model,
+            robot=ready.cell.robot.name,
+            started=started,
+            seconds=seconds,
             ended=ended,
             problem=problem or loop.refusal or None,
-            seconds=seconds,
+            limits=ready.limits,
+            filter_delay=float(np.asarray(ready.numbers.filters.delay())),
+            tool=ready.calibrated.tool_name,
             bias=None if tare is None else tare.bias,
             scheduling=self._scheduling,
             line=line,

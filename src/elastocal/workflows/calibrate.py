@@ -126,13 +126,6 @@ class CalibrateSettings(FitSettings):
 def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResult:  # noqa: ARG001 - done in an instant
     """Identify the compliances of a robot from a measured dataset.
 
-    Parameters
-    ----------
-    settings : CalibrateSettings
-        Or its ``data``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     DatasetError, ConventionError, IdentificationError, RobotError, SpringError

@@ -60,10 +60,8 @@ def _recording(path: Path) -> FileDescription:
 def _live_record(path: Path) -> FileDescription:
     """Describe the record of a live compensation."""
     found = read_json(path, workflows.LiveResult)
-    names = ("cell", "robot", "started", "seconds", "ended", "problem")
-    facts = {name: getattr(found, name) for name in names}
-    schema = {"schema": "elastocal.live/1"}
-    return "record of a live compensation", schema | facts | {"line": found.line.sentence()}
+    facts = kinds.schema_and(found, "cell", "robot", "started", "seconds", "ended", "problem")
+    return "record of a live compensation", facts | {"line": found.line.sentence()}
 
 
 def _robot(path: Path, tcp: str | None = None) -> FileDescription:
@@ -248,13 +246,6 @@ def _label(name: str) -> str:
 @workflow(CheckSettings, marks=("<title>Calibration plan:", _PLAN_PAGE), outputs=("preview",))
 def check(settings: CheckSettings, progress: Progress) -> CheckResult:  # noqa: ARG001 - an instant
     """Validate a file and say what it holds.
-
-    Parameters
-    ----------
-    settings : CheckSettings
-        Or its ``file``.
-    progress : Progress, optional
-        Called with stage, done and total.
 
     Raises
     ------

@@ -136,13 +136,6 @@ class CodecResult(Result):
 def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
     """Cross-validate growing training sets: how many poses, which technique.
 
-    Parameters
-    ----------
-    settings : CodecSettings
-        Or its ``data``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     CodecError

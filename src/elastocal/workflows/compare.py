@@ -56,13 +56,6 @@ class CompareSettings:
 def compare(settings: CompareSettings, progress: Progress) -> CompareResult:  # noqa: ARG001 - done in an instant
     """State which springs changed between two calibrations, and whether predictions did.
 
-    Parameters
-    ----------
-    settings : CompareSettings
-        Or its ``old``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     IdentificationError, SchemaError, SpringError, RobotError

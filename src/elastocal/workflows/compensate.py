@@ -140,13 +140,6 @@ class CompensateResult(Result, CorrectionFigures):
 def compensate(settings: CompensateSettings, progress: Progress) -> CompensateResult:
     r"""Correct a programmed path so that the loaded tool is where it was programmed.
 
-    Parameters
-    ----------
-    settings : CompensateSettings
-        Or its ``model``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     PathError

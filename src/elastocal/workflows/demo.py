@@ -14,7 +14,7 @@ from elastocal.cell import PROCESS_FILE, require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError, of_kind
 from elastocal.files import write_text
-from elastocal.options import Option
+from elastocal.options import Option, settings_fields
 from elastocal.parallel import process_count, process_pool
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
@@ -54,16 +54,8 @@ _FILES = (
     ("c/", "C99 of the model and its compensator, for the real-time target"),
     (LOG, "every command as it was given, and what it printed"),
 )
-_FLAGS = {"models": "--model", "tools": "--tool", "seeds": "--seed", "path": ""}
-"""Names of options that differ from those of the fields; empty: positional."""
 _POSTURES: dict[str, dict[str, str]] = {"machining": {"posture": STIFFEST}}
 """A spindle may be turned about its axis: there the posture is chosen (paper 4.3.1)."""
-_OWN_FLAGS = {
-    ("init", "kind"): "--like",
-    ("simulate_process", "kind"): "--process",
-    ("export", "out"): "--c",
-}
-"""The same for one command alone."""
 
 
 @brief_repr
@@ -174,13 +166,6 @@ class DemoResult(Result):
 def demo(settings: DemoSettings, progress: Progress) -> DemoResult:
     """Show the whole story on a simulated cell: from an empty folder to a signed-off report.
 
-    Parameters
-    ----------
-    settings : DemoSettings
-        Or its ``kind``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     SchemaError
@@ -274,9 +259,12 @@ def _chapter(
     title: str, workflow: Workflow[Any, Result], source: Path, **options: object
 ) -> Chapter:
     """Return a workflow with its options, and the command that does the same."""
-    words = [workflow.__name__.replace("_", "-"), str(source)]
-    for name, value in options.items():
-        flag = _OWN_FLAGS.get((workflow.__name__, name), _FLAGS.get(name, f"--{name}"))
+    name = workflow.__name__
+    settings = settings_fields(workflow.__module__, f"{name.title().replace('_', '')}Settings")
+    fields = {each.name: each for each in settings}
+    words = [name.replace("_", "-"), str(source)]
+    for key, value in options.items():
+        flag = "" if fields[key].option.argument else fields[key].flag
         for each in value if isinstance(value, tuple) else (value,):
             words += [word for word in (flag, "" if each is True else str(each)) if word]
 

@@ -72,13 +72,6 @@ class DeriveResult(Result):
 def derive(settings: DeriveSettings, progress: Progress) -> DeriveResult:  # noqa: ARG001 - an instant
     """Derive ``dataset.nc`` and ``summary.json`` of a run again from its raw streams.
 
-    Parameters
-    ----------
-    settings : DeriveSettings
-        Or its ``run``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     ElastocalError

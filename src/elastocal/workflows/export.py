@@ -126,13 +126,6 @@ class ExportResult(Result):
 def export(settings: ExportSettings, progress: Progress) -> ExportResult:  # noqa: ARG001 - done in an instant
     """Write a model as dependency-free C99 with filters, limits and a self-test.
 
-    Parameters
-    ----------
-    settings : ExportSettings
-        Or its ``model``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     CompensationError, SchemaError

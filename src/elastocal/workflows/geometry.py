@@ -140,13 +140,6 @@ class GeometryResult(Result):
 def geometry(settings: GeometrySettings, progress: Progress) -> GeometryResult:
     """Find the geometric errors of an arm, and what it yields under its weight and payloads.
 
-    Parameters
-    ----------
-    settings : GeometrySettings
-        Or its ``positions``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     GeometryError

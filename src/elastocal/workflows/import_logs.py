@@ -102,13 +102,6 @@ class ImportLogsResult(Result):
 def import_logs(settings: ImportLogsSettings, progress: Progress) -> ImportLogsResult:
     """Merge the logs of controller, force sensor and tracker; find the readings; write a dataset.
 
-    Parameters
-    ----------
-    settings : ImportLogsSettings
-        Or its ``logs``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     LogError
@@ -222,13 +215,6 @@ def import_positions(
 
     The table is that of `geometry`. Where the logs hold forces, plateaus under load do not count.
 
-    Parameters
-    ----------
-    settings : ImportPositionsSettings
-        Or its ``logs``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     LogError
@@ -298,13 +284,6 @@ class GuessMapResult(Result):
 @workflow(GuessMapSettings)
 def guess_map(settings: GuessMapSettings, progress: Progress) -> GuessMapResult:
     """Write a first map of logs, by names and sizes of their columns, for a person to correct.
-
-    Parameters
-    ----------
-    settings : GuessMapSettings
-        Or its ``logs``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
 
     Raises
     ------

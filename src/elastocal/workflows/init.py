@@ -57,13 +57,6 @@ def init(settings: InitSettings, progress: Progress) -> InitResult:  # noqa: ARG
 
     The path is the one that ``simulate-process`` runs for seed 0.
 
-    Parameters
-    ----------
-    settings : InitSettings
-        Or its ``out``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     SchemaError

@@ -76,13 +76,6 @@ class KrcConfigResult(Result):
 def krc_config(settings: KrcConfigSettings, progress: Progress) -> KrcConfigResult:  # noqa: ARG001 - done in an instant
     """Write what a KUKA controller needs for RSI, and a sheet to be signed; or check a file of it.
 
-    Parameters
-    ----------
-    settings : KrcConfigSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     DeviceError

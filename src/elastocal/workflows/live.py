@@ -1,26 +1,24 @@
 """``live``: a programmed path corrected while it is run: wrench in, correction out, each cycle."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
-from elastocal.cell import Arming, Cell, CycleStatistics, PathLimits, load_cell
+from elastocal.cell import Arming, Cell, PathLimits, load_cell
 from elastocal.compensation import CompensatorSettings, read_settings
 from elastocal.compensation.conditioning import read_sensor_load
-from elastocal.compensation.online import LiveCounts, TaughtCourses, design
+from elastocal.compensation.online import TaughtCourses, design
 from elastocal.errors import CompensationError, DeviceError
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel, ModelSource, model_name
 from elastocal.options import Option
 from elastocal.procedure.derive import read_taught_markers, sensor_load
 from elastocal.progress import Progress
-from elastocal.records import record, validate, write_json
-from elastocal.results import Result, brief_repr
+from elastocal.records import validate, write_json
+from elastocal.results import brief_repr
 from elastocal.units import in_unit, quantity
 from elastocal.workflows._inputs import (
     NewTool,
@@ -31,12 +29,7 @@ from elastocal.workflows._inputs import (
     require_same_robot,
     seconds_of,
 )
-from elastocal.workflows._live_session import (
-    LiveEnd,
-    LiveReport,
-    LiveSession,
-    Prepared,
-)
+from elastocal.workflows._live_session import LiveReport, LiveResult, LiveSession, Prepared
 from elastocal.workflows._operator_and_devices import rig_of
 from elastocal.workflows._workflow import workflow
 
@@ -80,78 +73,6 @@ class LiveSettings(NewTool, TouchedArm):
     """Whether it is to end now; Ctrl-C ends it, too."""
 
 
-@record("elastocal.live/1")
-class LiveResult(Result):
-    """The record of a live compensation."""
-
-    cell: str
-    model: str
-    robot: str
-    started: str
-    """Date and time, UTC."""
-    seconds: float
-    """Time from the controller's first message to the end, in s of wall time."""
-    ended: str
-    """Why it ended."""
-    problem: str | None
-    """Error that ended it; None: no error."""
-    limits: PathLimits
-    filter_delay: float
-    """Delay of a slow wrench by the filters, in s."""
-    tool: str
-    """The tool that the model is for, in words."""
-    bias: tuple[float, ...] | None
-    """Bias that was taken at the beginning, in N and N·m; none: that of the tool file."""
-    scheduling: str
-    """Scheduling of the loop's thread."""
-    line: CycleStatistics
-    loop: LiveCounts
-    logged: int
-    """Cycles in the log."""
-    dropped: int
-    """Cycles that it could not take."""
-    notes: tuple[str, ...]
-    """Notes for the user."""
-
-    def facts(self) -> tuple[tuple[str, str], ...]:
-        """Return the main facts, a label and a text each."""
-        loop, limits = self.loop, self.limits
-        longest = (
-            f"{in_unit(loop.largest_correction, 'mm'):.3f} of {quantity(limits.correction, 'mm')}"
-        )
-        step = in_unit(loop.largest_step, "mm")
-        return (
-            ("ended", f"{self.ended}, after {self.seconds:.1f} s"),
-            *((("problem", self.problem),) if self.problem else ()),
-            ("line", self.line.sentence()),
-            ("later than 7/8 of a cycle", f"{self.line.late_share:.3%}"),
-            (
-                "cycles",
-                f"{loop.cycles}: {loop.corrected} corrected, {loop.held} held, {loop.faded} faded",
-            ),
-            ("largest correction", f"{longest}, {step:.3g} mm in a cycle"),
-            (
-                "saturated",
-                f"{loop.limited} cycles by the limit, {loop.rate_limited} by the rate,"
-                f" {self.line.saturated} at the arm; sensor {loop.saturated}",
-            ),
-            *self._courses(),
-            ("scheduling", self.scheduling),
-            ("log", f"{self.logged} cycles, {self.dropped} dropped"),
-            *(("note", text) for text in self.notes),
-        )
-
-    def _courses(self) -> Iterator[tuple[str, str]]:
-        loop = self.loop
-        if loop.courses or loop.offsets_refused:
-            largest = quantity(loop.largest_offset, "mm", ".3f")
-            yield (
-                "courses",
-                f"{loop.courses} with an offset of their own, at most {largest};"
-                f" {loop.offsets_refused} offsets refused",
-            )
-
-
 @workflow(LiveSettings)
 def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG001 - it reports
     """Correct the path that an arm's own program follows, by the measured wrench, cycle by cycle.
@@ -159,13 +80,6 @@ def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG
     Soft real time: answers, and late ones among them, are counted. It ends after the duration or
     when it is interrupted: the correction fades to zero, the controller is sent the end of
     corrections, and the record is written.
-
-    Parameters
-    ----------
-    settings : LiveSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Not called: `LiveSettings.report` is.
 
     Raises
     ------
@@ -194,25 +108,11 @@ def live(settings: LiveSettings, progress: Progress) -> LiveResult:  # noqa: ARG
             ready, rig, Arming.of(ready.cell), settings.report, settings.interrupted
         )
         if settings.out is None:
-            return _result(settings, ready, session.run(None), started)
+            return session.run(None, started)
         with filling(settings.out, LIVE_RECORD, settings.force) as folder:
-            end = session.run(folder / LIVE_LOG, started)
-            found = _result(settings, ready, end, started)
+            found = session.run(folder / LIVE_LOG, started)
             write_json(folder / LIVE_RECORD, found)
         return found
-
-
-def _result(settings: LiveSettings, ready: Prepared, end: LiveEnd, started: str) -> LiveResult:
-    return LiveResult(
-        cell=ready.cell.name,
-        model=model_name(settings.model),
-        robot=ready.cell.robot.name,
-        started=started,
-        limits=ready.limits,
-        filter_delay=float(np.asarray(ready.numbers.filters.delay())),
-        tool=ready.calibrated.tool_name,
-        **vars(end),
-    )
 
 
 def _prepare(settings: LiveSettings) -> Prepared:
@@ -234,6 +134,7 @@ def _prepare(settings: LiveSettings) -> Prepared:
         raise CompensationError(f"{name}: {error}") from error
     return Prepared(
         cell=cell,
+        model=name,
         rig=rig,
         driver=driver,
         limits=limits,

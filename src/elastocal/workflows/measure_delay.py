@@ -83,13 +83,6 @@ def measure_delay(settings: MeasureDelaySettings, progress: Progress) -> Measure
 
     The tool follows a chirp along each axis of base. Nothing is pressed; a blow stops the arm.
 
-    Parameters
-    ----------
-    settings : MeasureDelaySettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     DeviceError

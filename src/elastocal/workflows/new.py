@@ -60,13 +60,6 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:
     Positions of the surface are tried, unless given, until the arm reaches it. HOME is a posture
     before the surface that is free of collisions.
 
-    Parameters
-    ----------
-    settings : NewSettings
-        Or its ``out``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     ElastocalError

@@ -148,13 +148,6 @@ class PlanFigures:
 def plan(settings: PlanSettings, progress: Progress) -> PlanResult:
     """Choose calibration poses on the tooling, check them, and put them in order.
 
-    Parameters
-    ----------
-    settings : PlanSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     PlanningError
@@ -215,9 +208,8 @@ def _planned(
 ) -> planning.PlanAndPool:
     """Return a plan of its own, or one of poses that add to a run, with what they bring."""
     if settings.without is not None:
-        untracked = planning.Untracked(settings.doubled)
-        bare = without_tracker(cell)
-        return planning.make_plan(bare, other, settings.jobs, progress, untracked=untracked)
+        cell, variant = without_tracker(cell), planning.Untracked(settings.doubled)
+        return planning.make_plan(cell, other, settings.jobs, progress, variant)
     if added is None:
         return planning.make_plan(cell, other, settings.jobs, progress)
     to = planning.AddedTo(added.joint_position, added.beside)
@@ -368,13 +360,6 @@ class PlanPositionsSettings:
 @workflow(PlanPositionsSettings)
 def plan_positions(settings: PlanPositionsSettings, progress: Progress) -> PositionPlan:
     """Choose poses in free space that determine the geometry of the arm best; write plan and table.
-
-    Parameters
-    ----------
-    settings : PlanPositionsSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
 
     Raises
     ------

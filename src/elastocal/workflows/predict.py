@@ -115,13 +115,6 @@ class PredictResult(Result):
 def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # noqa: ARG001 - done in an instant
     """Predict the deflection of each row, with 95 % intervals of the fit and of a measurement.
 
-    Parameters
-    ----------
-    settings : PredictSettings
-        Or its ``model``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     SchemaError, PathError

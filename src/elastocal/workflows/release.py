@@ -144,13 +144,6 @@ class _NoForce:
 def release(settings: ReleaseSettings, progress: Progress) -> ReleaseResult:  # noqa: ARG001 - short
     """Retract a tool from a surface along its own axis.
 
-    Parameters
-    ----------
-    settings : ReleaseSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     ProcedureError

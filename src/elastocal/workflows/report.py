@@ -168,13 +168,6 @@ class ReportResult(Result):
 def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     """Write the report of a calibration: one HTML file that an inspector can sign.
 
-    Parameters
-    ----------
-    settings : ReportSettings
-        Or its ``run``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     FileAccessError

@@ -313,13 +313,6 @@ class _Job:
 def run(settings: RunSettings, progress: Progress) -> RunResult:
     """Press on the tooling at every pose of a plan, record what happens, derive the dataset.
 
-    Parameters
-    ----------
-    settings : RunSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     ProcedureError

@@ -98,13 +98,6 @@ def simulate(
 ) -> SimulateResult:
     """Serve the devices of a simulated cell on this machine until stopped.
 
-    Parameters
-    ----------
-    settings : SimulateSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     DeviceError

@@ -378,7 +378,7 @@ class SimulateProcessSettings(NewTool):
         ),
     ] = ()
     """Further shares of the force to run the same courses under; see `process.at_load`."""
-    tools: tuple[Path, ...] = ()
+    tools: Annotated[tuple[Path, ...], Option("--tool")] = ()
     """Tool files; as ``models``. None: the cell's tool, and a sensor zeroed in the air."""
     arm_states: Annotated[tuple[Path, ...], Option("--arm-state", metavar="STATE.json")] = ()
     """States of the arm by `touch`; as ``models``. None: the arm counts as when it was cold."""
@@ -409,13 +409,6 @@ def simulate_process(
     settings: SimulateProcessSettings, progress: Progress
 ) -> SimulateProcessResult:
     """Run a process on the simulated cell without and with correction: how much is left.
-
-    Parameters
-    ----------
-    settings : SimulateProcessSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
 
     Raises
     ------

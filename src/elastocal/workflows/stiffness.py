@@ -205,13 +205,6 @@ class StiffnessResult(Result):
 def stiffness(settings: StiffnessSettings, progress: Progress) -> StiffnessResult:
     """Map the stiffness over spin, rail and path; choose the stiffest posture.
 
-    Parameters
-    ----------
-    settings : StiffnessSettings
-        Or its ``model``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     PathError

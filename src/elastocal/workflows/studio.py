@@ -121,13 +121,6 @@ def studio(
 ) -> StudioResult:
     """Serve the page of a cell on this machine until stopped.
 
-    Parameters
-    ----------
-    settings : StudioSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     DeviceError

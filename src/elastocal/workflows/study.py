@@ -124,13 +124,6 @@ class StudyResult(Result):
 def study(settings: StudySettings, progress: Progress) -> StudyResult:
     """Simulate many calibrations of a cell: what reaches which accuracy.
 
-    Parameters
-    ----------
-    settings : StudySettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     CodecError

@@ -94,13 +94,6 @@ class _PostureSource:
 def tool(settings: ToolSettings, progress: Progress) -> ToolResult:  # noqa: ARG001 - done in an instant
     """Find mass, centre of mass and sensor bias from static postures, and what else they carry.
 
-    Parameters
-    ----------
-    settings : ToolSettings
-        Or its ``postures``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     CompensationError

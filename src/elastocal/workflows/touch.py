@@ -65,13 +65,6 @@ class TouchSettings:
 def touch(settings: TouchSettings, progress: Progress) -> ArmGrowth:
     """Touch the tooling warm where it was touched cold, and write how far the arm has grown.
 
-    Parameters
-    ----------
-    settings : TouchSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     ProcedureError

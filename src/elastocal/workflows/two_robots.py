@@ -79,13 +79,6 @@ class PlanPairSettings:
 def plan_pair(settings: PlanPairSettings, progress: Progress) -> PairPlan:  # noqa: ARG001 - seconds
     """Plan where two robots press on each other: postures that both reach, chosen by a search.
 
-    Parameters
-    ----------
-    settings : PlanPairSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     SchemaError
@@ -157,13 +150,6 @@ _TRACKER = 15e-6
 @workflow(SimulatePairSettings)
 def simulate_pair(settings: SimulatePairSettings, progress: Progress) -> SimulatePairResult:  # noqa: ARG001 - seconds
     """Simulate the campaign of a plan: two true arms press on each other, tip to tip.
-
-    Parameters
-    ----------
-    settings : SimulatePairSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
 
     Raises
     ------
@@ -261,13 +247,6 @@ class CalibratePairSettings:
 def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairResult:  # noqa: ARG001 - seconds
     """Calibrate two robots by presses on each other, with or without a tracker.
 
-    Parameters
-    ----------
-    settings : CalibratePairSettings
-        Or its ``cell``, ``first`` and ``second``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     SchemaError
@@ -353,13 +332,6 @@ class CompensatePairSettings:
 @workflow(CompensatePairSettings)
 def compensate_pair(settings: CompensatePairSettings, progress: Progress) -> CooperationSummary:  # noqa: ARG001 - seconds
     r"""Correct the paths of two robots that work on each other, shared by weights and limits.
-
-    Parameters
-    ----------
-    settings : CompensatePairSettings
-        Or its ``cell``, ``models``, ``first`` and ``second``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
 
     Raises
     ------

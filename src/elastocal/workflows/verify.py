@@ -96,13 +96,6 @@ def _on_one_line(text: str) -> str:
 def verify(settings: VerifySettings, progress: Progress) -> VerifyResult:  # noqa: ARG001 - seconds
     """Verify the chain of a run from its streams to its model, or a report with what it shows.
 
-    Parameters
-    ----------
-    settings : VerifySettings
-        Or its ``file``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     FileAccessError

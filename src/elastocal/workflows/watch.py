@@ -96,13 +96,6 @@ def watch(settings: WatchSettings, progress: Progress) -> WatchResult:  # noqa: 
     of an arm that is not enabled, which moves nothing; in mode ``compensation`` it gets none. A
     device that another program talks to is left to it, and one that fails is tried again.
 
-    Parameters
-    ----------
-    settings : WatchSettings
-        Or its ``cell``, and the other fields by name.
-    progress : Progress, optional
-        Called with stage, done and total.
-
     Raises
     ------
     ElastocalError

@@ -4,7 +4,6 @@ import json
 import shutil
 import signal
 import subprocess
-import time
 from collections import deque
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from elastocal.errors import CompensationError, DeviceError
 from support.cli import PATIENCE
 from support.exported import HARNESS, SANITIZED, needs_gcc
 from support.live_on_wire import LiveFiles, served
+from support.waiting import until
 
 pytestmark = [
     needs_gcc,
@@ -83,12 +83,12 @@ def test_over_loopback_it_corrects_holds_fades_and_ends_at_zero(program):
     with served(files) as (robot, box):
         process = subprocess.Popen([path, "--arm"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         try:
-            wait(lambda: robot.statistics.answered > 120)
+            until(lambda: robot.statistics.answered > 120)
             here = robot.statistics.answered
             box.box.lose = 10**6
-            wait(lambda: robot.statistics.answered > here + 90)
+            until(lambda: robot.statistics.answered > here + 90)
             box.box.lose = 0
-            wait(lambda: robot.statistics.answered > here + 130)
+            until(lambda: robot.statistics.answered > here + 130)
             process.send_signal(signal.SIGINT)
             out, err = process.communicate(timeout=PATIENCE)
         finally:
@@ -117,13 +117,13 @@ def test_what_is_refused_and_a_bad_status_are_said_when_they_happen(program):
         robot._malformed = deque([telegram])
         process = subprocess.Popen([path, "--arm"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         try:
-            wait(lambda: robot.statistics.answered > 40)
+            until(lambda: robot.statistics.answered > 40)
             robot.inject("malformed")
             box.box.status = 0x80004000
             here = robot.statistics.answered
-            wait(lambda: robot.statistics.answered > here + 60)
+            until(lambda: robot.statistics.answered > here + 60)
             box.box.status = 0
-            wait(lambda: robot.statistics.answered > here + 400)
+            until(lambda: robot.statistics.answered > here + 400)
             process.send_signal(signal.SIGINT)
             out, err = process.communicate(timeout=PATIENCE)
         finally:
@@ -212,13 +212,6 @@ def test_python_and_c_see_the_same_correction_in_effect(program, tmp_path):
         np.testing.assert_allclose(found[:, 4:], expected[:, 4:], rtol=0.0, atol=1e-12)
         kinds |= {tuple(row) for row in found[:, :3].astype(int)}
     assert {(4, 0, 0), (4, 0, 1), (4, 1, 0), (2, 0, 0), (3, -2, 0)} <= kinds
-
-
-def wait(holds, seconds=PATIENCE):
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 @pytest.mark.parametrize(

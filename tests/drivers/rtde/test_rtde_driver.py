@@ -14,6 +14,7 @@ from elastocal.drivers.rtde.driver import RtdeDriver, RtdeSettings
 from elastocal.drivers.rtde.line import UrLine, pose_of_T
 from elastocal.errors import DeviceError
 from support.simulated import example_cell
+from support.waiting import until
 
 
 class Controller:
@@ -140,14 +141,6 @@ def test_a_line_that_breaks_says_why(cell):
     with pytest.raises(DeviceError, match=r"the controller is lost: .*rtde"):
         line.sample()
     line.close()
-
-
-def until(holds, patience=5.0):
-    """Wait until something holds, in s of the wall."""
-    end = time.monotonic() + patience
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from elastocal.sim.wire import LiveCell
 from elastocal.sim.wire.rtde import PORTS, RtdeServer
 from support.cli import PATIENCE
 from support.ur_client import UrClient
+from support.waiting import until
 
 RATE = 4.0
 """Seconds of the cell a second of the wall."""
@@ -55,14 +56,6 @@ def wait(arm, *motions, patience=PATIENCE):
         assert time.monotonic() < end, state
         time.sleep(0.01)
     return state
-
-
-def until(holds, patience=PATIENCE):
-    """Wait until something holds, in s of the wall."""
-    end = time.monotonic() + patience
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def above(cell):

@@ -30,6 +30,7 @@ from elastocal.robot import Robot
 from elastocal.sim.arm import SHOP_FLOOR, Linkage, bearing_truth, measure, press_forces, press_poses
 from elastocal.sim.arm.elastic_arm import ElasticArm
 from elastocal.sim.arm.measurement import SphericalCap
+from support.by_day import some_by_day
 from support.cells import START, linear_truth, rich_truth, robot, urdf
 from support.geared import geared, heavy_robot
 from support.recertified import softened
@@ -83,7 +84,7 @@ def test_an_unchanged_robot_on_other_poses_and_loads_is_the_same(springs):
     assert any("hold what springs cannot express" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("springs", ["gears", "bearing"])
+@pytest.mark.parametrize("springs", some_by_day(["gears", "bearing"]))
 def test_a_robot_that_really_changed_is_told_from_other_poses_and_loads(springs):
     model, readings = after(springs, 3.0)
     found = recertify(before(springs), model, rows=ComparedRows.of(readings), limit=LIMIT).summary

@@ -2,7 +2,6 @@
 
 import socket
 import struct
-import time
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from elastocal.cell import WallClock
 from elastocal.sim.wire import LiveCell
 from elastocal.sim.wire.net_ft import NetFtBox, NetFtServer
 from support.simulated import QUIET, example_cell
+from support.waiting import until
 
 
 @pytest.fixture
@@ -78,14 +78,6 @@ def test_netft_reads_counts(live, server):
     wanted = scale * np.concatenate([truth.force, truth.moment])
     for each in (counts, *streamed):
         np.testing.assert_allclose(each, wanted, atol=1.0)
-
-
-def until(holds):
-    for _ in range(500):
-        if holds():
-            return
-        time.sleep(0.01)
-    raise AssertionError("it did not come to hold")
 
 
 def command(code, orders=0):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, Triple, triple
 from elastocal.blocks import Block
 from elastocal.cell import SensorLoad, weight_response
 from elastocal.compensation.conditioning.tool_choice import PostureSetAside, ToolChoice, ToolRung
@@ -16,7 +16,6 @@ from elastocal.records import read_json, record, write_json
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot, inverse_transform, parse_urdf
 
-_Triple = tuple[float, float, float]
 _Rows = tuple[tuple[float, ...], ...]
 
 
@@ -27,15 +26,15 @@ class ToolResult(Result):
     flange: str
     """Link of the robot that the sensor is bolted to."""
     mass: float
-    centre: _Triple
+    centre: Triple
     """In the sensor's frame."""
-    force_bias: _Triple
-    moment_bias: _Triple
-    R_flange_sensor: tuple[_Triple, _Triple, _Triple]
+    force_bias: Triple
+    moment_bias: Triple
+    R_flange_sensor: tuple[Triple, Triple, Triple]
     """Rotation from the sensor's to the flange frame, by rows."""
-    sensor_origin: _Triple
+    sensor_origin: Triple
     """In the flange frame; not identified, static postures do not see it."""
-    gravity: _Triple
+    gravity: Triple
     """In base."""
     half_width: dict[str, float | None]
     """Half the 95 % interval of each unknown; null where not determined."""
@@ -105,7 +104,7 @@ class ToolResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
 
-        def vector(values: _Triple, unit: str, scale: float = 1.0) -> str:
+        def vector(values: Triple, unit: str, scale: float = 1.0) -> str:
             return f"({', '.join(f'{scale * value:.4g}' for value in values)}) {unit}"
 
         return (
@@ -169,12 +168,12 @@ def tool_result(
     return ToolResult(
         flange=mount.flange,
         mass=mass,
-        centre=_triple(fit.centre),
-        force_bias=_triple(fit.force_bias),
-        moment_bias=_triple(fit.moment_bias),
+        centre=triple(fit.centre),
+        force_bias=triple(fit.force_bias),
+        moment_bias=triple(fit.moment_bias),
         R_flange_sensor=_rotation_rows(fit.R_flange_sensor),
-        sensor_origin=_triple(mount.origin),
-        gravity=_triple(mount.gravity),
+        sensor_origin=triple(mount.origin),
+        gravity=triple(mount.gravity),
         half_width={name: _or_none(width) for name, width in fit.half_width.items()},
         undetermined=fit.undetermined,
         postures=fit.count,
@@ -194,13 +193,8 @@ def tool_result(
     )
 
 
-def _triple(numbers: FloatArray) -> _Triple:
-    x, y, z = (float(number) for number in numbers)
-    return x, y, z
-
-
-def _rotation_rows(R: FloatArray) -> tuple[_Triple, _Triple, _Triple]:
-    x, y, z = (_triple(row) for row in R)
+def _rotation_rows(R: FloatArray) -> tuple[Triple, Triple, Triple]:
+    x, y, z = (triple(row) for row in R)
     return x, y, z
 
 

@@ -51,7 +51,7 @@ from elastocal.identification import CalibratedModel, near_postures
 from elastocal.planning import cell_surface
 from elastocal.planning.surface import Surface
 from elastocal.results import brief_repr
-from elastocal.robot import has_wrist, wrist_angle
+from elastocal.robot import T_from_xyzabc, has_wrist, wrist_angle
 from elastocal.robot.inverse import InverseKinematics, inverse_for, joints_along_path, posture_jumps
 
 _RAYS = 400
@@ -278,7 +278,7 @@ class _Trial:
     def joints(
         self, course: Course, spin: float, external: FloatArray, rows: FloatArray | slice
     ) -> FloatArray:
-        T = course.T_base_tcp[rows] @ _turn(spin)
+        T = course.T_base_tcp[rows] @ T_from_xyzabc(0, 0, 0, spin, 0, 0)
         positions = np.repeat(external[None], len(T), axis=0)
         return joints_along_path(
             self.solver, T, positions, self.cell.home, lambda row: f"row {row + 1}"
@@ -286,18 +286,12 @@ class _Trial:
 
     def follow(self, course: Course, spin: float, first: FloatArray) -> Course:
         """Return a course with the tool turned, on the branch of a posture at its first row."""
-        T = course.T_base_tcp @ _turn(spin)
+        T = course.T_base_tcp @ T_from_xyzabc(0, 0, 0, spin, 0, 0)
         external = np.repeat(first[None, : self.cell.robot.external_axes], len(T), axis=0)
         q = joints_along_path(
             self.solver, T, external, first, lambda row: f"{course.name}, row {row + 1}"
         )
         return replace(course, T_base_tcp=T, q=q)
-
-
-def _turn(spin: float) -> FloatArray:
-    """Return a turn about the tool's axis, shape (4, 4)."""
-    c, s = np.cos(spin), np.sin(spin)
-    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
 
 PROCESSES: Mapping[str, type[Process]] = {"afp": FibrePlacement, "machining": Roughing}

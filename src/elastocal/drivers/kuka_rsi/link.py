@@ -235,24 +235,14 @@ class LinkCounts:
         """
         median, p99 = self.took.quantile(0.5), self.took.quantile(0.99)
         between = list(self.between)
+        counts = {key: each for key, each in vars(self).items() if key not in ("took", "between")}
         return LinkStatistics(
-            received=self.received,
-            answered=self.answered,
+            **counts,
             lost=lost,
-            skipped=self.skipped,
-            out_of_order=self.out_of_order,
-            jumps=self.jumps,
-            late=self.late,
-            malformed=self.malformed,
-            foreign=self.foreign,
-            overtures=self.overtures,
-            controller_delay=self.controller_delay,
             answer_median=math.nan if median is None else median,
             answer_p99=math.nan if p99 is None else p99,
             answer_longest=self.took.longest if self.took.count else math.nan,
             jitter=float(np.std(between)) if between else float("nan"),
-            first_refused=self.first_refused,
-            last_refused=self.last_refused,
         )
 
 

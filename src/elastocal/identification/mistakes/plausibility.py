@@ -21,8 +21,11 @@ from elastocal.identification.mistakes._motion import AXES, MM, contradictions, 
 from elastocal.robot import Robot
 from elastocal.wording import phrase
 
-_WIND_UP = 2e-3
-_DRIVE = 4e7
+WIND_UP = 2e-3
+"""Angle by which a gear is assumed to wind up under the permissible torque of its joint, in rad:
+makers of gears for robots state 1 to 3 mrad."""
+DRIVE = 4e7
+"""Stiffness of a linear drive, in N/m."""
 _TORQUES = np.array([1.0, 1.0, 0.8, 0.26, 0.26, 0.16])
 """Torque that each joint of an arm of six axes may use over that of its second."""
 _RATIO, _RATIO_SPREAD = np.log(1.3), np.log(2.0)
@@ -109,7 +112,7 @@ def _sizes(
     model = ElasticModel(robot, actuated(robot))
     turning = np.array(robot.revolute)
     loads = readings.joint_position, readings.force, readings.moment
-    softness = 1.0 / np.where(turning, torque / _WIND_UP, _DRIVE)
+    softness = 1.0 / np.where(turning, torque / WIND_UP, DRIVE)
     rule = median_norm(model.observation_blocks(*loads, marker_offset) @ softness)
     used = np.abs(model.load_torques(*loads)) / torque
     share = float(np.median(used[:, turning].max(axis=1)))

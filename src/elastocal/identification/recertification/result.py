@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray, Triple, triple
 from elastocal.blocks import Block, Facts
 from elastocal.findings import group_alike
 from elastocal.identification.spring_sums import Term
@@ -92,9 +92,6 @@ class SpringChange:
         return abs(d.value) / width if width > 0.0 else float("inf")
 
 
-_Triple = tuple[float, float, float]
-
-
 @brief_repr
 @record()
 class CommonGround:
@@ -143,15 +140,15 @@ class LargestChange:
     """Its number among the rows that were given, from 0."""
     joints: tuple[float, ...]
     """In rad or m."""
-    force: _Triple
+    force: Triple
     """On the robot at the tcp in base, in N."""
-    moment: _Triple | None
+    moment: Triple | None
     """On the robot at the tcp in base, in N·m; None if not given."""
-    tcp_position: _Triple
+    tcp_position: Triple
     """In base, in m."""
-    old: _Triple
+    old: Triple
     """Deflection by the old model in base, in m."""
-    new: _Triple
+    new: Triple
     """Deflection by the new model in base, in m."""
 
 
@@ -314,11 +311,11 @@ class RowComparison:
         where = LargestChange(
             row=int(self.number[row]),
             joints=tuple(self.q[row].tolist()),
-            force=_triple(self.force[row]),
-            moment=None if self.moment is None else _triple(self.moment[row]),
-            tcp_position=_triple(self.tcp_position[row]),
-            old=_triple(self.old[row]),
-            new=_triple(self.new[row]),
+            force=triple(self.force[row]),
+            moment=None if self.moment is None else triple(self.moment[row]),
+            tcp_position=triple(self.tcp_position[row]),
+            old=triple(self.old[row]),
+            new=triple(self.new[row]),
         )
         size, low, high = (tuple(each.tolist()) for each in (self.size, self.low, self.high))
         return DeflectionChange(len(self.q), self.mean, self.largest, where, size, low, high)
@@ -350,8 +347,3 @@ class CompareResult(Result):
 
         yield from show_comparison(self.summary, self.rows or self.calibrated)
         yield Facts(tuple(("note", text) for text in group_alike(self.summary.notes)))
-
-
-def _triple(vector: FloatArray) -> _Triple:
-    x, y, z = vector.tolist()
-    return x, y, z

@@ -35,7 +35,6 @@ from elastocal.cell import (
     CONDITIONING,
     LIGHT_CONTACT,
     SENSOR_CORRECTED,
-    TRACKER,
     Cell,
     LineCounts,
     SensorLoad,
@@ -661,14 +660,14 @@ def derive_poses(
         If no reading is usable.
     """
     poses = label_doubled(poses, plan)
-    tool, tracked = sensor or sensor_load(cell), TRACKER not in plan.without
+    tool = sensor or sensor_load(cell)
     registration = NO_REGISTRATION
-    if tracked:
+    if plan.tracked:
         lever = marker_in_tcp(cell)
         seen = marker_readings(poses, cell.robot, cell.gravity_base, lever)
         registration = register(seen, lever)
     conditioned = cell.file.procedure.conditioning
-    rows = load_rows(poses, registration, tool, conditioned=conditioned, metrology=tracked)
+    rows = load_rows(poses, registration, tool, conditioned=conditioned, metrology=plan.tracked)
     had = {row.load_case for row in rows if row.status is ReadingStatus.OK}
     if not had:
         raise DatasetError(f"no usable reading among {len(rows)}: {_reasons(rows, registration)}")

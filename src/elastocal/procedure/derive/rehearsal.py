@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import LIGHT_CONTACT, TRACKER, Cell
+from elastocal.cell import LIGHT_CONTACT, Cell
 from elastocal.planning import PlanResult, PoseRecord
 from elastocal.procedure.derive._rows import LoadRow, LoadValues
 from elastocal.procedure.derive.derivation import dataset_of, measured_arm, run_provenance
@@ -65,7 +65,7 @@ def rehearse_derivation(cell: Cell, plan: PlanResult, folder: RunFolder, record:
 
 def _registration(plan: PlanResult, lever: FloatArray) -> Registration:
     """Return stations that stand at the base and saw what the plan has them see."""
-    if TRACKER in plan.without:
+    if not plan.tracked:
         return NO_REGISTRATION
     none, stations = np.zeros(3), dict[str, list[int]]()
     for pose in plan.poses:
@@ -96,14 +96,13 @@ def _rows(pose: PoseRecord, plan: PlanResult) -> Iterator[LoadRow]:
     """Yield every load of a pose, as a soft arm takes it."""
     sigma, nan = np.full(3, _SIGMA), np.full(3, np.nan)
     place = pose.id if pose.doubles is None else pose.doubles
-    unseen = TRACKER in plan.without
     for name, force_tcp in plan.contact.load_cases.items():
         if name != LIGHT_CONTACT:
             force = pose.T_base_tcp[:3, :3] @ np.array(force_tcp)
             values = LoadValues(
                 q=np.array(pose.joints),
                 controller_displacement=np.zeros(3),
-                marker_displacement=nan if unseen else _COMPLIANCE * force,
+                marker_displacement=_COMPLIANCE * force if plan.tracked else nan,
                 marker_sigma=sigma,
                 force=force,
                 moment=np.zeros(3),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.cell import LIGHT_CONTACT, TRACKER, Cell, CollisionWatch, ProcedureSettings
+from elastocal.cell import LIGHT_CONTACT, Cell, CollisionWatch, ProcedureSettings
 from elastocal.errors import ProcedureError, present
 from elastocal.findings import Finding
 from elastocal.planning import PlanResult
@@ -107,10 +107,9 @@ def run_settings(cell: Cell, plan: PlanResult, *, touches: bool = False) -> RunS
     if T_sensor_tcp is None:
         raise ProcedureError(f"{cell.path}: sensor is missing: a run measures the force")
     unseen = [pose.id for pose in plan.poses if pose.seen_by is None]
-    tracked = TRACKER not in plan.without
-    if touches and not tracked:
+    if touches and not plan.tracked:
         raise ProcedureError(f"{cell.path}: a tracker measures touches, and the plan has none")
-    if unseen and tracked:
+    if unseen and plan.tracked:
         raise ProcedureError(
             f"{cell.path}: pose {unseen[0]} is seen by no tracker: a run measures the marker"
             " (without a tracker: `elastocal plan --without tracker`)"
@@ -130,7 +129,7 @@ def run_settings(cell: Cell, plan: PlanResult, *, touches: bool = False) -> RunS
         near_contact=plan.contact.near_contact,
         approach_distance=plan.contact.approach_distance,
         loads=_touching(cell) if touches else loads,
-        tracked=tracked,
+        tracked=plan.tracked,
     )
 
 

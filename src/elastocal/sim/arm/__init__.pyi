@@ -32,7 +32,6 @@ from .springs import (
     Linear as Linear,
     SpringChain as SpringChain,
     TruthSpring as TruthSpring,
-    as_triple as as_triple,
     axial_spring as axial_spring,
     build_spring_chain as build_spring_chain,
     link_hinges as link_hinges,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, triple
 from elastocal.errors import RobotError, SpringError
 from elastocal.sim.arm.gears import StiffeningGear
 from elastocal.sim.arm.linkage import Linkage
@@ -21,7 +21,6 @@ from elastocal.sim.arm.springs import (
     Linear,
     SpringChain,
     TruthSpring,
-    as_triple,
     axial_spring,
     build_spring_chain,
     joint_index,
@@ -102,7 +101,7 @@ class ElasticArm:
 
         def joint_of(spring: TruthSpring) -> int | None:
             joint = linkage.joint_names.index(spring.joint)
-            own = as_triple(linkage.axis[joint]) == tuple(spring.axis) and not any(spring.at)
+            own = triple(linkage.axis[joint]) == tuple(spring.axis) and not any(spring.at)
             return joint if own and spring.revolute == linkage.revolute[joint] else None
 
         return tuple(map(joint_of, self.springs))

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray, triple
 from elastocal.errors import SpringError, nearest
 from elastocal.results import brief_repr
 from elastocal.sim.arm.linkage import Linkage, Screws
@@ -145,7 +145,7 @@ def _require_known(linkage: Linkage, springs: Sequence[TruthSpring]) -> None:
 
 def axial_spring(linkage: Linkage, joint: int, stiffness: float) -> TruthSpring:
     """Return the spring of a gear or drive: about the joint's axis, along it if prismatic."""
-    name, axis = linkage.joint_names[joint], as_triple(linkage.axis[joint])
+    name, axis = linkage.joint_names[joint], triple(linkage.axis[joint])
     return TruthSpring(name, axis, Linear(stiffness), linkage.revolute[joint])
 
 
@@ -178,9 +178,9 @@ def tilt_springs(
             c * first + s * np.cross(axis, first),
             c * second + s * np.cross(axis, second),
         )
-    at = as_triple(offset * axis)
+    at = triple(offset * axis)
     return [
-        TruthSpring(name, as_triple(direction), Linear(float(k)), at=at)
+        TruthSpring(name, triple(direction), Linear(float(k)), at=at)
         for direction, k in zip((first, second), stiffness, strict=True)
     ]
 
@@ -200,9 +200,9 @@ def link_hinges(
     length = np.linalg.norm(link)
     if not length > 1e-6:
         raise SpringError(f"the link behind joint {joint!r} has no length: it cannot bend")
-    at = as_triple(fraction * link)
+    at = triple(fraction * link)
     return [
-        TruthSpring(joint, as_triple(direction), Linear(stiffness), distal=True, at=at)
+        TruthSpring(joint, triple(direction), Linear(stiffness), distal=True, at=at)
         for direction in _transverse_axes(link / length)
     ]
 
@@ -223,9 +223,3 @@ def _transverse_axes(axis: FloatArray) -> list[FloatArray]:
     first /= np.linalg.norm(first)
     second = second - axis * (axis @ second) - first * (first @ second)
     return [first, second / np.linalg.norm(second)]
-
-
-def as_triple(vector: FloatArray) -> tuple[float, float, float]:
-    """Return a vector of three as plain numbers."""
-    x, y, z = (float(value) for value in vector)
-    return x, y, z

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray, triple
 from elastocal.cell import Cell
 from elastocal.errors import DeviceError
 from elastocal.robot import inverse_transform
@@ -37,7 +37,6 @@ from elastocal.sim.arm import (
     RobotSprings,
     SpringChain,
     TruthSpring,
-    as_triple,
     axial_spring,
     build_spring_chain,
     link_hinges,
@@ -323,11 +322,9 @@ def _floor(linkage: Linkage, external: int, tilt: float) -> list[TruthSpring]:
     T_base_joint, screws = linkage.T_base_joint[external], linkage.screws
     axis, point = screws.axis[external], screws.point[external]
     foot = point - axis * (axis @ point)
-    at = as_triple(T_base_joint[:3, :3].T @ (foot - point))
+    at = triple(T_base_joint[:3, :3].T @ (foot - point))
     name = linkage.joint_names[external]
-    return [
-        TruthSpring(name, as_triple(T_base_joint[k, :3]), Linear(tilt), at=at) for k in range(3)
-    ]
+    return [TruthSpring(name, triple(T_base_joint[k, :3]), Linear(tilt), at=at) for k in range(3)]
 
 
 def _bending(linkage: Linkage, joint: int, stiffness: float) -> list[TruthSpring]:
@@ -342,10 +339,10 @@ def _end_effector(cell: Cell, linkage: Linkage) -> list[TruthSpring]:
     """Return three turns and three shifts at the sensor, last of all springs."""
     entry, scale = truth_of(cell).end_effector, truth_of(cell).truth.end_effector
     T = inverse_transform(linkage.T_base_joint[-1]) @ linkage.T_base_tip @ _sensor_frame(cell)
-    at, name = as_triple(T[:3, 3]), linkage.joint_names[-1]
+    at, name = triple(T[:3, 3]), linkage.joint_names[-1]
     kinds = ((True, scale * entry.turn), (False, scale * entry.shift))
     return [
-        TruthSpring(name, as_triple(T[:3, k]), Linear(stiffness), turns, distal=True, at=at)
+        TruthSpring(name, triple(T[:3, k]), Linear(stiffness), turns, distal=True, at=at)
         for turns, stiffness in kinds
         for k in range(3)
     ]

@@ -564,11 +564,6 @@ class ProcessCell:
         seen = statics.knots(np.zeros(len(columns[0])), *columns).seen
         return seen.reshape(*state.force.shape[:-1], seen.shape[-1])
 
-    def free_gears(self, q: FloatArray) -> FloatArray:
-        """Return how far links are from their motors in the air, (..., joint); see `free_shift`."""
-        state = self._statics.free(q, np.zeros(3), None)
-        return self._statics.robot.gear_angles(state.theta)
-
     def read_links(self, q: FloatArray, gears: FloatArray) -> FloatArray | None:
         """Return what the secondary encoders of the arm read, (..., arm joint); None: none.
 
