@@ -336,7 +336,8 @@ def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] | None =
             _translate(figure, say)
         for many in figure.findobj(_has_many_parts):
             many.set_rasterized(True)
-            _let_ground_through(many)
+            if isinstance(many, Collection):
+                _let_ground_through(many)
         figure.savefig(buffer, format="svg", dpi=_IMAGE_DPI, metadata=_metadata(".svg"))
     svg = buffer.getvalue().decode("utf-8")
     light, dark = {}, {}
@@ -400,7 +401,7 @@ def _let_ground_through(faces: Collection) -> None:
         return
     opacity = ((1.0 - grey) / (1.0 - _SHADE)).clip(0.0, 1.0)
     shades = np.minimum(grey, _SHADE).repeat(3, axis=1)
-    faces.set_facecolor(np.hstack([shades, opacity]))
+    faces.set_facecolor(list(map(tuple, np.hstack([shades, opacity]))))
     # Edges and smoothed borders would be seen twice through one another.
     faces.set_edgecolor("none")
     faces.set_antialiased(False)
