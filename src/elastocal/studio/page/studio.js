@@ -132,6 +132,13 @@ function showJoints(joints) {
   });
 }
 
+function along({ parts, interval }) { // with intervals a line an axis
+  if (!interval) return element("td", parts);
+  const cell = element("td"), ends = interval.split(", ");
+  cell.append(...parts.split(", ").map((part, k) => element("div", `${"xyz"[k]} ${part} (${ends[k]})`)));
+  return cell;
+}
+
 function showCases(posture) {
   const cases = posture.cases;
   if (!cases.some((each) => each.name === state.chosen)) state.chosen = (cases.find((each) => each.name === "normal") || cases[0]).name;
@@ -141,7 +148,7 @@ function showCases(posture) {
     row.setAttribute("aria-selected", String(each.name === state.chosen));
     button.addEventListener("click", () => { state.chosen = each.name; showCases(state.posture); [...$("cases").querySelectorAll("button")].find((b) => b.textContent === each.name).focus(); });
     name.append(button);
-    row.append(name, element("td", each.size), element("td", each.interval ? `${each.parts} (95 %: ${each.interval})` : each.parts));
+    row.append(name, element("td", each.size), along(each));
     if (each.caveat) row.lastElementChild.append(element("span", `; ${each.caveat}`, { className: "bad" }));
     return row;
   }));
