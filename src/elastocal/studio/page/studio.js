@@ -76,6 +76,7 @@ export function fill(list, rows) { // a definition list
 }
 
 export const view = $("view").shown = new Viewer($("view"), { eager: true });
+new ResizeObserver(() => { view.top = $("cameras").offsetTop + $("cameras").offsetHeight + 6; view.draw(); }).observe($("cameras"));
 
 // Only the newest wish counts: while one is asked, later ones replace each other.
 let waiting = null, asking = false;
