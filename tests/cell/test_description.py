@@ -207,7 +207,11 @@ def test_process_poses_are_read(folder, example):
         ("robot.model", "KR 120 R2700 extra XA", "did you mean 'KR 120 R2700 extra HA'"),
         ("robot.model", None, "exactly one of model, urdf is needed; there is none"),
         ("robot.urdf", "arm.urdf", "there is model and urdf"),
-        ("robot.flange", "flansch", "no link 'flansch'"),
+        (
+            "robot.flange",
+            "flansch",
+            "no link 'flansch': write the link that carries the tool",
+        ),
         ("limits.payload", "50 kg", "payload 50 kg is below the tool's mass, 60 kg"),
         ("limits.torque.factor", 1.5, "limits.torque.factor: Input should be less than or equal"),
         ("limits.torque.provenance", None, "say where the torque values are from"),

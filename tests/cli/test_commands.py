@@ -151,12 +151,16 @@ def test_predict_says_which_rows_lie_outside_of_what_was_calibrated(folder):
     rows.write_text("\n".join([lines[0], ",".join(far), ",".join(heavy)]) + "\n")
     result = elastocal("predict", folder / "model.json", rows, "--out", out)
     assert result.err.count("0% of 2 rows given lie within 30 deg in each joint but the last") == 1
-    assert "first: row 2; no interval covers the others" in " ".join(result.err.split())
+    assert "first: row 2 of the file; no interval covers the others" in " ".join(result.err.split())
     assert columns(out, "outside_pose", "outside_load")[:, 1].tolist()[1] == 1.0
     assert columns(out, "outside_pose")[0].tolist() == [1.0]
     figures = elastocal("predict", folder / "model.json", rows, "--out", out, "--json")
     coverage = json.loads(figures.out)["coverage"]
-    assert (coverage["rows"], coverage["covered"], coverage["first"]) == (2, 0.0, "row 2")
+    assert (coverage["rows"], coverage["covered"], coverage["first"]) == (
+        2,
+        0.0,
+        "row 2 of the file",
+    )
 
 
 def test_rows_of_a_visit_share_what_friction_remembers_and_every_row_is_of_one(tmp_path):

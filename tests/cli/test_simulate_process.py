@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import elastocal as ec
 from elastocal.compensation import process
 from elastocal.compensation.process import read_process
 from elastocal.files import sha256
@@ -58,6 +59,16 @@ def test_it_writes_the_table_and_every_point_of_it(folder):
     assert source["model_sha256"] == sha256(model)
     assert figures["settings"]["cycle"] == 0.004
     assert not figures["budget"]
+
+
+def test_in_python_a_model_needs_no_file(folder, tmp_path):
+    model = made_up(example_cell("afp").robot)
+    result = ec.simulate_process(
+        example_cell("afp").path, models=[model], kind="afp", courses=1, out=tmp_path / "all"
+    )
+    (source,) = result.runs
+    written = (folder / "model.json").read_text(encoding="utf-8")
+    assert (source.model, source.model_sha256) == ("the model", sha256(written))
 
 
 def test_the_offset_of_a_course_is_read_and_its_time_said(folder):

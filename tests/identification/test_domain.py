@@ -114,3 +114,14 @@ def test_the_domain_is_that_of_the_readings_in_the_fit():
     np.testing.assert_allclose(
         domain().joint_position[domain().reading_pose], measured.joint_position, atol=5e-3
     )
+
+
+def test_what_a_sensor_reads_of_a_side_that_nothing_pushed_is_no_load():
+    noise = np.random.default_rng(5).normal(0.0, 0.02, (31, 3))
+    press = np.array([0.0, 0.0, -60.0])
+    pose = np.arange(31)
+    loads = CalibratedLoads.of_forces(ARM, domain().joint_position, press + noise, pose)
+    as_loud = loads.levels(press + 2.0 * noise)
+    assert np.all(as_loud.min(axis=1) <= 1.001)
+    aside = loads.levels(np.array([[20.0, 0.0, -50.0]]))
+    assert np.all(np.isinf(aside))

@@ -285,7 +285,7 @@ def watch_it(page, cell, told):
 
 
 def run_it(page, cell, told):
-    page.wait("document.getElementById('run-plan').options.length > 0")
+    page.wait("document.getElementById('run-plan').value !== ''")
     page.get("document.getElementById('run-form').elements.rate.value = '20'")
     page.click("#run-form button")
     page.wait("/Force/.test(document.getElementById('live-figures').textContent)")

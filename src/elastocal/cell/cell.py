@@ -46,7 +46,7 @@ from elastocal.cell.procedure import (
 from elastocal.cell.production import ProcessFile, ProductionPath, read_production
 from elastocal.cell.rig import DeviceChoices
 from elastocal.dataset import require_joint_names
-from elastocal.errors import ElastocalError, FileAccessError, SchemaError
+from elastocal.errors import ElastocalError, FileAccessError, RobotError, SchemaError
 from elastocal.files import read_text, sha256
 from elastocal.records import StrictModel, from_data, parse_yaml
 from elastocal.robot import (
@@ -59,9 +59,11 @@ from elastocal.robot import (
     parse_urdf,
     read_urdf,
     refusals_naming,
+    tool_link,
     with_tool,
     with_tool_mass,
 )
+from elastocal.wording import listed
 
 SCHEMA = "elastocal.cell/1"
 _Section = TypeVar("_Section")
@@ -425,8 +427,13 @@ def mounted_robot(path: Path, entry: RobotEntry, tcp: Pose) -> Robot:
     with contextlib.nullcontext() if place is None else refusals_naming(place):
         if place is not None:
             meshes = find_meshes(urdf, place.parent)
-        links = {link.get("name") for link in parse_urdf(urdf).findall("link")}
+        links = [link.get("name", "") for link in parse_urdf(urdf).findall("link")]
         tip = f"cell_{_TCP}" if _TCP in links else _TCP
+        if entry.flange not in links:
+            raise RobotError(
+                f"the robot has no link {entry.flange!r}: write the link that carries the tool,"
+                f" such as flange: {tool_link(urdf)} (links: {listed(links)})"
+            )
         urdf = with_tool(urdf, entry.flange, tip, tcp.T)
         if entry.rail is not None:
             rail = entry.rail

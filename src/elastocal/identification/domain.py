@@ -8,8 +8,9 @@ directions, one by one:
     hypot(fx / Fx, fy / Fy) <= 1,   0 <= -fz / Fz <= 1,
 
 with ``Fx`` the largest calibrated force to the side that ``fx`` points to, and so on; the larger of
-the two is the *level* of the force. A side to which nothing was pushed has no level. A moment,
-where rows have one, is within them when its torque about each joint is within the largest that a
+the two is the *level* of the force. A side to which nothing was pushed has no level; a hundredth
+of the largest calibrated force is nothing, since no sensor reads zero. A moment, where rows have
+one, is within them when its torque about each joint is within the largest that a
 calibrated load made there.
 """
 
@@ -29,7 +30,9 @@ LEVEL_REACH = 1.05
 """Largest level of a covered force: forces are never met exactly."""
 _SIDES = ("+x", "-x", "+y", "-y", "press")
 _LEAST = 1e-3
-"""Force in N below which nothing was pushed to a side."""
+"""Force in N below which there is none."""
+_LEAST_SHARE = 0.01
+"""Part of the largest calibrated force below which nothing is pushed to a side."""
 _LEAST_TORQUE = 0.05
 """Part of the largest calibrated torque that every joint is taken to have met: no force presses
 about the axis on which the tool sits."""
@@ -115,6 +118,8 @@ class CalibratedLoads:
     """Unit vectors along the forces on the robot, tcp frame, shape (load, 3)."""
     torque: FloatArray
     """Largest torque of a load about each joint, in size, shape (joint,), in N·m or N."""
+    least: float
+    """Force up to which nothing is pushed to a side, in N."""
 
     @classmethod
     def of_domain(cls, robot: Robot, domain: CalibrationDomain) -> "CalibratedLoads":
@@ -148,20 +153,21 @@ class CalibratedLoads:
     def _of(
         cls, q: FloatArray, force_tcp: FloatArray, pose: IndexArray, torque: FloatArray
     ) -> "CalibratedLoads":
+        size = np.linalg.norm(force_tcp, axis=1, keepdims=True)
+        least = max(_LEAST, _LEAST_SHARE * float(size.max(initial=0.0)))
         pushed = _sides(force_tcp)
         largest = np.zeros((len(q), len(_SIDES)))
         np.maximum.at(largest, pose, pushed)
         # Lateral loads may point between the axes of the tool: each is within what was pressed.
-        own = _aside(_parts(pushed, largest[pose]))
+        own = _aside(_parts(pushed, largest[pose], least))
         beyond = np.ones(len(q))
         np.maximum.at(beyond, pose, np.where(np.isfinite(own), own, 1.0))
         largest[:, :4] *= beyond[:, None]
-        size = np.linalg.norm(force_tcp, axis=1, keepdims=True)
         units = (force_tcp / np.maximum(size, _LEAST))[size[:, 0] > _LEAST]
         # Readings of one load case at all poses have nearly the same direction: one of them is
         # enough.
         _, first = np.unique(np.round(units, 1), axis=0, return_index=True)
-        return cls(q, largest, units[first], torque)
+        return cls(q, largest, units[first], torque, least)
 
     def levels(self, force_tcp: FloatArray) -> FloatArray:
         """Return the level of forces at each posture, shape (row, pose).
@@ -171,7 +177,7 @@ class CalibratedLoads:
         force_tcp : ndarray, shape (row, 3)
             Force on the robot in the tcp frame, in N.
         """
-        part = _parts(_sides(force_tcp)[:, None], self.largest)
+        part = _parts(_sides(force_tcp)[:, None], self.largest, self.least)
         pull = np.maximum(force_tcp[:, 2:3], 0.0) / np.maximum(self.largest[:, 4], _LEAST)
         pulls = np.where(pull > LEVEL_REACH - 1.0, np.inf, 0.0)
         return np.asarray(np.maximum(np.maximum(_aside(part), part[..., 4]), pulls))
@@ -193,11 +199,11 @@ class CalibratedLoads:
         return np.asarray((torque / known).max(axis=1))
 
 
-def _parts(pushed: FloatArray, largest: FloatArray) -> FloatArray:
+def _parts(pushed: FloatArray, largest: FloatArray, least: float) -> FloatArray:
     """Return forces to each side in parts of the largest there; infinite where nothing was."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        part = pushed / np.where(largest > _LEAST, largest, 0.0)
-    return np.where(pushed > _LEAST, part, 0.0)
+        part = pushed / np.where(largest > least, largest, 0.0)
+    return np.where(pushed > least, part, 0.0)
 
 
 def _aside(part: FloatArray) -> FloatArray:

@@ -234,7 +234,7 @@ def _known(value: float, low: float, high: float, spring: SpringSummary) -> Cell
             return ""
         half = (high - low) / 2.0 / abs(value)
         text = (
-            phrase("±{share}", share=f"{half:.0%}")
+            phrase("±{share}", share=f"{half:.0%}" if half >= 0.01 else f"{half:.1%}")
             if half <= _MOST_SAID
             else phrase("more than ±{share}", share=f"{_MOST_SAID:.0%}")
         )

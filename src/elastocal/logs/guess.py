@@ -452,7 +452,7 @@ def write_guess(logs: Sequence[GuessedLog], robot: str) -> str:
 
 
 ROBOT_TO_WRITE = """\
-robot: {model: "?"}                       # of the catalogue (elastocal robots), or urdf: FILE
+robot: {model: "?"}                       # of `elastocal robots`, or urdf: FILE, flange: LINK
 tcp: {xyz: ["0 mm", "0 mm", "0 mm"]}      # in the flange, z out of the tool
 # tool: {mass: "0 kg", centre_of_mass: ["0 mm", "0 mm", "0 mm"]}   # in the flange
 sensor: {xyz: ["0 mm", "0 mm", "0 mm"]}   # measuring frame in the flange

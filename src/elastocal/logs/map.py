@@ -52,7 +52,7 @@ from elastocal.units import factor
 
 SCHEMA = "elastocal.log-map/1"
 UNKNOWN = "?"
-"""Unit that a person must still write: `elastocal import --guess` could not determine it."""
+"""What a person must still write: `elastocal import --guess` could not determine it."""
 
 _ColumnName = Annotated[str, BeforeValidator(lambda name: str(name) if name is not True else name)]
 """A name of the header, or the number of a column from 1."""

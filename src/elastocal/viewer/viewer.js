@@ -43,12 +43,14 @@ const triples = (given) => { const flat = numbers(given); return Array.from({ le
 
 class Viewer {
   // What a page wants to know: a posture's tag was chosen, the handle was dragged, a line of sight was
-  // pressed along; `handle` is a place that can be dragged. `eager`: the wheel zooms unasked.
+  // pressed along; `handle` is a place that can be dragged. `eager`: the wheel zooms unasked. `top`:
+  // height in pixels of what the page lays over the view.
   onPick = () => {};
   onDrag = () => {};
   onPress = () => {};
   handle = null;
   layers = [];
+  top = 0;
   #places = NONE;
   #view = { centre: [0, 0, 0], turn: 0, rise: 0.5, distance: 1 };
   #written = [];
@@ -266,6 +268,12 @@ class Viewer {
     this.#write(pen, camera, parts, colour);
   }
 
+  // Where a name can be read whose place the border, or what a page lays over the top, would cut.
+  #legible([x, y], half, size, { width, height }) {
+    if (x < -half || x > width + half || y < -size || y > height + size) return [x, y];
+    return [Math.min(Math.max(x, half), width - half), Math.min(Math.max(y, this.top + size), height - size)];
+  }
+
   // What nothing hides. Tags of poses on the far side of the surface are pale.
   #write(pen, camera, parts, colour) {
     const size = camera.width < 600 ? 9 : 12;
@@ -274,9 +282,10 @@ class Viewer {
       part, text: part.texts[i], hint: part.hints[i] ?? "", at: this.project(at, camera), pose: part.poses || part.normals ? Number(part.texts[i]) : null,
       far: part.normals && dot(part.normals[i], add(camera.eye, at, -1)) < 0,
     })));
-    for (const { far, part, text, at: [x, y], pose } of this.#written.sort((a, b) => b.at[2] - a.at[2])) {
+    for (const { far, part, text, at, pose } of this.#written.sort((a, b) => b.at[2] - a.at[2])) {
       pen.globalAlpha = far ? 0.25 : 1;
       pen.font = `${pose === null ? 600 : 500} ${size}px system-ui, sans-serif`;
+      const [x, y] = pose === null ? this.#legible(at, pen.measureText(text).width / 2 + 7, size, camera) : at;
       pen.strokeStyle = colour(part.colour);
       pen.fillStyle = colour("--card");
       pen.beginPath();

@@ -126,7 +126,10 @@ class CompensateResult(Result, CorrectionFigures):
             ("tool", self.tool),
             ("rows", f"{self.rows}; all figures are predicted by the model, nothing is measured"),
             *(
-                (label, f"{_shown(each.mean)} mean, {_shown(each.max)} max at {each.at}")
+                (
+                    label,
+                    f"{_shown(each.mean)} mean, {_shown(each.max)} max at {each.at} of the file",
+                )
                 for label, each in lengths.items()
             ),
             ("posture jumps", f"{self.posture_jumps}{first}"),
@@ -162,7 +165,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     >>> _ = Path("path.csv").write_text(f"{heads}\n0,0,0,0,-60,0,0,0,500\n")
     >>> found = ec.compensate(model, path="path.csv", out="corrected.csv")
     >>> dict(found.facts())["correction"]
-    '1.62 mm mean, 1.62 mm max at row 2'
+    '1.62 mm mean, 1.62 mm max at row 2 of the file'
     """
     path, forces = settings.path, settings.forces
     is_program = path.suffix.lower() in PROGRAM_READERS

@@ -160,7 +160,7 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
         arm.angles.add(loads.joints)
     coverage = None
     if covered is not None:
-        coverage = covered.figures(name=loads.label)
+        coverage = covered.figures(name=lambda row: f"{loads.label(row)} of the file")
     summary = PredictSummary(
         rows=len(norms),
         deflection=size,

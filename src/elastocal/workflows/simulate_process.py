@@ -29,11 +29,19 @@ from elastocal.compensation.online import Compensator
 from elastocal.compensation.process import Course, CourseRun, ProcessRun, SimulateProcessResult
 from elastocal.dataset import joint_dimensions
 from elastocal.errors import CompensationError, present
-from elastocal.files import filling, read_text, sha256
-from elastocal.identification import CalibratedModel, PredictionDoubt, ProductionCoverage
+from elastocal.files import filling, json_text, read_text, sha256
+from elastocal.identification import (
+    CalibratedModel,
+    CalibrateResult,
+    ModelSource,
+    PredictionDoubt,
+    ProductionCoverage,
+    model_name,
+)
 from elastocal.options import Option
 from elastocal.parallel import map_in_processes, process_count
 from elastocal.progress import Progress
+from elastocal.records import sealed_data
 from elastocal.results import brief_repr
 from elastocal.robot import inverse_transform
 from elastocal.sim import truth_of
@@ -337,7 +345,7 @@ __all__ = [
     "simulate_process",
 ]
 PROGRAMMED, STIFFEST = "programmed", "stiffest"
-_File = TypeVar("_File", bound=Path | None)
+_Given = TypeVar("_Given")
 _PACKAGES = ("elastocal", "numpy", "scipy")
 _LARGEST_LOAD = 5.0
 _SUDDEN = 0.1
@@ -351,8 +359,10 @@ class SimulateProcessSettings(NewTool):
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file."""
-    models: Annotated[tuple[Path, ...], Option("--model")]
-    """Model files of this cell; one, or one for each seed."""
+    models: Annotated[
+        tuple[str | PathLike[str] | CalibrateResult | CalibratedModel, ...], Option("--model")
+    ]
+    """Models of this cell, or their files; one, or one for each seed."""
     out: Annotated[Path, Option(metavar="DIR")]
     """Folder to write into."""
     kind: Annotated[str | None, Option("--process", choices="process")] = None
@@ -427,26 +437,28 @@ def simulate_process(
         raise CompensationError(
             f"--posture {settings.posture!r} is not one of {PROGRAMMED}, {STIFFEST}"
         )
-    runs = _runs(settings)
+    models = _one_for_each("--model", settings.models, settings.seeds)
+    runs = _runs(settings, models)
     cell = load_cell(Path(settings.cell))
     with filling(settings.out, process.TABLE, settings.force) as folder:
-        found, programmed = _simulate(settings, cell, runs, progress)
+        found, programmed = _simulate(settings, cell, runs, models, progress)
         units = joint_dimensions(cell.robot.joint_names, cell.robot.revolute)
         process.write_programmed_path(folder / process.PROGRAMMED_PATH, programmed, units)
         process.write_process(folder, found)
     return found.table
 
 
-def _runs(settings: SimulateProcessSettings) -> tuple[ProcessRun, ...]:
-    """Return the files that each seed is run with."""
+def _runs(
+    settings: SimulateProcessSettings, models: Sequence[ModelSource]
+) -> tuple[ProcessRun, ...]:
+    """Return the model and the files that each seed is run with."""
     seeds = settings.seeds
     if len(set(seeds)) < len(seeds):
         raise CompensationError(f"--seed {', '.join(map(str, seeds))}: each seed counts once")
-    models = _one_for_each("--model", settings.models, seeds)
     tools = _one_for_each("--tool", settings.tools or (None,), seeds)
     states = _one_for_each("--arm-state", settings.arm_states or (None,), seeds)
     hashes: dict[Path | None, str] = {
-        path: sha256(read_text(path)) for path in (*models, *tools, *states) if path is not None
+        path: sha256(read_text(path)) for path in (*tools, *states) if path is not None
     }
 
     def named(path: Path | None) -> str | None:
@@ -454,14 +466,22 @@ def _runs(settings: SimulateProcessSettings) -> tuple[ProcessRun, ...]:
 
     return tuple(
         ProcessRun(
-            *(seed, str(model), hashes[model], named(tool), hashes.get(tool)),
+            *(seed, model_name(model), _model_sha256(model), named(tool), hashes.get(tool)),
             *(named(state), hashes.get(state)),
         )
         for seed, model, tool, state in zip(seeds, models, tools, states, strict=True)
     )
 
 
-def _one_for_each(option: str, files: Sequence[_File], seeds: Sequence[int]) -> list[_File]:
+def _model_sha256(model: ModelSource) -> str:
+    """Return the hash of a model's file, or of what the file would hold."""
+    if isinstance(model, str | PathLike):
+        return sha256(read_text(Path(model)))
+    whole = model if isinstance(model, CalibrateResult) else CalibrateResult.of(model)
+    return sha256(json_text(sealed_data(whole)))
+
+
+def _one_for_each(option: str, files: Sequence[_Given], seeds: Sequence[int]) -> list[_Given]:
     if len(files) not in (1, len(seeds)):
         raise CompensationError(
             f"{option} is given {len(files)} times for {len(seeds)} seeds: give it once, or once"
@@ -471,11 +491,18 @@ def _one_for_each(option: str, files: Sequence[_File], seeds: Sequence[int]) -> 
 
 
 def _simulate(
-    settings: SimulateProcessSettings, cell: Cell, runs: tuple[ProcessRun, ...], progress: Progress
+    settings: SimulateProcessSettings,
+    cell: Cell,
+    runs: tuple[ProcessRun, ...],
+    models: Sequence[ModelSource],
+    progress: Progress,
 ) -> tuple[process.SimulatedProcess, tuple[Course, ...]]:
     """Run the process for every seed; return also the path with the forces of the first."""
     compensator = _compensator_settings(settings)
-    trials = tuple(_trial(cell, compensator, run, settings) for run in runs)
+    trials = tuple(
+        _trial(cell, compensator, run, model, settings)
+        for run, model in zip(runs, models, strict=True)
+    )
     own = None if settings.path is None else _own_courses(settings, cell, compensator)
     loads = {load: _Lines() for load in (1.0, *_further_loads(settings))}
     found = _SeedRuns(settings, cell, runs, trials, loads)
@@ -739,9 +766,13 @@ def with_encoders(settings: CompensatorSettings, cell: Cell) -> CompensatorSetti
 
 
 def _trial(
-    cell: Cell, compensator: CompensatorSettings, run: ProcessRun, settings: SimulateProcessSettings
+    cell: Cell,
+    compensator: CompensatorSettings,
+    run: ProcessRun,
+    model: ModelSource,
+    settings: SimulateProcessSettings,
 ) -> ProcessTrial:
-    calibrated = settings.read_model(Path(run.model))
+    calibrated = settings.read_model(model)
     robot = calibrated.model.robot
     require_same_robot(robot, cell.robot, (run.model, cell.name))
     load = read_sensor_load(Path(run.tool) if run.tool else None, robot)

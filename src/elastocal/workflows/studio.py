@@ -16,6 +16,12 @@ from typing import Annotated
 
 from elastocal.cell import LOOPBACK, SIMULATED, Arming, Cell, DeviceReading, load_cell
 from elastocal.errors import DeviceError
+from elastocal.identification import (
+    CalibratedModel,
+    CalibrateResult,
+    ModelSource,
+    model_name,
+)
 from elastocal.options import Option
 from elastocal.planning import read_plan
 from elastocal.procedure import Progress as RunProgress, RunEnd
@@ -58,8 +64,8 @@ class StudioSettings:
 
     cell: Annotated[str | PathLike[str], Option(argument=True)]
     """Cell file, ``.yaml``; edits are written back to it."""
-    model: Path | None = None
-    """Model file of `calibrate`, of the same robot; none: default springs."""
+    model: str | PathLike[str] | CalibrateResult | CalibratedModel | None = None
+    """Model of the same robot by `calibrate`, or its file; none: default springs."""
     host: Annotated[str, Option(default="127.0.0.1")] = LOOPBACK
     """Address to answer on; another than this machine's own lets its network in."""
     port: Annotated[int, Option(least=0, most=65535)] = 0
@@ -157,7 +163,7 @@ def _notes(settings: StudioSettings) -> Iterator[str]:
 class _Commands:
     """The commands that the studio has done, as `elastocal.studio.StudioWork` wants them."""
 
-    model: Path | None
+    model: ModelSource | None
 
     def check(self, cell: Path) -> object:
         return describe_file(cell)
@@ -166,8 +172,9 @@ class _Commands:
         if self.model is None:
             return default_springs(cell)
         calibrated = NewTool().read_model(self.model)
-        require_same_robot(calibrated.model.robot, cell.robot, (str(self.model), cell.name))
-        return calibrated_springs(calibrated, self.model.name)
+        name = model_name(self.model)
+        require_same_robot(calibrated.model.robot, cell.robot, (name, cell.name))
+        return calibrated_springs(calibrated, Path(name).name)
 
     def plan(self, cell: Path, message: PlanMessage) -> Callable[[Outbox], Data]:
         return partial(_plan, cell, message)

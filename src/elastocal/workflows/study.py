@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.blocks import Block
+from elastocal.blocks import Block, Picture
 from elastocal.cell import CONDITIONING, DEFAULT_POSES, LIGHT_CONTACT, Cell, fingerprint, load_cell
 from elastocal.codec import ALL_LOADS, study as studies, training_cases
 from elastocal.codec.study import (
@@ -38,6 +38,7 @@ from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import to_data
 from elastocal.report import drawn, study_figure, write_study_figure
+from elastocal.report.document import write_page
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.sim.workcell import (
@@ -52,6 +53,7 @@ from elastocal.workflows._workflow import workflow
 DEFAULT_VARIATION = "poses=6,10,15,20,31"
 """Variation of a study that names none."""
 _SIMULATION = "elastocal.workflows.study"
+_PAGE = "study.html"
 
 
 @brief_repr
@@ -147,8 +149,25 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
         )
     summary = studies.study_summary(design, results, settings.target)
     names = studies.write_study(settings.out, design, results, summary)
-    names.append(write_study_figure(settings.out, design, results, summary))
-    return StudyResult(summary, design, results, tuple(names))
+    names += [write_study_figure(settings.out, design, results, summary), _PAGE]
+    result = StudyResult(summary, design, results, tuple(names))
+    _write_page(settings.out / _PAGE, result)
+    return result
+
+
+def _write_page(path: Path, result: StudyResult) -> None:
+    """Write the page of a study: its figures for each condition, and their box plots."""
+    summary = result.summary
+    chart = Picture(
+        partial(study_figure, result.design, result.samples, summary),
+        summary.sentence,
+        "One value for each arm: its mean and its largest error at the unseen poses.",
+    )
+    sections = (
+        ("result", "What the arms reach", result.show()),
+        ("chart", "How much they differ", (chart,)),
+    )
+    write_page(path, f"Study: {summary.cell}", sections, maker="elastocal study")
 
 
 def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]:

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from matplotlib.collections import PolyCollection
 
 from elastocal.errors import FileAccessError, SchemaError
 from elastocal.planning.surface.mesh import TriangleMesh
 from elastocal.planning.surface.surface import build_surface
 from elastocal.report import write_plan_figure
-from elastocal.report.plots import (
-    plan_figure,
-)
+from elastocal.report.plots import plan_figure, themed_svg
+from elastocal.report.plots.style import new_figure
 
 
 def _texts(axes):
@@ -115,3 +115,16 @@ def test_a_pool_of_another_run_is_refused(tmp_path, on_block, plan):
     with pytest.raises(SchemaError, match="belongs to another plan"):
         write_plan_figure(tmp_path / "f.svg", surface, plan, candidates)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_surface_of_a_page_lets_its_ground_through_and_is_the_same_on_white():
+    greys = np.linspace(0.86, 0.96, 500)
+    corners = np.arange(500)[:, None, None] + [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+    figure = new_figure(2.0, 2.0)
+    faces = PolyCollection(list(corners), facecolors=np.repeat(greys[:, None], 3, axis=1))
+    figure.add_panel(0.0, 0.0, 2.0, 2.0).add_collection(faces)
+    themed_svg(lambda: figure)
+    shown = np.array(faces.get_facecolor())
+    assert np.all(shown[:, 3] < 0.5)
+    on_white = shown[:, :3] * shown[:, 3:] + 1.0 - shown[:, 3:]
+    np.testing.assert_allclose(on_white, np.repeat(greys[:, None], 3, axis=1), atol=1e-12)

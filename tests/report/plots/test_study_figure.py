@@ -2,9 +2,8 @@ import numpy as np
 
 from elastocal.codec.study import Condition, Sample, study_summary
 from elastocal.report import write_study_figure
-from elastocal.report.plots import (
-    study_figure,
-)
+from elastocal.report.plots import study_figure, themed_svg
+from elastocal.report.plots.style import BLUE, tint
 from support.studies import settings, simulate
 
 RESULTS = [simulate(Sample(3, number)) for number in range(6)]
@@ -59,3 +58,11 @@ def test_the_same_study_draws_the_same_bytes(tmp_path):
         drawn = write_study_figure(tmp_path / name, made, RESULTS, record)
         found.append((tmp_path / name / drawn).read_bytes())
     assert found[0] == found[1]
+
+
+def test_boxes_of_the_page_are_dark_where_the_page_is():
+    svg = themed_svg(lambda: drawn(settings(10, 5))).decode()
+    light, dark = tint(BLUE), tint(BLUE, ground=0x14)
+    assert svg.count(light) == 1  # where its name is defined
+    assert f"--fill0:{dark}" in svg.split("dark)")[1]
+    assert "fill: var(--fill0)" in svg

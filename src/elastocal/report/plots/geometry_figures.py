@@ -121,7 +121,7 @@ def _draw_map(
         return
     order = np.argsort(error)
     axes.scatter(
-        x[order], y[order], c=error[order], cmap=style.SEQUENTIAL, norm=scale, s=size, lw=0.2,
+        x[order], y[order], c=error[order], cmap=style.SEQUENTIAL, norm=scale, s=size, lw=0.5,
         edgecolors=style.MUTED,
     )  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")

@@ -62,6 +62,8 @@ _SCREEN_DPI = 100
 _IMAGE_DPI = 100
 _MOST_PARTS = 400
 """Parts of one artist beyond which SVG would be larger than an image."""
+_SHADE = 0.7
+"""Grey of faces that let the ground of a page through."""
 ON_BRIGHT, ON_DARK = "#1b1b1a", "#fffffe"
 """Ink on the colours of a map, which are the same in every scheme."""
 _THEMED = {
@@ -74,11 +76,6 @@ _DARK = {
     "refused": "#a5a59f",
 }  # fmt: skip
 """Colours of the style sheet of pages."""
-_SCHEMES = (
-    f":root{{{';'.join(f'--{name}:{colour}' for colour, name in _THEMED.items())}}}"
-    "@media screen and (prefers-color-scheme:dark){"
-    f":root{{{';'.join(f'--{name}:{colour}' for name, colour in _DARK.items())}}}}}"
-)
 _UNDATED: dict[str, dict[str, str | None]] = {
     ".svg": {"Date": None, "Creator": "elastocal"},
     ".pdf": {"CreationDate": None, "Creator": "elastocal"},
@@ -310,10 +307,20 @@ def figure_bytes(
     return buffer.getvalue()
 
 
+def _schemes() -> dict[str, tuple[str, str]]:
+    """Return the colours that follow the scheme of a page, each with its names and dark value."""
+    ground = int(_DARK["ground"][1:3], 16)
+    fills = {
+        tint(colour): (f"fill{k}", tint(colour, ground=ground)) for k, colour in enumerate(COLOURS)
+    }
+    return {colour: (name, _DARK[name]) for colour, name in _THEMED.items()} | fills
+
+
 def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] | None = None) -> bytes:
     """Return a figure as SVG whose greys follow the colour scheme of the page that shows it.
 
-    Artists with very many parts are embedded as an image with a transparent background.
+    Artists with very many parts are embedded as an image with a transparent background; where all
+    their faces are grey, these are as translucent as makes them look the same on white paper.
 
     Parameters
     ----------
@@ -329,12 +336,22 @@ def themed_svg(draw: Callable[[], Figure], say: Callable[[object], str] | None =
             _translate(figure, say)
         for many in figure.findobj(_has_many_parts):
             many.set_rasterized(True)
+            if isinstance(many, Collection):
+                _let_ground_through(many)
         figure.savefig(buffer, format="svg", dpi=_IMAGE_DPI, metadata=_metadata(".svg"))
     svg = buffer.getvalue().decode("utf-8")
-    for colour, name in _THEMED.items():
+    light, dark = {}, {}
+    for colour, (name, at_night) in _schemes().items():
         svg = svg.replace(colour, f"var(--{name})")
+        light[name], dark[name] = colour, at_night
     opened = svg.index(">", svg.index("<svg")) + 1
-    return f"{svg[:opened]}<style>{_SCHEMES}</style>{svg[opened:]}".encode()
+    sheet = f"{_rule(light)}@media screen and (prefers-color-scheme:dark){{{_rule(dark)}}}"
+    return f"{svg[:opened]}<style>{sheet}</style>{svg[opened:]}".encode()
+
+
+def _rule(colours: dict[str, str]) -> str:
+    """Return the rule of a style sheet that gives names to colours."""
+    return f":root{{{';'.join(f'--{name}:{colour}' for name, colour in colours.items())}}}"
 
 
 class _Said(Formatter):
@@ -374,6 +391,20 @@ def _has_many_parts(artist: Artist) -> bool:
     if isinstance(artist, PathCollection):
         return len(np.asarray(artist.get_offsets())) > _MOST_PARTS
     return isinstance(artist, Collection) and len(artist.get_paths()) > _MOST_PARTS
+
+
+def _let_ground_through(faces: Collection) -> None:
+    """Replace opaque greys by one grey whose opacity gives the same colours on white."""
+    colours = np.array(faces.get_facecolor(), dtype=float)
+    grey = colours[:, :1]
+    if not len(colours) or np.any(colours[:, :3] != grey) or np.any(colours[:, 3] != 1.0):
+        return
+    opacity = ((1.0 - grey) / (1.0 - _SHADE)).clip(0.0, 1.0)
+    shades = np.minimum(grey, _SHADE).repeat(3, axis=1)
+    faces.set_facecolor(list(map(tuple, np.hstack([shades, opacity]))))
+    # Edges and smoothed borders would be seen twice through one another.
+    faces.set_edgecolor("none")
+    faces.set_antialiased(False)
 
 
 def _metadata(suffix: str, title: str = "", description: str = "") -> dict[str, str | None]:

@@ -80,15 +80,16 @@ function showTechniques({ rows, candidates, own }) {
 export async function showFolders() {
   const found = await attempt(() => ask("folders"));
   if (!found) return;
-  const options = (select, names) => {
+  const options = (select, names, open) => {
     const kept = select.value;
-    select.replaceChildren(...names.map(([name, text]) => element("option", text, { value: name })));
+    select.replaceChildren(...(names.length ? names : [["", "none yet"]]).map(([name, text]) => element("option", text, { value: name })));
+    if (open) open.disabled = !names.length;
     if (names.some(([name]) => name === kept)) select.value = kept;
   };
   const plans = found.plans.map((name) => [name, name]);
-  options($("plans"), plans);
+  options($("plans"), plans, $("open-plan"));
   options($("run-plan"), plans);
-  options($("runs"), found.runs.map(({ folder, state: text }) => [folder, `${folder}: ${text}`]));
+  options($("runs"), found.runs.map(({ folder, state: text }) => [folder, `${folder}: ${text}`]), $("open-run"));
   const { real, armed } = state.cell;
   $("rig").textContent = !real ? "All devices of this cell are simulated, or simulators on this machine: nothing real moves."
     : armed ? "The cell names real devices, and the studio is armed: the arm WILL MOVE." : "The cell names real devices. Nothing moves: the studio was started without --arm.";

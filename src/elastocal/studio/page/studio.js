@@ -76,6 +76,7 @@ export function fill(list, rows) { // a definition list
 }
 
 export const view = $("view").shown = new Viewer($("view"), { eager: true });
+new ResizeObserver(() => { view.top = $("cameras").offsetTop + $("cameras").offsetHeight + 6; view.draw(); }).observe($("cameras"));
 
 // Only the newest wish counts: while one is asked, later ones replace each other.
 let waiting = null, asking = false;
@@ -132,6 +133,13 @@ function showJoints(joints) {
   });
 }
 
+function along({ parts, interval }) { // with intervals a line an axis
+  if (!interval) return element("td", parts);
+  const cell = element("td"), ends = interval.split(", ");
+  cell.append(...parts.split(", ").map((part, k) => element("div", `${"xyz"[k]} ${part} (${ends[k]})`)));
+  return cell;
+}
+
 function showCases(posture) {
   const cases = posture.cases;
   if (!cases.some((each) => each.name === state.chosen)) state.chosen = (cases.find((each) => each.name === "normal") || cases[0]).name;
@@ -141,7 +149,7 @@ function showCases(posture) {
     row.setAttribute("aria-selected", String(each.name === state.chosen));
     button.addEventListener("click", () => { state.chosen = each.name; showCases(state.posture); [...$("cases").querySelectorAll("button")].find((b) => b.textContent === each.name).focus(); });
     name.append(button);
-    row.append(name, element("td", each.size), element("td", each.interval ? `${each.parts} (95 %: ${each.interval})` : each.parts));
+    row.append(name, element("td", each.size), along(each));
     if (each.caveat) row.lastElementChild.append(element("span", `; ${each.caveat}`, { className: "bad" }));
     return row;
   }));
