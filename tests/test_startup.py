@@ -69,6 +69,14 @@ def test_calibrate_and_predict_import_only_what_they_use(folder):
     assert len(predict) <= 1050
 
 
+def test_no_command_imports_the_statistics_and_filters_of_scipy_before_it_needs_them():
+    code = (
+        "import elastocal.workflows as w, elastocal.cli._operator, elastocal.cell, elastocal.sim\n"
+        "[getattr(each, name) for each in (w, elastocal.cell, elastocal.sim) for name in dir(each)]"
+    )
+    assert not imported(code) & {"scipy.stats", "scipy.signal"}
+
+
 def test_help_imports_nothing_numerical():
     found = of_command("--help")
     assert not found & (UNUSED | NUMERICAL)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.findings import Finding, Kind, as_count, as_number
@@ -101,7 +101,7 @@ def _cluster(problem: GeometryProblem, rows: IndexArray) -> Iterator[Finding]:
     best, chance = None, _CHANCE / len(coordinates)
     for name, values in coordinates.items():
         low, high, inside, there = _narrowest(values, rows)
-        probability = float(binom.sf(inside - 1, len(rows), there / len(values)))
+        probability = float(bdtrc(inside - 1, len(rows), there / len(values)))
         if inside >= _DENSE * there and probability < chance:
             best, chance = (name, low, high, inside, there), probability
     if best is not None:

@@ -200,19 +200,44 @@ class PoseGrams:
         ndarray, shape (choice, spring)
         """
         total = self._sums(multiplicity) + self.prior.T @ self.prior
-        n = len(self.scale)
         if prior_error is not None:
+            n = len(self.scale)
             total[:, :n, n] += prior_error @ self.prior[: prior_error.shape[1], :n]
-        # G = V diag(s^2) V^T gives what `minimise` takes of A = U diag(s) V^T: eigenvalues rise,
-        # singular values fall, and U^T b = diag(1/s) V^T (A^T b). Round-off may leave an eigenvalue
-        # just below zero.
-        eigenvalues, vectors = np.linalg.eigh(total[:, :n, :n])
-        s = np.sqrt(np.maximum(eigenvalues[:, ::-1], 0.0))
-        Vt = np.swapaxes(vectors[:, :, ::-1], 1, 2)
-        projected = (Vt @ total[:, :n, n:])[..., 0]
-        y = np.divide(projected, s, out=np.zeros_like(s), where=s > 0.0)
-        lower, upper = self.lower * self.scale, self.upper * self.scale
-        return minimise(s, Vt, y, lower, upper) / self.scale
+        return _fit_grams(total, self.scale, self.lower, self.upper)
+
+
+def fit_each(problems: Sequence[Problem]) -> FloatArray:
+    """Return the compliances of problems that differ in their rows only, by a Gram matrix each.
+
+    All at once: of a few dozen springs a fit alone is mostly overhead. Correct to eight digits.
+    Shape (problem, spring).
+    """
+    first, n = problems[0], problems[0].columns
+    rows = np.stack([each.weighted().reshape(-1, n + 1) for each in problems])
+    total = np.swapaxes(rows, 1, 2) @ rows
+    gain, scale = column_scaling(np.sqrt(np.einsum("fnn->fn", total[:, :n, :n])), first.size)
+    one = np.ones((len(problems), 1))
+    factor = np.concatenate([gain, one], axis=1)
+    total *= factor[:, :, None] * factor[:, None, :]
+    prior = first.prior_rows / np.concatenate([scale, one], axis=1)[:, None]
+    total += np.swapaxes(prior, 1, 2) @ prior
+    return _fit_grams(total, scale, first.lower, first.upper)
+
+
+def _fit_grams(
+    total: FloatArray, scale: FloatArray, lower: FloatArray, upper: FloatArray
+) -> FloatArray:
+    """Return the bounded compliances of Gram matrices of ``[O d]``, columns divided by a scale."""
+    # G = V diag(s^2) V^T gives what `minimise` takes of A = U diag(s) V^T: eigenvalues rise,
+    # singular values fall, and U^T b = diag(1/s) V^T (A^T b). Round-off may leave an eigenvalue
+    # just below zero.
+    n = total.shape[2] - 1
+    eigenvalues, vectors = np.linalg.eigh(total[:, :n, :n])
+    s = np.sqrt(np.maximum(eigenvalues[:, ::-1], 0.0))
+    Vt = np.swapaxes(vectors[:, :, ::-1], 1, 2)
+    projected = (Vt @ total[:, :n, n:])[..., 0]
+    y = np.divide(projected, s, out=np.zeros_like(s), where=s > 0.0)
+    return minimise(s, Vt, y, lower * scale, upper * scale) / scale
 
 
 @brief_repr

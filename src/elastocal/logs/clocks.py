@@ -19,8 +19,6 @@ from datetime import UTC, datetime
 from itertools import groupby
 
 import numpy as np
-from scipy.signal import correlate, find_peaks
-from scipy.stats import theilslopes
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, present
@@ -201,6 +199,9 @@ def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> Cloc
     if len(at) < _LEAST_STRETCHES:
         sigma = math.hypot(step, unseen)
         return ClockFit(log.clock, reference.clock, coarse, sigma, 0.0, None, correlation, first)
+    # Takes half a second to import, and few logs have clocks of their own.
+    from scipy.stats import theilslopes
+
     drift, level, *_ = theilslopes(offset, at)
     scatter = max(1.4826 * float(np.median(np.abs(offset - level - drift * at))), 0.1 * step)
     drift_sigma = scatter / math.sqrt(((at - at.mean()) ** 2).sum())
@@ -270,6 +271,8 @@ def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArr
 
     Each correlation is over the samples that are known in both.
     """
+    from scipy.signal import correlate, find_peaks
+
     lags = np.arange(-(len(ours.value) - 1), len(theirs.value))
     seen, there = ours.known.astype(float), theirs.known.astype(float)
     product = correlate(theirs.value, ours.value, method="fft")
@@ -316,6 +319,8 @@ def weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float
 
 def _stretch_offsets(ours: _Activity, theirs: _Activity, lag: int) -> tuple[FloatArray, FloatArray]:
     """Return time since the start and offset beside the common one of each stretch, in s."""
+    from scipy.signal import correlate
+
     step, found = ours.step, []
     length, reach = round(_STRETCH / step), round(_SEARCHED / step)
     for start in range(0, len(ours.value) - length + 1, length // 2):

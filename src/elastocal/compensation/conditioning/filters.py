@@ -24,7 +24,6 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator, SerializeAsAny
-from scipy import signal
 
 from elastocal import plugins
 from elastocal.arrays import FloatArray
@@ -231,6 +230,9 @@ def low_pass(cutoff: float, order: int, sample: float) -> tuple[Section, ...]:
     _check_frequency("low-pass cut-off", cutoff, sample)
     if order not in range(1, _LARGEST_ORDER + 1):
         raise CompensationError(f"low-pass order {order}: allowed are 1 to {_LARGEST_ORDER}")
+    # Takes half a second to import, and few wrenches are filtered so.
+    from scipy import signal
+
     return _sections(signal.butter(order, cutoff, fs=1.0 / sample, output="sos"))
 
 
@@ -256,6 +258,8 @@ def notch(frequency: float, width: float, sample: float) -> tuple[Section, ...]:
         raise CompensationError(
             f"notch width {width:g} Hz must be above 0 and below twice its {frequency:g} Hz"
         )
+    from scipy import signal
+
     b, a = signal.iirnotch(frequency, frequency / width, fs=1.0 / sample)
     return _sections(np.concatenate([b, a])[None])
 

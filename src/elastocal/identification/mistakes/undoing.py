@@ -13,10 +13,10 @@ fit and iterated. Thresholds are measured on correct campaigns
 (docs/decisions/0105-mistakes-undone.md).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, permutations, product
+from itertools import combinations, islice, permutations, product
 from operator import itemgetter
 
 import numpy as np
@@ -36,7 +36,7 @@ from elastocal.identification.mistakes._motion import AXES, median_norm
 from elastocal.identification.mistakes.plausibility import sensor_frames
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
-from elastocal.identification.solve import PoseGrams
+from elastocal.identification.solve import fit_each
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import leave_poses_out
 from elastocal.robot import Robot
@@ -152,8 +152,7 @@ class Rows:
 
 def fitted(problem: Problem) -> FloatArray:
     """Return the bounded compliances of a problem by one Gram matrix, which is quick."""
-    whole = replace(problem, block=np.zeros_like(problem.block))
-    return np.asarray(PoseGrams.of(whole).refit(np.ones((1, 1)))[0])
+    return np.asarray(fit_each([problem])[0])
 
 
 def beside(problem: Problem, columns: FloatArray) -> Problem:
@@ -330,16 +329,18 @@ def _turned_for_a_part(rows: Rows, turns: Iterator[OtherReading]) -> Iterator[Ot
             estimated=True,
         )
 
-    def left(reading: OtherReading) -> float:
-        return _residual(rows.read(reading))
+    def left(parts: Iterable[tuple[OtherReading, int, bool]]) -> Iterator[float]:
+        return _residuals(rows.read(partly(*each)) for each in parts)
 
     starts = range(_SHORTEST, len(order) - _SHORTEST + 1)
     if not starts:
         return
     coarse = sorted({starts[round(part * (len(starts) - 1))] for part in _PARTS})
-    each = product(turns, coarse, (True, False))
-    turn, _, late = min(each, key=lambda tried: left(partly(*tried)))
-    yield min((partly(turn, start, late) for start in starts), key=left)
+    each = list(product(turns, coarse, (True, False)))
+    _, (turn, _, late) = min(zip(left(each), each, strict=True), key=itemgetter(0))
+    finer = left((turn, start, late) for start in starts)
+    _, start = min(zip(finer, starts, strict=True))
+    yield partly(turn, start, late)
 
 
 def _other_force_rows(rows: Rows) -> Iterator[OtherReading]:
@@ -650,6 +651,8 @@ def _any_marker_frame(rows: Rows) -> Iterator[OtherReading]:
 
 _TRIMMED = 0.9
 """Part of the readings, those with the smallest residuals, that rank readings of the data."""
+_AT_ONCE = 16
+"""Problems that are fitted at once: each alone is mostly overhead, and all take memory."""
 _FEWEST = 6
 """Fewest poses; with fewer, another interpretation may fit better by chance."""
 _FEWEST_ESTIMATED = 8
@@ -705,14 +708,19 @@ def find_undone(
     except IdentificationError:
         return ()
     stated = rows.problem.take(rows.kept)
-    before = _residual(stated)
+    before = next(_residuals([stated]))
     if not before > 1e-6 * float(np.linalg.norm(stated.d, axis=1).mean()):
         return ()
     compliance = fitted(stated)
-    ranked = [
-        (_residual(rows.read(each)) * max(each.louder, 1.0) / before, number, each)
+    others = [
+        (number, each)
         for number, each in enumerate(other_readings(rows, compliance))
         if poses >= _FEWEST_ESTIMATED or not each.estimated
+    ]
+    left = _residuals(rows.read(each) for _, each in others)
+    ranked = [
+        (residual * max(each.louder, 1.0) / before, number, each)
+        for residual, (number, each) in zip(left, others, strict=True)
     ]
     possible = sorted(each for each in ranked if each[0] < each[2].least)[:_TRIED]
     tried = (_plainest(possible[number:]) for number in range(len(possible)))
@@ -829,7 +837,10 @@ def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
     return _Found(left * _ALIKE, parted)
 
 
-def _residual(problem: Problem) -> float:
-    """Return the trimmed mean residual of a fit, in m."""
-    size = np.sort(np.linalg.norm(problem.residuals(fitted(problem)), axis=1))
-    return float(size[: max(1, int(_TRIMMED * len(size)))].mean())
+def _residuals(problems: Iterable[Problem]) -> Iterator[float]:
+    """Yield the trimmed mean residual of the fit of each problem of a shape, in m."""
+    remaining = iter(problems)
+    while part := list(islice(remaining, _AT_ONCE)):
+        for problem, compliance in zip(part, fit_each(part), strict=True):
+            size = np.sort(np.linalg.norm(problem.residuals(compliance), axis=1))
+            yield float(size[: max(1, int(_TRIMMED * len(size)))].mean())

@@ -162,8 +162,8 @@ def _projected(observation: FloatArray, projection: FloatArray) -> FloatArray:
     gram = np.empty((len(observation), projection.shape[1], projection.shape[1]))
     for begin in range(0, len(observation), _CHUNK):
         part = slice(begin, begin + _CHUNK)
-        rows = observation[part]
-        gram[part] = projection.T @ (np.swapaxes(rows, 1, 2) @ rows) @ projection
+        seen = observation[part] @ projection
+        gram[part] = np.swapaxes(seen, 1, 2) @ seen
     return gram
 
 

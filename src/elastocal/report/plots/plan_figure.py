@@ -11,13 +11,14 @@ is drawn twice, from two opposite sides.
 """
 
 from dataclasses import dataclass
-from itertools import combinations
-from pathlib import Path
+from itertools import combinations, pairwise
+from pathlib import Path as FilePath
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 from scipy.spatial import cKDTree
 
 from elastocal.arrays import FloatArray, IndexArray
@@ -257,6 +258,10 @@ _DISC, _CROWD = 13.0, 200.0
 """Diameter of a numbered disc in points; with many it shrinks to the second over their root."""
 _MANY = 20_000
 """Number of candidates above which their dots are stored as an image."""
+_COLOURS = 256
+"""Number of colours of the dots, as many as the colour map has."""
+_SPECK = 1e-6
+"""Length of the line that is drawn as a dot, in m."""
 _FINE = 5_000
 """Number of faces or border lines above which the surface is stored as an image."""
 
@@ -279,7 +284,9 @@ class _Choice:
     """Metric of the covering radius: ``euclidean`` or ``geodesic``."""
 
 
-def write_plan_figure(path: Path, surface: Surface, plan: PlanResult, pool: PoolData) -> Path:
+def write_plan_figure(
+    path: FilePath, surface: Surface, plan: PlanResult, pool: PoolData
+) -> FilePath:
     """Write the figure of a plan, atomically; return its path.
 
     Parameters
@@ -395,13 +402,17 @@ def _draw_frame(figure: style.Page, plan: PlanResult, flat: FlatMap, dots: PathC
 def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
     face, corner = np.divmod(surface.border_half_edges, 3)
     for sheet in flat.sheets:
-        triangles = surface.mesh.vertices[surface.mesh.faces[sheet.faces]]
+        triangles = sheet.flat(surface.mesh.vertices[surface.mesh.faces[sheet.faces]])
         lit = surface.face_normals[sheet.faces] @ sheet.towards_viewer
-        grey = 0.86 + 0.1 * lit.clip(0.0, 1.0)
-        colours = np.repeat(grey[:, None], 3, axis=1)
+        grey = np.round(0.86 + 0.1 * lit.clip(0.0, 1.0), 3)
+        # Neighbours in the order of drawing that have one grey are one shape.
+        runs = _runs(grey)
+        colours = np.repeat(grey[[run.start for run in runs], None], 3, axis=1)
+        corners = [Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
         axes.add_collection(
-            PolyCollection(
-                list(sheet.flat(triangles)), facecolors=colours, edgecolors=colours, lw=0.3,
+            PathCollection(
+                [_shapes(triangles[run][:, [0, 1, 2, 0]], corners) for run in runs],
+                facecolors=colours, edgecolors=colours, lw=0.3,
                 rasterized=len(triangles) > _FINE,
             )
         )  # fmt: skip
@@ -409,22 +420,55 @@ def _draw_surface(axes: Axes, surface: Surface, flat: FlatMap) -> None:
         ends = [surface.mesh.faces[face[shown], (corner[shown] + step) % 3] for step in (0, 1)]
         border = sheet.flat(surface.mesh.vertices[np.stack(ends, axis=1)])
         axes.add_collection(
-            LineCollection(list(border), colors=style.MUTED, lw=0.8, rasterized=len(border) > _FINE)
-        )
+            PathCollection(
+                [_shapes(border, [Path.LINETO])], facecolors="none", edgecolors=style.MUTED, lw=0.8,
+                rasterized=len(border) > _FINE,
+            )
+        )  # fmt: skip
 
 
 def _draw_candidates(
     axes: Axes, place: FloatArray, distance: FloatArray, farthest: float
 ) -> PathCollection:
-    """Draw a dot a candidate, brightest at the distance ``farthest`` in m."""
+    """Draw a dot a candidate, brightest at the distance ``farthest`` in m.
+
+    Dots of one colour are one path of lines that have hardly a length, and round ends: as many
+    artists as there are colours are drawn, not as many as there are candidates.
+    """
     # The farthest come last, so that no gap hides under near ones.
     order = np.argsort(distance)
-    size = float(np.clip(12_000.0 / len(place), 0.5, 12.0))
-    x, y = place[order].T
-    return axes.scatter(
-        x, y, s=size, c=in_unit(distance[order], "mm"), cmap=style.SEQUENTIAL, vmin=0.0,
-        vmax=in_unit(farthest, "mm"), linewidths=0, rasterized=len(order) > _MANY,
+    largest = in_unit(farthest, "mm")
+    value = in_unit(distance[order], "mm")
+    runs = _runs(np.minimum(np.floor(_COLOURS * value / (largest or 1.0)), _COLOURS - 1))
+    ends = np.stack([place[order], place[order] + (_SPECK, 0.0)], axis=1)
+    dots = PathCollection(
+        [_shapes(ends[run], [Path.LINETO]) for run in runs],
+        facecolors="none", linewidths=np.sqrt(np.clip(12_000.0 / len(place), 0.5, 12.0)),
+        capstyle="round", snap=False, cmap=style.SEQUENTIAL, rasterized=len(order) > _MANY,
     )  # fmt: skip
+    dots.set_array([value[run].mean() for run in runs])
+    dots.set_clim(0.0, largest)
+    axes.add_collection(dots)
+    return dots
+
+
+def _runs(values: FloatArray) -> list[slice]:
+    """Return the runs of equal neighbours, in order."""
+    ends = [0, *(np.flatnonzero(np.diff(values)) + 1), len(values)]
+    return [slice(*each) for each in pairwise(ends)]
+
+
+def _shapes(points: FloatArray, steps: list[np.uint8]) -> Path:
+    """Return one path of many shapes.
+
+    Parameters
+    ----------
+    points : ndarray, shape (shape, point, 2)
+        Points of each.
+    steps : list of uint8
+        How each point but the first is reached, shape (point - 1,).
+    """
+    return Path(points.reshape(-1, 2), np.tile([Path.MOVETO, *steps], len(points)))
 
 
 def _draw_chosen(axes: Axes, anchor: FloatArray, choice: _Choice) -> None:

@@ -39,14 +39,18 @@ class Screws:
     """Whether each turns (else it slides), shape (element,)."""
 
     @cached_property
-    def wedge(self) -> FloatArray:
-        """Matrices of the cross product with the axes, shape (element, 3, 3)."""
-        return np.cross(self.axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
+    def twist(self) -> FloatArray:
+        """Velocity of a point, ``S [p, 1]``, per speed of each element, shape (element, 4, 4)."""
+        S = np.zeros((len(self.axis), 4, 4))
+        wedge = np.cross(self.axis[:, None, :], np.eye(3)).transpose(0, 2, 1)
+        S[self.revolute, :3, :3] = wedge[self.revolute]
+        S[:, :3, 3] = np.where(self.revolute[:, None], np.cross(self.point, self.axis), self.axis)
+        return S
 
     @cached_property
-    def wedge_squared(self) -> FloatArray:
-        """Their squares, shape (element, 3, 3)."""
-        return self.wedge @ self.wedge
+    def twist_squared(self) -> FloatArray:
+        """Their squares, shape (element, 4, 4); zero for one that slides."""
+        return self.twist @ self.twist
 
 
 def motions(screws: Screws, positions: FloatArray) -> FloatArray:
@@ -96,16 +100,15 @@ def moved_axes(screws: Screws, before: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def _exponentials(screws: Screws, positions: FloatArray) -> FloatArray:
-    """Return exp(S_e x_e) by Rodrigues' formula, shape (element, batch, 4, 4)."""
-    angle = np.where(screws.revolute, positions, 0.0).T[..., None, None]
-    slide = np.where(screws.revolute, 0.0, positions).T[..., None]
-    rotation = np.sin(angle) * screws.wedge[:, None]
-    rotation += (1.0 - np.cos(angle)) * screws.wedge_squared[:, None]
-    steps = np.zeros((*angle.shape[:2], 4, 4))
-    steps[..., :3, :3] = rotation + np.eye(3)
-    steps[..., :3, 3] = -(rotation @ screws.point[:, None, :, None])[..., 0]
-    steps[..., :3, 3] += slide * screws.axis[:, None]
-    steps[..., 3, 3] = 1.0
+    """Return exp(S_e x_e) by Rodrigues' formula, shape (element, batch, 4, 4).
+
+    ``exp(S x) = 1 + sin(x) S + (1 - cos x) S^2`` of one that turns, ``1 + x S`` of one that slides.
+    """
+    first = np.where(screws.revolute, np.sin(positions), positions).T[..., None, None]
+    second = (1.0 - np.cos(positions)).T[..., None, None]
+    steps: FloatArray = first * screws.twist[:, None]
+    steps += second * screws.twist_squared[:, None]
+    steps += np.eye(4)
     return steps
 
 

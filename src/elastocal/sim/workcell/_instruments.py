@@ -17,9 +17,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
@@ -448,10 +448,13 @@ def _draw(slow: float, rate: float) -> Draw:
     """Return the generator of a block of noise of unit size, shape (`BLOCK`, 3)."""
     keep = math.exp(-1.0 / (rate * _AIR_TIME))
 
+    def follow(before: float, drive: float) -> float:
+        return keep * before + drive
+
     def draw(rng: np.random.Generator) -> FloatArray:
         fast, drive = rng.standard_normal((2, BLOCK, 3))
         drive[1:] *= math.sqrt(1.0 - keep**2)
-        air = lfilter([1.0], [1.0, -keep], drive, axis=0)
+        air = np.transpose([list(accumulate(each, follow)) for each in drive.T.tolist()])
         noise: FloatArray = math.sqrt(1.0 - slow**2) * fast + slow * air
         return noise
 
