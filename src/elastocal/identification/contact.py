@@ -151,7 +151,8 @@ class TipPlace:
         return phrase(
             "The tip lies beside the stated tcp by {x} along x, {y} along y and {z} along z"
             " (standard error by noise); the model has its tcp there. Of such shifts the springs"
-            " do not imitate {seen}: along z, what they lack moves it too.",
+            " do not imitate {seen}. What they lack of the arm moves it too: this is no"
+            " measurement of the tool.",
             x=x,
             y=y,
             z=z,
