@@ -14,7 +14,7 @@ import elastocal as ec
 from elastocal.dataset import Dataset
 from elastocal.errors import IdentificationError
 from elastocal.identification import Contact
-from elastocal.robot import Robot
+from elastocal.robot import Robot, fixed_joint_of, with_joint_origins
 from independent.arms import drawing, poses
 from independent.contact_truth import STEEL, URETHANE, Plate, contact_campaign
 from independent.mujoco_truth import Laws, MujocoArm, true_deflection
@@ -46,9 +46,13 @@ def unseen(arm: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return q, np.array(turned), true_deflection(real, q, np.array(turned))
 
 
-def judged(arm: str, plate: Plate, contact: Contact, springs: str = "auto") -> tuple[float, float]:
+def judged(
+    arm: str, data: Plate | Dataset, contact: Contact, springs: str = "auto"
+) -> tuple[float, float]:
     """Return the mean error over the mean deflection, and the share inside the interval."""
-    found = ec.calibrate(dataset(arm, plate), contact=contact, springs=springs).calibrated
+    if isinstance(data, Plate):
+        data = dataset(arm, data)
+    found = ec.calibrate(data, contact=contact, springs=springs).calibrated
     q, force, true = unseen(arm)
     predicted = found.predict(q, force)
     error = np.linalg.norm(predicted.deflection - true, axis=1).mean()
@@ -88,3 +92,18 @@ def test_gears_with_a_free_normal_and_presses_along_the_normal_alone_are_refused
         ec.calibrate(dataset("kuka", STEEL), contact=Contact(), springs="gears")
     with pytest.raises(IdentificationError, match="every press is along the normal on one disk"):
         ec.calibrate(dataset("kuka", replace(STEEL, sideways=False)), contact=Contact())
+
+
+def test_a_tip_9_mm_off_is_found_beside_the_springs():
+    T = np.eye(4)
+    T[:3, 3] = 5e-3, -4e-3, 6e-3
+    found = []
+    for arm in ARMS:
+        data = dataset(arm, STEEL)
+        joint = fixed_joint_of(data.robot_urdf, "tcp")
+        urdf = with_joint_origins(data.robot_urdf, {joint: T})
+        off = replace(data, attributes={**data.attributes, "robot_urdf": urdf})
+        found.append(judged(arm, off, replace(KNOWN, tip=5e-3)))
+    errors, inside = zip(*found, strict=True)
+    assert np.mean(errors) < 0.011
+    assert 0.85 <= np.mean(inside) <= 0.99

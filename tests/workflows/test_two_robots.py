@@ -76,6 +76,14 @@ def test_the_stated_contact_is_corrected_by_the_presses(result):
     assert figures["lateral"].low < 1.0 / 35e6 < figures["lateral"].high
 
 
+def test_the_page_shows_both_arms_and_names_what_is_not_seen(done, result):
+    page = (done / "models" / "pair.html").read_text(encoding="utf-8")
+    assert "<title>Two robots: " in page
+    assert all(f"{each.name}.json" in page for each in result.arms)
+    assert f"{result.held_out / result.deflection:.1%}".rstrip("%") in page
+    assert "both bases" in page
+
+
 def test_what_is_not_seen_is_named(result):
     (tilt,) = [each for each in result.findings if each.kind == "two-robots.tilt"]
     assert "how much each base tilts about the line that joins both bases is not seen" in tilt

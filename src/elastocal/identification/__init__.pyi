@@ -173,6 +173,7 @@ from .spring_sums import (
 from .suspicious import (
     screen as screen,
 )
+from .tip_place import with_tip_found as with_tip_found
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_UNEXPLAINED as MOST_UNEXPLAINED,

@@ -70,6 +70,8 @@ _LEAST_ERROR = 1e-3
 """Least standard error of a compliance over its value."""
 _SAME_LOAD = 0.1
 """Part of a force within which two presses are of one load case."""
+_FARTHEST = 0.05
+"""Largest standard deviation of the tip's place, in m: farther off is another tool."""
 _IMITATORS = 3
 """Springs that are named as those that imitate a compliance of the contact."""
 
@@ -88,9 +90,17 @@ def _parse_length(text: object) -> float:
     return value
 
 
+def _parse_place(text: object) -> float:
+    value = parse_quantity(text, "length")
+    if not 0.0 < value <= _FARTHEST:
+        raise ValueError(f"{text!r} must be above 0 and up to 50 mm")
+    return value
+
+
 _Share = Annotated[float, BeforeValidator(partial(parse_share, most=1.0))]
 _Stiffness = Annotated[float, BeforeValidator(_parse_stiffness)]
 _Length = Annotated[float, BeforeValidator(_parse_length)]
+_Place = Annotated[float, BeforeValidator(_parse_place)]
 
 
 _APART = 3.0
@@ -106,6 +116,7 @@ class ContactEntry(StrictModel):
     spread: _Share = 0.2
     stop: _Length = 10e-6
     slip: _Length = 2e-6
+    tip: _Place | None = None
 
     @property
     def contact(self) -> "Contact":
@@ -117,6 +128,36 @@ class ContactFile(StrictModel):
     """A contact file."""
 
     contact: ContactEntry
+
+
+@brief_repr
+@record()
+class TipPlace:
+    """Where the tip was found, against where the description has the tcp."""
+
+    place: tuple[float, float, float]
+    """In the tcp frame, in m."""
+    sigma: tuple[float, float, float]
+    """Standard error along each axis, from the noise of the rows and what was stated, in m."""
+    outside: tuple[float, float, float]
+    """Part of the effect of a shift along each axis outside the columns of the springs, 0 to 1."""
+
+    def sentence(self) -> Phrase:
+        """Return in words where the tip is."""
+        x, y, z = (
+            f"{1e3 * value:+.1f} ± {1e3 * sigma:.1f} mm"
+            for value, sigma in zip(self.place, self.sigma, strict=True)
+        )
+        return phrase(
+            "The tip lies beside the stated tcp by {x} along x, {y} along y and {z} along z"
+            " (standard error by noise); the model has its tcp there. Of such shifts the springs"
+            " do not imitate {seen}. What they lack of the arm moves it too: this is no"
+            " measurement of the tool.",
+            x=x,
+            y=y,
+            z=z,
+            seen=", ".join(f"{each:.0%}" for each in self.outside),
+        )
 
 
 @record()
@@ -135,6 +176,10 @@ class Contact:
     """Standard deviation of a position in which the controller stops, in m."""
     slip: float = 2e-6
     """Standard deviation of the slip sideways from press to press, in m."""
+    tip: float | None = None
+    """Standard deviation of the tip's place along each axis of the tcp, in m; None: it is exact."""
+    tip_found: TipPlace | None = None
+    """Where the tip was found (`elastocal.identification.with_tip_found`)."""
     doubled: tuple[tuple[float, float] | None, tuple[float, float] | None] = (None, None)
     """Normal and lateral compliance by presses on one and on two disks alone, each with its
     standard error, in m/N; None: there are too few (`with_doubled`)."""
@@ -154,7 +199,7 @@ class Contact:
             If a stiffness, a share or a length is no number, not above 0, or beyond that of any
             contact.
         """
-        for name in (NORMAL, LATERAL, "uncertainty", "spread", "stop", "slip"):
+        for name in (NORMAL, LATERAL, "uncertainty", "spread", "stop", "slip", "tip"):
             if isinstance(value := getattr(self, name), str):
                 raise IdentificationError(
                     f"contact.{name} is {value!r}: in Python a number in SI units, in a contact"
@@ -173,6 +218,10 @@ class Contact:
                 raise IdentificationError(
                     f"contact.{name} is {value:g}: it must be above 0 and up to {most:g}"
                 )
+        if self.tip is not None and not 0.0 < self.tip <= _FARTHEST:
+            raise IdentificationError(
+                f"contact.tip is {self.tip:g}: it must be above 0 and up to {_FARTHEST:g}"
+            )
 
     @property
     def row_noise(self) -> float:
@@ -725,6 +774,8 @@ class ContactSummary:
     measured, in m."""
     fixed: tuple[str, ...] = ()
     """Compliances that no press loads: they were not fitted."""
+    tip: TipPlace | None = None
+    """Where the tip was found; None: its place was taken as exact."""
 
     def sentence(self) -> Phrase:
         """Return in words where the zero of the deflections comes from."""
@@ -796,6 +847,7 @@ def contact_summary(
         noise=contact.row_noise,
         zero=zero,
         fixed=tuple(name for name in (NORMAL, LATERAL) if name not in names),
+        tip=contact.tip_found,
     )
 
 

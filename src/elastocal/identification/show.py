@@ -413,6 +413,8 @@ def show_contact(contact: ContactSummary | None) -> Iterator[Block]:
         for each in contact.figures
     )
     yield Table(phrase("Stiffness of one disk or tip on the tooling"), heads, rows)
+    if contact.tip is not None:
+        yield Paragraph(contact.tip.sentence())
     if contact.fixed:
         names = sentences([_DIRECTIONS[each] for each in contact.fixed], ", ")
         text = phrase("Not fitted, since no press loads it: {names}.", names=names)

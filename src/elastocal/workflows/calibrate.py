@@ -29,6 +29,7 @@ from elastocal.identification import (
     update_springs,
     weigh_contact,
     with_knowledge,
+    with_tip_found,
 )
 from elastocal.options import Option, ToolFrame
 from elastocal.progress import Progress
@@ -156,7 +157,8 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     readings = without(measured.readings(arm.joint_names), settings.exclude)
     marker = measured.marker if settings.marker is None else settings.marker
     readings = at_tcp(arm, readings, marker)
-    options = weigh_contact(arm, readings, settings.options(), marker)
+    arm, options = with_tip_found(arm, readings, settings.options())
+    options = weigh_contact(arm, readings, options, marker)
     settings = replace(settings, contact=options.contact)
     path, unknown = _production(settings, arm)
     rows = None if path is None else _rows(path)

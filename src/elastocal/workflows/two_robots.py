@@ -23,6 +23,7 @@ from elastocal.identification import CalibratedModel, CalibrateResult, read_mode
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import read_json, schema_of, write_json
+from elastocal.report.document import write_page
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.sim import Tips, press_together, true_arm
@@ -59,6 +60,8 @@ __all__ = [
 
 PAIR_FILE = "pair.json"
 """Record of a calibration of two robots, in its folder."""
+PAGE_FILE = "pair.html"
+"""Report of a calibration of two robots, in its folder."""
 COOPERATION_FILE = "cooperation.json"
 """Record of a corrected cooperative process, in its folder."""
 
@@ -232,7 +235,7 @@ class CalibratePairSettings:
     second: Annotated[Path, Option(argument=True)]
     """Dataset of the second robot: the same poses and load cases."""
     out: Annotated[Path, Option(metavar="DIR")]
-    """Folder for the model of each arm, ``ARM.json``, and ``pair.json``."""
+    """Folder for the model of each arm, ``ARM.json``, ``pair.json`` and ``pair.html``."""
     springs: Annotated[str, Option(choices="springs", file=True)] = "auto"
     """Springs of both arms: ``auto``, a layout, or ``gears``."""
     draws: Annotated[int, Option(least=40, most=100_000)] = 200
@@ -290,6 +293,9 @@ def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairR
         for file, model in zip(files, found.models, strict=True):
             write_model(folder / file, model)
         write_json(folder / PAIR_FILE, result)
+        title = phrase("Two robots: {cell}", cell=cell.name)
+        sections = [("result", phrase("Both arms"), result.show())]
+        write_page(folder / PAGE_FILE, title, sections, maker="elastocal calibrate-pair")
     return result
 
 
