@@ -197,6 +197,7 @@ def own(folder: Path, out: str, *arguments: object):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_path_of_ones_own_deviates_as_the_built_in_process_that_it_repeats(folder):
     result = own(folder, "own", "--load", "0.5,-1")
     assert result.code == 0, result.err

@@ -264,6 +264,7 @@ def test_ioops_crowds_at_the_edges_and_cover_does_not(folders):
     assert ioops["covering_radius"] > 1.5 * cover["covering_radius"]
 
 
+@pytest.mark.slow
 def test_the_same_cell_gives_the_same_plan(folders, tmp_path):
     folder = folders["afp"]
     case("afp", folder)

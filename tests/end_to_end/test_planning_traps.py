@@ -51,6 +51,7 @@ def test_an_open_mesh_works_and_says_so(tmp_path):
     assert "open mesh" in " ".join(result.err.split())
 
 
+@pytest.mark.slow
 def test_a_mesh_that_is_no_manifold_works_and_says_so(tmp_path):
     def with_fin(dome):
         a, b, _ = dome.faces[len(dome.faces) // 2]
@@ -64,6 +65,7 @@ def test_a_mesh_that_is_no_manifold_works_and_says_so(tmp_path):
     assert any("not a manifold" in finding for finding in findings(tmp_path))
 
 
+@pytest.mark.slow
 def test_inverted_normals_are_found_and_said(tmp_path):
     def inverted(dome):
         dome.invert()

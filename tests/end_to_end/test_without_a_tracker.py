@@ -137,6 +137,17 @@ def test_the_codec_of_a_campaign_without_a_tracker(story):
     assert "no tracker measured at 6 poses" in " ".join(json.loads(ran.out)["findings"])
 
 
+def test_the_codec_does_not_ignore_that_the_tip_may_lie_elsewhere(story, tmp_path):
+    contact = tmp_path / "contact.yaml"
+    contact.write_text('contact: {tip: "5 mm"}\n')
+    ran = elastocal(
+        "codec", story / "run", "--contact", contact, "--compare", "springs=actuated",
+        "--out", tmp_path / "codec",
+    )  # fmt: skip
+    assert "leave contact.tip out" in ran.reason
+    assert not (tmp_path / "codec").exists()
+
+
 class Person(Unattended):
     """Puts the second disk on when asked, or wants to stop then."""
 

@@ -12,13 +12,12 @@ from elastocal.cli.commands import COMMANDS
 from fuzz import harness
 from fuzz.harness import PLAIN, Case, drawn_cases, quick_place, run_cases
 from fuzz.seeds import KINDS, make_seeds
-from support.by_day import some_by_day
 from support.kept import kept
 
 CORPUS = json.loads((Path(__file__).parent / "corpus.json").read_text(encoding="utf-8"))
 REPORTS = ("report ", '["report"')
 PARTS = 40
-"""Tests that share the cases: the first runs by day, the others at night."""
+"""Tests that share the cases."""
 CASES = 2_000
 NIGHTLY = 100_000
 NIGHTLY_PARTS = 8
@@ -61,7 +60,8 @@ def test_what_fell_once_does_not_fall_again(seeds, report):
     assert fallen(run_cases([Case(**entry) for entry in entries], seeds)) == []
 
 
-@pytest.mark.parametrize("part", some_by_day(range(PARTS), PARTS))
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(PARTS))
 def test_no_case_of_two_thousand_falls(seeds, part):
     assert fallen(run_cases(drawn_cases(CASES // PARTS, 100 + part), seeds)) == []
 

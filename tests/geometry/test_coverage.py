@@ -11,6 +11,7 @@ from elastocal.geometry.ladder import GeometryLadder, _Sums, blocks, climb
 from elastocal.geometry.solve import fit, register
 from elastocal.identification import interval
 from elastocal.progress import silent
+from support.by_day import some_by_day
 from support.measured_arms import ARMS, Measured, measure, rounded, seven_axes, universal
 
 NOISE = 3e-5
@@ -55,7 +56,7 @@ def held_by_parameter(arm: str, campaign: str, campaigns: int) -> dict[str, list
     return {name: each for name, each in held.items() if len(each) > campaigns // 2}
 
 
-@pytest.mark.parametrize("campaign", CAMPAIGNS)
+@pytest.mark.parametrize("campaign", some_by_day(CAMPAIGNS, every=4))
 def test_intervals_of_few_and_many_poses_hold_the_truth(campaign):
     """Eight campaigns: each of some 20 errors may miss once in twenty."""
     held = np.concatenate(list(held_by_parameter("parallel axes", campaign, 8).values()))
@@ -63,7 +64,7 @@ def test_intervals_of_few_and_many_poses_hold_the_truth(campaign):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("campaign", CAMPAIGNS)
+@pytest.mark.parametrize("campaign", some_by_day(CAMPAIGNS, every=4))
 @pytest.mark.parametrize("arm", FOUR_ARMS)
 def test_95_percent_intervals_of_100_campaigns_cover_about_95_percent(arm, campaign):
     held = held_by_parameter(arm, campaign, 100)

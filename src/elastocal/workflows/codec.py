@@ -26,6 +26,7 @@ from elastocal.codec import (
     write_index_table,
 )
 from elastocal.dataset import content_sha256, merge_files, without
+from elastocal.errors import CodecError
 from elastocal.files import filling
 from elastocal.findings import group_alike
 from elastocal.identification import FitOptions, at_tcp, weigh_contact
@@ -161,6 +162,11 @@ def codec(settings: CodecSettings, progress: Progress) -> CodecResult:
     marker = measured.marker if settings.marker is None else settings.marker
     readings = at_tcp(arm, readings, marker)
     known = FitOptions(contact=known_contact(settings.contact))
+    if known.contact is not None and known.contact.tip is not None:
+        raise CodecError(
+            "the codec takes the place of a tip as exact: leave contact.tip out (calibrate finds"
+            " the place of the tip)"
+        )
     settings = replace(settings, contact=weigh_contact(arm, readings, known, marker).contact)
     with filling(Path(settings.out), VERDICTS, settings.force) as folder:
         data = cross_validate(
