@@ -133,6 +133,11 @@ SHARED: dict[str, tuple[str, Option]] = {
 """Types of fields that several settings share, by the name used at the field."""
 
 
+def settings_class(workflow: str) -> str:
+    """Return the name of the class of settings of a workflow, or command, of this name."""
+    return f"{workflow.title().replace('_', '')}Settings"
+
+
 @cache
 def settings_fields(module: str, name: str) -> tuple[SettingsField, ...]:
     """Return the fields of a class of settings, its own before those of its bases.

@@ -17,7 +17,7 @@ import typer
 from elastocal import workflows
 from elastocal.cli import output
 from elastocal.cli.generator import Command, Given
-from elastocal.options import CHOICES, Option
+from elastocal.options import CHOICES, Option, settings_class
 
 if TYPE_CHECKING:
     from elastocal.blocks import Block
@@ -54,7 +54,7 @@ def command(
         COMMANDS[name.replace("_", "-")] = Command(
             group,
             module or f"{workflows.__name__}.{name}",
-            settings or f"{name.title().replace('_', '')}Settings",
+            settings or settings_class(name),
             function or name,
             run,
             more,

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, triple
 from elastocal.elastic import ElasticModel, ModelPosture, check_vectors
 from elastocal.errors import RobotError, SpringError
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
@@ -129,7 +129,7 @@ def change_tool(
         robot.tip if before is None else before.calibrated_tcp,
         (x, y, z, a, b, c),
         mass,
-        None if point is None else (float(point[0]), float(point[1]), float(point[2])),
+        None if point is None else triple(point),
     )
     return ElasticModel(moved, model.springs), change
 

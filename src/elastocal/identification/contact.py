@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator
 
-from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray, Triple
 from elastocal.dataset import Readings
 from elastocal.errors import IdentificationError
 from elastocal.identification._least_squares import RANK_TOLERANCE
@@ -70,6 +70,8 @@ _LEAST_ERROR = 1e-3
 """Least standard error of a compliance over its value."""
 _SAME_LOAD = 0.1
 """Part of a force within which two presses are of one load case."""
+_LONGEST = 1e-3
+"""Largest standard deviation of a stop and of a slip, in m."""
 _FARTHEST = 0.05
 """Largest standard deviation of the tip's place, in m: farther off is another tool."""
 _IMITATORS = 3
@@ -83,24 +85,17 @@ def _parse_stiffness(text: object) -> float:
     return value
 
 
-def _parse_length(text: object) -> float:
+def _parse_length(text: object, most: float) -> float:
     value = parse_quantity(text, "length")
-    if not 0.0 < value <= 1e-3:
-        raise ValueError(f"{text!r} must be above 0 and up to 1 mm")
-    return value
-
-
-def _parse_place(text: object) -> float:
-    value = parse_quantity(text, "length")
-    if not 0.0 < value <= _FARTHEST:
-        raise ValueError(f"{text!r} must be above 0 and up to 50 mm")
+    if not 0.0 < value <= most:
+        raise ValueError(f"{text!r} must be above 0 and up to {1e3 * most:g} mm")
     return value
 
 
 _Share = Annotated[float, BeforeValidator(partial(parse_share, most=1.0))]
 _Stiffness = Annotated[float, BeforeValidator(_parse_stiffness)]
-_Length = Annotated[float, BeforeValidator(_parse_length)]
-_Place = Annotated[float, BeforeValidator(_parse_place)]
+_Length = Annotated[float, BeforeValidator(partial(_parse_length, most=_LONGEST))]
+_Place = Annotated[float, BeforeValidator(partial(_parse_length, most=_FARTHEST))]
 
 
 _APART = 3.0
@@ -135,11 +130,11 @@ class ContactFile(StrictModel):
 class TipPlace:
     """Where the tip was found, against where the description has the tcp."""
 
-    place: tuple[float, float, float]
+    place: Triple
     """In the tcp frame, in m."""
-    sigma: tuple[float, float, float]
+    sigma: Triple
     """Standard error along each axis, from the noise of the rows and what was stated, in m."""
-    outside: tuple[float, float, float]
+    outside: Triple
     """Part of the effect of a shift along each axis outside the columns of the springs, 0 to 1."""
 
     def sentence(self) -> Phrase:
@@ -212,16 +207,13 @@ class Contact:
                     f"contact.{name} is {value:g} N/m: it must lie between {_SOFTEST:g} and"
                     f" {_STIFFEST:g}"
                 )
-        for name, most in (("uncertainty", 1.0), ("spread", 1.0), ("stop", 1e-3), ("slip", 1e-3)):
+        bounds = {"uncertainty": 1.0, "spread": 1.0, "stop": _LONGEST, "slip": _LONGEST}
+        for name, most in (bounds | ({} if self.tip is None else {"tip": _FARTHEST})).items():
             value = getattr(self, name)
             if not 0.0 < value <= most:
                 raise IdentificationError(
                     f"contact.{name} is {value:g}: it must be above 0 and up to {most:g}"
                 )
-        if self.tip is not None and not 0.0 < self.tip <= _FARTHEST:
-            raise IdentificationError(
-                f"contact.tip is {self.tip:g}: it must be above 0 and up to {_FARTHEST:g}"
-            )
 
     @property
     def row_noise(self) -> float:

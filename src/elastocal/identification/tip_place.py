@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, triple
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError, present
@@ -96,12 +96,7 @@ def _step(robot: Robot, readings: Readings, options: FitOptions, place: FloatArr
     found = place - np.linalg.solve(normal, own.T @ left + gain**2 * place)
     sigma = contact.row_noise * np.sqrt(np.diag(np.linalg.inv(normal)))
     seen = np.linalg.norm(own, axis=0) / np.linalg.norm(J, axis=0)
-    return TipPlace(_three(found), _three(sigma), _three(seen))
-
-
-def _three(values: FloatArray) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z
+    return TipPlace(triple(found), triple(sigma), triple(seen))
 
 
 def _moved(robot: Robot, place: FloatArray) -> Robot:

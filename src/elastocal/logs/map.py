@@ -29,7 +29,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, triple
 from elastocal.cell import (
     CONDITIONING,
     IDENTITY,
@@ -317,5 +317,5 @@ def _site(
         T_tcp_sensor=T_tcp_flange @ T_flange_sensor,
         gravity=gravity,
     )
-    named = None if upright else (float(gravity[0]), float(gravity[1]), float(gravity[2]))
+    named = None if upright else triple(gravity)
     return Site(robot, urdf, named, load, T_flange_sensor, np.array(marker))

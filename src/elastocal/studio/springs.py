@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, Triple, triple
 from elastocal.cell import Cell
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import CalibratedModel
@@ -36,11 +36,11 @@ class CaseFigure:
     """In the tcp frame."""
     size: str
     """Norm of the predicted deflection."""
-    parts: str
-    """Along x, y, z of base."""
-    interval: str
-    """95 % of a measurement along each axis; empty where nothing is known of it."""
-    deflection: tuple[float, float, float]
+    parts: tuple[str, ...]
+    """Along x, y, z of base, in mm."""
+    intervals: tuple[str, ...]
+    """95 % of a measurement along each; empty where nothing is known of it."""
+    deflection: Triple
     """In base, in m."""
     caveat: str = ""
     """Why the interval may not hold; empty where posture and load were calibrated."""
@@ -103,26 +103,27 @@ class StudioSprings:
         """
         force_tcp = np.array(list(levels.values()))
         rows, force = np.tile(q, (len(force_tcp), 1)), force_tcp @ T[:3, :3].T
-        intervals, caveats = [""] * len(levels), [""] * len(levels)
+        intervals: list[tuple[str, ...]] = [()] * len(levels)
+        caveats = [""] * len(levels)
         if self.calibrated is None:
             deflection = self.model.deflection(self.compliance, rows, force)
         else:
             found = self.calibrated.predict(rows, force)
             deflection = found.deflection
             ends = zip(found.measured_low, found.measured_high, strict=True)
-            intervals = [_interval_text(low, high) for low, high in ends]
+            intervals = [_interval_texts(low, high) for low, high in ends]
             caveats = _caveats(self.calibrated, rows, force)
         return tuple(
             CaseFigure(
                 name=name,
                 force=f"{_round(load)} N",
                 size=mm(float(np.linalg.norm(each))),
-                parts=", ".join(f"{in_unit(part, 'mm') + 0.0:.3f}" for part in each),
-                interval=interval,
-                deflection=(float(each[0]), float(each[1]), float(each[2])),
+                parts=tuple(f"{in_unit(part, 'mm') + 0.0:.3f}" for part in each),
+                intervals=ends_of,
+                deflection=triple(each),
                 caveat=caveat,
             )
-            for (name, load), each, interval, caveat in zip(
+            for (name, load), each, ends_of, caveat in zip(
                 levels.items(), deflection, intervals, caveats, strict=True
             )
         )
@@ -176,10 +177,10 @@ def _stiffness_text(compliance: float) -> str:
     return f"{_MICROMETRES / compliance:.3g} N/µm"
 
 
-def _interval_text(low: FloatArray, high: FloatArray) -> str:
+def _interval_texts(low: FloatArray, high: FloatArray) -> tuple[str, ...]:
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
-        return ""
-    return ", ".join(
+        return ()
+    return tuple(
         f"{in_unit(a, 'mm'):.3f} to {in_unit(b, 'mm'):.3f}" for a, b in zip(low, high, strict=True)
     )
 

@@ -14,7 +14,7 @@ from elastocal.cell import PROCESS_FILE, require_example
 from elastocal.compensation.process import SimulateProcessResult
 from elastocal.errors import FileAccessError, of_kind
 from elastocal.files import write_text
-from elastocal.options import Option, settings_fields
+from elastocal.options import Option, settings_class, settings_fields
 from elastocal.parallel import process_count, process_pool
 from elastocal.procedure import RunEnd
 from elastocal.progress import Progress
@@ -260,7 +260,7 @@ def _chapter(
 ) -> Chapter:
     """Return a workflow with its options, and the command that does the same."""
     name = workflow.__name__
-    settings = settings_fields(workflow.__module__, f"{name.title().replace('_', '')}Settings")
+    settings = settings_fields(workflow.__module__, settings_class(name))
     fields = {each.name: each for each in settings}
     words = [name.replace("_", "-"), str(source)]
     for key, value in options.items():

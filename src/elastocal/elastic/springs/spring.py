@@ -8,7 +8,7 @@ from typing import ClassVar, Generic
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, triple
 from elastocal.elastic.springs.expression import Quantity
 from elastocal.errors import SpringError, nearest, present
 from elastocal.records import record
@@ -303,7 +303,7 @@ def as_axis(vector: ArrayLike) -> tuple[float, float, float]:
     if not 0.0 < length < np.inf:
         raise SpringError(f"axis {vector!r} must be three finite numbers that are not all zero")
     unit: FloatArray = array / length
-    return float(unit[0]), float(unit[1]), float(unit[2])
+    return triple(unit)
 
 
 def coordinate_axis(unit: ArrayLike) -> str | None:

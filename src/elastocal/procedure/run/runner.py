@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import FloatArray, Triple, triple
 from elastocal.cell import CONDITIONING, LIGHT_CONTACT, ArmState, Devices, Motion
 from elastocal.errors import ProcedureError, present
 from elastocal.planning import Joints, PoseRecord
@@ -955,11 +955,10 @@ class Runner:
             marker=self._marker(seen),
         )
 
-    def _marker(self, seen: Snapshot) -> tuple[float, float, float] | None:
+    def _marker(self, seen: Snapshot) -> Triple | None:
         if not (self._settings.tracked and len(seen.points)):
             return None
-        x, y, z = seen.points.position[-1].tolist()
-        return x, y, z
+        return triple(seen.points.position[-1])
 
     def _given_up_message(self) -> str:
         if not self._given_up:

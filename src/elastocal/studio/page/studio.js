@@ -133,10 +133,10 @@ function showJoints(joints) {
   });
 }
 
-function along({ parts, interval }) { // with intervals a line an axis
-  if (!interval) return element("td", parts);
-  const cell = element("td"), ends = interval.split(", ");
-  cell.append(...parts.split(", ").map((part, k) => element("div", `${"xyz"[k]} ${part} (${ends[k]})`)));
+function along({ parts, intervals }) { // with intervals a line an axis
+  if (!intervals.length) return element("td", parts.join(", "));
+  const cell = element("td");
+  cell.append(...parts.map((part, k) => element("div", `${"xyz"[k]} ${part} (${intervals[k]})`)));
   return cell;
 }
 
