@@ -1,5 +1,6 @@
 """Drivers of other people: packages with an entry point, as an installation leaves them."""
 
+import sys
 from pathlib import Path
 
 from support.plugged import describe
@@ -7,6 +8,7 @@ from support.plugged import describe
 
 def install(folder: Path, monkeypatch, name: str, source: str) -> None:
     """Put a package with a driver on the path; its module has an object ``DRIVER``."""
+    monkeypatch.delitem(sys.modules, name, raising=False)
     describe(folder, name, {"elastocal.drivers": {name: f"{name}:DRIVER"}})
     (folder / f"{name}.py").write_text(source)
     monkeypatch.syspath_prepend(str(folder))

@@ -2,7 +2,6 @@
 
 import contextlib
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -67,8 +66,7 @@ def fake(tmp_path, monkeypatch):
     drivers.install(tmp_path / "site", monkeypatch, "fake", drivers.REAL)
     import fake
 
-    yield fake
-    del sys.modules["fake"]
+    return fake
 
 
 class Page:
