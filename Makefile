@@ -18,7 +18,7 @@ tests units end-to-end browser slow: export OMP_NUM_THREADS := 1
 # start as they do for users.
 tests units end-to-end browser: export LOKY_MAX_CPU_COUNT := 1
 
-.PHONY: demo test style types lint tests units end-to-end browser docs-strict fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
+.PHONY: demo test style types lint tests units end-to-end browser docs-strict site fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -51,16 +51,21 @@ end-to-end: $(VENV)/installed-dev
 browser: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m 'browser and not slow' tests
 
-# Every page and link; an index for the search says nothing of them.
+# Every page and link; an index for the search says nothing of them, nor do figures.
 docs-strict: $(VENV)/installed-dev
-	NO_MKDOCS_2_WARNING=1 SITE_SEARCH=false $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 SITE_SEARCH=false SITE_FIGURES=false $(BIN)/mkdocs build --strict --quiet \
+		--site-dir .cache/site
+
+# The site as readers see it: its figures drawn, its notebooks run.
+site: $(VENV)/installed-dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 # Every parser of what devices send, under Atheris; `make fuzz-lines UNTIL=-runs=1000000` is longer.
 UNTIL ?= -max_total_time=6
 fuzz-lines: $(VENV)/installed-fuzz
 	cd tests && ../$(BIN)/python -m fuzz.lines $(UNTIL) -max_len=4096 -verbosity=0 -print_final_stats=1
 
-nightly: slow notebooks process-figures coverage lowest package mutation
+nightly: slow site notebooks process-figures coverage lowest package mutation
 
 slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA

@@ -44,6 +44,7 @@ BY_DAY = ("01", "02", "03", "04", "08", "09", "11")
 """The others are run at night."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path",
     [

@@ -42,6 +42,7 @@ print(sum(name.startswith("elastocal.") for name in sys.modules))
 """
 
 
+@pytest.mark.slow
 def test_every_module_can_be_imported_without_what_only_posix_has():
     done = subprocess.run(
         [sys.executable, "-c", IMPORT_ALL], capture_output=True, text=True, check=False

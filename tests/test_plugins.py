@@ -94,6 +94,7 @@ def model_with_a_spring_of_another_package(path: Path) -> CalibratedModel:
     return made
 
 
+@pytest.mark.slow
 def test_a_model_file_with_a_spring_of_a_plug_in_is_read_by_a_fresh_process(examples, tmp_path):
     made = model_with_a_spring_of_another_package(tmp_path / "model.json")
     code = (
@@ -140,6 +141,7 @@ def test_a_spring_file_gives_settings_of_a_spring_of_a_plug_in(examples, tmp_pat
     assert spring == KINDS["softening"]("joint_2.softening-x", "joint_2", (1.0, 0, 0), opening=250)
 
 
+@pytest.mark.slow
 def test_a_technique_of_a_plug_in_works_in_other_processes(examples):
     """They know it by its name, as those of a study do."""
     assert "exchange-t" in TECHNIQUES
@@ -283,6 +285,7 @@ class TestACommandOfAPlugIn:
         printed = json.loads(elastocal("softest", tmp_path / "model.json", "--json").out)
         assert next(iter(printed["springs"])) == last
 
+    @pytest.mark.slow
     def test_its_result_is_a_page_in_another_language(self, examples, tmp_path):
         model_with_a_spring_of_another_package(tmp_path / "model.json")
         page = tmp_path / "softest.html"

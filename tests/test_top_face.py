@@ -59,6 +59,7 @@ def test_a_package_that_bears_the_name_of_a_command_does_not_hide_it():
         ec.codec()
 
 
+@pytest.mark.slow
 def test_packages_are_completed_and_found_without_being_imported():
     code = "import elastocal as ec; print(ec.identification.calibrate.__name__, *dir(ec))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

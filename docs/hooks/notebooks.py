@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+from figures import DRAWN
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import Files
@@ -29,7 +30,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Return the page of a notebook with its outputs."""
     del config
     source = page.file.src_uri
-    if not source.startswith(_FOLDER) or source.endswith("index.md"):
+    if not DRAWN or not source.startswith(_FOLDER) or source.endswith("index.md"):
         return markdown
     name = source.removeprefix(_FOLDER).removesuffix(".md")
     file = files.get_file_from_path(f"figures/{name}.ipynb")

@@ -42,6 +42,7 @@ def compliances(figures: dict) -> np.ndarray:
     return np.array([spring["compliance"] for spring in figures["springs"]])
 
 
+@pytest.mark.slow
 def test_several_datasets_are_calibrated_as_one(folder):
     parts = calibrated(folder, folder / "monday.nc", folder / "tuesday.nc", "--springs", "actuated")
     whole = calibrated(folder, folder / "whole.nc", "--springs", "actuated")
@@ -49,6 +50,7 @@ def test_several_datasets_are_calibrated_as_one(folder):
     np.testing.assert_allclose(compliances(parts), compliances(whole), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_model_names_every_dataset(folder):
     calibrated(folder, folder / "monday.nc", folder / "tuesday.nc", "--springs", "actuated")
     provenance = json.loads((folder / "model.json").read_text())["provenance"]
@@ -56,6 +58,7 @@ def test_the_model_names_every_dataset(folder):
     assert "tuesday.nc" in provenance
 
 
+@pytest.mark.slow
 def test_a_campaign_whose_tracker_moved_is_fitted_with_its_frame(folder):
     data = (folder / "monday.nc", folder / "moved.nc", "--springs", "bearing")
     tied = calibrated(folder, *data)

@@ -48,6 +48,7 @@ def test_pictures_and_indices_are_written_when_asked_for(data, tmp_path):
     assert {each["kind"] for each in kept} == {"growth", "size", "size_and_split"}
 
 
+@pytest.mark.slow
 def test_without_a_comparison_the_default_stands_alone(data, tmp_path):
     result = elastocal("codec", data, "--out", tmp_path / "c", "--splits", "3")
     assert result.code == 0, result.err
@@ -56,6 +57,7 @@ def test_without_a_comparison_the_default_stands_alone(data, tmp_path):
         assert text in result.err
 
 
+@pytest.mark.slow
 def test_options_reach_the_codec(data, tmp_path):
     out = tmp_path / "c"
     result = elastocal(
@@ -81,6 +83,7 @@ def test_both_files_pass_the_check(data, tmp_path):
         assert isinstance(found["variants"], list)
 
 
+@pytest.mark.slow
 def test_a_folder_with_files_is_kept_unless_forced(data, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     arguments = ("codec", data, "--out", tmp_path, "--splits", "2")

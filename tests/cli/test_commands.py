@@ -60,6 +60,7 @@ def columns(path: Path, *names: str) -> np.ndarray:
     return np.array([[float(row[header.index(name)]) for name in names] for row in rows])
 
 
+@pytest.mark.slow
 def test_calibrate_prints_a_table_that_answers_the_first_questions(folder):
     shown = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json").err
     for text in (
@@ -349,6 +350,7 @@ def test_help_and_version_load_no_numerical_library():
     assert "calibrate" in done.stdout
 
 
+@pytest.mark.slow
 def test_calibrate_takes_the_marker_of_the_dataset_unless_told_otherwise(folder, tmp_path):
     data = dataset.read(folder / "data.nc").to_xarray().copy(deep=True)
     data.attrs["marker"] = "0.0 m, 0.03 m, -0.02 m"
@@ -386,6 +388,7 @@ def test_every_number_of_repetitions_has_a_bound():
     assert [name for name, most in counts.items() if most is None] == []
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_run_stands_for_its_dataset(tmp_path):
     run = reported.finished() / "run"
     made = [

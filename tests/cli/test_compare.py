@@ -42,6 +42,7 @@ def run(folder: Path, *arguments: object, old: str = "old", new: str = "soft"):
     return elastocal("compare", folder / f"{old}.json", folder / f"{new}.json", *arguments)
 
 
+@pytest.mark.slow
 def test_a_softened_gear_is_named_to_people(folder):
     result = run(folder, "--rows", folder / "rows.csv", "--limit", "0.03 mm")
     assert result.code == 0

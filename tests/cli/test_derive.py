@@ -10,6 +10,7 @@ from support.cli import elastocal
 from support.recorded_runs import record_run
 
 
+@pytest.mark.slow
 def test_dataset_and_summary_are_written_and_the_summary_printed(tmp_path):
     run = record_run(tmp_path / "run")
     printed = json.loads(elastocal("derive", run.path, "--json").out)
@@ -19,6 +20,7 @@ def test_dataset_and_summary_are_written_and_the_summary_printed(tmp_path):
     assert read(run.path / "dataset.nc").poses == tuple(range(6))
 
 
+@pytest.mark.slow
 def test_people_are_told_counts_and_places_on_standard_error(tmp_path):
     run = record_run(tmp_path / "run")
     said = elastocal("derive", run.path)

@@ -67,6 +67,7 @@ def test_nothing_is_left_to_fill_in(tmp_path, model):
         assert "@" not in (tmp_path / "c" / name).read_text()
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_with_tool_and_settings_the_self_test_is_zero(tmp_path, model, tool):
     settings = tmp_path / "online.yaml"

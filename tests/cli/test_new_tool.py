@@ -115,6 +115,7 @@ def test_the_exported_c_names_the_tool(folder):
     assert "12 kg" in head
 
 
+@pytest.mark.slow
 def test_a_process_is_simulated_with_the_cells_tool_by_a_model_of_another_one(folder):
     cell = example_cell("afp")
     other = made_up(cell.robot).with_tool(T_from_xyzabc(0.0, 0.0, -0.1, 0.0, 0.0, 0.0))

@@ -59,6 +59,7 @@ def test_a_closed_output_is_known_before_the_long_work(folder, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_sigterm_leaves_nothing_half_written(folder, tmp_path):
     process = subprocess.Popen(
         [*COMMAND, "plan", folder / "cell.yaml", "--jobs", "1", "--out", tmp_path / "plan"],
@@ -171,12 +172,14 @@ def test_what_nohup_ignores_is_ignored():
     assert "went on" in result.stdout
 
 
+@pytest.mark.slow
 def test_sigterm_is_handled_as_before_once_a_command_has_ended(tmp_path):
     before = signal.getsignal(signal.SIGTERM)
     elastocal("init", tmp_path / "cell")
     assert signal.getsignal(signal.SIGTERM) is before
 
 
+@pytest.mark.slow
 def test_a_folder_may_be_named_like_markup(tmp_path):
     result = elastocal("init", tmp_path / "x[/red]a[bold]")
     assert result.code == 0

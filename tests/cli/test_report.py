@@ -23,6 +23,7 @@ def copied(finished, tmp_path):
     return copy
 
 
+@pytest.mark.slow
 def test_a_report_is_written_and_its_verdict_is_told(finished, tmp_path):
     out = tmp_path / "report.html"
     result = elastocal("report", finished, "--out", out)
@@ -34,6 +35,7 @@ def test_a_report_is_written_and_its_verdict_is_told(finished, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
+@pytest.mark.slow
 def test_json_has_the_verdict_and_nothing_else_stands_on_standard_output(finished, tmp_path):
     result = elastocal("report", finished, "--out", tmp_path / "r.html", "--json")
     figures = json.loads(result.out)
@@ -88,6 +90,7 @@ def test_options_that_make_no_sense_are_refused_in_a_line(finished, tmp_path, op
     assert not out.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("missing", ["codec", "model.json", "run"])
 def test_the_report_comes_and_says_what_is_missing(copied, tmp_path, missing):
     folder = copied()
@@ -103,6 +106,7 @@ def test_the_report_comes_and_says_what_is_missing(copied, tmp_path, missing):
     assert "Missing in this report" in out.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_partial_run_is_reported_as_such(finished, copied, tmp_path):
     """A run of which three poses were committed before it was killed, derived as it stands."""
     folder = copied("run")
@@ -134,6 +138,7 @@ def test_a_model_alone_is_reported(finished, tmp_path):
     assert "could not be reproduced" in figures["verdict"]
 
 
+@pytest.mark.slow
 def test_a_damaged_part_is_told_and_one_that_is_named_is_refused(copied, tmp_path):
     folder = copied()
     codec = folder / "codec" / "codec.nc"

@@ -120,6 +120,7 @@ def test_a_signal_leaves_the_surface_and_can_be_resumed(planned, tmp_path, numbe
     assert run(planned, out, "--resume", "--yes").code == 0
 
 
+@pytest.mark.slow
 def test_a_complete_run_may_be_resumed_without_moving(planned, whole):
     out, _ = whole
     commits = read_commits(RunFolder(out).journal)
@@ -154,6 +155,7 @@ def starts(plan):
     return np.cumsum([0.0, *each])[:-1]
 
 
+@pytest.mark.slow
 def test_a_dry_run_of_plan_writes_nothing_and_prints_the_poses_of_the_plan(planned, tmp_path):
     out = tmp_path / "nothing"
     result = elastocal("plan", planned.cell, "--out", out, "--compare", "none", "--dry-run")

@@ -39,6 +39,7 @@ def run(folder: Path, out: str, *arguments: object, model: str = "model.json"):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_it_writes_the_table_and_every_point_of_it(folder):
     result = run(folder, "all", "--seed", 2, "--json")
     assert result.code == 0, result.err
@@ -87,6 +88,7 @@ def test_the_offset_of_a_course_is_read_and_its_time_said(folder):
     assert read["spatial"][0]["after"]["mean"] < bare["spatial"][0]["after"]["mean"]
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_the_c_of_the_target_gives_the_same_figures(folder, tmp_path, monkeypatch):
     given = "--seed", 2, "--course-offset", "--json"
@@ -106,6 +108,7 @@ def test_the_c_of_the_target_gives_the_same_figures(folder, tmp_path, monkeypatc
                 assert other[when] == pytest.approx(one[when], rel=0, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "within"),
     # The offset of a course enters one cycle later, with the next reading of the sensor.
@@ -130,6 +133,7 @@ def test_the_loop_of_live_gives_the_same_figures(folder, monkeypatch, option, wi
                 assert other[when] == pytest.approx(one[when], rel=0, abs=within)
 
 
+@pytest.mark.slow
 def test_check_knows_the_table_and_the_folder(folder):
     result = run(folder, "checked", "--seed", 4)
     assert result.code == 0, result.err
@@ -140,6 +144,7 @@ def test_check_knows_the_table_and_the_folder(folder):
     assert told["courses"] == 1
 
 
+@pytest.mark.slow
 def test_the_place_of_every_deviation_lies_on_the_course(folder):
     result = run(folder, "placed", "--seed", 4)
     assert result.code == 0, result.err
@@ -155,6 +160,7 @@ def test_the_place_of_every_deviation_lies_on_the_course(folder):
     np.testing.assert_allclose(steps, 0.1 * 0.004, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_its_programmed_path_is_one_that_compensate_takes(folder):
     result = run(folder, "programme", "--seed", 2)
     assert result.code == 0, result.err
@@ -302,6 +308,7 @@ def test_settings_in_another_frame_are_refused_by_file(folder):
     assert "tcp.yaml: frame is 'tcp'" in result.reason
 
 
+@pytest.mark.slow
 def test_people_see_before_after_and_reduction_within_80_columns(folder):
     result = run(folder, "told", "--seed", 2)
     lines = result.err.splitlines()

@@ -73,6 +73,7 @@ def test_the_command_writes_tables_record_and_charts(tmp_path):
     assert "no condition is shown" in " ".join(again.err.split())
 
 
+@pytest.mark.slow
 def test_a_sample_is_calibrated_as_the_dataset_of_a_run_would_be():
     study = prepared("poses=12", "springs=bearing")
     simulate, sample = study.simulate, Sample(0, 0)
@@ -104,6 +105,7 @@ def test_springs_that_readings_decide_are_chosen_for_each_arm_and_not_tabulated(
     assert auto.error_mean < 0.1 * auto.deflection_mean
 
 
+@pytest.mark.slow
 def test_verification_poses_are_never_chosen():
     simulate = prepared("poses=12,48", "search=cover,ioops,random").simulate
     aside = set(simulate.pool.verification.tolist())

@@ -93,6 +93,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
     assert "journal.jsonl" in result.reason
 
 
+@pytest.mark.slow
 def test_a_run_is_derived_with_the_matrix_of_its_tool_file(tmp_path):
     run = record_run(tmp_path / "run", poses=8)
     out = tmp_path / "tool.json"
@@ -106,6 +107,7 @@ def test_a_run_is_derived_with_the_matrix_of_its_tool_file(tmp_path):
     assert "sensor corrected by a tool file" in corrected.provenance
 
 
+@pytest.mark.slow
 def test_a_tool_file_of_before_is_still_read(tmp_path, postures):
     out = tmp_path / "tool.json"
     data = posture_table(tmp_path / "s.csv", postures)

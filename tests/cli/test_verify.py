@@ -163,6 +163,7 @@ def test_a_file_that_the_report_does_not_show_is_named(signed, tmp_path):
     assert "run/plan/plan.json is not the one that the report shows" in found.err.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_what_is_not_signed_is_said_and_refused_where_a_key_is_asked_for(keys):
     run = reported.finished() / "run"
     said = elastocal("verify", run)

@@ -118,6 +118,7 @@ def test_errors_are_those_of_the_springs_that_each_split_chose(readings):
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", ["cover", "ioops"])
 def test_springs_of_a_small_training_set_are_what_calibrate_takes_on_it(readings, search):
     """They were those of all training poses: a tensor at each joint, from a single pose on."""
@@ -192,6 +193,7 @@ def with_friction() -> Readings:
     return replace(both, marker_displacement=both.controller_displacement + exact + noise)
 
 
+@pytest.mark.slow
 def test_splits_keep_the_order_in_which_friction_was_loaded():
     readings = with_friction()
     variant = [Variant(springs="gears")]

@@ -248,6 +248,7 @@ def test_touches_of_two_warmths_make_no_state(at):
         state_of(in_two_sessions(warm, cold, at))
 
 
+@pytest.mark.slow
 def test_a_run_that_was_gone_on_with_at_once_is_one_state():
     same, refused = np.random.default_rng(1).uniform(10e-6, 30e-6, 6), 0
     for seed in range(60):

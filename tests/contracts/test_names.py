@@ -101,6 +101,7 @@ class TestTheRehearsalOfARun:
             assert "provenance" in elastocal(*words).reason
         assert list(tmp_path.iterdir()) == []
 
+    @pytest.mark.slow
     def test_its_dataset_has_the_shape_of_that_of_a_run(self, planned, tmp_path, monkeypatch):
         from elastocal.procedure.derive import rehearsal
 

@@ -93,6 +93,7 @@ class TestEveryWorkflow:
             assert getattr(given, each) == wanted, each
 
 
+@pytest.mark.slow
 def test_paths_given_as_texts_are_read_and_written(tmp_path_factory):
     done = reported.finished()
     out = tmp_path_factory.mktemp("texts")

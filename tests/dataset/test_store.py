@@ -22,6 +22,7 @@ def bits(data: Dataset) -> list[bytes]:
     ]
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(datasets())
 def test_netcdf_and_csv_carry_every_dataset_bit_for_bit(data):

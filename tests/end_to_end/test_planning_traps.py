@@ -43,6 +43,7 @@ def findings(folder):
     return [each["text"] for each in found]
 
 
+@pytest.mark.slow
 def test_an_open_mesh_works_and_says_so(tmp_path):
     path, _ = cell(tmp_path)
     result = elastocal("plan", path, "--out", tmp_path / "plan")
@@ -76,6 +77,7 @@ def test_inverted_normals_are_found_and_said(tmp_path):
     assert "flip_normals: true" in reason
 
 
+@pytest.mark.slow
 def test_inverted_normals_are_mended_by_the_cell_file(tmp_path):
     def inverted(dome):
         dome.invert()
@@ -120,6 +122,7 @@ def test_more_poses_than_the_pool_has_are_refused_by_the_cell_file(tmp_path):
     assert "must be at least the 101 poses" in reason
 
 
+@pytest.mark.slow
 def test_more_poses_than_the_valid_candidates_are_refused(tmp_path):
     reason = refusal(
         tmp_path,
@@ -147,6 +150,7 @@ def test_too_little_friction_for_the_loads_is_refused_by_name(tmp_path):
     assert "friction" in reason
 
 
+@pytest.mark.slow
 def test_loads_beyond_the_torques_name_the_torque(tmp_path):
     reason = refusal(
         tmp_path,
@@ -199,6 +203,7 @@ def test_an_accuracy_without_a_process_says_what_it_needs(tmp_path):
     assert "process.file" in reason
 
 
+@pytest.mark.slow
 def test_a_folder_that_holds_files_is_left_alone(tmp_path):
     path, _ = cell(tmp_path)
     (tmp_path / "plan").mkdir()
@@ -240,12 +245,14 @@ def test_a_home_in_collision_is_refused_before_the_long_work_and_names_the_bodie
     assert "post" in reason
 
 
+@pytest.mark.slow
 def test_a_tool_longer_than_its_stem_is_refused_by_collision(tmp_path):
     deep = ('pose: {xyz: ["0 mm", "0 mm", "190 mm"]}', 'pose: {xyz: ["0 mm", "0 mm", "350 mm"]}')
     few = ("pool: 100", "pool: 31")
     assert "collision" in refusal(tmp_path, deep, few)
 
 
+@pytest.mark.slow
 def test_what_the_catalogue_assumes_is_said(tmp_path):
     path, _ = cell(tmp_path, like="machining")
     assert elastocal("plan", path, "--out", tmp_path / "plan").code == 0

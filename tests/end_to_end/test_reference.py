@@ -54,6 +54,7 @@ def dataset(run) -> Dataset:
     return read(run[0] / "dataset.nc")
 
 
+@pytest.mark.slow
 def test_the_plan_lists_every_press_in_order(run):
     assert tuple(read_plan(run[1]).contact.load_cases) == ORDER
 
@@ -85,6 +86,7 @@ def test_displacements_count_from_the_light_contact(dataset):
     assert np.all(low / full < 0.45)
 
 
+@pytest.mark.slow
 def test_a_plan_without_the_presses_is_refused(run, tmp_path):
     old = planned_cell(tmp_path, POSES)
     with pytest.raises(ProcedureError, match=r"contact\.load_cases are normal, north, those of"):
@@ -109,6 +111,7 @@ def fits(run, dataset, tmp_path_factory):
     return [ec.calibrate(path, springs="actuated") for path in paths]
 
 
+@pytest.mark.slow
 def test_the_check_enters_neither_fit_nor_draws_nor_left_out_errors(fits):
     plain, off = fits
     np.testing.assert_array_equal(plain.calibrated.compliance, off.calibrated.compliance)

@@ -57,6 +57,7 @@ def test_bounds_that_leave_the_data_no_part_are_refused(data, bounds):
     assert "bound" in elastocal("calibrate", data, "--out", out, "--bounds", bounds).reason
 
 
+@pytest.mark.slow
 def test_every_spring_is_observable_stands_in_a_group_or_is_too_weak_to_see():
     for poses in (3, 4, 6, 10):
         readings = few(poses).readings(robot().joint_names)
@@ -83,6 +84,7 @@ def test_trusted_conventions_are_fitted_with_the_doubt_in_the_model():
     assert any("in spite of this: joints 1, 4 and 6" in warning for warning in warnings)
 
 
+@pytest.mark.slow
 def test_names_that_look_like_markup_are_shown_as_they_are(tmp_path):
     measured = Cell(linear_truth(), poses=12).measure()
     arrays = {name: getattr(measured, name) for name in ("joint_position", "force")}

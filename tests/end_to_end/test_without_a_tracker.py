@@ -60,6 +60,7 @@ def _make(folder: Path) -> None:
     ec.calibrate(run, contact=contact, out=run / "model.json", springs="actuated", draws=40)
 
 
+@pytest.mark.slow
 def test_the_cell_of_the_story_has_no_station(story):
     file = load_cell(story / "cell" / "cell.yaml").file
     assert file.marker is None
@@ -124,6 +125,7 @@ def test_codec_refuses_readings_that_no_tracker_took_in_one_line(story):
     assert "Traceback" not in ran.err
 
 
+@pytest.mark.slow
 def test_the_codec_of_a_campaign_without_a_tracker(story):
     out = story / "codec-contact"
     ran = elastocal(

@@ -267,6 +267,7 @@ class TestTheCommand:
         with pytest.raises(IdentificationError, match=message):
             calibrate_files(days, update=files / "model.json")
 
+    @pytest.mark.slow
     def test_the_tool_is_given_as_in_the_calibration(self, files, tmp_path):
         # Readings that state the place of their tcp leave no choice.
         for name in ("old", "monday", "tuesday"):

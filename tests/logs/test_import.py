@@ -48,6 +48,7 @@ def _apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean((a - b) ** 2)))
 
 
+@pytest.mark.slow
 def test_every_reading_of_the_run_is_found(imported, derived):
     assert imported.dataset.poses == derived.poses
     assert len(imported.dataset.load_cases) == len(derived.load_cases)
@@ -80,6 +81,7 @@ def test_the_clocks_are_found_with_their_drift(imported):
     assert abs(tracker.offset - TRACKER_OFFSET) < 4.0 * tracker.offset_sigma < 0.2
 
 
+@pytest.mark.slow
 def test_a_calibration_of_it_agrees_with_that_of_the_run(imported):
     run = ec.calibrate(reported.finished() / "run" / "dataset.nc", springs="actuated", draws=40)
     logs = ec.calibrate(imported.figures.dataset, springs="actuated", draws=40)
@@ -110,6 +112,7 @@ def with_encoders(rows, tmp_path):
     return files, path
 
 
+@pytest.mark.slow
 def test_secondary_encoders_are_imported_with_their_reference(with_encoders):
     files, path = with_encoders
     data = ec.import_logs(files, map=path).dataset

@@ -86,6 +86,7 @@ def test_geometry_is_calibrated_from_them(campaign, tmp_path):
     assert model.held_out.chosen.mean < 2e-5 < 1e-4 < model.held_out.registration.mean
 
 
+@pytest.mark.slow
 def test_plateaus_under_load_do_not_count(tmp_path):
     run = reported.finished() / "run"
     files = write_logs(rows_of(run), tmp_path)

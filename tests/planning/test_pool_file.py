@@ -134,6 +134,7 @@ def test_an_unknown_schema_is_refused_by_name(tmp_path):
     assert "None" in damaged(tmp_path, lambda data: data.drop_attrs(deep=False))
 
 
+@pytest.mark.slow
 def test_a_missing_variable_and_a_wrong_dimension_are_named(tmp_path):
     assert "'margin' is missing" in damaged(tmp_path, lambda data: data.drop_vars("margin"))
     assert "q has dimensions" in damaged(tmp_path, lambda data: data.assign(q=data["q"].T))

@@ -42,6 +42,7 @@ def test_there_are_as_many_candidates_as_wanted(tmp_path, sampling):
     np.testing.assert_allclose(found.pool.postures.contact, at, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_blue_noise_candidates_keep_their_distance(tmp_path):
     def nearest(sampling):
         cell = example(tmp_path, pool=("pool: 3000", f"pool: 150\n  sampling: {sampling}"))
@@ -63,6 +64,7 @@ def test_the_number_of_processes_does_not_change_the_pool(tmp_path, monkeypatch)
     np.testing.assert_array_equal(alone.pool.refused_by, helped.pool.refused_by)
 
 
+@pytest.mark.slow
 def test_the_seed_decides_the_pool(tmp_path):
     cell = example(tmp_path, pool=("pool: 3000", "pool: 30"))
     one, again, other = (gathered(cell, seed=seed).pool.postures.q for seed in (0, 0, 1))
@@ -78,6 +80,7 @@ def test_progress_counts_up_to_what_is_wanted(tmp_path):
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
 
 
+@pytest.mark.slow
 def test_a_surface_out_of_reach_is_given_up_early(tmp_path):
     cell = example(tmp_path, pool=FEW, place=('xyz: ["1.85 m"', 'xyz: ["8 m"'))
     found = gathered(cell)

@@ -208,6 +208,7 @@ def test_load_cases_that_are_too_small_come_with_larger_ones(cell):
     assert "ask for load_cases.fz of" in texts
 
 
+@pytest.mark.slow
 def test_a_plan_of_fewer_poses_than_the_cell_says_is_still_a_plan_of_that_cell(folder, tmp_path):
     cell = folder / "cell.yaml"
     workflows.plan(cell, out=tmp_path / "plan", poses=5, compare="none", jobs=1)

@@ -118,6 +118,7 @@ def hostile(kind: str) -> bytes:
     raise ValueError(kind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", some_by_day(["page of objects", "page of texts", "page of brackets"])
 )

@@ -202,6 +202,7 @@ def test_values_of_other_files_are_not_read(tmp_path, link):
         read_arrays(path)
 
 
+@pytest.mark.slow
 def test_a_damaged_file_prints_nothing_but_its_refusal(tmp_path, capfd, monkeypatch):
     monkeypatch.setenv("ELASTOCAL_MAX_SECONDS", "1")  # with some of them HDF5 spins for ever
     path = tmp_path / "a.nc"

@@ -496,6 +496,7 @@ def test_a_xacro_file_is_known_by_its_suffix(tmp_path):
         check(path)
 
 
+@pytest.mark.slow
 def test_three_thousand_leaves_are_checked_once(tmp_path):
     leaves = "".join(link(f"f{n}") + fixed(f"fj{n}", "link_3", f"f{n}") for n in range(3000))
     path = tmp_path / "arm.urdf"

@@ -312,6 +312,7 @@ def run_it(page, cell, told):
     told["names"] = page.get(NAMES)
 
 
+@pytest.mark.slow
 def test_the_page_complains_of_nothing_and_asks_nobody_else(told):
     # The browser notes each refusal that a page is told, whatever the page makes of it.
     assert [text for text in told["complaints"] if "422" not in text] == []

@@ -338,6 +338,7 @@ class Silent:
         pass
 
 
+@pytest.mark.slow
 def test_a_survey_and_a_comparison_are_made_of_the_pool_of_the_cell(tmp_path):
     path = planned_cell(tmp_path, poses=3).cell
     found = survey_reach(path, Silent())

@@ -32,6 +32,7 @@ def gathered(folder):
     return gather_evidence(EvidenceOptions(folder / "run", model=folder / "model.json"), MADE)
 
 
+@pytest.mark.slow
 def test_the_errors_are_those_of_all_campaigns(two):
     folder, other = two
     found = gathered(folder)

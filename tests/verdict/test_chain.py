@@ -159,6 +159,7 @@ def test_what_is_broken_is_named_and_costs_the_green(copied, name):
     assert str(folder) not in reasons[0]
 
 
+@pytest.mark.slow
 def test_an_edited_model_is_not_read_and_nothing_is_judged(copied):
     folder = copied()
     edit_a_compliance(folder)

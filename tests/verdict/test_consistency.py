@@ -27,6 +27,7 @@ def err_more(record):
     record["calibration"]["held_out"]["mean"] *= 1.01
 
 
+@pytest.mark.slow
 def test_a_model_of_other_readings_is_doubted(copied):
     folder = copied("run", "model.json")
     model = folder / "model.json"
@@ -102,6 +103,7 @@ def test_a_tool_of_another_robot_is_no_part_of_the_run(copied):
     assert "is no link of" in absent(gather_evidence(EvidenceOptions(folder), MADE))["tool file"]
 
 
+@pytest.mark.slow
 def test_a_cell_file_that_was_changed_after_the_plan_is_doubted(copied):
     folder = copied("run")
     path = folder / "run" / "cell" / "cell.yaml"
@@ -115,10 +117,12 @@ def doubts(folder):
     return " | ".join(gather_evidence(EvidenceOptions(folder), MADE).doubts)
 
 
+@pytest.mark.slow
 def test_parts_of_one_run_raise_no_doubt(finished):
     assert gather_evidence(EvidenceOptions(finished), MADE).doubts == ()
 
 
+@pytest.mark.slow
 def test_a_dataset_of_another_run_is_doubted(copied):
     folder = copied("run")
     path = folder / "run" / "dataset.nc"
@@ -155,6 +159,7 @@ def test_a_summary_of_another_run_is_doubted(copied):
     assert "the summary is of a run that began at another time" in doubts(folder)
 
 
+@pytest.mark.slow
 def test_a_codec_of_another_run_is_doubted(copied):
     folder = copied("run", "codec")
     data = read_codec(folder / "codec")

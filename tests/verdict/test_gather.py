@@ -24,6 +24,7 @@ def damage(path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
+@pytest.mark.slow
 def test_everything_is_found_under_its_default_name(parts, finished):
     assert set(absent(parts)) == {"earlier calibration"}
     assert parts.name == "afp"
@@ -40,6 +41,7 @@ def test_everything_is_found_under_its_default_name(parts, finished):
     }
 
 
+@pytest.mark.slow
 def test_the_run_itself_may_be_named_in_place_of_the_folder_around_it(parts, finished):
     inner = gather_evidence(EvidenceOptions(finished / "run"), MADE)
     assert [(each.name, each.sha256) for each in inner.files] == [
@@ -59,6 +61,7 @@ def test_the_calibration_made_again_is_that_of_the_model_file(parts):
     assert unseen.poses == unseen.folds == POSES
 
 
+@pytest.mark.slow
 def test_settings_in_the_model_file_are_followed(copied):
     folder = copied("run")
     made = elastocal(
@@ -202,12 +205,14 @@ def test_a_path_that_is_not_there_is_refused(tmp_path):
         gather_evidence(EvidenceOptions(tmp_path / "nowhere"), MADE)
 
 
+@pytest.mark.slow
 def test_a_tolerance_on_the_command_line_goes_before_that_of_the_cell(finished):
     parts = gather_evidence(EvidenceOptions(finished, tolerance=1e-3, drift=2e-3), MADE)
     assert (parts.limits.tolerance, parts.limits.drift) == (1e-3, 2e-3)
     assert "--tolerance" in parts.limits.source
 
 
+@pytest.mark.slow
 def test_an_earlier_model_is_compared_over_the_readings_of_the_run(finished, tmp_path):
     old = tmp_path / "old.json"
     made = elastocal(

@@ -38,6 +38,7 @@ def test_everything_else_counts_in_json(tmp_path, change):
     assert read_hash(one) != read_hash(written(tmp_path / "b.json", change))
 
 
+@pytest.mark.slow
 def test_a_number_in_the_dataset_counts_and_its_origin_does_not(finished, tmp_path):
     data = dataset.read(finished / "run" / "dataset.nc")
     same, other = data.to_xarray().copy(deep=True), data.to_xarray().copy(deep=True)

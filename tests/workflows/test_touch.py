@@ -51,6 +51,7 @@ def truth(cell, q):
     return share * (robot.forward(q)[..., :3, 3] - robot.foot(q))
 
 
+@pytest.mark.slow
 def test_the_state_is_what_the_simulated_arm_has_grown(touched):
     folder, made, data = touched
     cell, found = load_cell(made.cell), read_touches(folder / "cold", folder / "state-run")

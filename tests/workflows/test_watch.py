@@ -140,6 +140,7 @@ def test_no_fault_moves_the_arm_or_hides_another_device_and_mended_it_is_heard(w
         np.testing.assert_allclose(lines.live.press().tool, before, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_stream_that_another_client_has_taken_is_left_to_it(wired, monkeypatch):
     found, opened = wired
     asked, obey = [], NetFtServer._obey
@@ -158,6 +159,7 @@ def test_a_stream_that_another_client_has_taken_is_left_to_it(wired, monkeypatch
         assert len(asked) == before + 1  # the thief alone
 
 
+@pytest.mark.slow
 def test_a_device_in_use_is_left_to_its_program_and_the_others_are_shown(wired):
     found, opened = wired
     rig = rig_of(load_cell(found.cell))
@@ -295,6 +297,7 @@ def test_a_watch_of_a_cell_that_names_no_driver_is_refused(tmp_path):
     assert "devices.arm: unknown driver 'kuka'" in elastocal("watch", cell).reason
 
 
+@pytest.mark.slow
 def test_the_studio_shows_the_same_rows_and_ends_the_watch():
     told = []
 

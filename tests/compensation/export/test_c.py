@@ -117,6 +117,7 @@ def test_golden_robot(tmp_path, count):
     assert_deflections_agree(executable, calibrated, count)
 
 
+@pytest.mark.slow
 @at_many_states
 @pytest.mark.parametrize("like", ["afp", "machining"])
 def test_example_robots_one_of_them_on_a_rail(tmp_path, like, count):
@@ -504,6 +505,7 @@ def test_sine_and_cosine_are_good_to_two_ulp_over_many_turns(folder, tmp_path):
         assert (np.abs(column - expected) <= 2.0 * np.spacing(np.abs(expected)) + 1e-19).all()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not on this machine")
 @pytest.mark.parametrize("springs", some_by_day(["gears", "hinges"]))
 def test_instructions_do_not_depend_on_the_input(tmp_path, springs):

@@ -55,6 +55,7 @@ def program(tmp_path_factory):
     return made(folder / "c", "check"), files
 
 
+@pytest.mark.slow
 def test_it_compiles_strictly_and_its_self_test_is_clean_under_the_sanitizers(program, tmp_path):
     folder = shutil.copytree(program[0].parent, tmp_path / "c")
     made(folder, "clean")

@@ -22,6 +22,7 @@ def certificate(parts):
     return certificate_of_evidence(replace(parts, stated=stated), judge_evidence(parts))
 
 
+@pytest.mark.slow
 def test_the_bar_has_every_mark_at_its_part_of_the_scale(certificate, parts):
     bar, unseen = certificate.bar, parts.unseen
     per_metre = bar.tolerance.at / parts.limits.tolerance

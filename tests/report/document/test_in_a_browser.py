@@ -202,6 +202,7 @@ def sheets_of(tab):
 
 
 class TestPlanAndGeometry:
+    @pytest.mark.slow
     def test_the_keyboard_reaches_everything_and_chooses_poses(self, reached):
         assert reached["first"] == "#poses"
         assert reached["chosen"].startswith("Pose 1:")
@@ -231,6 +232,7 @@ def press(tab, key):
         tab.evaluate("new Promise((done) => setTimeout(done, 150))")
 
 
+@pytest.mark.slow
 def test_the_keyboard_opens_sections_by_the_contents_and_by_themselves(keys):
     assert keys["opened"]
     assert keys["unfolded"]
@@ -254,6 +256,7 @@ def test_the_first_picture_waits_for_no_view(keys):
     assert not keys["drawn"]
 
 
+@pytest.mark.slow
 def test_the_probe_sees_what_is_wrong(browser, tmp_path):
     """Each fault of this page must be seen, or the tests above could not fail."""
     page = tmp_path / "bad.html"
@@ -279,6 +282,7 @@ def test_the_probe_sees_what_is_wrong(browser, tmp_path):
     assert seen.requests == ["http://127.0.0.1:9/asked"]
 
 
+@pytest.mark.slow
 def test_the_page_refuses_itself_the_network(browser, tmp_path):
     page = write_report(tmp_path / "report.html", Evidence(made=MADE)).path
     asked = 'fetch("http://127.0.0.1:9/asked").catch(() => {});'
@@ -288,6 +292,7 @@ def test_the_page_refuses_itself_the_network(browser, tmp_path):
     assert any("Content Security Policy" in line for line in seen.complaints)
 
 
+@pytest.mark.slow
 def test_a_script_that_the_page_did_not_come_with_is_not_run(browser, tmp_path):
     page = write_report(tmp_path / "report.html", Evidence(made=MADE)).path
     text = page.read_text("utf-8")
@@ -310,6 +315,7 @@ def test_it_prints_to_pages_of_a4_with_its_appendix(browser, report, tmp_path):
 LONG = "a reason that is as long as reasons may be, with names of poses and of load cases, " * 5
 
 
+@pytest.mark.slow
 def test_the_certificate_alone_is_one_sheet_in_every_language_whatever_it_has_to_say(
     browser, parts, tmp_path, monkeypatch
 ):
@@ -337,6 +343,7 @@ SIZES = """(({ scrollHeight, clientHeight }) => [scrollHeight, clientHeight])(
   document.querySelector(".certificate"))"""
 
 
+@pytest.mark.slow
 def test_the_head_of_a_first_column_stands_over_it(browser, plan):
     heads = """JSON.stringify([...document.querySelectorAll("table")].map((table) =>
       [table.tHead.rows[0].cells[0], table.tBodies[0].rows[0].cells[0]]

@@ -61,6 +61,7 @@ def test_the_report_shows_a_comparison_as_the_terminal_does(parts):
     assert_cells(shown, found.html)
 
 
+@pytest.mark.slow
 def test_the_page_of_a_codec_has_the_errors_of_the_terminal(tmp_path):
     found = judged()
     shown = tuple(show_codec(codec_summary(found.data, found.verdicts)))

@@ -103,6 +103,7 @@ def run_of(folder):
     return read_journal(folder / "run" / "journal.jsonl")[0].run.identity
 
 
+@pytest.mark.slow
 def test_equal_runs_give_equal_reports_but_for_times(text, finished, copied, tmp_path):
     folder = copied()
     journal, summary = (folder / "run" / name for name in ("journal.jsonl", "summary.json"))
@@ -162,6 +163,7 @@ class TestInGerman:
 
     german = language_of("de")
 
+    @pytest.mark.slow
     def test_the_report(self, parts, tmp_path):
         page = write_report(tmp_path / "de.html", parts, language=self.german).path
         text = page.read_text("utf-8")

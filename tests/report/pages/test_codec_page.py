@@ -174,6 +174,7 @@ def test_another_suffix_is_refused(tmp_path):
         write_figure(tmp_path / "f.gif", lambda: None, "", "")
 
 
+@pytest.mark.slow
 def test_page_draws_in_a_browser_and_tells_what_the_slider_asks(tmp_path, text):
     browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
     if browser is None:

@@ -124,6 +124,7 @@ def test_saturation_of_the_norm_is_not_drawn_into_other_axes(known):
     assert "aturat" not in texts_of(figure)
 
 
+@pytest.mark.slow
 def test_no_text_covers_another(known):
     charts = (
         codec_chart(known.data, known.verdicts),
@@ -163,6 +164,7 @@ def test_every_spring_has_a_panel_with_a_readable_unit(known):
     assert {name.partition(".")[0] for name in first} == {"joint_1"}
 
 
+@pytest.mark.slow
 def test_of_many_springs_those_without_a_finding_have_no_panel(known, monkeypatch):
     monkeypatch.setattr(analysis_charts, "_MOST_SPRINGS", 10)
     found = {

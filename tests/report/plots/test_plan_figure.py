@@ -41,6 +41,7 @@ def fine(plan, pool, moved_onto):
     return surface, *moved_onto(surface, plan, pool)
 
 
+@pytest.mark.slow
 def test_a_fine_mesh_is_an_image_in_the_svg_and_a_small_one_is_lines(tmp_path, fine, on_block):
     small = write_plan_figure(tmp_path / "s.svg", *on_block).read_text(encoding="utf-8")
     large = write_plan_figure(tmp_path / "l.svg", *fine).read_text(encoding="utf-8")

@@ -31,6 +31,7 @@ def titles(figure):
     return [text.get_text() for text in figure.texts]
 
 
+@pytest.mark.slow
 def test_a_calibration_shows_every_spring(result):
     (axes,) = result.plot().axes
     names = [label.get_text() for label in axes.get_yticklabels()]

@@ -75,6 +75,7 @@ def test_nothing_to_compare_still_makes_a_page(found):
     assert "No compared spring moved." in words(figure)
 
 
+@pytest.mark.slow
 def test_many_rows_are_drawn_in_groups_that_keep_the_extremes(compared):
     change = compared.rows
     many = recertify(
@@ -95,6 +96,7 @@ def test_texts_keep_inside_the_page(found):
         assert page.y0 <= box.y0 < box.y1 <= page.y1
 
 
+@pytest.mark.slow
 def test_the_same_comparison_gives_the_same_bytes(found, tmp_path):
     files = [write_recertification_figure(tmp_path / f"{n}.svg", found) for n in "ab"]
     assert files[0].read_bytes() == files[1].read_bytes()
