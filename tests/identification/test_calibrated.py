@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import RobotError
 from elastocal.identification import CalibratedModel, Observability
-from elastocal.identification.uncertainty import Misfit
+from elastocal.identification.uncertainty import Misfit, interval
 from support.problems import elastic
 from support.virtual_chain import configurations
 
@@ -41,7 +41,7 @@ def test_a_prediction_is_the_deflection_of_the_model(calibrated):
 def test_its_interval_is_that_of_the_predictions_of_the_draws(calibrated):
     q, force, _ = rows(7)
     each = [elastic("actuated").deflection(draw, q, force) for draw in DRAWS]
-    low, high = np.percentile(each, [2.5, 97.5], axis=0)
+    low, high = interval(np.array(each))
     found = calibrated.predict(q, force)
     np.testing.assert_allclose(found.low, low, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(found.high, high, rtol=1e-9, atol=1e-15)
@@ -97,8 +97,15 @@ def test_stiffness_is_infinite_where_nothing_yields(calibrated):
 
 
 def test_the_interval_of_a_compliance_is_that_of_its_draws(calibrated):
-    low, high = calibrated.interval()
-    np.testing.assert_allclose([low, high], np.percentile(DRAWS, [2.5, 97.5], axis=0))
+    np.testing.assert_array_equal(calibrated.interval(), interval(DRAWS))
+
+
+def test_the_interval_of_a_compliance_lacks_the_doubt_about_the_model(calibrated):
+    """A prediction has a meaning in every model, a spring in its own alone."""
+    q, force, _ = rows(7)
+    told = replace(calibrated, spring_draws=C + 0.5 * (DRAWS - C))
+    np.testing.assert_array_equal(told.interval(), interval(C + 0.5 * (DRAWS - C)))
+    np.testing.assert_array_equal(told.predict(q, force).low, calibrated.predict(q, force).low)
 
 
 def test_arrays_are_copied_and_read_only():

@@ -16,7 +16,7 @@ from elastocal.identification import (
     summary,
 )
 from elastocal.identification.recertification import recertify
-from elastocal.identification.uncertainty import Misfit, measured_coverage
+from elastocal.identification.uncertainty import Misfit, interval, measured_coverage
 from elastocal.records import from_data, to_data
 from support.cells import Cell, linear_truth
 from support.problems import elastic, linear_readings, planted
@@ -195,7 +195,7 @@ def test_a_left_out_reading_is_inside_where_draws_and_misfit_together_reach_it()
         kept = held_out.fold != fold
         others = Misfit.of(held_out.axis_error[kept], held_out.size[kept])
         error = others.error(np.linalg.norm(predicted))
-        low, high = np.percentile(deviations @ rows.T, [2.5, 97.5], axis=0)
+        low, high = interval(deviations @ rows.T)
         down, up = np.minimum(low, 0.0), np.maximum(high, 0.0)
         off = d - predicted
         inside.append((off >= -np.hypot(down, error)) & (off <= np.hypot(up, error)))

@@ -341,6 +341,8 @@ _MOST_ORDERS = 24
 """Orders of markers that are tried."""
 _ROWS = 60
 """Rows by which the likeliest are found."""
+_SEVERAL = 4
+"""Rows left out of which a convention of joints is looked for; fewer are single blunders."""
 _ROBUST_STEPS = 6
 """Steps of least absolute distances."""
 _STILL = 0.25
@@ -378,6 +380,8 @@ def plausible_ladder(
         mistakes = _explanations(problem, MOST_LEFT_OUT * length)
         raise GeometryError(_refusal(problem, mistakes, str(error))) from error
     why, stated = implausible(problem, found), _left_out(found)
+    if why is None and (mistaken := _contradicted(problem, found)) is not None:
+        raise GeometryError(_refusal(problem, *mistaken))
     if why is None and not stated > _SUSPICIOUS * length:
         return found
     limit = _FAR_BETTER * stated
@@ -535,6 +539,43 @@ def require_known_markers(found: FloatArray, known: FloatArray) -> None:
         f"marker {number + 1} is measured {1e3 * off[number]:.3g} mm from where --marker says"
         f"{why or '; is it on another tool, in another unit or frame?'}"
     )
+
+
+def _contradicted(
+    problem: GeometryProblem, found: GeometryLadder
+) -> tuple[list[tuple[str, float]], str] | None:
+    """Return the convention of joints that explains the rows left out, and what they say without.
+
+    Rows whose joints hardly turn together, as in sweeps of one joint after the other, fit in any
+    convention but for those of one joint, and a fit takes these for blunders.
+    """
+    robot, data = problem.robot, problem.data
+    out = np.setdiff1d(problem.row, problem.row[found.whole.fit.used])
+    if len(out) < _SEVERAL:
+        return None
+    # As many rows to either side, or the larger would hide the other.
+    kept = np.setdiff1d(np.arange(len(data)), out)
+    some = [rows[np.linspace(0, len(rows) - 1, _ROWS).astype(np.intp)] for rows in (out, kept)]
+    rows = np.unique(np.concatenate(some))
+
+    def missed(robot: Robot, data: Positions) -> tuple[float, float]:
+        whole = GeometryProblem(robot, data)
+        nominal = register(GeometryProblem(robot, data.rows(rows)))
+        distance = np.linalg.norm(whole.residual(nominal), axis=1)
+        is_out = np.isin(whole.row, out)
+        return float(np.median(distance[is_out])), float(np.median(distance[~is_out]))
+
+    far, near = missed(robot, data)
+    for each in _readings(robot, data):
+        there, elsewhere = missed(each.robot, each.data)
+        if there <= _FAR_BETTER * far and elsewhere <= _TIE * near:
+            left = _undone_error(each)
+            if np.isfinite(left):
+                why = (
+                    f"{counted(len(out), 'row')} of {len(data)} miss by {1e3 * far:.3g} mm (median)"
+                )
+                return [(each.mistake, left)], why
+    return None
 
 
 def _left_out(found: GeometryLadder) -> float:

@@ -193,7 +193,7 @@ class CalibratedModel:
     compliance: FloatArray
     """Shape (spring,), in rad/(N·m) or m/N."""
     draws: FloatArray
-    """Bootstrap draws, shape (draw, spring)."""
+    """Bootstrap draws, of which predictions have their intervals, shape (draw, spring)."""
     observability: Observability
     provenance: str = ""
     """Origin of the data."""
@@ -210,12 +210,22 @@ class CalibratedModel:
     it belonged to another tool."""
     encoders: tuple[EncoderZero, ...] = ()
     """What secondary encoders read in the air; empty: the calibration had none."""
+    spring_draws: FloatArray | None = None
+    """Draws of which springs have their intervals, shape (draw, spring); None: `draws`. They lack
+    the doubt whether another model is right, since a spring has a value in its own model alone."""
 
     def __post_init__(self) -> None:
-        for name in ("compliance", "draws"):
+        for name in ("compliance", "draws", "spring_draws"):
+            if getattr(self, name) is None:
+                continue
             array = np.array(getattr(self, name), dtype=float)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+
+    @property
+    def draws_of_springs(self) -> FloatArray:
+        """Draws of which springs and sums of springs have their intervals, shape (draw, spring)."""
+        return self.draws if self.spring_draws is None else self.spring_draws
 
     @property
     def stiffness(self) -> FloatArray:
@@ -318,7 +328,7 @@ class CalibratedModel:
 
     def interval(self) -> tuple[FloatArray, FloatArray]:
         """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
-        return interval(self.draws)
+        return interval(self.draws_of_springs)
 
     def predict(
         self,

@@ -176,7 +176,9 @@ class Calibration:
     coverage: Coverage
     """Measured coverage of the intervals of a prediction."""
     widening: float
-    """Factor by which the bootstrap draws were stretched; see `widening_factor`."""
+    """Factor by which the draws of predictions were stretched; see `widening_factor`."""
+    spring_widening: float
+    """Factor by which those of the springs were: without the doubt about the model."""
     screening: Screening
     solution: Solution
     warnings: tuple[Finding, ...]
@@ -248,9 +250,10 @@ def calibrate(
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
     draws = bootstrap(PoseGrams.of(weighted), options.draws, rng, weighted.prior_error)
     draws[:, weighted.springs] = _as_of_arms(draws[:, weighted.springs], model.parameters)
-    by = _widening(weighted, solution.compliance, draws, held_out, ladder, unexplained)
-    widened = widen_draws(weighted, solution.compliance, draws, by)
     springs, frames, c = weighted.springs, weighted.frame_columns, solution.compliance
+    few, by = _widening(weighted, c, draws, held_out, ladder, unexplained)
+    widened = widen_draws(weighted, c, draws, by)
+    in_model = widen_draws(weighted, c, draws, few) if few < by else widened
     compliance, plain = c[springs], weighted.of_springs()
     calibrated = CalibratedModel(
         model,
@@ -262,6 +265,7 @@ def calibrate(
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, fitted, kept.block),
         encoders=encoder_zeros(model, fitted, compliance) if options.encoders else (),
+        spring_draws=_as_of_arms(in_model[:, springs], model.parameters) if few < by else None,
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
@@ -280,10 +284,11 @@ def calibrate(
         ladder=tuple(ladder),
         coverage=measured_coverage(weighted, held_out, widened - c, low_loads(fitted)),
         widening=by,
+        spring_widening=few,
         screening=screening,
         solution=solution,
         warnings=tuple(warnings),
-        frames=frame_summaries(weighted.frames, c[frames], widened[:, frames]),
+        frames=frame_summaries(weighted.frames, c[frames], interval(widened[:, frames])),
         contact=contact,
         encoders=encoders,
     )
@@ -371,17 +376,22 @@ def _widening(
     held_out: HeldOut,
     ladder: Sequence[Climbed],
     unexplained: float,
-) -> float:
-    """Return the factor that widens draws: for few poses, and for model uncertainty."""
-    by = widening_factor(problem, compliance, draws, held_out.compliance)
-    stretched = compliance + by * (draws - compliance)
+) -> tuple[float, float]:
+    """Return the factors that widen draws: for few poses, and for model uncertainty besides.
+
+    Another model would predict otherwise, while a spring has a value in its own model alone.
+    """
+    few = widening_factor(problem, compliance, draws, held_out.compliance)
+    stretched = compliance + few * (draws - compliance)
     open_to_choice = [each for each in ladder if np.isfinite(each.apart)]
     figures = [(each.difference, each.standard_error, each.apart) for each in open_to_choice]
     moved = doubt(*np.array(figures).reshape(-1, 3).T)
-    by *= doubt_factor(problem, compliance, stretched, moved)
+    by = few * doubt_factor(problem, compliance, stretched, moved)
     if not unexplained <= MOST_UNEXPLAINED:
-        return max(by, distrust_factor(problem, compliance, draws, held_out))
-    return by
+        # No model of this arm: its springs are as far off as its predictions.
+        by = max(by, distrust_factor(problem, compliance, draws, held_out))
+        return by, by
+    return few, by
 
 
 def _data_warnings(

@@ -6,7 +6,7 @@ data are explained far better without one of them, the fit is refused with that 
 (docs/decisions/0006-conventions-verdict.md).
 
 A new mistake is a function that undoes it and an entry in `FORCE_MISTAKES`; of the joints, an
-entry in `elastocal.robot.JOINT_READINGS`.
+entry in `elastocal.robot.other_joint_readings`.
 """
 
 from collections.abc import Callable

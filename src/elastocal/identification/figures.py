@@ -305,7 +305,7 @@ def spring_summaries(
             parts = dict(zip(names, each.weights, strict=True))
             group, reach = seen.group_of(parts), seen.faint_reach(parts)
             value = float(calibrated.compliance[own] @ weights)
-            low, high = map(float, interval(calibrated.draws[:, own] @ weights))
+            low, high = map(float, interval(calibrated.draws_of_springs[:, own] @ weights))
             # Noise may mix the parts of a gear and leave what they come to.
             whole = np.count_nonzero(weights) > 1 and 0.5 * (high - low) <= abs(value)
             if whole and group is not None and group > len(seen.unobservable):
@@ -343,7 +343,7 @@ def sum_summaries(calibrated: CalibratedModel) -> tuple[SumSummary, ...]:
     sums = calibrated.observability.seen_beside(parameters)
     rows = sum_weights(sums, list(units))
     values = (rows @ calibrated.compliance).tolist()
-    ends = interval(calibrated.draws @ rows.T)
+    ends = interval(calibrated.draws_of_springs @ rows.T)
     return tuple(
         SumSummary(terms, units[terms[0].spring], value, float(low), float(high))
         for terms, value, low, high in zip(sums, values, *ends, strict=True)

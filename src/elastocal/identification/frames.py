@@ -171,7 +171,7 @@ def _require_poses(
 
 
 def frame_summaries(
-    names: tuple[str, ...], values: FloatArray, draws: FloatArray
+    names: tuple[str, ...], values: FloatArray, ends: tuple[FloatArray, FloatArray]
 ) -> tuple[FrameSummary, ...]:
     """Return the frames of a fit.
 
@@ -181,16 +181,15 @@ def frame_summaries(
         Sessions.
     values : ndarray, shape (9 sessions,)
         Their numbers.
-    draws : ndarray, shape (draw, 9 sessions)
-        Draws of these.
+    ends : tuple of ndarray, shape (9 sessions,)
+        Lower and upper ends of their 95 % intervals.
     """
 
     def each() -> Iterator[FrameSummary]:
-        low, high = np.percentile(draws, [2.5, 97.5], axis=0)
         for number, name in enumerate(names):
             own = slice(number * NUMBERS, (number + 1) * NUMBERS)
             t, w, e = values[own].reshape(3, 3).tolist()
-            half = 0.5 * (high - low)[own]
+            half = 0.5 * (ends[1] - ends[0])[own]
             yield FrameSummary(name, tuple(t), tuple(w), tuple(e), tuple(half.tolist()))
 
     return tuple(each())

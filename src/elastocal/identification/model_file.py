@@ -69,7 +69,7 @@ class CalibrateResult(Result):
     compliance: FloatArray
     """Shape (parameter,), in rad/(N·m) or m/N of hinges."""
     draws: FloatArray
-    """Bootstrap draws, shape (draw, parameter)."""
+    """Bootstrap draws, of which predictions have their intervals, shape (draw, parameter)."""
     observability: Observability
     provenance: str
     """Origin of the data."""
@@ -89,6 +89,9 @@ class CalibrateResult(Result):
     in files before it was written."""
     update: SpringUpdate | None = None
     """Update of the springs by tracked production; None: they are those of the calibration."""
+    spring_draws: FloatArray | None = None
+    """Draws of which springs have their intervals, shape (draw, parameter); none: `draws`. See
+    `CalibratedModel.spring_draws`."""
     needs: dict[str, str] = field(default_factory=dict)
     """Distributions besides elastocal that define its springs, with the versions that made it;
     readers require them first (`elastocal.plugins.require_distributions`)."""
@@ -116,7 +119,9 @@ class CalibrateResult(Result):
         n = sum(len(spring.parameters) for spring in self.springs)
         if len(self.draws) < MINIMUM_DRAWS:
             raise SchemaError(f"{len(self.draws)} draws, at least {MINIMUM_DRAWS} are needed")
-        for name, rows in (("compliance", self.compliance[None]), ("draws", self.draws)):
+        numbers = {"compliance": self.compliance[None], "draws": self.draws}
+        numbers |= {} if self.spring_draws is None else {"spring_draws": self.spring_draws}
+        for name, rows in numbers.items():
             if rows.ndim != 2 or rows.shape[1] != n:
                 raise SchemaError(f"{name} must have one number for each of {n} parameters")
             require_possible([p for s in self.springs for p in s.parameters], rows, name)
@@ -166,6 +171,7 @@ class CalibrateResult(Result):
             calibration=calibration,
             tool=calibrated.tool,
             domain=calibrated.domain,
+            spring_draws=calibrated.spring_draws,
         )
 
     @cached_property
@@ -195,6 +201,7 @@ class CalibrateResult(Result):
             float("nan") if self.calibration is None else self.calibration.unexplained,
             None if self.calibration is None or self.tool is not None else self.calibration.doubt,
             self._encoders,
+            self.spring_draws,
         )
 
     @property

@@ -292,9 +292,14 @@ def bootstrap(
 
 
 def interval(draws: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper end of the 95 % percentile interval over the first axis."""
+    """Return the lower and upper end of the 95 % percentile interval over the first axis.
+
+    Between its ends lies 95 % in the mean of what the draws are drawn from, however few they are:
+    the k-th of n in order has ``k / (n + 1)`` of it below (E. J. Gumbel, "Statistics of Extremes",
+    1958, section 1.2.7). Of 200 draws NumPy's default ends hold 94.1 %.
+    """
     tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.percentile(draws, [tail, 100.0 - tail], axis=0)
+    low, high = np.percentile(draws, [tail, 100.0 - tail], axis=0, method="weibull")
     return low, high
 
 

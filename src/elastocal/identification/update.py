@@ -251,7 +251,8 @@ def update_springs(
     if refusal is not None:
         return calibrated, replace(known, farthest=0.0, refusal=refusal)
     draws = _draws(calibrated, rows, L, weight, rng)
-    return replace(calibrated, compliance=_springs(calibrated, c + L @ z), draws=draws), known
+    compliance = _springs(calibrated, c + L @ z)
+    return replace(calibrated, compliance=compliance, draws=draws, spring_draws=None), known
 
 
 def _refusal(left: float, ratio: float, gain: float, standard_error: float) -> Finding | None:

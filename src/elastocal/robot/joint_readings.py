@@ -30,34 +30,42 @@ def _turn_roll(robot: Robot, q: FloatArray) -> FloatArray:
     return q * signs
 
 
-def _uncoupled(sign: float) -> Callable[[Robot, FloatArray], FloatArray]:
+def _uncoupled(sign: float, sense: float) -> Callable[[Robot, FloatArray], FloatArray]:
+    """Return the reading of a third joint whose column is the tilt of the forearm, up or down."""
+
     def read(robot: Robot, q: FloatArray) -> FloatArray:
         free = q.copy()
         second, third = robot.external_axes + 1, robot.external_axes + 2
-        free[:, third] = sign * q[:, third] - q[:, second]
+        free[:, third] = sense * (sign * q[:, third] - q[:, second])
         return free
 
     return read
 
 
-JOINT_READINGS = (
-    JointReading(
-        "joints 1, 4 and 6 of the arm turn the other way round than in the URDF (KUKA's A1, A4,"
-        " A6 turn clockwise)",
-        _turn_roll,
-    ),
-    JointReading(
-        "the third joint is coupled to the second as on FANUC controllers: use -(q2 + q3)",
-        _uncoupled(-1.0),
-    ),
-    JointReading(
-        "the third joint is measured against the horizontal: use q3 - q2", _uncoupled(1.0)
-    ),
-    JointReading("the joints are in reverse order", lambda _, q: q[:, ::-1]),
-)
-"""Conventions of arms with six axes or more, the likeliest first."""
-
-
 def other_joint_readings(robot: Robot) -> tuple[JointReading, ...]:
-    """Return the other conventions in which the joints of a robot may have been recorded."""
-    return JOINT_READINGS if len(robot.joint_names) >= 6 else ()
+    """Return the other conventions in which the joints of a robot may have been recorded.
+
+    Those of arms with six axes or more, the likeliest first. In many URDFs of FANUC arms the third
+    joint turns against the second, which changes both signs of a coupled one.
+    """
+    if len(robot.joint_names) < 6:
+        return ()
+    shoulder, elbow = robot.chain.joints[robot.external_axes + 1 :][:2]
+    sense = float(np.copysign(1.0, shoulder.axis @ elbow.placement[:3, :3] @ elbow.axis))
+    coupled, level = ("-(q2 + q3)", "q3 - q2") if sense > 0.0 else ("q2 + q3", "q2 - q3")
+    return (
+        JointReading(
+            "joints 1, 4 and 6 of the arm turn the other way round than in the URDF (KUKA's A1, A4,"
+            " A6 turn clockwise)",
+            _turn_roll,
+        ),
+        JointReading(
+            f"the third joint is coupled to the second as on FANUC controllers: use {coupled}",
+            _uncoupled(-1.0, sense),
+        ),
+        JointReading(
+            f"the third joint is measured against the horizontal: use {level}",
+            _uncoupled(1.0, sense),
+        ),
+        JointReading("the joints are in reverse order", lambda _, q: q[:, ::-1]),
+    )
