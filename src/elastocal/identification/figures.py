@@ -217,6 +217,9 @@ class CalibrationSummary:
     """Combinations that noise hides; their numbers follow those of `unobservable`."""
     sums: tuple[SumSummary, ...] = ()
     """What the readings tell of their springs."""
+    spring_widening: float | None = None
+    """Factor by which the draws of springs were stretched, as `interval_widening` those of
+    predictions; None in older files."""
     check: LoadCheck | None = None
     """The error at load cases that are kept out of every fit, where there are any."""
 
@@ -260,6 +263,7 @@ def summary(
         held_out=_held_out(calibration.held_out),
         draws=len(calibrated.draws),
         interval_widening=calibration.widening,
+        spring_widening=calibration.spring_widening,
         warnings=calibration.warnings,
         settings=settings,
         ladder=tuple(map(rung_summary, calibration.ladder)),
