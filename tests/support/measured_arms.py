@@ -221,4 +221,27 @@ def rounded(quarter: str) -> Robot:
     )  # fmt: skip
 
 
+_LAYOUTS = (
+    ("0", "{q}", "0", "0", "{q}", "-{q}"),
+    ("0", "-{q}", "0", "-{q}", "{q}", "-{q}"),
+    ("0", "-{q}", "0", "{q}", "-{q}", "{q}"),
+    ("0", "-{q}", "{q}", "-{q}", "{q}", "-{q}", "{q}"),
+)
+"""Turns about x between the axes: three parallel ones, spherical wrists, seven axes."""
+
+
+def made_up(seed: int) -> Robot:
+    """Return an arm of links drawn at random, whose file rounds quarter turns to some digits."""
+    rng, z = np.random.default_rng([seed, 31]), "0 0 1"
+    q, layout = ("1.5708", "1.571")[seed % 2], _LAYOUTS[seed // 2 % len(_LAYOUTS)]
+    joints = []
+    for turn in layout:
+        place = np.zeros(3)
+        place[rng.integers(3)] = rng.uniform(0.1, 0.6)
+        place[rng.integers(3)] += rng.choice([0.0, 0.05])
+        yaw = rng.choice(["0", "{q}", "-{q}"])
+        joints.append((" ".join(map(str, place.tolist())), z, f"{turn} 0 {yaw}".format(q=q)))
+    return chain(*joints)
+
+
 ARMS = {"spherical wrist": kuka, "parallel axes": universal, "seven axes": seven_axes}

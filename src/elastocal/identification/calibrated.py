@@ -221,6 +221,8 @@ class CalibratedModel:
             array = np.array(getattr(self, name), dtype=float)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        if self.spring_draws is not None and np.array_equal(self.spring_draws, self.draws):
+            object.__setattr__(self, "spring_draws", None)
 
     @property
     def draws_of_springs(self) -> FloatArray:

@@ -248,24 +248,21 @@ def calibrate(
     weighted = kept.reweighted(solution.reading_weight)
     held_out = leave_poses_out(weighted)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
-    draws = bootstrap(PoseGrams.of(weighted), options.draws, rng, weighted.prior_error)
-    draws[:, weighted.springs] = _as_of_arms(draws[:, weighted.springs], model.parameters)
     springs, frames, c = weighted.springs, weighted.frame_columns, solution.compliance
+    draws = _resampled(weighted, options.draws, rng, model.parameters)
     few, by = _widening(weighted, c, draws, held_out, ladder, unexplained)
-    widened = widen_draws(weighted, c, draws, by)
-    in_model = widen_draws(weighted, c, draws, few) if few < by else widened
-    compliance, plain = c[springs], weighted.of_springs()
+    widened = _stretched(weighted, c, draws, by, model.parameters)
     calibrated = CalibratedModel(
         model,
-        compliance,
-        _as_of_arms(widened[:, springs], model.parameters),
-        _seen(model, plain, compliance, options),
+        c[springs],
+        widened[:, springs],
+        _seen(model, weighted.of_springs(), c[springs], options),
         provenance,
         held_out.misfit,
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, fitted, kept.block),
-        encoders=encoder_zeros(model, fitted, compliance) if options.encoders else (),
-        spring_draws=_as_of_arms(in_model[:, springs], model.parameters) if few < by else None,
+        encoders=encoder_zeros(model, fitted, c[springs]) if options.encoders else (),
+        spring_draws=_stretched(weighted, c, draws, few, model.parameters)[:, springs],
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
@@ -367,6 +364,28 @@ def _as_of_arms(draws: FloatArray, parameters: Sequence[Parameter]) -> FloatArra
     dimensions = (present(dimension_of_unit(each.unit.si), "dimension") for each in parameters)
     most = np.array([largest(each)[0] for each in dimensions])
     return np.clip(draws, -most, most)
+
+
+def _resampled(
+    problem: Problem, count: int, rng: Generator, parameters: Sequence[Parameter]
+) -> FloatArray:
+    """Return the bootstrap draws, their springs no larger than those of any arm."""
+    draws = bootstrap(PoseGrams.of(problem), count, rng, problem.prior_error)
+    draws[:, problem.springs] = _as_of_arms(draws[:, problem.springs], parameters)
+    return draws
+
+
+def _stretched(
+    problem: Problem,
+    compliance: FloatArray,
+    draws: FloatArray,
+    by: float,
+    parameters: Sequence[Parameter],
+) -> FloatArray:
+    """Return draws stretched about the estimate, as `_resampled` made them."""
+    found = widen_draws(problem, compliance, draws, by)
+    found[:, problem.springs] = _as_of_arms(found[:, problem.springs], parameters)
+    return found
 
 
 def _widening(
