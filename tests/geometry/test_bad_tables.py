@@ -8,8 +8,9 @@ import pytest
 
 import elastocal as ec
 from elastocal.errors import FileAccessError, GeometryError
-from elastocal.geometry import GeometryProblem, Positions
+from elastocal.geometry import GeometryProblem, Positions, read_positions
 from elastocal.geometry.plausibility import plausible_ladder
+from elastocal.robot import Robot
 from support.measured_arms import Measured, measure, universal, write_positions
 
 
@@ -86,6 +87,18 @@ def test_two_outputs_in_one_file_are_refused(tmp_path, measured):
     with pytest.raises(FileAccessError, match="cannot write two outputs to"):
         calibrated(tmp_path, measured, out=both, urdf=both)
     assert not both.exists()
+
+
+def test_a_tcp_in_the_middle_of_the_arm_is_refused_by_the_joints_behind_it(tmp_path, measured):
+    """It was fitted, or a station was said to have moved."""
+    path = write_positions(tmp_path / "positions.csv", measured)
+    middle = Robot.from_urdf(measured.robot.urdf, "l4")
+    with pytest.raises(GeometryError, match=r"'l4' is a link in .*\(j5, j6\); give --tcp 'tcp'"):
+        read_positions(path, middle)
+    still = measured.data.q.copy()
+    still[:, 4:] = 0.3
+    write_positions(path, replace(measured, data=replace(measured.data, q=still)))
+    assert read_positions(path, middle).q.shape[1] == 4
 
 
 def test_a_file_that_is_no_table_says_so(tmp_path, measured):

@@ -11,14 +11,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.errors import GeometryError, UnitError, nearest
+from elastocal.errors import GeometryError, RobotError, UnitError, nearest
 from elastocal.geometry.arm import arm_length
 from elastocal.geometry.positions import LEAST_READINGS, Positions
 from elastocal.geometry.sessions import in_sessions
 from elastocal.records import from_data, read_arrays, read_yaml_data, record
-from elastocal.robot import GRAVITY, Robot, T_from_xyzabc
+from elastocal.robot import GRAVITY, Robot, T_from_xyzabc, parse_urdf, tip_links
 from elastocal.tables import Column, TableError, TableRows, number_in_cell, opened_table
 from elastocal.units import factor, impossible, split_column
+from elastocal.wording import listed
 
 AXES = ("x", "y", "z")
 _MARKER = re.compile(r"marker(\d*)_x")
@@ -195,6 +196,12 @@ class _Columns:
                 raise GeometryError(f"row {line}, column {name!r}: {problem}")
         return values
 
+    def joints(self, robot: Robot) -> FloatArray:
+        """Return the columns of the joints of an arm, shape (row, joint), in rad or m."""
+        kinds = ["angle" if turns else "length" for turns in robot.revolute]
+        names = zip(robot.joint_names, kinds, strict=True)
+        return np.column_stack([self.numbers(name, kind) for name, kind in names])
+
     def plain(self, name: str) -> FloatArray:
         """Return the numbers of a column without a unit, shape (row,); NaN where empty."""
         if name not in self.found:
@@ -223,9 +230,8 @@ def _positions(header: Sequence[str], rows: TableRows, robot: Robot) -> Position
         raise GeometryError("no rows of numbers below a header: is it a table?")
     if count < LEAST_READINGS:
         raise GeometryError(f"{count} rows are too few: at least {LEAST_READINGS}")
-    kinds = ["angle" if turns else "length" for turns in robot.revolute]
-    names = zip(robot.joint_names, kinds, strict=True)
-    q = np.column_stack([columns.numbers(name, kind) for name, kind in names])
+    q = columns.joints(robot)
+    _require_last_link(columns, robot)
     in_rad = [columns.found[name][1] == "rad" for name in robot.joint_names]
     _require_within_limits(q, robot, rows.lines, in_rad)
     markers = _markers(columns)
@@ -301,6 +307,27 @@ def _or_hidden(cell: str) -> float:
     if not math.isfinite(value):
         raise ValueError("is not a finite number")
     return value
+
+
+def _require_last_link(columns: _Columns, robot: Robot) -> None:
+    """Refuse a tcp in the middle of the arm, behind which joints of the table move."""
+    root, own = parse_urdf(robot.urdf), robot.joint_names
+    if not {each.get("name") for each in root.iterfind("joint")} - {*own} & columns.found.keys():
+        return
+    for tip in tip_links(root):
+        try:
+            whole = Robot.from_urdf(robot.urdf, tip, robot.base)
+        except RobotError:  # of another chain
+            continue
+        behind = whole.joint_names[len(own) :]
+        if whole.joint_names[: len(own)] == own and columns.found.keys() >= {*behind}:
+            moved = np.ptp(columns.joints(whole), axis=0)[len(own) :] > _SAME_POSE
+            names = [name for name, moves in zip(behind, moved.tolist(), strict=True) if moves]
+            if names:
+                raise GeometryError(
+                    f"tcp {robot.tip!r} is a link in the middle of the arm: joints move behind it"
+                    f" in the table ({listed(names)}); give --tcp {tip!r}"
+                )
 
 
 def _require_within_limits(
