@@ -175,12 +175,15 @@ def held_by_spring(arm: str, poses: int, campaigns: int) -> dict[str, list[bool]
 @pytest.mark.parametrize("poses", POSES)
 @pytest.mark.parametrize("arm", ARMS)
 def test_the_interval_of_a_known_spring_holds_what_was_planted(arm, poses):
-    """One of twenty may miss: of 25, five are more than chance makes of any spring."""
+    """One of twenty may miss: of 25, five are more than chance makes of any spring.
+
+    With seven poses 99.6 % of all arms were held while springs had the doubt about the model.
+    """
     held = held_by_spring(arm, POSES[poses], CAMPAIGNS)
     for name, each in held.items():
         print(f"{arm}, {poses}: {name} {sum(each)} of {len(each)}")
     every = np.concatenate(list(held.values()))
-    assert every.mean() > 0.93
+    assert 0.93 < every.mean() < 0.995
     assert all(np.sum(~np.array(each)) < 5 for name, each in held.items() if name != "sums")
 
 
