@@ -296,7 +296,7 @@ OUTSIDE = (
         rows("marker_displacement", stood_still),
         ("the same", "row", "stood still"),
     ),
-    Mistake("forces 30 % of the next load case", rows("force", of_next(0.3)), ("lag", "next")),
+    Mistake("forces 30 % of the next load case", rows("force", of_next(0.3)), ("run ahead",)),
     Mistake(
         "markers drift by 0.5 mm in each pose",
         in_each_pose("marker_displacement", 0.3e-3, -0.3e-3, 0.27e-3),
