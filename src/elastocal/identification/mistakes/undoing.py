@@ -193,8 +193,9 @@ def apart(problem: Problem, late: BoolArray) -> Problem:
 _CLEAR, _LIKELY, _FITTED, _IN_TIME = 0.9, 0.75, 0.85, 0.97
 """Part of the error that may be left: by forces and rows, by markers, by estimated numbers, by
 those that grow in the order of poses, which no correct arm imitates."""
-_IN_POSE = 0.75
-"""The same by what grows in each pose: creep of a correct arm leaves 0.79."""
+_IN_POSE, _GROWN = 0.75, 0.2
+"""The same by what grows in each pose, and its least part of the median force or deflection:
+correct arms creep, which leaves 0.7 of the error but is a drift of less than a tenth."""
 _TILTED, _CROSS_TALK = np.radians(8.0), 0.15
 """Tilt of a sensor, and part of one axis in another, from which they are reported; where the
 springs miss much, correct arms seem to have 6 deg and 9 %."""
@@ -241,7 +242,6 @@ def other_readings(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]
         (_constants(rows, compliance), False),
         (_marker_drifts(rows), True),
         (_force_drifts(rows, compliance), False),
-        (_marker_references(rows), True),
         (_force_gains(rows, compliance), False),
         (_mixed_forces(rows, compliance), False),
         (_marker_gains(rows), True),
@@ -494,23 +494,38 @@ def _marker_drifts(rows: Rows) -> Iterator[OtherReading]:
         for low, high in ((0.25, 0.5), (0.33, 0.67), (0.25, 0.75), (0.5, 0.75))
     ]
     again = "over the campaign: read a fixed target again and again"
-    jump = "jump half way (station bumped?)"
-    courses = [("drift", t, again, _IN_TIME)]
-    courses += [(jump, each, again, _IN_TIME) for each in (*steps, *whiles)]
     in_pose = "in each pose: read the reference again at its end"
-    courses.append(("drift", _time_in_pose(rows), in_pose, _IN_POSE))
-    for how, course, remedy, least in courses:
-        widened = beside(rows.problem, course[:, None, None] * eye).take(rows.kept)
+    jump = "jump half way (station bumped?)"
+    courses = [("drift", _Course(t, again))]
+    courses += [(jump, _Course(each, again)) for each in (*steps, *whiles)]
+    courses.append(("drift", _Course(_time_in_pose(rows), in_pose, _IN_POSE, _GROWN)))
+    for how, course in courses:
+        widened = beside(rows.problem, course.place[:, None, None] * eye).take(rows.kept)
         grown = fitted(widened)[-3:]
+        if np.linalg.norm(grown) < course.smallest * median_norm(d):
+            continue
         yield OtherReading(
             ("marker displacements {how} by ({x}, {y}, {z}) mm {remedy}").format(
-                how=how, remedy=remedy, **_parts(grown, 1000.0, 2)
+                how=how, remedy=course.remedy, **_parts(grown, 1000.0, 2)
             ),
             rows.problem.O,
-            d - course[:, None] * grown,
-            least,
+            d - course.place[:, None] * grown,
+            course.least,
             estimated=True,
         )
+
+
+@dataclass(frozen=True)
+class _Course:
+    """The order of time in which something grows."""
+
+    place: FloatArray
+    """Of each reading, from 0 to 1."""
+    remedy: str
+    least: float = _IN_TIME
+    """Part of the error that may be left."""
+    smallest: float = 0.0
+    """Part of the median force or deflection below which it is not reported."""
 
 
 def _time(rows: Rows) -> FloatArray:
@@ -527,38 +542,24 @@ def _time_in_pose(rows: Rows) -> FloatArray:
 
 def _force_drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
     """Yield readings of forces without a constant that grew in the order of time."""
+    size = median_norm(rows.readings.force)
     courses = (
-        (_time(rows), "over the campaign: zero the sensor before each pose", _IN_TIME),
-        (_time_in_pose(rows), "in each pose: let the sensor warm up", _IN_POSE),
+        _Course(_time(rows), "over the campaign: zero the sensor before each pose"),
+        _Course(_time_in_pose(rows), "in each pose: let the sensor warm up", _IN_POSE, _GROWN),
     )
-    for (course, remedy, least), frame in product(courses, ("tcp", "base")):
-        found = _offset(rows, compliance, rows.frames[frame], course)
-        if found is None:
+    for course, frame in product(courses, ("tcp", "base")):
+        found = _offset(rows, compliance, rows.frames[frame], course.place)
+        if found is None or np.linalg.norm(found[0]) < course.smallest * size:
             continue
         yield OtherReading(
             (
                 "the zero of the force drifts by ({x}, {y}, {z}) N in the {frame} frame {remedy}"
-            ).format(frame=frame, remedy=remedy, **_parts(found[0])),
+            ).format(frame=frame, remedy=course.remedy, **_parts(found[0])),
             found[1],
             rows.problem.d,
-            least,
+            course.least,
             estimated=True,
             cause="drift of the force",
-        )
-
-
-def _marker_references(rows: Rows) -> Iterator[OtherReading]:
-    """Yield readings of markers whose reference was read under a part of the first press."""
-    first = rows.problem.d[_first_of_pose(rows.readings)]
-    part = float(fitted(beside(rows.problem, -first[..., None]).take(rows.kept))[-1])
-    if part > 0.0:
-        yield OtherReading(
-            f"marker displacements seem to be counted from {part / (1.0 + part):.0%} of the first"
-            " press of each pose: read the reference without load",
-            rows.problem.O,
-            rows.problem.d + part * first,
-            _FITTED,
-            estimated=True,
         )
 
 
