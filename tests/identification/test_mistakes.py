@@ -13,9 +13,10 @@ from support.campaigns import Sound, campaign, sounds
 from support.further_mistakes import FURTHER
 from support.mistake_table import alarms, outcome, rates, tabulate
 from support.mistakes import MISTAKES, changed
+from support.outside_mistakes import OUTSIDE
 from support.walk_mistakes import MADE_IN, require_whole
 
-KNOWN = {each.name: each for each in (*MISTAKES, *FURTHER)}
+KNOWN = {each.name: each for each in (*MISTAKES, *FURTHER, *OUTSIDE)}
 ON_RAIL, SMALL = Sound(poses=15, seed=1), Sound(like="ur20", poses=12, seed=2)
 REFUSED = (
     "force_x reversed",
@@ -167,6 +168,31 @@ def test_forces_that_are_wrong_for_a_part_or_drift_are_named(sound, name, said):
     made = KNOWN[name].make(campaign(sound))
     (found,) = find_undone(made.robot, made.readings, made.marker)
     assert said in str(found)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    some_by_day(
+        (
+            ("forces written there and back", "written backwards at every second pose"),
+            ("markers with poses sorted as text", "displacements are sorted by pose as text"),
+            ("a row of the forces lost half way", "from pose 7 on forces are those of the row"),
+            ("a row of the markers lost half way", "from pose 8 on marker displacements are"),
+            ("forces 30 % of the next load case", "forces run ahead: they seem to hold 30%"),
+            ("cross-talk of 25 % from force_z", "cross-talk, 25% in force_x and -28% in force_y"),
+        )
+    ),
+)
+def test_mistakes_from_outside_are_named(name, said):
+    made = KNOWN[name].make(campaign(ON_RAIL))
+    (found,) = find_undone(made.robot, made.readings, made.marker)
+    assert said in str(found)
+
+
+def test_a_sensor_that_is_tilted_is_named_with_its_tilt():
+    made = KNOWN["sensor tilted by 15 deg about x"].make(campaign(SMALL))
+    (found,) = find_undone(made.robot, made.readings, made.marker)
+    assert "the sensor looks tilted by 15 deg about (-1.0" in str(found)
 
 
 @pytest.mark.slow

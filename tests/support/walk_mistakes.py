@@ -20,6 +20,7 @@ from support.further_mistakes import FURTHER
 from support.log_mistakes import LOG_MISTAKES, Recording, log_alarms, log_outcome
 from support.mistake_table import HARMFUL, Outcome, alarms, outcome
 from support.mistakes import MISTAKES
+from support.outside_mistakes import OUTSIDE
 from support.tool_mistakes import TOOL_MISTAKES, Table, tool_alarms, tool_outcome
 
 MADE_IN = (
@@ -28,6 +29,12 @@ MADE_IN = (
     Sound("ur20", "kind", 25, 103),
     Sound("machining", "harsh", 31, 102, conditioned=True),
 )
+MADE_OUTSIDE = (
+    Sound("ur20", "kind", 25, 403),
+    Sound("afp", "typical", 31, 401),
+    Sound("machining", "harsh", 31, 405, conditioned=True),
+)
+"""Sound campaigns that are none of those on which a threshold was chosen."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,13 @@ WALKS = {
         (*FURTHER, *MISTAKES),
         lambda sound, mistake: outcome(campaign(sound), mistake),
         sounds(200, seed=11000),
+        lambda sound: alarms(campaign(sound)),
+    ),
+    "outside": Walk(
+        MADE_OUTSIDE,
+        OUTSIDE,
+        lambda sound, mistake: outcome(campaign(sound), mistake),
+        (),
         lambda sound: alarms(campaign(sound)),
     ),
     "tool": Walk(

@@ -12,6 +12,7 @@ HARMFUL = 0.05
 """Change of predictions from which a mistake is harmful."""
 _INPUTS = {
     "calibrate": ("predictions", "campaigns"),
+    "outside": ("predictions", "campaigns"),
     "tool": ("what is taken off", "tables"),
     "import": ("predictions", "recordings"),
 }
@@ -40,11 +41,11 @@ def told(tried: dict[str, Any], changed: str, inputs: str) -> str:
     named = sum(row["named"] for row in found)
     alarms = sum(bool(row["said"]) for row in sound)
     kinds = len({row["mistake"] for row in rows})
+    heard = f". Of {len(sound)} sound {inputs} {alarms} are warned of" if sound else ""
     return (
         f"{len(rows)} trials of {kinds} mistakes: {len(bad)} change {changed} by more than"
         f" {HARMFUL:.0%}; {len(found)} of these ({len(found) / len(bad):.0%}) are refused or warned"
-        f" of, {named} ({named / len(found):.0%}) by the right name. Of {len(sound)} sound"
-        f" {inputs} {alarms} are warned of"
+        f" of, {named} ({named / len(found):.0%}) by the right name{heard}"
     )
 
 
