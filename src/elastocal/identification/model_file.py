@@ -89,6 +89,9 @@ class CalibrateResult(Result):
     in files before it was written."""
     update: SpringUpdate | None = None
     """Update of the springs by tracked production; None: they are those of the calibration."""
+    tip: FloatArray | None = None
+    """Where each draw has the tip (`CalibratedModel.tip`), shape (draw, 3), in m; none where its
+    place is known."""
     needs: dict[str, str] = field(default_factory=dict)
     """Distributions besides elastocal that define its springs, with the versions that made it;
     readers require them first (`elastocal.plugins.require_distributions`)."""
@@ -120,6 +123,8 @@ class CalibrateResult(Result):
             if rows.ndim != 2 or rows.shape[1] != n:
                 raise SchemaError(f"{name} must have one number for each of {n} parameters")
             require_possible([p for s in self.springs for p in s.parameters], rows, name)
+        if self.tip is not None and self.tip.shape != (len(self.draws), 3):
+            raise SchemaError(f"tip {self.tip.shape} must have a place for each of the draws")
         gravity = impossible("acceleration", *(self.robot.gravity or ()))
         if gravity is not None:
             raise SchemaError(f"robot.gravity is {gravity}")
@@ -166,6 +171,7 @@ class CalibrateResult(Result):
             calibration=calibration,
             tool=calibrated.tool,
             domain=calibrated.domain,
+            tip=calibrated.tip,
         )
 
     @cached_property
@@ -195,6 +201,7 @@ class CalibrateResult(Result):
             float("nan") if self.calibration is None else self.calibration.unexplained,
             None if self.calibration is None or self.tool is not None else self.calibration.doubt,
             self._encoders,
+            self.tip,
         )
 
     @property
