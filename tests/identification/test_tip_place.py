@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 
 import elastocal as ec
-from elastocal.errors import IdentificationError
-from elastocal.identification import Contact, FitOptions, read_contact, with_tip_found
+from elastocal.errors import IdentificationError, SchemaError
+from elastocal.identification import (
+    CalibrateResult,
+    Contact,
+    FitOptions,
+    TipPlace,
+    read_contact,
+    with_tip_found,
+)
+from elastocal.records import read_json, write_json
 from elastocal.robot import Robot, fixed_joint_of, with_joint_origins
 from support.held import Held, held_by_contact, robot
 
@@ -32,12 +40,10 @@ def found(how: Held = NOISY):
     return with_tip_found(described(WRONG), readings, FitOptions(contact=KNOWN))
 
 
-def test_the_place_across_the_normal_is_found_within_its_error():
+def test_the_place_across_the_normal_is_found():
     tip = found()[1].contact.tip_found
-    missed = np.array(tip.place) + WRONG
-    assert np.all(np.abs(missed[:2]) < np.minimum(1e-3, 4.0 * np.array(tip.sigma[:2])))
-    assert max(tip.sigma) < KNOWN.tip
-    assert all(0.0 < each <= 1.0 for each in tip.outside)
+    np.testing.assert_allclose(tip.place[:2], -WRONG[:2], atol=1e-3)
+    assert tip.beside_gears == tip.place
 
 
 def test_the_robot_has_its_tcp_where_the_tip_was_found():
@@ -55,13 +61,57 @@ def test_without_a_width_the_place_is_exact():
     assert with_tip_found(arm, readings, exact) == (arm, exact)
 
 
-def test_calibrate_says_where_the_tip_is():
+@cache
+def calibrated() -> CalibrateResult:
     data = held_by_contact(NOISY)
     off = replace(data, attributes={**data.attributes, "robot_urdf": described(WRONG).urdf})
-    result = ec.calibrate(off, contact=KNOWN, springs="actuated", draws=40)
-    contact = result.calibration.contact
-    np.testing.assert_allclose(np.array(contact.tip.place)[:2], -WRONG[:2], atol=1e-3)
-    assert "The tip lies beside the stated tcp by" in str(contact.tip.sentence())
+    return ec.calibrate(off, contact=KNOWN, springs="actuated", draws=40)
+
+
+def test_calibrate_says_where_the_tip_is_with_an_interval_that_holds_it():
+    tip = calibrated().calibration.contact.tip
+    assert np.all((np.array(tip.low) <= -WRONG) & (np.array(tip.high) >= -WRONG))
+    assert tip.told()[:2] == (True, True)
+    assert "The tip lies beside the stated tcp along x:" in str(tip.sentence())
+
+
+def test_an_axis_along_which_the_readings_say_no_more_than_was_stated_has_no_number():
+    tip = TipPlace(
+        (0.0, 0.0, 4e-3), 5e-3, (0.0, 0.0, 4e-3), (-1e-3, -1e-3, -5e-3), (1e-3, 1e-3, 1e-2)
+    )
+    assert tip.told() == (True, True, False)
+    assert "along z: not told from the springs" in str(tip.sentence())
+
+
+def test_the_draws_of_a_prediction_move_the_tip():
+    model = calibrated().calibrated
+    q, force = np.full((1, 6), 0.3), np.array([[0.0, 100.0, -900.0]])
+    for draw in (0, 7):
+        # A draw is springs and a tip: what it predicts is what a model with its tcp there does.
+        own = replace(model, compliance=model.draws[draw], tip=None)
+        T = np.eye(4)
+        T[:3, 3] = model.tip[draw]
+        wanted = own.with_tool(T).predict(q, force).deflection
+        alone = own.predict(q, force).deflection
+        by_shift = model.shift_blocks(model.model.at(q), force) @ model.tip[draw]
+        assert np.linalg.norm(alone + by_shift - wanted) < 0.05 * np.linalg.norm(alone - wanted)
+    exact = replace(model, tip=np.zeros_like(model.tip)).predict(q, force)
+    assert not np.allclose(exact.low, model.predict(q, force).low, rtol=1e-3)
+
+
+def test_a_model_file_keeps_where_the_draws_have_the_tip(tmp_path):
+    write_json(tmp_path / "model.json", calibrated())
+    read = read_json(tmp_path / "model.json", CalibrateResult)
+    np.testing.assert_array_equal(read.tip, calibrated().tip)
+    with pytest.raises(SchemaError, match="a place for each of the draws"):
+        replace(calibrated(), tip=calibrated().tip[1:])
+
+
+def test_another_tool_is_stated_from_the_tip_and_moves_with_it():
+    model = calibrated().calibrated
+    T = np.eye(4)
+    T[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(model.with_tool(T).tip, model.tip @ T[:3, :3])
 
 
 def test_a_tracked_pose_is_refused_with_it():

@@ -143,6 +143,8 @@ def _new_link(urdf: str) -> str:
     return link
 
 
+_SHIFT = 2e-3
+"""Half the difference of two tips by which a derivative is taken, in m."""
 _CHUNK = 2000
 """Configurations predicted at a time, so that the draws of a long path fit into memory."""
 
@@ -214,8 +216,12 @@ class CalibratedModel:
     """Draws of which springs have their intervals, shape (draw, spring); None: `draws`. They lack
     the doubt whether another model is right, since a spring has a value in its own model alone."""
 
+    tip: FloatArray | None = None
+    """Where each draw has the tip, from the tcp of the model in its frame, shape (draw, 3), in m;
+    None: its place is known."""
+
     def __post_init__(self) -> None:
-        for name in ("compliance", "draws", "spring_draws"):
+        for name in ("compliance", "draws", "spring_draws", "tip"):
             if getattr(self, name) is None:
                 continue
             array = np.array(getattr(self, name), dtype=float)
@@ -316,7 +322,9 @@ class CalibratedModel:
             If the transform is not rigid, or mass and centre do not come together.
         """
         model, tool = change_tool(self.model, self.tool, T_tcp_tool, mass, centre)
-        return replace(self, model=model, tool=tool, on_production=None)
+        # A tool that is stated from the tip is where the tip is.
+        tip = None if self.tip is None else self.tip @ np.asarray(T_tcp_tool, dtype=float)[:3, :3]
+        return replace(self, model=model, tool=tool, tip=tip, on_production=None)
 
     @property
     def calibrated_model(self) -> ElasticModel:
@@ -380,7 +388,10 @@ class CalibratedModel:
                 posture, force[rows], m, friction=friction_torque
             )
             result[0, rows] = blocks @ self.compliance
-            ends = interval(np.moveaxis(blocks @ self.draws.T, -1, 0))
+            drawn = blocks @ self.draws.T
+            if self.tip is not None:
+                drawn += self.shift_blocks(posture, force[rows], m, friction_torque) @ self.tip.T
+            ends = interval(np.moveaxis(drawn, -1, 0))
             beyond = self._beyond_calibrated(posture, force[rows], m)
             result[1:, rows] = widened(result[0, rows], *ends, beyond)
         deflection, low, high = result
@@ -390,6 +401,36 @@ class CalibratedModel:
             *widened(deflection, low, high, self.misfit.of_the_springs(size)),
             *widened(deflection, low, high, self.misfit.error(size)),
         )
+
+    def shift_blocks(
+        self,
+        posture: ModelPosture,
+        force: FloatArray,
+        moment: FloatArray | None = None,
+        friction: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return what a shift of the tip along each axis of the tcp adds, shape (row, 3, 3).
+
+        In m per m. The force then acts at the shifted point, whose displacement is wanted.
+
+        Parameters
+        ----------
+        posture, force, moment, friction
+            As for `ElasticModel.observation_blocks`, a row each.
+        """
+        R = self.model.robot.forward(posture.q)[:, :3, :3]
+        base = np.zeros_like(force) if moment is None else moment
+        found = np.empty((len(force), 3, 3))
+        for axis, step in enumerate(_SHIFT * np.eye(3)):
+            ahead, behind = (
+                self.model.observation_blocks(
+                    posture, force, base + np.cross(R @ by, force), by, friction
+                )
+                @ self.compliance
+                for by in (step, -step)
+            )
+            found[:, :, axis] = (ahead - behind) / (2.0 * _SHIFT)
+        return found
 
     @cached_property
     def _calibrated_torques(self) -> CalibratedTorques | None:

@@ -45,13 +45,13 @@ from elastocal.identification.observability import (
 from elastocal.identification.options import MEDIAN_NORM, FitOptions
 from elastocal.identification.problem import (
     Problem,
-    build,
     contact_visibility,
     same_configuration,
 )
 from elastocal.identification.rungs import low_loads
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
+from elastocal.identification.tip_place import settle_tip, tip_with_interval
 from elastocal.identification.uncertainty import (
     MOST_UNEXPLAINED,
     Coverage,
@@ -228,7 +228,8 @@ def calibrate(
     provenance : str
         Where the readings came from; kept with the model.
     ladder : sequence of Climbed
-        What the model was chosen from (`choose_model`); kept with the calibration.
+        What the model was chosen from (`choose_model`), and what shows what it lacks
+        (`Choice.lacked`); the former is kept with the calibration.
 
     Raises
     ------
@@ -239,8 +240,7 @@ def calibrate(
     IdentificationError
         If there are too few poses, or the bounds are impossible or leave the data no part.
     """
-    options = options or FitOptions()
-    problem = build(model, readings, options, marker_offset)
+    model, options, problem = settle_tip(model, readings, options or FitOptions(), marker_offset)
     warnings = _data_warnings(model, readings, problem, options, marker_offset)
     screening, used = _screened(problem, options)
     kept, fitted = problem.take(used), readings.take(used)
@@ -263,12 +263,13 @@ def calibrate(
         domain=CalibrationDomain.of(model.robot, fitted, kept.block),
         encoders=encoder_zeros(model, fitted, c[springs]) if options.encoders else (),
         spring_draws=_stretched(weighted, c, draws, few, model.parameters)[:, springs],
+        tip=(widened - c)[:, weighted.tip_columns] if weighted.tip else None,
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
     warnings += _fit_warnings(calibrated, reach, weighted) + _unsettled(solution, options.loss)
     warnings += _lever_warnings(calibrated, fitted, kept.residuals(c))
     encoders = _encoders(weighted, solution, held_out, calibrated.encoders)
-    contact = _contact(model, weighted, fitted, options, widened)
+    contact = _contact(model, weighted, fitted, options, widened, calibrated.tip)
     warnings += _encoder_warnings(encoders) + _contact_warnings(contact, options)
     return Calibration(
         calibrated=calibrated,
@@ -278,7 +279,7 @@ def calibrate(
         poses=len(np.unique(kept.block)),
         attainable_rank=reach,
         held_out=held_out,
-        ladder=tuple(ladder),
+        ladder=tuple(each for each in ladder if not each.beside),
         coverage=measured_coverage(weighted, held_out, widened - c, low_loads(fitted)),
         widening=by,
         spring_widening=few,
@@ -333,6 +334,7 @@ def _contact(
     readings: Readings,
     options: FitOptions,
     draws: FloatArray,
+    tip: FloatArray | None,
 ) -> ContactSummary | None:
     """Return the contact as it was found; None where a tracker measured every reading."""
     if options.contact is None or not problem.contact:
@@ -343,7 +345,8 @@ def _contact(
     left = problem.O[:, :, own] @ (draws[:, own] - found).T
     zero = float(np.sqrt(np.mean(np.square(left))))
     seen = contact_visibility(problem, model)
-    return contact_summary(options.contact, readings, seen, (found, *interval(draws[:, own])), zero)
+    contact = options.contact if tip is None else tip_with_interval(options.contact, tip)
+    return contact_summary(contact, readings, seen, (found, *interval(draws[:, own])), zero)
 
 
 def _contact_warnings(found: ContactSummary | None, options: FitOptions) -> list[Finding]:

@@ -22,6 +22,7 @@ stiff. Rows are whitened by that (C. R. Henderson, "Best linear unbiased estimat
 under a selection model", Biometrics 31, 1975).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -62,7 +63,7 @@ _REPEATED = 0.03
 _OTHER_STACK, _OTHER_STACK_SIGMAS, _OTHER_STACK_POSES = 0.05, 4.0, 3
 """Part of its travel by which a repeated press of another stack travels further, that difference
 over its standard error, and poses where it is seen."""
-_CUT = 0.1
+CUT = 0.1
 """Part of its standard deviation by which a compliance that is cut is weighed."""
 _LEAST_PLACES = 4
 """Places with presses on one and on two disks from which a standard error is known."""
@@ -74,6 +75,9 @@ _LONGEST = 1e-3
 """Largest standard deviation of a stop and of a slip, in m."""
 _FARTHEST = 0.05
 """Largest standard deviation of the tip's place, in m: farther off is another tool."""
+_TOLD, _NORMAL_95 = 0.5, 1.96
+"""Part of the interval of what was stated of the tip's place below which the readings tell it, and
+that interval's half width in standard deviations."""
 _IMITATORS = 3
 """Springs that are named as those that imitate a compliance of the contact."""
 
@@ -125,6 +129,18 @@ class ContactFile(StrictModel):
     contact: ContactEntry
 
 
+@dataclass(frozen=True, eq=False)
+class TipShift:
+    """What is known of a shift of the tip beside a fit, along each axis of the tcp."""
+
+    expected: FloatArray
+    """Shape (3,), in m."""
+    sigma: float
+    """Its standard deviation, in m."""
+    noise: float
+    """Standard deviation of one component of a row, in m."""
+
+
 @brief_repr
 @record()
 class TipPlace:
@@ -132,26 +148,42 @@ class TipPlace:
 
     place: Triple
     """In the tcp frame, in m."""
-    sigma: Triple
-    """Standard error along each axis, from the noise of the rows and what was stated, in m."""
-    outside: Triple
-    """Part of the effect of a shift along each axis outside the columns of the springs, 0 to 1."""
+    stated: float
+    """Standard deviation that was stated, in m."""
+    beside_gears: Triple
+    """Where the tip is beside gears that stiffen, whatever springs the model has."""
+    low: Triple = (-math.inf, -math.inf, -math.inf)
+    """Lower ends of the 95 % intervals, in m; infinite before the springs are fitted."""
+    high: Triple = (math.inf, math.inf, math.inf)
+    """Upper ends of them, in m."""
+
+    def told(self) -> tuple[bool, ...]:
+        """Return along which axes the readings tell the place, beyond what was stated."""
+        least = _TOLD * 2.0 * _NORMAL_95 * self.stated
+        return tuple(high - low < least for low, high in zip(self.low, self.high, strict=True))
 
     def sentence(self) -> Phrase:
         """Return in words where the tip is."""
         x, y, z = (
-            f"{1e3 * value:+.1f} ± {1e3 * sigma:.1f} mm"
-            for value, sigma in zip(self.place, self.sigma, strict=True)
+            phrase(
+                "{value} mm ({low} to {high})",
+                value=f"{1e3 * value:+.1f}",
+                low=f"{1e3 * low:.1f}",
+                high=f"{1e3 * high:.1f}",
+            )
+            if told
+            else phrase("not told from the springs")
+            for value, low, high, told in zip(
+                self.place, self.low, self.high, self.told(), strict=True
+            )
         )
         return phrase(
-            "The tip lies beside the stated tcp by {x} along x, {y} along y and {z} along z"
-            " (standard error by noise); the model has its tcp there. Of such shifts the springs"
-            " do not imitate {seen}. What they lack of the arm moves it too: this is no"
-            " measurement of the tool.",
+            "The tip lies beside the stated tcp along x: {x}; along y: {y}; along z: {z} (95 %"
+            " intervals); the model has its tcp there, and its draws move the tip. It is the place"
+            " that predicts best, and no measurement of the tool.",
             x=x,
             y=y,
             z=z,
-            seen=", ".join(f"{each:.0%}" for each in self.outside),
         )
 
 
@@ -272,7 +304,7 @@ class KnownCompliance:
     @property
     def gain_sigma(self) -> float:
         """Standard deviation by which the fit weighs it, in m/N."""
-        return _CUT * self.sigma if self.is_cut else self.sigma
+        return CUT * self.sigma if self.is_cut else self.sigma
 
 
 def guessed(contact: Contact) -> Contact:

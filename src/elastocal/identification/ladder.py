@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, KnownSpring, bearing
-from elastocal.errors import IdentificationError
+from elastocal.errors import IdentificationError, present
 from elastocal.findings import Finding, Grade, Kind
+from elastocal.identification.contact import as_fitted
 from elastocal.identification.displacement import with_references
 from elastocal.identification.knowledge import DriveCompliances, with_knowledge
 from elastocal.identification.options import FitOptions
@@ -51,6 +52,9 @@ from elastocal.robot import Robot
 _LEAST_GAIN = 0.05
 """Part of the error that a richer rung must gain where the evidence for it is within one standard
 error; measured in docs/decisions/0066-ladder.md."""
+_LACKED = "gears"
+"""The rung that is fitted beside a free contact as a first fit has it, where its springs imitate
+the contact: bending links are what the rungs that are left lack."""
 REFUSED = Kind(
     "ladder.refused",
     "springs {springs} were not tried: {reason}",
@@ -80,11 +84,14 @@ class Climbed:
     standard_error: float = 0.0
     """Standard error of the difference, in m."""
     chosen: bool = False
+    beside: bool = False
+    """Whether its springs imitate a free contact, so that it was fitted with the contact of a first
+    fit. It is never taken, and shows what the springs of the chosen rung lack."""
     counted: BoolArray | None = None
     """Pose blocks whose score decides, shape (block,); none: all. See `poses_in_company`."""
     apart: float = float("nan")
     """Root mean square distance of its predictions at left-out poses from those of the chosen rung,
-    in m; NaN where it could not be chosen."""
+    in m; NaN where it could not be chosen and does not show what that lacks (``beside``)."""
     known: tuple[KnownSpring, ...] = ()
     """Prior knowledge of its springs that its fits used."""
     forecast: ProductionForecast | None = None
@@ -117,6 +124,8 @@ class Choice:
     """Every rung that the readings allow, the simplest first."""
     refused: tuple[Finding, ...] = ()
     """Rungs that the readings do not allow, with the reason."""
+    lacked: tuple[Climbed, ...] = ()
+    """Rungs among those, fitted beside the contact of a first fit (`Climbed.beside`)."""
 
     @property
     def taken(self) -> str:
@@ -258,6 +267,7 @@ def climb(
     rows = None if production is None else production.few()
     drives = DriveCompliances.of(robot, readings, options, marker_offset) if rows else None
     tried: list[Climbed] = []
+    lacked: list[Climbed] = []
     refused: list[Finding] = []
     low, reason = low_loads(readings), NO_LEVELS
     # The frame of a load case that is left out is not known, so it cannot be judged.
@@ -277,9 +287,39 @@ def climb(
         except IdentificationError as error:
             reason = str(error)
             refused.append(REFUSED(springs=rung.name, reason=reason))
+            if rung.name == _LACKED and options.contact is not None:
+                fit = _beside_contact_found(robot, model, readings, options)
+                found = try_rung(rung.name, model, build(model, readings, fit), judged)
+                lacked.append(replace(found, counted=counted, beside=True))
     if not any(each.name in allowed for each in tried):
         raise IdentificationError(reason)
-    return replace(take_best(tried, allowed), refused=tuple(refused))
+    return replace(_against(take_best(tried, allowed), lacked), refused=tuple(refused))
+
+
+def _against(choice: Choice, lacked: Sequence[Climbed]) -> Choice:
+    """Return a choice with rungs that were fitted beside the contact of a first fit."""
+    taken = next(each for each in choice.ladder if each.chosen)
+    found = []
+    for each in lacked:
+        score = np.stack([taken.score, each.score], axis=1)
+        score = score if each.counted is None else score[each.counted]
+        overlap = Overlap.leaving_one_out(len(score))
+        apart = judge_models(score, np.ones(2, dtype=bool), overlap).difference
+        figures = {
+            "difference": float(apart.mean[1]),
+            "standard_error": float(np.nan_to_num(apart.standard_error[1])),
+        }
+        found.append(replace(each, **figures, apart=_distance(each, taken)))
+    return replace(choice, lacked=tuple(found))
+
+
+def _beside_contact_found(
+    robot: Robot, model: ElasticModel, readings: Readings, options: FitOptions
+) -> FitOptions:
+    """Return options of a fit of springs that imitate a free contact, with that of a first fit."""
+    options = replace(options, contact=as_fitted(present(options.contact, "contact")))
+    known = DriveCompliances.of(robot, readings, options).known_springs(model)
+    return with_knowledge(options, known, model, readings)
 
 
 def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:

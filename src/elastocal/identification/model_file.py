@@ -92,6 +92,9 @@ class CalibrateResult(Result):
     spring_draws: FloatArray | None = None
     """Draws of which springs have their intervals, shape (draw, parameter); none: `draws`. See
     `CalibratedModel.spring_draws`."""
+    tip: FloatArray | None = None
+    """Where each draw has the tip (`CalibratedModel.tip`), shape (draw, 3), in m; none where its
+    place is known."""
     needs: dict[str, str] = field(default_factory=dict)
     """Distributions besides elastocal that define its springs, with the versions that made it;
     readers require them first (`elastocal.plugins.require_distributions`)."""
@@ -125,6 +128,8 @@ class CalibrateResult(Result):
             if rows.ndim != 2 or rows.shape[1] != n:
                 raise SchemaError(f"{name} must have one number for each of {n} parameters")
             require_possible([p for s in self.springs for p in s.parameters], rows, name)
+        if self.tip is not None and self.tip.shape != (len(self.draws), 3):
+            raise SchemaError(f"tip {self.tip.shape} must have a place for each of the draws")
         gravity = impossible("acceleration", *(self.robot.gravity or ()))
         if gravity is not None:
             raise SchemaError(f"robot.gravity is {gravity}")
@@ -172,6 +177,7 @@ class CalibrateResult(Result):
             tool=calibrated.tool,
             domain=calibrated.domain,
             spring_draws=calibrated.spring_draws,
+            tip=calibrated.tip,
         )
 
     @cached_property
@@ -202,6 +208,7 @@ class CalibrateResult(Result):
             None if self.calibration is None or self.tool is not None else self.calibration.doubt,
             self._encoders,
             self.spring_draws,
+            self.tip,
         )
 
     @property

@@ -22,6 +22,7 @@ from elastocal.identification._least_squares import RANK_TOLERANCE
 from elastocal.identification.contact import (
     ContactColumns,
     ContactVisibility,
+    TipShift,
     contact_columns,
     is_doubled,
     is_pressed_sideways,
@@ -87,6 +88,9 @@ class Problem:
     contact: tuple[str, ...] = ()
     """Compliances of the contact that holds the tool; their columns follow those of the frames
     (`elastocal.identification.contact`)."""
+    tip: int = 0
+    """Directions in which the place of the tip is open; their columns come last
+    (`elastocal.identification.tip_place`)."""
     shared: FloatArray | None = None
     """Errors that readings of one block share, each of unit variance, over the noise of a typical
     row, shape (reading, 3, error); None: there are none."""
@@ -102,7 +106,7 @@ class Problem:
 
     @property
     def columns(self) -> int:
-        """Number of columns: of the parameters of all springs, of frames, and of the contact."""
+        """Number of columns: of the parameters of all springs, of frames, contact, and tip."""
         return int(self.O.shape[2])
 
     @property
@@ -119,7 +123,18 @@ class Problem:
     @property
     def contact_columns(self) -> slice:
         """The columns of the contact."""
-        return slice(self.columns - len(self.contact), self.columns)
+        end = self.tip_columns.start
+        return slice(end - len(self.contact), end)
+
+    @property
+    def tip_columns(self) -> slice:
+        """The columns of the place of the tip."""
+        return slice(self.columns - self.tip, self.columns)
+
+    @property
+    def arm_columns(self) -> IndexArray:
+        """The columns of which the deflection of the arm is made: of springs, and of the tip."""
+        return np.r_[self.springs, self.tip_columns]
 
     def weighted(self) -> FloatArray:
         """Return the weighted rows ``[O d]``, whitened by what readings of a block share.
@@ -190,27 +205,51 @@ class Problem:
         wider = _with_columns_behind(
             self, contact.columns, limits, contact.size / scale, contact.prior
         )
-        error = np.zeros(len(wider.prior_rows))
-        if self.prior_error is not None:
-            error[: len(self.prior_error)] = self.prior_error
-        error[len(self.prior_rows) :] = contact.prior_error
+        error = self._prior_error_with(contact.prior_error)
         return replace(wider, contact=contact.names, shared=contact.shared, prior_error=error)
+
+    def with_tip(self, columns: FloatArray, scale: float, known: TipShift) -> "Problem":
+        """Return the problem with the columns of a tip last, whose place is open.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (reading, 3, 3)
+            What a shift of the tip along each axis of the tcp adds to a deflection, in m per m.
+        scale : float
+            Sensible size of the first parameter, in its unit.
+        known : TipShift
+            What is known of the shift.
+        """
+        count = columns.shape[2]
+        free, gain = np.full(count, np.inf), known.noise / known.sigma
+        prior = gain * np.column_stack([np.eye(count), known.expected])
+        size = np.full(count, known.sigma / scale)
+        wider = _with_columns_behind(self, columns, (-free, free), size, prior)
+        error = self._prior_error_with(np.full(count, known.noise))
+        return replace(wider, tip=count, prior_error=error)
+
+    def _prior_error_with(self, more: FloatArray) -> FloatArray:
+        """Return the errors of the rows of the prior with those of further rows."""
+        own = np.zeros(len(self.prior_rows)) if self.prior_error is None else self.prior_error
+        return np.concatenate([own, more])
 
     def of_springs(self) -> "Problem":
         """Return the problem of the springs in what neither a frame nor the contact can explain.
 
         Weighted rows are projected on the complement of the frames' columns, and of those of a
         contact of which nothing is known: what the springs' fit and their observability rest on. A
-        compliance of the contact that is stated takes from them what its prior leaves open.
+        compliance of the contact that is stated, and the place of a tip, take from them what their
+        priors leave open.
         """
-        if not (self.frames or self.contact):
+        if not (self.frames or self.contact or self.tip):
             return self
         n, size = self.springs.stop, np.broadcast_to(self.size, self.lower.shape)
         rows = self.weighted().reshape(-1, self.columns + 1)
         U, s, _ = np.linalg.svd(rows[:, self.frame_columns], full_matrices=False)
         Q = U[:, s > RANK_TOLERANCE * s[0]] if s.size else U
         rows = rows - Q @ (Q.T @ rows)
-        rows = _without_known(rows, self.contact_columns, self.prior_rows)
+        behind = slice(self.contact_columns.start, self.columns)
+        rows = _without_known(rows, behind, self.prior_rows)
         seen = rows[:, [*range(n), -1]].reshape(len(self), -1, n + 1)
         return Problem(
             O=seen[:, :3, :n],

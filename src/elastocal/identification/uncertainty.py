@@ -413,8 +413,8 @@ def widen_draws(
 
 def _variance(problem: Problem, deviations: FloatArray) -> float:
     """Return the sum over deviations of the mean squared change of predicted deflection."""
-    n = problem.springs
-    rows = problem.O[:, :, n].reshape(-1, n.stop)
+    n = problem.arm_columns
+    rows = problem.O[:, :, n].reshape(-1, len(n))
     gram = rows.T @ rows / len(problem)
     deviations = deviations[:, n]
     return float(np.einsum("dn,nm,dm->", deviations, gram, deviations))

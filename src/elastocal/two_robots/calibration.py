@@ -1,7 +1,7 @@
 """Both arms from presses on each other: prior, fit, left-out poses, intervals, what is not seen.
 
 The prior says what is known beside the presses. Of an arm that was calibrated before, its model,
-with the spread of its own draws; of another one, that no spring is softer by far than the drive of
+which the draws alone spread; of another one, that no spring is softer by far than the drive of
 its joint (`elastocal.identification.DriveCompliances`). Where the presses see only the sum of a
 tilt of both bases, the prior shares it out.
 """
@@ -17,6 +17,7 @@ from elastocal.elastic import ElasticModel, actuated
 from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification import (
+    CUT,
     MOST_UNEXPLAINED,
     RANK_TOLERANCE,
     CalibratedModel,
@@ -46,7 +47,7 @@ from elastocal.identification import (
 )
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
-from elastocal.two_robots.presses import PairModel, PairReadings, build_pair
+from elastocal.two_robots.presses import PairModel, PairPrior, PairReadings, build_pair
 from elastocal.two_robots.tilts import unseen_findings
 
 AUTO = "auto"
@@ -57,6 +58,9 @@ _ROUNDS = 3
 _ALIKE = 0.1
 """Standard deviation of the springs of two arms of one type from one another, over the compliance
 of the drive of the joint."""
+_DRAWN_APART = 2.0
+"""How many times as far apart the draws let them be: the fit errs less with a tenth, and arms of
+one type differ by a fifth (docs/decisions/0146-draws-move-the-tip.md)."""
 _LEAST_SPREAD = 1e-3
 """Least standard deviation of a known direction, over the largest of its arm."""
 
@@ -211,16 +215,19 @@ def _drives(pair: PairReadings, contact: Contact | None) -> DriveCompliances:
     return DriveCompliances.of_problem(joints, revolute, problem, model.springs)
 
 
-def prior_rows(
+def prior_of(
     model: PairModel, known: Mapping[str, CalibratedModel], drives: DriveCompliances
-) -> FloatArray:
-    """Return the rows of the prior, of unit variance, right-hand side last.
+) -> PairPrior:
+    """Return what is known of both arms beside the presses.
 
     Of a known arm ``L^-1 (c - c_before)`` with the covariance ``L L'`` of its draws; of another
-    ``c / s`` with the sizes ``s`` of its drives. Shape (parameter, parameter + 1).
+    ``c / s`` with the sizes ``s`` of its drives. The fit takes a known arm as it is and only draws
+    it, as `elastocal.identification.KnownCompliance` does: what both models lack, and the contact,
+    would move it, and its draws would not show by how much.
     """
     parameters = model.parameters
     rows = np.zeros((len(parameters), len(parameters) + 1))
+    drawn = np.ones(len(parameters))
     sizes = drives.sizes(parameters)
     for arm, name in enumerate(model.names):
         own = model.columns(arm)
@@ -232,15 +239,17 @@ def prior_rows(
         deviations = (before.draws - before.compliance) / scale
         values, vectors = np.linalg.eigh(deviations.T @ deviations / len(deviations))
         least = _LEAST_SPREAD**2 * max(float(values.max()), np.finfo(float).tiny)
-        whitening = (vectors / np.sqrt(np.maximum(values, least))).T / scale
+        whitening = (vectors / np.sqrt(np.maximum(values, least))).T / scale / CUT
         rows[own, own], rows[own, -1] = whitening, whitening @ before.compliance
+        drawn[own] = 1.0 / CUT
     first, second = (model.columns(arm) for arm in (0, 1))
     if known or not of_one_type(model):
-        return rows
+        return PairPrior(rows, drawn)
     alike = np.zeros((len(sizes[first]), rows.shape[1]))
     apart = 1.0 / (_ALIKE * np.minimum(sizes[first], sizes[second]))
     alike[:, first], alike[:, second] = np.diag(apart), -np.diag(apart)
-    return np.concatenate([rows, alike])
+    drawn = np.append(drawn, np.full(len(alike), _DRAWN_APART))
+    return PairPrior(np.concatenate([rows, alike]), drawn)
 
 
 def of_one_type(model: PairModel) -> bool:
@@ -265,7 +274,7 @@ def _fit(
     drives: DriveCompliances,
 ) -> _Fit:
     model = _model(pair, name, known)
-    problem = build_pair(model, pair, weighed[0], prior_rows(model, known, drives), weighed[1])
+    problem = build_pair(model, pair, weighed[0], prior_of(model, known, drives), weighed[1])
     return _Fit(name, model, problem, leave_poses_out(problem), solve(problem))
 
 

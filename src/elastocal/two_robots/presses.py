@@ -289,11 +289,21 @@ def pair_blocks(model: PairModel, pair: PairReadings) -> FloatArray:
     return np.concatenate([first, -second], axis=2)
 
 
+@dataclass(frozen=True, eq=False)
+class PairPrior:
+    """What is known of the springs of both arms beside the presses."""
+
+    rows: FloatArray
+    """Rows of unit variance in the fit, right-hand side last, shape (row, parameter + 1)."""
+    drawn: FloatArray
+    """Standard deviation of the right-hand side of each over the draws, shape (row,)."""
+
+
 def build_pair(
     model: PairModel,
     pair: PairReadings,
     contact: Contact | None = None,
-    prior: FloatArray | None = None,
+    prior: PairPrior | None = None,
     noise: float = 1.0,
 ) -> Problem:
     """Return the observation system of both arms.
@@ -306,8 +316,8 @@ def build_pair(
         The presses.
     contact : Contact, optional
         What is known of the contact that holds the tools; none where a tracker measured both.
-    prior : ndarray, shape (row, parameter + 1), optional
-        Rows of a prior of unit variance, right-hand side last.
+    prior : PairPrior, optional
+        What is known of the springs.
     noise : float
         Standard deviation of a component of a row in m, against which the prior is weighed.
 
@@ -317,7 +327,7 @@ def build_pair(
         If there are too few poses, or the springs imitate a compliance of the contact that is free.
     """
     parameters = model.parameters
-    rows = np.zeros((0, len(parameters) + 1)) if prior is None else prior
+    prior = prior or PairPrior(np.zeros((0, len(parameters) + 1)), np.zeros(0))
     problem = Problem(
         O=pair_blocks(model, pair),
         d=pair.relative,
@@ -325,9 +335,9 @@ def build_pair(
         block=pose_blocks(pair.first),
         lower=np.array([each.lower for each in parameters]),
         upper=np.full(len(parameters), np.inf),
-        prior_rows=noise * rows,
+        prior_rows=noise * prior.rows,
         size=relative_sizes(parameters),
-        prior_error=np.full(len(rows), noise),
+        prior_error=noise * prior.drawn,
     )
     if pair.tracked:
         return problem

@@ -315,7 +315,8 @@ def _chosen(
     name, options = str(settings.springs), settings.options()
     choice = choose_model(arm, readings, name, options, marker, production=rows)
     known = known_springs(arm, name) or choice.known
-    return _Chosen(choice.model, choice.ladder, known, choice.refused)
+    ladder = (*choice.ladder, *choice.lacked)
+    return _Chosen(choice.model, ladder, known, choice.refused)
 
 
 def _as_built(
