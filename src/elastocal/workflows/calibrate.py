@@ -173,6 +173,10 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         ladder=chosen.ladder,
         provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
+    if settings.contact is not None and calibration.contact is not None:
+        # Where the springs have it, so that a report makes the same fit again.
+        tip = calibration.contact.tip
+        settings = replace(settings, contact=replace(settings.contact, tip_found=tip))
     figures = summary(calibration, settings.fit, chosen.known)
     if measured.check_cases:
         kept_out = measured.readings(arm.joint_names, check=True)
@@ -225,6 +229,12 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
             flag = each.name.replace("_", "-")
             raise IdentificationError(f"--{flag} goes with a calibration, not with --update")
     before = read_json(file, CalibrateResult)
+    if before.tip is not None:
+        raise IdentificationError(
+            f"{file}: its tip was found beside the springs (contact.tip), and the marker of a"
+            " tracker is stated from a tcp that is known: calibrate with the tip where it is"
+            " (contact.tip left out) before --update"
+        )
     found = read_datasets(settings.data)
     made_from = {str(path): content_sha256(each) for path, each in found}
     _require_new(made_from, before, file)
