@@ -13,7 +13,6 @@ from elastocal.identification import (
     CalibrateResult,
     Contact,
     FitOptions,
-    TipPlace,
     read_contact,
     reproduce_calibration,
     with_tip_found,
@@ -82,9 +81,8 @@ def test_calibrate_says_where_the_tip_is_with_an_interval_that_holds_it():
 
 
 def test_an_axis_along_which_the_readings_say_no_more_than_was_stated_has_no_number():
-    tip = TipPlace(
-        (0.0, 0.0, 4e-3), 5e-3, (0.0, 0.0, 4e-3), (-1e-3, -1e-3, -5e-3), (1e-3, 1e-3, 1e-2)
-    )
+    low, high = (-1e-3, -1e-3, -5e-3), (1e-3, 1e-3, 1e-2)
+    tip = replace(calibrated().calibration.contact.tip, stated=5e-3, low=low, high=high)
     assert tip.told() == (True, True, False)
     assert "along z: not told from the springs" in str(tip.sentence())
 
@@ -134,7 +132,7 @@ def test_predict_compensate_and_export_take_such_a_model(tmp_path):
     wanted = model.calibrated.predict(rows[:, :6], rows[:, 6:])
     np.testing.assert_allclose(ec.predict(model, path).prediction.low, wanted.low, rtol=1e-9)
     ec.compensate(model, path, out=tmp_path / "corrected.csv")
-    ec.export(model, c=tmp_path / "c")
+    ec.export(model, out=tmp_path / "c")
     assert (tmp_path / "corrected.csv").exists()
     assert any((tmp_path / "c").iterdir())
 

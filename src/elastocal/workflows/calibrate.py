@@ -173,11 +173,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         ladder=chosen.ladder,
         provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
-    if settings.contact is not None and calibration.contact is not None:
-        # Where the springs have it, so that a report makes the same fit again.
-        tip = calibration.contact.tip
-        settings = replace(settings, contact=replace(settings.contact, tip_found=tip))
-    figures = summary(calibration, settings.fit, chosen.known)
+    figures = summary(calibration, _with_tip(settings, calibration).fit, chosen.known)
     if measured.check_cases:
         kept_out = measured.readings(arm.joint_names, check=True)
         figures = replace(figures, check=check_loads(calibration, kept_out, marker))
@@ -194,6 +190,16 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+def _with_tip(
+    settings: CalibrateSettings, calibration: identification.Calibration
+) -> CalibrateSettings:
+    """Return settings with the tip where the springs have it: a report makes the same fit again."""
+    if settings.contact is None or calibration.contact is None:
+        return settings
+    tip = calibration.contact.tip
+    return replace(settings, contact=replace(settings.contact, tip_found=tip))
 
 
 def _with_contact_file(settings: CalibrateSettings) -> CalibrateSettings:
