@@ -17,6 +17,7 @@ from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
     Climbed,
+    Contact,
     FitSettings,
     PredictionDoubt,
     ProductionCoverage,
@@ -196,10 +197,10 @@ def _with_tip(
     settings: CalibrateSettings, calibration: identification.Calibration
 ) -> CalibrateSettings:
     """Return settings with the tip where the springs have it: a report makes the same fit again."""
-    if settings.contact is None or calibration.contact is None:
+    contact = settings.contact
+    if not isinstance(contact, Contact) or calibration.contact is None:
         return settings
-    tip = calibration.contact.tip
-    return replace(settings, contact=replace(settings.contact, tip_found=tip))
+    return replace(settings, contact=replace(contact, tip_found=calibration.contact.tip))
 
 
 def _with_contact_file(settings: CalibrateSettings) -> CalibrateSettings:
