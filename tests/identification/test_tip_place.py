@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 import elastocal as ec
+from elastocal.dataset import Dataset
 from elastocal.errors import IdentificationError, SchemaError
 from elastocal.identification import (
     CalibrateResult,
     Contact,
     FitOptions,
-    TipPlace,
     read_contact,
+    reproduce_calibration,
     with_tip_found,
 )
 from elastocal.records import read_json, write_json
@@ -62,10 +63,14 @@ def test_without_a_width_the_place_is_exact():
 
 
 @cache
-def calibrated() -> CalibrateResult:
+def elsewhere() -> Dataset:
     data = held_by_contact(NOISY)
-    off = replace(data, attributes={**data.attributes, "robot_urdf": described(WRONG).urdf})
-    return ec.calibrate(off, contact=KNOWN, springs="actuated", draws=40)
+    return replace(data, attributes={**data.attributes, "robot_urdf": described(WRONG).urdf})
+
+
+@cache
+def calibrated() -> CalibrateResult:
+    return ec.calibrate(elsewhere(), contact=KNOWN, springs="actuated", draws=40)
 
 
 def test_calibrate_says_where_the_tip_is_with_an_interval_that_holds_it():
@@ -76,9 +81,8 @@ def test_calibrate_says_where_the_tip_is_with_an_interval_that_holds_it():
 
 
 def test_an_axis_along_which_the_readings_say_no_more_than_was_stated_has_no_number():
-    tip = TipPlace(
-        (0.0, 0.0, 4e-3), 5e-3, (0.0, 0.0, 4e-3), (-1e-3, -1e-3, -5e-3), (1e-3, 1e-3, 1e-2)
-    )
+    low, high = (-1e-3, -1e-3, -5e-3), (1e-3, 1e-3, 1e-2)
+    tip = replace(calibrated().calibration.contact.tip, stated=5e-3, low=low, high=high)
     assert tip.told() == (True, True, False)
     assert "along z: not told from the springs" in str(tip.sentence())
 
@@ -105,6 +109,32 @@ def test_a_model_file_keeps_where_the_draws_have_the_tip(tmp_path):
     np.testing.assert_array_equal(read.tip, calibrated().tip)
     with pytest.raises(SchemaError, match="a place for each of the draws"):
         replace(calibrated(), tip=calibrated().tip[1:])
+
+
+def test_a_report_makes_the_same_fit_again():
+    model = calibrated()
+    assert reproduce_calibration(model.calibrated, model.calibration, elsewhere()).same
+
+
+def test_tracked_production_does_not_update_a_model_whose_tip_was_found(tmp_path):
+    write_json(tmp_path / "model.json", calibrated())
+    with pytest.raises(IdentificationError, match=r"contact\.tip left out\) before --update"):
+        ec.calibrate(elsewhere(), update=tmp_path / "model.json")
+
+
+def test_predict_compensate_and_export_take_such_a_model(tmp_path):
+    model, names = calibrated(), robot().joint_names
+    q = elsewhere().readings(names).joint_position[:3]
+    rows = np.column_stack([q, np.tile([0.0, 100.0, -900.0], (3, 1))])
+    heads = [*(f"{each}[rad]" for each in names), *(f"force_{axis}[N]" for axis in "xyz")]
+    path = tmp_path / "path.csv"
+    np.savetxt(path, rows, "%.17g", ",", header=",".join(heads), comments="")
+    wanted = model.calibrated.predict(rows[:, :6], rows[:, 6:])
+    np.testing.assert_allclose(ec.predict(model, path).prediction.low, wanted.low, rtol=1e-9)
+    ec.compensate(model, path, out=tmp_path / "corrected.csv")
+    ec.export(model, out=tmp_path / "c")
+    assert (tmp_path / "corrected.csv").exists()
+    assert any((tmp_path / "c").iterdir())
 
 
 def test_another_tool_is_stated_from_the_tip_and_moves_with_it():

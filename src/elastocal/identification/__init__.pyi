@@ -22,7 +22,6 @@ from .contact import (
     CUT as CUT,
     Contact as Contact,
     ContactEntry as ContactEntry,
-    TipPlace as TipPlace,
     as_fitted as as_fitted,
     at_tcp as at_tcp,
     contact_columns as contact_columns,

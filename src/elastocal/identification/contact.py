@@ -22,7 +22,6 @@ stiff. Rows are whitened by that (C. R. Henderson, "Best linear unbiased estimat
 under a selection model", Biometrics 31, 1975).
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -152,13 +151,15 @@ class TipPlace:
     """Standard deviation that was stated, in m."""
     beside_gears: Triple
     """Where the tip is beside gears that stiffen, whatever springs the model has."""
-    low: Triple = (-math.inf, -math.inf, -math.inf)
-    """Lower ends of the 95 % intervals, in m; infinite before the springs are fitted."""
-    high: Triple = (math.inf, math.inf, math.inf)
+    low: Triple | None = None
+    """Lower ends of the 95 % intervals, in m; None before the springs are fitted."""
+    high: Triple | None = None
     """Upper ends of them, in m."""
 
     def told(self) -> tuple[bool, ...]:
         """Return along which axes the readings tell the place, beyond what was stated."""
+        if self.low is None or self.high is None:
+            return False, False, False
         least = _TOLD * 2.0 * _NORMAL_95 * self.stated
         return tuple(high - low < least for low, high in zip(self.low, self.high, strict=True))
 
@@ -174,7 +175,11 @@ class TipPlace:
             if told
             else phrase("not told from the springs")
             for value, low, high, told in zip(
-                self.place, self.low, self.high, self.told(), strict=True
+                self.place,
+                self.low or self.place,
+                self.high or self.place,
+                self.told(),
+                strict=True,
             )
         )
         return phrase(

@@ -305,11 +305,14 @@ def _against(choice: Choice, lacked: Sequence[Climbed]) -> Choice:
         score = score if each.counted is None else score[each.counted]
         overlap = Overlap.leaving_one_out(len(score))
         apart = judge_models(score, np.ones(2, dtype=bool), overlap).difference
-        figures = {
-            "difference": float(apart.mean[1]),
-            "standard_error": float(np.nan_to_num(apart.standard_error[1])),
-        }
-        found.append(replace(each, **figures, apart=_distance(each, taken)))
+        found.append(
+            replace(
+                each,
+                difference=float(apart.mean[1]),
+                standard_error=float(np.nan_to_num(apart.standard_error[1])),
+                apart=_distance(each, taken),
+            )
+        )
     return replace(choice, lacked=tuple(found))
 
 

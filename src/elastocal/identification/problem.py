@@ -134,7 +134,7 @@ class Problem:
     @property
     def arm_columns(self) -> IndexArray:
         """The columns of which the deflection of the arm is made: of springs, and of the tip."""
-        return np.r_[self.springs, self.tip_columns]
+        return np.asarray(np.r_[self.springs, self.tip_columns], dtype=np.intp)
 
     def weighted(self) -> FloatArray:
         """Return the weighted rows ``[O d]``, whitened by what readings of a block share.

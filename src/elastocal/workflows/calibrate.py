@@ -17,6 +17,7 @@ from elastocal.identification import (
     CalibratedModel,
     CalibrateResult,
     Climbed,
+    Contact,
     FitSettings,
     PredictionDoubt,
     ProductionCoverage,
@@ -173,7 +174,7 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
         ladder=chosen.ladder,
         provenance=f"{source}; {measured.provenance}" if measured.provenance else source,
     )
-    figures = summary(calibration, settings.fit, chosen.known)
+    figures = summary(calibration, _with_tip(settings, calibration).fit, chosen.known)
     if measured.check_cases:
         kept_out = measured.readings(arm.joint_names, check=True)
         figures = replace(figures, check=check_loads(calibration, kept_out, marker))
@@ -190,6 +191,16 @@ def calibrate(settings: CalibrateSettings, progress: Progress) -> CalibrateResul
     if settings.out is not None:
         write_json(settings.out, result)
     return result
+
+
+def _with_tip(
+    settings: CalibrateSettings, calibration: identification.Calibration
+) -> CalibrateSettings:
+    """Return settings with the tip where the springs have it: a report makes the same fit again."""
+    contact = settings.contact
+    if not isinstance(contact, Contact) or calibration.contact is None:
+        return settings
+    return replace(settings, contact=replace(contact, tip_found=calibration.contact.tip))
 
 
 def _with_contact_file(settings: CalibrateSettings) -> CalibrateSettings:
@@ -225,6 +236,12 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
             flag = each.name.replace("_", "-")
             raise IdentificationError(f"--{flag} goes with a calibration, not with --update")
     before = read_json(file, CalibrateResult)
+    if before.tip is not None:
+        raise IdentificationError(
+            f"{file}: its tip was found beside the springs (contact.tip), and the marker of a"
+            " tracker is stated from a tcp that is known: calibrate with the tip where it is"
+            " (contact.tip left out) before --update"
+        )
     found = read_datasets(settings.data)
     made_from = {str(path): content_sha256(each) for path, each in found}
     _require_new(made_from, before, file)
