@@ -143,6 +143,11 @@ class TestIdentify:
         assert found["robot.serial"] == "KR-1"
         assert shown.count("sensor, uncertainty: ") == 2
 
+    def test_back_asks_the_entry_before_again(self, monkeypatch):
+        found, shown = identified(monkeypatch, "KR-1\nback\nM. Weber\nKR-1\nskip\n")
+        assert found == {"operator": "M. Weber", "robot.serial": "KR-1"}
+        assert shown.count("operator: ") == 2
+
     @pytest.mark.parametrize(("asks", "stdin"), [(False, Answers), (True, io.StringIO)])
     def test_nobody_is_asked_without_a_terminal_or_when_told_not_to(self, monkeypatch, asks, stdin):
         assert identified(monkeypatch, "M. Weber\n", asks, stdin) == ({}, "")

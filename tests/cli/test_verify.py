@@ -1,5 +1,6 @@
 """``elastocal verify``: keys, signed runs and reports, and whatever is no longer what it was."""
 
+import io
 import json
 import re
 import stat
@@ -37,6 +38,19 @@ def signed(keys, tmp_path_factory):
     made = elastocal("report", out, "--out", out.parent / "report.html", *sign)
     assert made.code == 0, made.err
     return out.parent
+
+
+def test_a_signed_report_asks_for_entries_that_nobody_stated(signed, keys, tmp_path, monkeypatch):
+    """Number, operator and place; the place once more after ``back``."""
+    keyboard = io.StringIO("C-7\nM. Tanaka\nHall 2\nback\nHall 3\nskip\n")
+    keyboard.isatty = lambda: True
+    monkeypatch.setattr("sys.stdin", keyboard)
+    page = tmp_path / "report.html"
+    made = elastocal("report", signed / "run", "--out", page, "--sign", keys / "mine")
+    assert made.code == 0, made.err
+    text = page.read_text(encoding="utf-8")
+    assert all(each in text for each in ("C-7", "M. Tanaka", "Hall 3"))
+    assert "Hall 2" not in text
 
 
 def public(keys, name="mine"):

@@ -11,7 +11,8 @@ import pytest
 
 import elastocal as ec
 from elastocal.dataset import read_dataset, write
-from elastocal.errors import LogError
+from elastocal.errors import LogError, SchemaError
+from elastocal.robot import catalogue
 from support import reported
 from support.cli import elastocal
 from support.foreign_logs import (
@@ -278,6 +279,69 @@ def test_an_open_unit_is_written_as_a_question(rows, tmp_path):
     assert "unit: '?'" in (tmp_path / "map.yaml").read_text(encoding="utf-8")
     again = elastocal("import", *files, "--map", tmp_path / "map.yaml", "--guess")
     assert "is there already" in again.reason
+
+
+ANSWERS = [
+    "arm.urdf", "KR 999", "KR 120 R2700-2", "0 mm, 0 mm, 0.2 m", "back", "0 mm, 0 mm, 210 mm",
+    "40 kg", "0 mm, 0 mm, 9 cm", "0 mm, 0 mm, 90 mm",
+    "0 mm, 0 mm, 30 mm, 90 deg, 0 deg, 0 deg",
+]  # fmt: skip
+"""Two names that are no robot, an answer undone by ``back``, a unit that is none."""
+
+
+def test_what_no_log_contains_is_asked_for_and_refused_answers_are_asked_again(rows, tmp_path):
+    files, questions = write_logs(_short(rows), tmp_path), []
+    answers = iter(["kN", "N", "N*mm", *ANSWERS])
+
+    def ask(question: str) -> str:
+        questions.append(question)
+        return next(answers, "skip")
+
+    text = ec.guess_map(files, out=tmp_path / "map.yaml", ask=ask).text
+    assert 'robot: {model: "KR 120 R2700-2"}' in text
+    assert 'tcp: {xyz: ["0 mm", "0 mm", "210 mm"]}' in text
+    assert 'tool: {mass: "40 kg", centre_of_mass: ["0 mm", "0 mm", "90 mm"]}' in text
+    assert 'abc: ["90 deg", "0 deg", "0 deg"]}  # measuring frame' in text
+    assert 'marker: ["0 mm", "0 mm", "0 mm"]' in text, "skipped"
+    refused = [each for each in questions if each.startswith("   ")]
+    assert [re.search("arm.urdf|KR 999|'cm'|'N'", each)[0] for each in refused] == [
+        "'N'", "arm.urdf", "KR 999", "'cm'",
+    ]  # fmt: skip
+
+
+def test_a_urdf_is_named_beside_the_map_with_its_link(rows, tmp_path):
+    files = write_logs(_short(rows), tmp_path)
+    urdf = tmp_path / "arms" / "own.urdf"
+    urdf.parent.mkdir()
+    urdf.write_text(catalogue.urdf("UR10e"), encoding="utf-8")
+    answers = iter(["", "", str(urdf), "elbow", "", "skip"])
+    out = tmp_path / "maps" / "map.yaml"
+    text = ec.guess_map(files, out=out, ask=lambda _: next(answers)).text
+    assert "robot: {urdf: ../arms/own.urdf, flange: flange}" in text
+
+
+def test_what_a_guessed_map_leaves_open_is_refused_with_what_to_write(rows, tmp_path):
+    files = write_logs(_short(rows), tmp_path)
+    path = tmp_path / "map.yaml"
+    answers = iter(["kN", "N*mm", "skip"])
+    text = ec.guess_map(files, ask=lambda _: next(answers)).text
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SchemaError, match=r"map\.yaml: robot: the \? .*urdf: FILE.*KR 210 R2700-2"):
+        ec.import_logs(files, map=path)
+
+
+def test_a_column_in_seconds_is_the_time_whatever_it_is_called(tmp_path):
+    log = tmp_path / "trace.csv"
+    head = "Elapsed[s],Cycle[s]," + ",".join(f"J{n}(deg)" for n in range(1, 7))
+    lines = (f"{0.1 * k},0.1,{k},2,3,4,5,6" for k in range(9))
+    log.write_text("\n".join([head, *lines]), encoding="utf-8")
+    assert "time: {column: 'Elapsed[s]', unit: s}" in ec.guess_map([log]).text
+    log.write_text(log.read_text().replace("[s]", ""), encoding="utf-8")
+    unknown = ec.guess_map([log]).text
+    assert "time: {column: '?'}  # no column looks like a time" in unknown
+    (tmp_path / "map.yaml").write_text(unknown.replace('model: "?"', "model: UR20"))
+    with pytest.raises(SchemaError, match="the column is still to be written"):
+        ec.import_logs([log], map=tmp_path / "map.yaml")
 
 
 def test_the_figures_are_one_json_object(imported, rows, tmp_path):

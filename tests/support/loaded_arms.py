@@ -55,7 +55,7 @@ def acquire(  # noqa: PLR0913 (a campaign has as many properties)
     tools = np.array([[0.0, 0.0, -press], [aside, 0.0, -press], [0.0, aside, -press]])
     q = q_0[:, None] + rng.normal(0.0, _APPROACH, (poses, len(tools), 6))
     felt = np.einsum("plij,lj->pli", true.forward(q)[..., :3, :3], tools)
-    torque = np.einsum("plij,pli->plj", _jacobian(true, q), felt)
+    torque = np.einsum("plij,pli->plj", jacobian(true, q), felt)
     station = np.arange(poses) * 2 // poses
     at_zero = _seen(measured, station, _point(true, q_0, MARKERS[0])[:, None])[:, 0]
     loaded = _seen(measured, station, _point(true, q + springs * torque, MARKERS[0]))
@@ -93,7 +93,7 @@ def _point(robot: Robot, q: np.ndarray, point: np.ndarray) -> np.ndarray:
     return T[..., :3, 3] + T[..., :3, :3] @ point
 
 
-def _jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
+def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Return how the tcp moves by the joints, by central differences, shape (..., 3, joint)."""
     step = 1e-6
     columns = [

@@ -23,9 +23,10 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from elastocal.asking import HELP, SKIP, ask_in_turn
 from elastocal.cell import DeviceReading, read_statements
 from elastocal.cli import output
-from elastocal.errors import ProcedureError, SchemaError
+from elastocal.errors import ProcedureError
 from elastocal.procedure import Progress
 from elastocal.units import quantity
 from elastocal.workflows import LiveReport, Supervision, WatchResult
@@ -248,8 +249,6 @@ _DONE = "done"
 """Answer that something has been done in the cell, and that it is clear."""
 _DISKS = {"1": "one disk", "2": "two disks"}
 """Number of disks that can be typed, with what is said to it."""
-_SKIP = "skip"
-"""Answer that leaves out all further questions."""
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
 """Signals by which a person, a terminal or a system ends or halts a program, which would leave the
 arm pressing without supervision. Not every system has all of them."""
@@ -319,27 +318,24 @@ class TerminalOperator:
             raise ProcedureError("not confirmed: nothing was moved")
 
     def identify(self, missing: Sequence[str]) -> Mapping[str, str]:
-        """Ask for missing entries of the certificate; an invalid answer is asked for again."""
+        """Ask for missing entries of the certificate."""
         found: dict[str, str] = {}
         if not (missing and self._asks and sys.stdin.isatty()):
             return found
-        self._console.print(
-            "For the certificate. Enter leaves one out; skip, or Ctrl-D, all that follow."
+        self._console.print(f"For the certificate. {HELP}.")
+
+        def put(name: str) -> str:
+            shown = f"{missing.index(name) + 1} of {len(missing)}  {name.replace('.', ', ')}"
+            self._console.print(f"  {shown}: ", end="")
+            return sys.stdin.readline() or SKIP
+
+        def take(name: str, answer: str) -> None:
+            found.pop(name, None)
+            found.update(read_statements((f"{name}={answer}",)) if answer else {})
+
+        ask_in_turn(
+            missing, put, take, lambda error: self._console.print(str(error), soft_wrap=True)
         )
-        waiting = list(missing)
-        while waiting:
-            number = len(missing) - len(waiting) + 1
-            name = waiting[0].replace(".", ", ")
-            self._console.print(f"  {number} of {len(missing)}  {name}: ", end="")
-            line = sys.stdin.readline()
-            if not line or line.strip().lower() == _SKIP:
-                break
-            try:
-                found |= read_statements((f"{waiting[0]}={line}",)) if line.strip() else {}
-            except SchemaError as error:
-                self._console.print(str(error), soft_wrap=True)
-                continue
-            waiting.pop(0)
         return found
 
     @contextmanager

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elastocal import workflows
+from elastocal.asking import SKIP
 from elastocal.cli import output
 from elastocal.cli.generator import Command, Given
 from elastocal.options import CHOICES, Option, settings_class
@@ -484,9 +485,10 @@ def _import(given: Given) -> None:
 
 
 def _ask(question: str) -> str:
-    """Return the answer given on the terminal; an empty one leaves the question open."""
-    answer: str = typer.prompt(question, default="", show_default=False, err=True)
-    return answer
+    """Return the answer given on the terminal; the end of input leaves out all that follow."""
+    screen = output.console()
+    screen.print(f"{question}: ", end="", soft_wrap=True, markup=False, highlight=False)
+    return sys.stdin.readline() or SKIP
 
 
 plain("Identify", "tool", _as_file)
@@ -611,7 +613,10 @@ plain("Two robots", "compensate_pair", _as_file, module=_PAIR)
 
 @command("Judge and hand over")
 def _report(given: Given) -> None:
-    result = workflows.report(**given.settings)
+    from elastocal.cli._operator import TerminalOperator
+
+    operator = TerminalOperator(output.console(), asks=not given.as_json)
+    result = workflows.report(**given.settings, identify=operator.identify)
     others = (path for path in (result.figures.pdf, result.figures.xlsx) if path)
     _show(given, result.figures, result.show(), *(f"written to {path}" for path in others))
 

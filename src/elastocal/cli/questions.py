@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from elastocal.asking import BACK, SKIP, ask_in_turn
 from elastocal.cli import output
 
 if TYPE_CHECKING:
@@ -32,13 +33,31 @@ _QUESTIONS = {
 """Questions in their order; the key is the field."""
 
 
+_HELP = (
+    f"Enter takes what is offered; {BACK} returns to the question before; {SKIP} takes what is"
+    " offered for all that follow."
+)
+
+
 def answered(settings: "NewSettings") -> "NewSettings":
     """Return settings with the answers of a person; an empty answer accepts the default."""
-    for name, question in _QUESTIONS.items():
-        if getattr(settings, name) is not None or _needless(settings, name):
-            continue
-        answer: dict[str, Any] = {name: _answer(settings, name, question)}
-        settings = replace(settings, **answer)
+    screen, given = output.console(), settings
+
+    def put(name: str) -> str | None:
+        if getattr(given, name) is not None or _needless(settings, name):
+            return None
+        return _answer(settings, name)
+
+    def take(name: str, answer: str) -> None:
+        nonlocal settings
+        settings.require_answer(name, answer)
+        said: dict[str, Any] = {name: answer}
+        settings = replace(settings, **said)
+
+    screen.print(_HELP)
+    ask_in_turn(
+        tuple(_QUESTIONS), put, take, lambda error: screen.print(f"   {error}", soft_wrap=True)
+    )
     return settings
 
 
@@ -52,24 +71,19 @@ def _needless(settings: "NewSettings", name: str) -> bool:
     )
 
 
-def _answer(settings: "NewSettings", name: str, question: str) -> str:
-    """Return a valid answer to one question; one that is not is refused, and asked again."""
-    from elastocal.errors import ElastocalError, ProcedureError
+def _answer(settings: "NewSettings", name: str) -> str:
+    """Return the answer to one question."""
+    from elastocal.errors import ProcedureError
 
+    said = getattr(settings, name)
     offered = None if name in ("robot", "mesh") else settings.offered(name)
-    while True:
-        try:
-            text: str = typer.prompt(question, default=offered, err=True)
-        except (typer.Abort, OSError) as end:
-            output.console().print()  # the question has no end of its line
-            if isinstance(end, typer.Abort) and not isinstance(end.__context__, EOFError):
-                raise KeyboardInterrupt from end
-            raise ProcedureError(
-                "nobody answers: standard input has ended; give options instead"
-            ) from end
-        try:
-            settings.require_answer(name, text.strip())
-        except ElastocalError as error:
-            output.console().print(f"   {error}", soft_wrap=True)
-        else:
-            return text.strip()
+    try:
+        text: str = typer.prompt(_QUESTIONS[name], default=said or offered, err=True)
+    except (typer.Abort, OSError) as end:
+        output.console().print()  # the question has no end of its line
+        if isinstance(end, typer.Abort) and not isinstance(end.__context__, EOFError):
+            raise KeyboardInterrupt from end
+        raise ProcedureError(
+            "nobody answers: standard input has ended; give options instead"
+        ) from end
+    return text

@@ -2,13 +2,13 @@ from .clocks import (
     ClockFit as ClockFit,
 )
 from .guess import (
-    ROBOT_TO_WRITE as ROBOT_TO_WRITE,
     GuessedLog as GuessedLog,
     guess_logs as guess_logs,
     write_guess as write_guess,
 )
 from .map import (
     SCHEMA as SCHEMA,
+    UNKNOWN as UNKNOWN,
     read_map as read_map,
     site as site,
 )

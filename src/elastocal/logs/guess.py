@@ -1,8 +1,8 @@
 """First map of logs, guessed from the names and sizes of their columns, for a person to correct."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
@@ -42,6 +42,8 @@ _TURNS_OF = {"FANUC": ("r", "p", "w"), "Denso or Yaskawa": ("rz", "ry", "rx")}
 """Angles about z, y and x, in the order of the map's a, b, c, as makers name them."""
 _TURN = re.compile(r"(?i)(.*?)(r[xyz]|[wpr])")
 _NO_TIMES = ("deg", "rad", "mm", "m", "N", "kN", "N*m", "N*mm")
+_TIMES = ("s", "ms", "us")
+"""Units by which a column is a time, whatever it is called."""
 _STATE = re.compile(r"(?i)(?:.*[./])?position\.(?![xyzw]$)")
 _RATE = re.compile(r"(?i)(?:.*[./])?(?:velocity|effort)\.")
 """Places, velocities and efforts of joints by their names, as a JointState becomes columns."""
@@ -124,17 +126,6 @@ class GuessedLog:
     columns: tuple[GuessedColumns, ...] = ()
     unused: tuple[str, ...] = ()
     """Columns whose meaning is not known."""
-
-    def answered(self, ask: Callable[[str], str]) -> "GuessedLog":
-        """Return the same with the units that a person gave; an empty answer leaves one open."""
-
-        def said(each: GuessedColumns) -> GuessedColumns:
-            if each.unit != UNKNOWN:
-                return each
-            unit = ask(f"{self.log}: unit of {', '.join(each.columns)} ({each.key}, {each.why})")
-            return replace(each, unit=unit.strip() or UNKNOWN)
-
-        return replace(self, columns=tuple(map(said, self.columns)))
 
     def lines(self) -> list[str]:
         """Return its entry of the map, with the reasons as comments."""
@@ -229,6 +220,7 @@ def guess_log(
     rest = _without(rest, force)
     where = [] if force else _places(table, rest, of_tool=bool(arm))
     unused = tuple(_without(rest, where))
+    when = when or [GuessedColumns("time", (UNKNOWN,), None, "no column looks like a time")]
     return GuessedLog(log, topic, (*when, *arm, *force, *where), unused)
 
 
@@ -245,12 +237,18 @@ def _when(table: LogTable, names: dict[str, str]) -> list[GuessedColumns]:
         for heading in (_TIME, _DATE)
         for name, bare in names.items()
         if heading.fullmatch(bare) and _stated(name) not in _NO_TIMES
-    ][:1]
+    ] or [name for name in names if _stated(name) in _TIMES and _rises(table, name)]
+    times = times[:1]
     steps = [name for name, bare in names.items() if _STEP.fullmatch(bare)][:1]
     return [
         *(GuessedColumns("time", (name,), *_time_unit(table, name)) for name in times),
         *(GuessedColumns("handshake", (name,), None, "its name") for name in steps),
     ]
+
+
+def _rises(table: LogTable, name: str) -> bool:
+    """Return whether the numbers of a column only rise."""
+    return bool(np.all(np.diff(_numbers(table, name)) > 0.0))
 
 
 def _of_places(names: dict[str, str]) -> dict[str, str]:
@@ -429,36 +427,26 @@ def _without_names(table: LogTable) -> tuple[GuessedColumns, ...]:
     return tuple(found)
 
 
-def write_guess(logs: Sequence[GuessedLog], robot: str) -> str:
+def write_guess(logs: Sequence[GuessedLog], cell: Sequence[str]) -> str:
     """Return the text of a map.
 
     Parameters
     ----------
     logs : sequence of GuessedLog
         What they were taken for.
-    robot : str
-        Lines that say robot, tool and sensor, or the cell file.
+    cell : sequence of str
+        Lines that say robot, tool, sensor and marker, or the cell file.
     """
     head = [
         f"schema: {SCHEMA}",
-        "# Guessed by names and sizes of columns: look at every line. A unit ? is yours to write.",
-        *robot.rstrip().splitlines(),
+        "# Guessed by names and sizes of columns: look at every line. A ? is yours to write.",
+        *cell,
         "logs:",
     ]
     tail = [
         "# load_cases: {normal: ['0 N', '0 N', '-1100 N']}  # on the robot, in the tcp; in order",
     ]
     return "\n".join([*head, *(line for each in logs for line in each.lines()), *tail]) + "\n"
-
-
-ROBOT_TO_WRITE = """\
-robot: {model: "?"}                       # of `elastocal robots`, or urdf: FILE, flange: LINK
-tcp: {xyz: ["0 mm", "0 mm", "0 mm"]}      # in the flange, z out of the tool
-# tool: {mass: "0 kg", centre_of_mass: ["0 mm", "0 mm", "0 mm"]}   # in the flange
-sensor: {xyz: ["0 mm", "0 mm", "0 mm"]}   # measuring frame in the flange
-marker: ["0 mm", "0 mm", "0 mm"]          # in the tcp, roughly
-"""
-"""Entries about the cell that no log contains."""
 
 
 def _bare(name: str) -> str:

@@ -47,8 +47,9 @@ from elastocal.cell import (
 from elastocal.errors import ElastocalError, SchemaError, present
 from elastocal.records import StrictModel, read_yaml
 from elastocal.results import brief_repr
-from elastocal.robot import GRAVITY, Robot, inverse_transform, with_tool_mass
+from elastocal.robot import GRAVITY, Robot, catalogue, inverse_transform, with_tool_mass
 from elastocal.units import factor
+from elastocal.wording import listed
 
 SCHEMA = "elastocal.log-map/1"
 UNKNOWN = "?"
@@ -74,6 +75,8 @@ class TimeColumn(StrictModel):
 
     @model_validator(mode="after")
     def _known_unit(self) -> "TimeColumn":
+        if self.column == UNKNOWN:
+            raise ValueError("the column is still to be written: the heading over the times")
         if self.unit is not None:
             _check_unit(self.unit, "time")
         return self
@@ -194,7 +197,7 @@ class LogEntry(StrictModel):
         if self.link_joints and not self.joints:
             raise ValueError("link_joints stand beside the joints of their log")
         if self.time is None and self.handshake is None:
-            raise ValueError("it needs a time or a handshake")
+            raise ValueError(f"{self.log} needs a time or a handshake")
         return self
 
 
@@ -224,6 +227,11 @@ class LogMap(StrictModel):
     def _whole(self) -> "LogMap":
         if (self.cell is None) == (self.robot is None):
             raise ValueError("give cell or robot, one of them")
+        if self.robot is not None and UNKNOWN in (self.robot.model, self.robot.urdf):
+            raise ValueError(
+                "robot: the ? is still to be written: robot: {model: NAME}, or robot: {urdf: FILE,"
+                f" flange: LINK}}; names: {listed(catalogue.names())}"
+            )
         if not any(each.joints for each in self.logs):
             raise ValueError("no log holds joints")
         if self.check is not None and self.check not in self.load_cases:

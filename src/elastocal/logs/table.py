@@ -37,6 +37,9 @@ _CELLS_AT_A_TIME = 200_000
 _COMMENTS = ("#", "//", "%", "!")
 _DELIMITERS = ";\t,|"
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?", re.ASCII)
+_DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?!\d)", re.ASCII)
+_YEAR_FIRST = re.compile(r"^(\d{4})/(\d\d)/(\d\d)", re.ASCII)
+"""Dates that are read alike everywhere, unlike 11/12/2026."""
 _NUMBER = re.compile(r"\s*[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?\s*", re.ASCII)
 _UNIT = re.compile(
     r"[\[(]?\s*(?:mm|m|[uµ]m|in|s|sec|ms|us|deg|°|rad|k?N|N[*·]?m|N[*·]?mm|°C|mbar|hPa|%)\s*[\])]?"
@@ -119,8 +122,8 @@ class LogTable:
     def seconds(self, name: str) -> FloatArray:
         """Return the times of a column without unit, shape (row,), in s.
 
-        Dates with a time of day (ISO 8601) count from 1970 UTC, times of day from midnight and go
-        on beyond 24 h when midnight passes.
+        Dates with a time of day (ISO 8601, ``27.11.2026`` or ``2026/11/27``) count from 1970 UTC,
+        times of day from midnight and go on beyond 24 h when midnight passes.
 
         Raises
         ------
@@ -177,9 +180,21 @@ class LogTable:
             hours, minutes, seconds = clock.groups()
             return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
         if text and not _NUMBER.fullmatch(text):
-            found = datetime.fromisoformat(text.replace(",", "."))
+            found = datetime.fromisoformat(_as_iso(text.replace(",", ".")))
             return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
         return self._number(cell)
+
+
+def _as_iso(text: str) -> str:
+    """Return a date as ISO 8601 writes it: ``27.11.2026``, ``2026/11/27`` and what is so already.
+
+    >>> _as_iso("27.11.2026 09:41:38.4"), _as_iso("2026/11/27 09:41:38")
+    ('2026-11-27 09:41:38.4', '2026-11-27 09:41:38')
+    """
+    if match := _DAY_FIRST.match(text):
+        day, month, year = match.groups()
+        return f"{year}-{month:0>2}-{day:0>2}{text[match.end() :]}"
+    return _YEAR_FIRST.sub(r"\1-\2-\3", text, count=1)
 
 
 def read_text_log(path: Path) -> LogTable:

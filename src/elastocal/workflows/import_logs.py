@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -23,6 +23,7 @@ from elastocal.records import record
 from elastocal.report.plots import require_kind, write_timeline_figure
 from elastocal.results import Result, brief_repr
 from elastocal.wording import counted
+from elastocal.workflows._map_questions import answered, map_text
 from elastocal.workflows._workflow import workflow
 
 
@@ -256,8 +257,9 @@ class GuessMapSettings:
     force: bool = False
     """Replace a map that is there."""
     ask: Callable[[str], str] | None = None
-    """Function that asks a person what cannot be determined, and returns the answer; an empty one
-    leaves ``?`` in the map. None: nobody is asked."""
+    """Function that asks a person what the logs do not tell (units; without ``cell`` also robot,
+    tool, sensor and marker), and returns the answer; an empty one leaves it to be written. None:
+    nobody is asked."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -299,11 +301,12 @@ def guess_map(settings: GuessMapSettings, progress: Progress) -> GuessMapResult:
     arm = None if settings.cell is None else load_cell(Path(settings.cell), production=False).robot
     joints = None if arm is None else dict(zip(arm.joint_names, arm.revolute, strict=True))
     guessed = foreign.guess_logs(files, joints)
+    site: Mapping[str, str] = {}
     if settings.ask is not None:
-        guessed = tuple(each.answered(settings.ask) for each in guessed)
+        folder = Path.cwd() if out is None else out.parent
+        guessed, site = answered(guessed, settings.ask, folder, about_cell=settings.cell is None)
     progress("logs", 1, 1)
-    robot = foreign.ROBOT_TO_WRITE if settings.cell is None else f"cell: {settings.cell}"
-    text = foreign.write_guess(guessed, robot)
+    text = map_text(guessed, site, settings.cell)
     if out is not None:
         write_text(out, text)
     return GuessMapResult(guessed, text)

@@ -1,7 +1,7 @@
 """``report``: the document that stays when the engineer has left."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from os import PathLike
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from elastocal.blocks import Block, Bullets, Facts, Paragraph
+from elastocal.cell import unstated
 from elastocal.errors import FileAccessError
 from elastocal.files import require_place
 from elastocal.identification.recertification import Estimate
@@ -89,6 +90,9 @@ class ReportSettings:
     state: Statements = field(default_factory=dict)
     """Statements for the certificate, in addition to those of cell file and run; see
     `elastocal.cell.read_statements`."""
+    identify: Callable[[Sequence[str]], Mapping[str, str]] | None = None
+    """Function that asks a person for the entries of a signed certificate that nobody has stated,
+    by their keys, and returns statements. None: nobody is asked."""
 
 
 @brief_repr
@@ -200,6 +204,9 @@ def report(settings: ReportSettings, progress: Progress) -> ReportResult:
     steps = 3 if settings.pdf else 2
     progress("report", 0, steps)
     evidence = gather_evidence(options, made)
+    if key is not None and settings.identify is not None:
+        answers = settings.identify(unstated(evidence.certificate))
+        evidence = replace(evidence, stated={**evidence.stated, **answers})
     progress("report", 1, steps)
     signed = None if key is None else partial(sign, key, OF_REPORT, made=made)
 
