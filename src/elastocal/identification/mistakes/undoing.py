@@ -13,10 +13,10 @@ fit and iterated. Thresholds are measured on correct campaigns
 (docs/decisions/0105-mistakes-undone.md).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import combinations, islice, permutations, product
+from functools import cache, cached_property
+from itertools import combinations, compress, islice, permutations, product
 from operator import itemgetter
 
 import numpy as np
@@ -31,14 +31,14 @@ from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.contact import Contact, compliance_columns
 from elastocal.identification.conventions import FORCE_MISTAKES
-from elastocal.identification.displacement import reference_joints
+from elastocal.identification.displacement import Between, reference_joints
 from elastocal.identification.mistakes._motion import AXES, median_norm
 from elastocal.identification.mistakes.plausibility import sensor_frames
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
-from elastocal.identification.solve import fit_each
+from elastocal.identification.solve import fit_each, grams_of, least_squares_left
 from elastocal.identification.suspicious import screen
-from elastocal.identification.uncertainty import leave_poses_out
+from elastocal.identification.uncertainty import HeldOut, leave_poses_out
 from elastocal.robot import Robot
 
 _TRACKER = FitOptions(encoders=False)
@@ -79,9 +79,8 @@ class Rows:
     """The same at the joints of the reference."""
     rest: FloatArray
     """Rows of what no force makes: moments and the arm's weight, shape (reading, 3, spring)."""
-    lever: FloatArray
-    """Rows per metre by which the marker sits elsewhere along each axis of the tcp frame, shape
-    (reading, 3, axis, spring)."""
+    place: FloatArray
+    """Marker in the tcp frame, shape (3,), in m."""
     kept: BoolArray
     """Readings that are no blunders, shape (reading,)."""
 
@@ -120,9 +119,7 @@ class Rows:
         reference = unit(before) if light is not None else np.zeros(0)
         kept = ~screen(problem).blunder
         place = np.zeros(3) if marker_offset is None else np.asarray(marker_offset, dtype=float)
-        moved = [build(model, readings, options, place + e).O - problem.O for e in np.eye(3)]
-        lever = np.stack(moved, axis=2)
-        bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), lever, kept)
+        bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), place, kept)
         return replace(bare, rest=problem.O - bare.blocks(readings.force, light))
 
     def blocks(self, force: FloatArray, light: FloatArray | None) -> FloatArray:
@@ -145,9 +142,55 @@ class Rows:
         """See `sensor_frames`."""
         return sensor_frames(self.model.robot, self.readings.joint_position)
 
+    @cached_property
+    def lever(self) -> FloatArray:
+        """Rows per metre by which the marker sits elsewhere along each axis of the tcp frame.
+
+        Shape (reading, 3, axis, spring).
+        """
+        between, n = Between.of(self.model, self.readings), self.problem.springs
+        found = np.zeros((*self.problem.O.shape[:2], 3, self.problem.columns))
+        for axis, e in enumerate(np.eye(3)):
+            found[:, :, axis, n] = between.of_point(self.place + e) - self.problem.O[:, :, n]
+        return found
+
+    @cached_property
+    def stated(self) -> Problem:
+        """The problem of the kept rows, read as stated."""
+        return self.without_blunders(self.problem)
+
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Compliances of the readings as stated, shape (spring,)."""
+        return fitted(self.stated)
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Norms of what they leave, shape (kept reading,), in m."""
+        return np.asarray(np.linalg.norm(self.stated.residuals(self.compliance), axis=1))
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """Refits of the readings as stated without each pose."""
+        return leave_poses_out(self.stated)
+
+    def without_blunders(self, problem: Problem) -> Problem:
+        """Return a problem of all readings without those that are blunders."""
+        return problem if self.kept.all() else problem.take(self.kept)
+
     def read(self, reading: OtherReading) -> Problem:
         """Return the problem of the kept rows, read otherwise."""
-        return replace(self.problem, O=reading.blocks, d=reading.d).take(self.kept)
+        return self.without_blunders(replace(self.problem, O=reading.blocks, d=reading.d))
+
+    def is_possible(self, grams: FloatArray) -> BoolArray:
+        """Return which Gram matrices of ``[O d]`` some values of the springs may explain.
+
+        The others leave far more than the readings as stated do, whatever the springs
+        (`_HOPELESS`): a bounded fit need not say so. Shape (fit,).
+        """
+        most = _HOPELESS**2 * float(self.residual @ self.residual)
+        left = least_squares_left(grams, self.problem.size)
+        return np.asarray(left <= most + _ROUND_OFF**2 * grams[:, -1, -1])
 
 
 def fitted(problem: Problem) -> FloatArray:
@@ -172,26 +215,14 @@ def beside(problem: Problem, columns: FloatArray) -> Problem:
     )
 
 
-def apart(problem: Problem, late: BoolArray) -> Problem:
-    """Return a problem with springs of their own for late readings, shape (reading,)."""
-
-    def twice(values: FloatArray | float) -> FloatArray:
-        return np.tile(np.broadcast_to(values, problem.lower.shape), 2)
-
-    part = late[:, None, None]
-    return replace(
-        problem,
-        O=np.concatenate([np.where(part, 0.0, problem.O), np.where(part, problem.O, 0.0)], axis=2),
-        lower=twice(problem.lower),
-        upper=twice(problem.upper),
-        prior_rows=np.zeros((0, 2 * problem.columns + 1)),
-        size=twice(problem.size),
-    )
-
-
 _CLEAR, _LIKELY, _FITTED, _IN_TIME = 0.9, 0.75, 0.85, 0.97
 """Part of the error that may be left: by forces and rows, by markers, by estimated numbers, by
 those that grow in the order of poses, which no correct arm imitates."""
+_HOPELESS = 2.0
+"""Root mean square residual over that of the readings as stated above which others are hopeless:
+what leaves twice as much in all does not leave clearly less in nine tenths of the rows."""
+_ROUND_OFF = 1e-3
+"""Part of the deflections below which what is left may be round-off."""
 _SHORTEST = 3
 """Fewest poses of a part of the campaign that is mistaken by itself."""
 _SHIFTS = (
@@ -203,6 +234,8 @@ _SHIFTS = (
 _ROUNDS = 4
 _CONSTANT_ROUNDS = 10
 """A constant as large as half the force takes more rounds to settle than a gain."""
+_SETTLED = 1e-6
+"""Step over the numbers themselves below which they have settled; messages show three digits."""
 _SMALLEST = 0.05
 """Part of the median force below which a constant is not reported."""
 _UPRIGHT = 0.95
@@ -218,29 +251,40 @@ _ANGLES = (90, -90, 180, 30, -30, 45, -45, 60, -60, 120, -120, 135, -135, 150, -
 """Angles in deg by which a sensor is turned about the tool; about other axes the first three."""
 
 
-def other_readings(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
-    """Yield every other reading of the data, the plainest first; of markers where there are any."""
+def other_readings(rows: Rows) -> Iterator[OtherReading]:
+    """Yield the other readings of the data that may explain them, the plainest first.
+
+    Those of markers where there are any.
+    """
     each = (
-        (_turned_forces(rows), False),
-        (_turned_markers(rows), True),
+        (_possible(rows, _turned_forces(rows)), False),
+        (_possible(rows, _turned_markers(rows)), True),
         (_turned_for_a_part(rows, _turned_forces(rows, plain=True)), False),
         (_turned_for_a_part(rows, _turned_markers(rows, plain=True)), True),
-        (_other_force_rows(rows), False),
-        (_other_marker_rows(rows), True),
-        (_constants(rows, compliance), False),
+        (_possible(rows, _other_force_rows(rows)), False),
+        (_possible(rows, _other_marker_rows(rows)), True),
+        (_constants(rows), False),
         (_marker_drifts(rows), True),
-        (_force_drifts(rows, compliance), False),
-        (_force_gains(rows, compliance), False),
+        (_force_drifts(rows), False),
+        (_force_gains(rows), False),
         (_marker_gains(rows), True),
-        (_force_lag(rows, compliance), False),
+        (_force_lag(rows), False),
         (_marker_lag(rows), True),
-        (_marker_places(rows, compliance), True),
+        (_marker_places(rows), True),
         (_any_marker_frame(rows), True),
     )
     seen = not rows.readings.by_contact.any()
     for readings, of_marker in each:
         if seen or not of_marker:
             yield from readings
+
+
+def _possible(rows: Rows, readings: Iterable[OtherReading]) -> Iterator[OtherReading]:
+    """Yield the readings that are not hopeless; see `Rows.is_possible`."""
+    remaining = iter(readings)
+    while part := list(islice(remaining, _AT_ONCE)):
+        grams = grams_of([rows.read(each) for each in part])
+        yield from compress(part, rows.is_possible(grams))
 
 
 def _turned_forces(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
@@ -270,7 +314,8 @@ def _turned_markers(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
         yield OtherReading(remedy, blocks, d, _LIKELY, certain=True)
 
 
-def _turns(name: str, any_angle: bool, plain: bool) -> list[tuple[str, FloatArray]]:
+@cache
+def _turns(name: str, any_angle: bool, plain: bool) -> Sequence[tuple[str, FloatArray]]:
     """Return matrices that undo exchanged, reversed and rotated axes, with their descriptions.
 
     They include all 47 ways to interpret three columns as other axes, with or without their signs;
@@ -329,16 +374,29 @@ def _turned_for_a_part(rows: Rows, turns: Iterator[OtherReading]) -> Iterator[Ot
             estimated=True,
         )
 
-    def left(parts: Iterable[tuple[OtherReading, int, bool]]) -> Iterator[float]:
-        return _residuals(rows.read(partly(*each)) for each in parts)
-
     starts = range(_SHORTEST, len(order) - _SHORTEST + 1)
     if not starts:
         return
     coarse = sorted({starts[round(part * (len(starts) - 1))] for part in _PARTS})
-    each = list(product(turns, coarse, (True, False)))
-    _, (turn, _, late) = min(zip(left(each), each, strict=True), key=itemgetter(0))
-    finer = left((turn, start, late) for start in starts)
+    piece = np.searchsorted(coarse, place, side="right")
+    pieces = [np.flatnonzero((piece == each) & rows.kept) for each in range(len(coarse) + 1)]
+
+    def grams(problem: Problem) -> FloatArray:
+        return np.concatenate([grams_of([problem.take(each)]) for each in pieces])
+
+    stated = grams(rows.problem)
+    possible = []
+    for turn in turns:
+        turned = grams(replace(rows.problem, O=turn.blocks, d=turn.d))
+        early = np.cumsum(turned - stated, axis=0)[:-1]
+        parted = np.stack([turned.sum(axis=0) - early, stated.sum(axis=0) + early], axis=1)
+        may = rows.is_possible(parted.reshape(-1, *stated.shape[1:]))
+        possible.extend((turn, *each) for each in compress(product(coarse, (True, False)), may))
+    if not possible:
+        return
+    left = _residuals(rows.read(partly(*each)) for each in possible)
+    _, (turn, _, late) = min(zip(left, possible, strict=True), key=itemgetter(0))
+    finer = _residuals(rows.read(partly(turn, start, late)) for start in starts)
     _, start = min(zip(finer, starts, strict=True))
     yield partly(turn, start, late)
 
@@ -392,11 +450,61 @@ def _orders(r: Readings) -> Iterator[tuple[str, IndexArray]]:
         yield f"those of the pose {which}", np.roll(table, shift, axis=0).ravel()
 
 
-def _constants(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+@dataclass(frozen=True)
+class _Unknown:
+    """Numbers on which rows of springs depend, estimated with the springs."""
+
+    none: FloatArray
+    """What they are where the readings are as stated, shape (number,)."""
+    blocks: Callable[[FloatArray], FloatArray]
+    """Returns the rows of the springs with numbers, shape (reading, 3, spring)."""
+    columns: Callable[[FloatArray], FloatArray]
+    """Returns their own columns with compliances, shape (reading, 3, number)."""
+    is_believed: Callable[[FloatArray], bool]
+
+
+def _estimated(
+    rows: Rows, unknowns: Sequence[_Unknown], rounds: int
+) -> list[tuple[FloatArray, FloatArray] | None]:
+    """Return numbers and rows of each, None where they are not believed.
+
+    Linearised about the springs' fit, and iterated; all of them at once, as many numbers each.
+    """
+    found = {number: (each.none, rows.problem.O) for number, each in enumerate(unknowns)}
+    going = list(found)
+    for turn in range(rounds):
+        springs = [replace(rows.problem, O=found[each][1]) for each in going]
+        compliances = (
+            fit_each([*map(rows.without_blunders, springs)])
+            if turn
+            else [rows.compliance] * len(going)
+        )
+        wide = [
+            beside(each, unknowns[number].columns(c))
+            for number, each, c in zip(going, springs, compliances, strict=True)
+        ]
+        steps = fit_each([*map(rows.without_blunders, wide)])[:, rows.problem.columns :]
+        changing = []
+        for number, step in zip(going, steps, strict=True):
+            numbers = found[number][0] + step
+            if not unknowns[number].is_believed(numbers):
+                del found[number]
+                continue
+            found[number] = numbers, unknowns[number].blocks(numbers)
+            if not np.linalg.norm(step) <= _SETTLED * np.linalg.norm(numbers):
+                changing.append(number)
+        going = changing
+        if not going:
+            break
+    return [found.get(number) for number in range(len(unknowns))]
+
+
+def _constants(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings without a constant in the forces: weight in base, bias in the tcp frame."""
-    one = np.ones(len(rows.readings))
-    for frame in ("base", "tcp"):
-        found = _offset(rows, compliance, rows.frames[frame], one)
+    frames = ("base", "tcp")
+    for frame, found in zip(
+        frames, _offsets(rows, frames, np.ones(len(rows.readings))), strict=True
+    ):
         if found is None:
             continue
         offset, blocks = found
@@ -428,23 +536,25 @@ def _parts(offset: FloatArray, scale: float = 1.0, digits: int = 0) -> dict[str,
     return {name: f"{scale * value:.{digits}f}" for name, value in zip(AXES, offset, strict=True)}
 
 
-def _offset(
-    rows: Rows, compliance: FloatArray, X: FloatArray, course: FloatArray
-) -> tuple[FloatArray, FloatArray] | None:
-    """Return a force that is too much in all readings, times a course, and rows without it."""
-    r, offset = rows.readings, np.zeros(3)
-    blocks, c = rows.problem.O, compliance
-    for _ in range(_CONSTANT_ROUNDS):
-        columns = -np.einsum("rikn,n->rik", rows.basis, c) @ X * course[:, None, None]
-        widened = beside(replace(rows.problem, O=blocks), columns).take(rows.kept)
-        x = fitted(widened)
-        offset = offset + x[-3:]
-        if not np.linalg.norm(offset) < 3.0 * np.median(np.linalg.norm(r.force, axis=1)):
-            return None
-        made = np.einsum("rikn,rk->rin", rows.basis, course[:, None] * (X @ offset))
-        blocks = rows.problem.O - made
-        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
-    return offset, blocks
+def _offsets(
+    rows: Rows, frames: Sequence[str], course: FloatArray
+) -> list[tuple[FloatArray, FloatArray] | None]:
+    """Return forces that are too much in all readings, times a course, and rows without them."""
+    most = 3.0 * np.median(np.linalg.norm(rows.readings.force, axis=1))
+
+    def constant(X: FloatArray) -> _Unknown:
+        def blocks(offset: FloatArray) -> FloatArray:
+            force = course[:, None] * (X @ offset)
+            return np.asarray(rows.problem.O - np.einsum("rikn,rk->rin", rows.basis, force))
+
+        def columns(c: FloatArray) -> FloatArray:
+            own = -np.einsum("rikn,n->rik", rows.basis, c) @ X * course[:, None, None]
+            return np.asarray(own)
+
+        return _Unknown(np.zeros(3), blocks, columns, lambda x: bool(np.linalg.norm(x) < most))
+
+    each = [constant(rows.frames[frame]) for frame in frames]
+    return _estimated(rows, each, _CONSTANT_ROUNDS)
 
 
 def _marker_drifts(rows: Rows) -> Iterator[OtherReading]:
@@ -456,9 +566,10 @@ def _marker_drifts(rows: Rows) -> Iterator[OtherReading]:
         (low, ((t > low) & (t < high)).astype(float))
         for low, high in ((0.25, 0.5), (0.33, 0.67), (0.25, 0.75), (0.5, 0.75))
     ]
-    for part, course in ((None, t), *steps, *whiles):
-        widened = beside(rows.problem, course[:, None, None] * eye).take(rows.kept)
-        grown = fitted(widened)[-3:]
+    courses = ((None, t), *steps, *whiles)
+    wide = [beside(rows.problem, course[:, None, None] * eye) for _, course in courses]
+    each = fit_each([*map(rows.without_blunders, wide)])[:, -3:]
+    for (part, course), grown in zip(courses, each, strict=True):
         how = ("drift by") if part is None else ("jump half way (station bumped?) by")
         yield OtherReading(
             (
@@ -477,10 +588,10 @@ def _time(rows: Rows) -> FloatArray:
     return np.linspace(0.0, 1.0, len(rows.readings))
 
 
-def _force_drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _force_drifts(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of forces without a constant that grew in the order of time."""
-    for frame in ("tcp", "base"):
-        found = _offset(rows, compliance, rows.frames[frame], _time(rows))
+    frames = ("tcp", "base")
+    for frame, found in zip(frames, _offsets(rows, frames, _time(rows)), strict=True):
         if found is None:
             continue
         yield OtherReading(
@@ -496,23 +607,40 @@ def _force_drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
         )
 
 
-def _force_gains(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _force_gains(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings with one axis of the force scaled."""
-    for frame, X in rows.frames.items():
-        for axis, letter in enumerate(AXES):
-            found = _force_gain(rows, compliance, X[:, :, axis])
-            if found is None:
-                continue
-            yield OtherReading(
-                (
-                    "force_{axis} in the {frame} frame looks {gain} times too large: check the"
-                    " gain of the sensor's channel"
-                ).format(axis=letter, frame=frame, gain=f"{1.0 / found[0]:.2f}"),
-                found[1],
-                rows.problem.d,
-                _FITTED,
-                estimated=True,
-            )
+    each = [(frame, axis) for frame in rows.frames for axis in range(3)]
+    gains = [_force_gain(rows, rows.frames[frame][:, :, axis]) for frame, axis in each]
+    for (frame, axis), found in zip(each, _estimated(rows, gains, _ROUNDS), strict=True):
+        if found is None:
+            continue
+        (gain,), blocks = found
+        yield OtherReading(
+            (
+                "force_{axis} in the {frame} frame looks {gain} times too large: check the"
+                " gain of the sensor's channel"
+            ).format(axis=AXES[axis], frame=frame, gain=f"{1.0 / gain:.2f}"),
+            blocks,
+            rows.problem.d,
+            _FITTED,
+            estimated=True,
+        )
+
+
+def _force_gain(rows: Rows, x: FloatArray) -> _Unknown:
+    """Return the factor that undoes a gain of the force along axes, shape (reading, 3)."""
+    along = x[:, :, None] * x[:, None, :]
+    part = np.einsum("rij,rj->ri", along, rows.readings.force)
+
+    def columns(c: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("rikn,rk,n->ri", rows.basis, part, c)[..., None])
+
+    return _Unknown(
+        np.ones(1),
+        lambda gain: rows.turned(np.eye(3) + (gain - 1.0) * along),
+        columns,
+        lambda gain: bool(_LEAST_GAIN < gain[0] < 1.0 / _LEAST_GAIN),
+    )
 
 
 def _marker_gains(rows: Rows) -> Iterator[OtherReading]:
@@ -522,8 +650,7 @@ def _marker_gains(rows: Rows) -> Iterator[OtherReading]:
     )
     for name, kept in (*columns, ("marker displacements", np.ones(3))):
         seen = rows.readings.marker_displacement * kept
-        widened = beside(rows.problem, -seen[..., None]).take(rows.kept)
-        gain = 1.0 + float(fitted(widened)[-1])
+        gain = 1.0 + _lag(rows, -seen)
         if not gain > 0.0:
             continue
         yield OtherReading(
@@ -540,29 +667,11 @@ def _marker_gains(rows: Rows) -> Iterator[OtherReading]:
         )
 
 
-def _force_gain(
-    rows: Rows, compliance: FloatArray, x: FloatArray
-) -> tuple[float, FloatArray] | None:
-    """Return the factor that undoes a gain along axes, shape (reading, 3), and rows with it."""
-    along = x[:, :, None] * x[:, None, :]
-    part = np.einsum("rij,rj->ri", along, rows.readings.force)
-    gain, blocks, c = 1.0, rows.problem.O, compliance
-    for _ in range(_ROUNDS):
-        column = np.einsum("rikn,rk,n->ri", rows.basis, part, c)[..., None]
-        widened = beside(replace(rows.problem, O=blocks), column).take(rows.kept)
-        gain += float(fitted(widened)[-1])
-        if not _LEAST_GAIN < gain < 1.0 / _LEAST_GAIN:
-            return None
-        blocks = rows.turned(np.eye(3) + (gain - 1.0) * along)
-        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
-    return gain, blocks
-
-
-def _force_lag(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _force_lag(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of forces without a part of what was read in the load case before."""
     r = rows.readings
     change = _since_case_before(r, r.force)
-    late = _lag(rows, np.einsum("rikn,rk,n->ri", rows.basis, change, compliance))
+    late = _lag(rows, np.einsum("rikn,rk,n->ri", rows.basis, change, rows.compliance))
     if 0.0 < late < _LONGEST_LAG:
         blocks = rows.blocks(r.force + late * change, r.reference_force)
         message = _lagging("forces", late)
@@ -586,7 +695,7 @@ def _since_case_before(r: Readings, values: FloatArray) -> FloatArray:
 
 def _lag(rows: Rows, column: FloatArray) -> float:
     """Return the factor of a column, shape (reading, 3), that is fitted beside the springs."""
-    return float(fitted(beside(rows.problem, column[..., None]).take(rows.kept))[-1])
+    return float(fitted(rows.without_blunders(beside(rows.problem, column[..., None])))[-1])
 
 
 def _lagging(name: str, late: float) -> str:
@@ -596,17 +705,18 @@ def _lagging(name: str, late: float) -> str:
     )
 
 
-def _marker_places(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _marker_places(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings with the marker elsewhere on the tool, estimated."""
-    blocks, c = rows.problem.O, compliance
-    place = np.zeros(3)
-    for _ in range(_ROUNDS):
-        widened = beside(replace(rows.problem, O=blocks), np.einsum("rikn,n->rik", rows.lever, c))
-        place = place + fitted(widened.take(rows.kept))[-3:]
-        if not np.linalg.norm(place) < _FARTHEST:
-            return
-        blocks = rows.problem.O + np.einsum("rikn,k->rin", rows.lever, place)
-        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
+    elsewhere = _Unknown(
+        np.zeros(3),
+        lambda place: np.asarray(rows.problem.O + np.einsum("rikn,k->rin", rows.lever, place)),
+        lambda c: np.asarray(np.einsum("rikn,n->rik", rows.lever, c)),
+        lambda place: bool(np.linalg.norm(place) < _FARTHEST),
+    )
+    (found,) = _estimated(rows, [elsewhere], _ROUNDS)
+    if found is None:
+        return
+    place, blocks = found
     x, y, z = 1e3 * place
     message = (
         f"the marker seems to sit ({x:.0f}, {y:.0f}, {z:.0f}) mm in the tcp frame from where it is"
@@ -620,7 +730,7 @@ def _any_marker_frame(rows: Rows) -> Iterator[OtherReading]:
     r = rows.readings
     m = r.marker_displacement
     columns = -np.einsum("ij,rk->rijk", np.eye(3), m).reshape(len(r), 3, 9)
-    x = fitted(beside(rows.problem, columns).take(rows.kept))[-9:]
+    x = fitted(rows.without_blunders(beside(rows.problem, columns)))[-9:]
     U, s, Vt = np.linalg.svd(np.eye(3) + x.reshape(3, 3))
     scale = float(np.median(s))
     if not s[2] > 0.0:
@@ -707,25 +817,21 @@ def find_undone(
         rows = Rows.of(robot, readings, marker_offset, contact)
     except IdentificationError:
         return ()
-    stated = rows.problem.take(rows.kept)
-    before = next(_residuals([stated]))
-    if not before > 1e-6 * float(np.linalg.norm(stated.d, axis=1).mean()):
+    before = _trimmed(rows.residual)
+    if not before > 1e-6 * float(np.linalg.norm(rows.stated.d, axis=1).mean()):
         return ()
-    compliance = fitted(stated)
     others = [
-        (number, each)
-        for number, each in enumerate(other_readings(rows, compliance))
-        if poses >= _FEWEST_ESTIMATED or not each.estimated
+        each for each in other_readings(rows) if poses >= _FEWEST_ESTIMATED or not each.estimated
     ]
-    left = _residuals(rows.read(each) for _, each in others)
+    left = _residuals(rows.read(each) for each in others)
     ranked = [
         (residual * max(each.louder, 1.0) / before, number, each)
-        for residual, (number, each) in zip(left, others, strict=True)
+        for number, (residual, each) in enumerate(zip(left, others, strict=True))
     ]
     possible = sorted(each for each in ranked if each[0] < each[2].least)[:_TRIED]
     tried = (_plainest(possible[number:]) for number in range(len(possible)))
-    undone = next(filter(None, (_judged(stated, rows, *each) for each in tried)), None)
-    changed = _parted(stated, readings.pose[rows.kept])
+    undone = next(filter(None, (_judged(rows, *each) for each in tried)), None)
+    changed = _parted(rows, readings.pose[rows.kept])
     found = [each for each in (undone, changed) if each is not None]
     return (min(found, key=lambda each: each.left).mistake,) if found else ()
 
@@ -767,17 +873,14 @@ def _plainest(possible: Sequence[_Ranked]) -> tuple[OtherReading, Sequence[str]]
     return plainest, told[:1]
 
 
-def _judged(
-    stated: Problem, rows: Rows, reading: OtherReading, others: Sequence[str]
-) -> _Found | None:
+def _judged(rows: Rows, reading: OtherReading, others: Sequence[str]) -> _Found | None:
     """Return the mistake if errors at left-out poses say so too, with one that says the same."""
-    undone = rows.read(reading)
-    before, after = (leave_poses_out(each).error for each in (stated, undone))
-    after = after * max(reading.louder, 1.0)
-    left, chance = _left(stated, before, after)
+    undone, before = rows.read(reading), rows.held_out.error
+    after = leave_poses_out(undone).error * max(reading.louder, 1.0)
+    left, chance = _left(rows.stated, before, after)
     if not (left < reading.least and chance < _BY_CHANCE):
         return None
-    if reading.estimated and not _believed(left, chance, _change(stated, undone)):
+    if reading.estimated and not _believed(left, chance, _change(rows, undone)):
         return None
     deflection = float(np.linalg.norm(undone.d, axis=1).mean()) * max(reading.louder, 1.0)
     certain = reading.certain and left < _CERTAIN and float(after.mean()) < _FITS_WELL * deflection
@@ -789,11 +892,11 @@ def _judged(
     return _Found(left, found)
 
 
-def _change(stated: Problem, undone: Problem) -> float:
+def _change(rows: Rows, undone: Problem) -> float:
     """Return the relative change of the deflections by the springs of the other interpretation."""
-    before, after = fitted(stated), fitted(undone)
-    moved = np.linalg.norm(stated.O @ (after - before), axis=1).mean()
-    return float(moved / max(np.linalg.norm(stated.O @ before, axis=1).mean(), 1e-12))
+    blocks, before = rows.stated.O, rows.compliance
+    moved = np.linalg.norm(blocks @ (fitted(undone) - before), axis=1).mean()
+    return float(moved / max(np.linalg.norm(blocks @ before, axis=1).mean(), 1e-12))
 
 
 def _believed(left: float, chance: float, change: float) -> bool:
@@ -813,20 +916,31 @@ def _left(problem: Problem, before: FloatArray, after: FloatArray) -> tuple[floa
     return float(after.mean() / before.mean()), chance
 
 
-def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
+def _parted(rows: Rows, pose: IndexArray) -> _Found | None:
     """Return a finding that readings change midway, where the springs of both parts differ."""
-    blocks, first = np.unique(stated.block, return_index=True)
+    blocks, first = np.unique(rows.stated.block, return_index=True)
     if len(blocks) < _FEWEST_PARTED:
         return None
     order = blocks[np.argsort(first)]
-    place = np.argsort(np.argsort(first))[np.searchsorted(blocks, stated.block)]
+    place = np.argsort(np.argsort(first))[np.searchsorted(blocks, rows.stated.block)]
     # What is known beforehand would count for one fit and not for the other.
-    free = replace(stated, prior_rows=np.zeros((0, stated.columns + 1)))
-    before = leave_poses_out(free).error
+    is_known = len(rows.stated.prior_rows) > 0
+    free = rows.stated.without_prior() if is_known else rows.stated
+    before = (leave_poses_out(free) if is_known else rows.held_out).error
     found = []
     for part in _PARTS:
         late = place >= round(part * len(order))
-        after = leave_poses_out(apart(free, late)).error
+        halves = [(mine, free.take(mine)) for mine in (late, ~late)]
+        if any(_loaded_poses(half) < 2 for _, half in halves):
+            continue
+        after = np.empty_like(before)
+        # No fit is better at a pose that it leaves out than at the same pose fitted.
+        for mine, half in halves:
+            after[mine] = np.linalg.norm(half.residuals(fitted(half)), axis=1)
+        if not after.mean() < _LEFT_APART * before.mean():
+            continue
+        for mine, half in halves:
+            after[mine] = leave_poses_out(half).error
         left, chance = _left(free, before, after)
         if left < _LEFT_APART and chance < _BY_CHANCE:
             found.append((left, late, after))
@@ -837,10 +951,19 @@ def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
     return _Found(left * _ALIKE, parted)
 
 
+def _loaded_poses(problem: Problem) -> int:
+    """Return the number of pose blocks whose readings load a spring."""
+    return len(np.unique(problem.block[np.any(problem.O, axis=(1, 2))]))
+
+
 def _residuals(problems: Iterable[Problem]) -> Iterator[float]:
     """Yield the trimmed mean residual of the fit of each problem of a shape, in m."""
     remaining = iter(problems)
     while part := list(islice(remaining, _AT_ONCE)):
         for problem, compliance in zip(part, fit_each(part), strict=True):
-            size = np.sort(np.linalg.norm(problem.residuals(compliance), axis=1))
-            yield float(size[: max(1, int(_TRIMMED * len(size)))].mean())
+            yield _trimmed(np.linalg.norm(problem.residuals(compliance), axis=1))
+
+
+def _trimmed(norms: FloatArray) -> float:
+    """Return the mean of the smallest residuals."""
+    return float(np.sort(norms)[: max(1, int(_TRIMMED * len(norms)))].mean())
