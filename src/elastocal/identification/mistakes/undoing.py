@@ -385,7 +385,7 @@ def _turned_for_a_part(rows: Rows, turns: Iterator[OtherReading]) -> Iterator[Ot
         return np.concatenate([grams_of([problem.take(each)]) for each in pieces])
 
     stated = grams(rows.problem)
-    possible = []
+    possible: list[tuple[OtherReading, int, bool]] = []
     for turn in turns:
         turned = grams(replace(rows.problem, O=turn.blocks, d=turn.d))
         early = np.cumsum(turned - stated, axis=0)[:-1]
