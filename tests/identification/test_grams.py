@@ -5,7 +5,7 @@ import pytest
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import FitOptions, Prior, build, solve
-from elastocal.identification.solve import PoseGrams
+from elastocal.identification.solve import PoseGrams, fit_each, grams_of, least_squares_left
 from support.problems import elastic, linear_readings, made_up, planted
 
 CHOICES = np.array([[1.0] * 31, [2.0, 0.0, 3.0] + [1.0] * 28, [0.0] * 20 + [1.0] * 11])
@@ -86,3 +86,25 @@ def test_sums_of_blocks_a_few_at_a_time_are_those_of_all_at_once(monkeypatch):
     whole = PoseGrams.of(problem).refit(CHOICES)
     monkeypatch.setitem(PoseGrams._sums.__globals__, "_BLOCKS", 4)
     np.testing.assert_allclose(PoseGrams.of(problem).refit(CHOICES), whole, rtol=1e-9)
+
+
+@pytest.mark.parametrize("lower", [-np.inf, 0.0, 1e-6])
+def test_no_fit_leaves_less_than_least_squares(lower):
+    problem, _ = planted(sigma=2e-5, options=FitOptions(lower=lower))
+    turned = [replace(problem, d=problem.d * sign) for sign in ([1, 1, 1], [1, -1, 1])]
+    least = least_squares_left(grams_of(turned), problem.size)
+    fits = zip(turned, fit_each(turned), strict=True)
+    left = np.array([np.sum(each.residuals(x) ** 2) for each, x in fits])
+    assert np.all(least <= left * (1.0 + 1e-5))
+    if np.isinf(lower):
+        np.testing.assert_allclose(least, left, rtol=1e-5)
+    else:
+        assert left[1] > 1.1 * least[1]
+
+
+def test_a_spring_that_nothing_loads_leaves_least_squares_as_they_are():
+    problem, _ = planted(sigma=2e-5)
+    dead = replace(problem, O=problem.O * (np.arange(problem.columns) > 0))
+    alone = dead.with_columns(np.arange(1, problem.columns))
+    each = [least_squares_left(grams_of([it]), it.size)[0] for it in (dead, alone)]
+    assert each[0] == pytest.approx(each[1], rel=1e-9)

@@ -13,15 +13,15 @@ fit and iterated. Thresholds are measured on correct campaigns
 (docs/decisions/0105-mistakes-undone.md).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import combinations, islice, permutations, product
+from functools import cache, cached_property
+from itertools import combinations, compress, islice, permutations, product
 from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import expm
+from scipy.linalg import expm, expm_frechet
 from scipy.spatial.transform import Rotation
 from scipy.special import stdtr
 
@@ -32,14 +32,14 @@ from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.contact import Contact, compliance_columns
 from elastocal.identification.conventions import FORCE_MISTAKES
-from elastocal.identification.displacement import reference_joints
+from elastocal.identification.displacement import Between, reference_joints
 from elastocal.identification.mistakes._motion import AXES, median_norm
 from elastocal.identification.mistakes.plausibility import sensor_frames
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
-from elastocal.identification.solve import fit_each
+from elastocal.identification.solve import fit_each, grams_of, least_squares_left
 from elastocal.identification.suspicious import screen
-from elastocal.identification.uncertainty import leave_poses_out
+from elastocal.identification.uncertainty import HeldOut, leave_poses_out
 from elastocal.robot import Robot
 
 _TRACKER = FitOptions(encoders=False)
@@ -80,9 +80,8 @@ class Rows:
     """The same at the joints of the reference."""
     rest: FloatArray
     """Rows of what no force makes: moments and the arm's weight, shape (reading, 3, spring)."""
-    lever: FloatArray
-    """Rows per metre by which the marker sits elsewhere along each axis of the tcp frame, shape
-    (reading, 3, axis, spring)."""
+    place: FloatArray
+    """Marker in the tcp frame, shape (3,), in m."""
     kept: BoolArray
     """Readings that are no blunders, shape (reading,)."""
 
@@ -121,9 +120,7 @@ class Rows:
         reference = unit(before) if light is not None else np.zeros(0)
         kept = ~screen(problem).blunder
         place = np.zeros(3) if marker_offset is None else np.asarray(marker_offset, dtype=float)
-        moved = [build(model, readings, options, place + e).O - problem.O for e in np.eye(3)]
-        lever = np.stack(moved, axis=2)
-        bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), lever, kept)
+        bare = cls(model, readings, problem, unit(at), reference, np.zeros(1), place, kept)
         return replace(bare, rest=problem.O - bare.blocks(readings.force, light))
 
     def blocks(self, force: FloatArray, light: FloatArray | None) -> FloatArray:
@@ -141,14 +138,64 @@ class Rows:
             None if light is None else np.einsum("rij,rj->ri", G, light),
         )
 
+    def moved(self, force: FloatArray, compliance: FloatArray) -> FloatArray:
+        """Return how forces, shape (reading, 3, force), bend springs of compliances, in m."""
+        return np.asarray(np.einsum("rikn,n->rik", self.basis, compliance) @ force)
+
     @cached_property
     def frames(self) -> dict[str, FloatArray]:
         """See `sensor_frames`."""
         return sensor_frames(self.model.robot, self.readings.joint_position)
 
+    @cached_property
+    def lever(self) -> FloatArray:
+        """Rows per metre by which the marker sits elsewhere along each axis of the tcp frame.
+
+        Shape (reading, 3, axis, spring).
+        """
+        between, n = Between.of(self.model, self.readings), self.problem.springs
+        found = np.zeros((*self.problem.O.shape[:2], 3, self.problem.columns))
+        for axis, e in enumerate(np.eye(3)):
+            found[:, :, axis, n] = between.of_point(self.place + e) - self.problem.O[:, :, n]
+        return found
+
+    @cached_property
+    def stated(self) -> Problem:
+        """The problem of the kept rows, read as stated."""
+        return self.without_blunders(self.problem)
+
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Compliances of the readings as stated, shape (spring,)."""
+        return fitted(self.stated)
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Norms of what they leave, shape (kept reading,), in m."""
+        return np.asarray(np.linalg.norm(self.stated.residuals(self.compliance), axis=1))
+
+    @cached_property
+    def held_out(self) -> HeldOut:
+        """Refits of the readings as stated without each pose."""
+        return leave_poses_out(self.stated)
+
+    def without_blunders(self, problem: Problem) -> Problem:
+        """Return a problem of all readings without those that are blunders."""
+        return problem if self.kept.all() else problem.take(self.kept)
+
     def read(self, reading: OtherReading) -> Problem:
         """Return the problem of the kept rows, read otherwise."""
-        return replace(self.problem, O=reading.blocks, d=reading.d).take(self.kept)
+        return self.without_blunders(replace(self.problem, O=reading.blocks, d=reading.d))
+
+    def is_possible(self, grams: FloatArray) -> BoolArray:
+        """Return which Gram matrices of ``[O d]`` some values of the springs may explain.
+
+        The others leave far more than the readings as stated do, whatever the springs
+        (`_HOPELESS`): a bounded fit need not say so. Shape (fit,).
+        """
+        most = _HOPELESS**2 * float(self.residual @ self.residual)
+        left = least_squares_left(grams, self.problem.size)
+        return np.asarray(left <= most + _ROUND_OFF**2 * grams[:, -1, -1])
 
 
 def fitted(problem: Problem) -> FloatArray:
@@ -173,23 +220,6 @@ def beside(problem: Problem, columns: FloatArray) -> Problem:
     )
 
 
-def apart(problem: Problem, late: BoolArray) -> Problem:
-    """Return a problem with springs of their own for late readings, shape (reading,)."""
-
-    def twice(values: FloatArray | float) -> FloatArray:
-        return np.tile(np.broadcast_to(values, problem.lower.shape), 2)
-
-    part = late[:, None, None]
-    return replace(
-        problem,
-        O=np.concatenate([np.where(part, 0.0, problem.O), np.where(part, problem.O, 0.0)], axis=2),
-        lower=twice(problem.lower),
-        upper=twice(problem.upper),
-        prior_rows=np.zeros((0, 2 * problem.columns + 1)),
-        size=twice(problem.size),
-    )
-
-
 _CLEAR, _LIKELY, _FITTED, _IN_TIME = 0.9, 0.75, 0.85, 0.97
 """Part of the error that may be left: by forces and rows, by markers, by estimated numbers, by
 those that grow in the order of poses, which no correct arm imitates."""
@@ -199,6 +229,11 @@ correct arms creep, which leaves 0.7 of the error but is a drift of less than a 
 _TILTED, _CROSS_TALK = np.radians(8.0), 0.15
 """Tilt of a sensor, and part of one axis in another, from which they are reported; where the
 springs miss much, correct arms seem to have 6 deg and 9 %."""
+_HOPELESS = 2.0
+"""Root mean square residual over that of the readings as stated above which others are hopeless:
+what leaves twice as much in all does not leave clearly less in nine tenths of the rows."""
+_ROUND_OFF = 1e-3
+"""Part of the deflections below which what is left may be round-off."""
 _SHORTEST = 3
 """Fewest poses of a part of the campaign that is mistaken by itself."""
 _SHIFTS = (
@@ -210,6 +245,10 @@ _SHIFTS = (
 _ROUNDS = 4
 _CONSTANT_ROUNDS = 10
 """A constant as large as half the force takes more rounds to settle than a gain."""
+_LAG_ROUNDS = 1
+"""A lag is estimated once: so its thresholds were measured."""
+_SETTLED = 1e-6
+"""Step over the numbers themselves below which they have settled; messages show three digits."""
 _SMALLEST = 0.05
 """Part of the median force below which a constant is not reported."""
 _UPRIGHT = 0.95
@@ -218,7 +257,7 @@ _HEAVY = 0.7
 """Part of the median force above which it is hardly one."""
 _LEAST_GAIN = 0.05
 _LARGEST_MIXTURE = 1.0
-"""Element of a step towards the mixture of a sensor's axes that is still believed."""
+"""Angle in rad of a tilt about an axis, and part of one axis in another, still believed."""
 _LONGEST_LAG = 2.0
 """Factor of the change since the load case before that is still believed."""
 _FARTHEST = 2.0
@@ -227,33 +266,44 @@ _ANGLES = (90, -90, 180, 30, -30, 45, -45, 60, -60, 120, -120, 135, -135, 150, -
 """Angles in deg by which a sensor is turned about the tool; about other axes the first three."""
 
 
-def other_readings(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
-    """Yield every other reading of the data, the plainest first; of markers where there are any."""
+def other_readings(rows: Rows) -> Iterator[OtherReading]:
+    """Yield the other readings of the data that may explain them, the plainest first.
+
+    Those of markers where there are any.
+    """
     each = (
-        (_turned_forces(rows), False),
-        (_turned_markers(rows), True),
+        (_possible(rows, _turned_forces(rows)), False),
+        (_possible(rows, _turned_markers(rows)), True),
         (_wrong_for_a_part(rows, _turned_forces(rows, plain=True)), False),
         (_wrong_for_a_part(rows, _turned_markers(rows, plain=True)), True),
         (_wrong_for_a_part(rows, _other_force_rows(rows, plain=True)), False),
         (_wrong_for_a_part(rows, _other_marker_rows(rows, plain=True)), True),
-        (_other_force_rows(rows), False),
-        (_other_marker_rows(rows), True),
-        (_other_marker_counts(rows), True),
-        (_constants(rows, compliance), False),
+        (_possible(rows, _other_force_rows(rows)), False),
+        (_possible(rows, _other_marker_rows(rows)), True),
+        (_possible(rows, _other_marker_counts(rows)), True),
+        (_constants(rows), False),
         (_marker_drifts(rows), True),
-        (_force_drifts(rows, compliance), False),
-        (_force_gains(rows, compliance), False),
-        (_mixed_forces(rows, compliance), False),
+        (_force_drifts(rows), False),
+        (_force_gains(rows), False),
+        (_mixed_forces(rows), False),
         (_marker_gains(rows), True),
-        (_force_lags(rows, compliance), False),
+        (_force_lags(rows), False),
         (_marker_lags(rows), True),
-        (_marker_places(rows, compliance), True),
+        (_marker_places(rows), True),
         (_any_marker_frame(rows), True),
     )
     seen = not rows.readings.by_contact.any()
     for readings, of_marker in each:
         if seen or not of_marker:
             yield from readings
+
+
+def _possible(rows: Rows, readings: Iterable[OtherReading]) -> Iterator[OtherReading]:
+    """Yield the readings that are not hopeless; see `Rows.is_possible`."""
+    remaining = iter(readings)
+    while part := list(islice(remaining, _AT_ONCE)):
+        grams = grams_of([rows.read(each) for each in part])
+        yield from compress(part, rows.is_possible(grams))
 
 
 def _turned_forces(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
@@ -283,7 +333,8 @@ def _turned_markers(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
         yield OtherReading(remedy, blocks, d, _LIKELY, certain=True)
 
 
-def _turns(name: str, any_angle: bool, plain: bool) -> list[tuple[str, FloatArray]]:
+@cache
+def _turns(name: str, any_angle: bool, plain: bool) -> Sequence[tuple[str, FloatArray]]:
     """Return matrices that undo exchanged, reversed and rotated axes, with their descriptions.
 
     They include all 47 ways to interpret three columns as other axes, with or without their signs;
@@ -342,18 +393,31 @@ def _wrong_for_a_part(rows: Rows, whole: Iterator[OtherReading]) -> Iterator[Oth
             estimated=True,
         )
 
-    def left(parts: Iterable[tuple[OtherReading, int, bool]]) -> Iterator[float]:
-        return _residuals(rows.read(partly(*each)) for each in parts)
-
     starts = range(_SHORTEST, len(order) - _SHORTEST + 1)
     if not starts:
         return
     coarse = sorted({starts[round(part * (len(starts) - 1))] for part in _PARTS})
-    each = list(product(whole, coarse, (True, False)))
-    _, (turn, _, late) = min(zip(left(each), each, strict=True), key=itemgetter(0))
-    finer = left((turn, start, late) for start in starts)
+    piece = np.searchsorted(coarse, place, side="right")
+    pieces = [np.flatnonzero((piece == each) & rows.kept) for each in range(len(coarse) + 1)]
+
+    def grams(problem: Problem) -> FloatArray:
+        return np.concatenate([grams_of([problem.take(each)]) for each in pieces])
+
+    stated = grams(rows.problem)
+    possible: list[tuple[OtherReading, int, bool]] = []
+    for reading in whole:
+        other = grams(replace(rows.problem, O=reading.blocks, d=reading.d))
+        early = np.cumsum(other - stated, axis=0)[:-1]
+        parted = np.stack([other.sum(axis=0) - early, stated.sum(axis=0) + early], axis=1)
+        may = rows.is_possible(parted.reshape(-1, *stated.shape[1:]))
+        possible.extend((reading, *each) for each in compress(product(coarse, (True, False)), may))
+    if not possible:
+        return
+    left = _residuals(rows.read(partly(*each)) for each in possible)
+    _, (best, _, late) = min(zip(left, possible, strict=True), key=itemgetter(0))
+    finer = _residuals(rows.read(partly(best, start, late)) for start in starts)
     _, start = min(zip(finer, starts, strict=True))
-    yield partly(turn, start, late)
+    yield partly(best, start, late)
 
 
 def _other_force_rows(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
@@ -429,11 +493,59 @@ def _orders(r: Readings) -> Iterator[tuple[str, IndexArray]]:
     yield "sorted by pose as text (1, 10, 11, 2)", table[np.argsort(written)].ravel()
 
 
-def _constants(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+@dataclass(frozen=True)
+class _Unknown:
+    """Numbers on which rows of springs depend, estimated with the springs."""
+
+    none: FloatArray
+    """What they are where the readings are as stated, shape (number,)."""
+    blocks: Callable[[FloatArray], FloatArray]
+    """Returns the rows of the springs with numbers, shape (reading, 3, spring)."""
+    columns: Callable[[FloatArray, FloatArray], FloatArray]
+    """Returns their own columns at numbers, with compliances, shape (reading, 3, number)."""
+    is_believed: Callable[[FloatArray], bool]
+
+
+def _estimated(
+    rows: Rows, unknowns: Sequence[_Unknown], rounds: int
+) -> list[tuple[FloatArray, FloatArray] | None]:
+    """Return numbers and rows of each, None where they are not believed.
+
+    Linearised about the springs' fit, and iterated; all of them at once, as many numbers each.
+    """
+    found = {number: (each.none, rows.problem.O) for number, each in enumerate(unknowns)}
+    going = list(found)
+    for turn in range(rounds):
+        springs = [replace(rows.problem, O=found[each][1]) for each in going]
+        compliances = (
+            fit_each([*map(rows.without_blunders, springs)])
+            if turn
+            else [rows.compliance] * len(going)
+        )
+        wide = [
+            beside(each, unknowns[number].columns(found[number][0], c))
+            for number, each, c in zip(going, springs, compliances, strict=True)
+        ]
+        steps = fit_each([*map(rows.without_blunders, wide)])[:, rows.problem.columns :]
+        changing = []
+        for number, step in zip(going, steps, strict=True):
+            numbers = found[number][0] + step
+            if not unknowns[number].is_believed(numbers):
+                del found[number]
+                continue
+            found[number] = numbers, unknowns[number].blocks(numbers)
+            if not np.linalg.norm(step) <= _SETTLED * np.linalg.norm(numbers):
+                changing.append(number)
+        going = changing
+        if not going:
+            break
+    return [found.get(number) for number in range(len(unknowns))]
+
+
+def _constants(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings without a constant in the forces: weight in base, bias in the tcp frame."""
-    one = np.ones(len(rows.readings))
-    for frame in ("base", "tcp"):
-        found = _offset(rows, compliance, rows.frames[frame], one)
+    each = [(frame, np.ones(len(rows.readings))) for frame in ("base", "tcp")]
+    for (frame, _), found in zip(each, _offsets(rows, each), strict=True):
         if found is None:
             continue
         offset, blocks = found
@@ -465,23 +577,28 @@ def _parts(offset: FloatArray, scale: float = 1.0, digits: int = 0) -> dict[str,
     return {name: f"{scale * value:.{digits}f}" for name, value in zip(AXES, offset, strict=True)}
 
 
-def _offset(
-    rows: Rows, compliance: FloatArray, X: FloatArray, course: FloatArray
-) -> tuple[FloatArray, FloatArray] | None:
-    """Return a force that is too much in all readings, times a course, and rows without it."""
-    r, offset = rows.readings, np.zeros(3)
-    blocks, c = rows.problem.O, compliance
-    for _ in range(_CONSTANT_ROUNDS):
-        columns = -np.einsum("rikn,n->rik", rows.basis, c) @ X * course[:, None, None]
-        widened = beside(replace(rows.problem, O=blocks), columns).take(rows.kept)
-        x = fitted(widened)
-        offset = offset + x[-3:]
-        if not np.linalg.norm(offset) < 3.0 * np.median(np.linalg.norm(r.force, axis=1)):
-            return None
-        made = np.einsum("rikn,rk->rin", rows.basis, course[:, None] * (X @ offset))
-        blocks = rows.problem.O - made
-        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
-    return offset, blocks
+def _offsets(
+    rows: Rows, each: Sequence[tuple[str, FloatArray]]
+) -> list[tuple[FloatArray, FloatArray] | None]:
+    """Return forces that are too much in all readings, and rows without them.
+
+    Each is constant in a frame, times a course of shape (reading,).
+    """
+    most = 3.0 * np.median(np.linalg.norm(rows.readings.force, axis=1))
+
+    def constant(X: FloatArray, course: FloatArray) -> _Unknown:
+        less = -X * course[:, None, None]
+        return _Unknown(
+            np.zeros(3),
+            lambda offset: np.asarray(
+                rows.problem.O + np.einsum("rikn,rk->rin", rows.basis, less @ offset)
+            ),
+            lambda _, c: rows.moved(less, c),
+            lambda offset: bool(np.linalg.norm(offset) < most),
+        )
+
+    constants = [constant(rows.frames[frame], course) for frame, course in each]
+    return _estimated(rows, constants, _CONSTANT_ROUNDS)
 
 
 def _marker_drifts(rows: Rows) -> Iterator[OtherReading]:
@@ -499,9 +616,8 @@ def _marker_drifts(rows: Rows) -> Iterator[OtherReading]:
     courses = [("drift", _Course(t, again))]
     courses += [(jump, _Course(each, again)) for each in (*steps, *whiles)]
     courses.append(("drift", _Course(_time_in_pose(rows), in_pose, _IN_POSE, _GROWN)))
-    for how, course in courses:
-        widened = beside(rows.problem, course.place[:, None, None] * eye).take(rows.kept)
-        grown = fitted(widened)[-3:]
+    columns = [course.place[:, None, None] * eye for _, course in courses]
+    for (how, course), grown in zip(courses, _factors(rows, columns), strict=True):
         if np.linalg.norm(grown) < course.smallest * median_norm(d):
             continue
         yield OtherReading(
@@ -540,15 +656,16 @@ def _time_in_pose(rows: Rows) -> FloatArray:
     return np.asarray(since / np.bincount(first)[first])
 
 
-def _force_drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _force_drifts(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of forces without a constant that grew in the order of time."""
     size = median_norm(rows.readings.force)
     courses = (
         _Course(_time(rows), "over the campaign: zero the sensor before each pose"),
         _Course(_time_in_pose(rows), "in each pose: let the sensor warm up", _IN_POSE, _GROWN),
     )
-    for course, frame in product(courses, ("tcp", "base")):
-        found = _offset(rows, compliance, rows.frames[frame], course.place)
+    each = [*product(courses, ("tcp", "base"))]
+    offsets = _offsets(rows, [(frame, course.place) for course, frame in each])
+    for (course, frame), found in zip(each, offsets, strict=True):
         if found is None or np.linalg.norm(found[0]) < course.smallest * size:
             continue
         yield OtherReading(
@@ -563,88 +680,102 @@ def _force_drifts(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
         )
 
 
-def _mixed_forces(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _mixed_forces(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of forces of a tilted sensor, or one with cross-talk, in the tcp frame."""
     skew = np.cross(np.eye(3)[:, None], np.eye(3)[None]).swapaxes(1, 2)
-    A = _mixture(rows, compliance, skew)
-    turn = np.zeros(3) if A is None else -Rotation.from_matrix(A).as_rotvec()
-    angle = float(np.linalg.norm(turn))
-    if A is not None and angle > _TILTED:
-        x, y, z = turn / angle
-        message = (
-            f"the sensor looks tilted by {np.degrees(angle):.0f} deg about ({x:.1f}, {y:.1f},"
-            f" {z:.1f}) in the tcp frame: check how it is mounted"
-        )
-        yield _with_mixture(rows, A, message)
-    for axis, letter in enumerate(AXES):
-        others = [each for each in range(3) if each != axis]
-        shear = np.einsum("ki,j->kij", np.eye(3)[others], np.eye(3)[axis])
-        A = _mixture(rows, compliance, shear)
-        if A is None or not np.abs(A[others, axis]).max() > _CROSS_TALK:
+    (found,) = _estimated(rows, [_mixture(rows, skew)], _ROUNDS)
+    if found is not None:
+        undone, blocks = found
+        angle = float(np.linalg.norm(undone))
+        if angle > _TILTED:
+            x, y, z = -undone / angle
+            message = (
+                f"the sensor looks tilted by {np.degrees(angle):.0f} deg about ({x:.1f}, {y:.1f},"
+                f" {z:.1f}) in the tcp frame: check how it is mounted"
+            )
+            yield OtherReading(message, blocks, rows.problem.d, _LIKELY, estimated=True)
+    others = [[each for each in range(3) if each != axis] for axis in range(3)]
+    shears = [
+        _mixture(rows, np.einsum("ki,j->kij", np.eye(3)[each], np.eye(3)[axis]))
+        for axis, each in enumerate(others)
+    ]
+    for axis, found in enumerate(_estimated(rows, shears, _ROUNDS)):
+        if found is None or not np.abs(found[0]).max() > _CROSS_TALK:
             continue
-        parts = " and ".join(f"{-A[each, axis]:.0%} in force_{AXES[each]}" for each in others)
+        undone, blocks = found
+        parts = " and ".join(
+            f"{-part:.0%} in force_{AXES[each]}"
+            for each, part in zip(others[axis], undone, strict=True)
+        )
         message = (
-            f"force_{letter} in the tcp frame seems to show by cross-talk, {parts}: check the"
+            f"force_{AXES[axis]} in the tcp frame seems to show by cross-talk, {parts}: check the"
             " sensor's calibration matrix"
         )
-        yield _with_mixture(rows, A, message)
+        yield OtherReading(message, blocks, rows.problem.d, _LIKELY, estimated=True)
 
 
-def _with_mixture(rows: Rows, A: FloatArray, message: str) -> OtherReading:
-    X = rows.frames["tcp"]
-    blocks = rows.turned(X @ A @ np.swapaxes(X, 1, 2))
-    return OtherReading(message, blocks, rows.problem.d, _LIKELY, estimated=True)
+def _mixture(rows: Rows, generators: FloatArray) -> _Unknown:
+    """Return the numbers that undo a mixture of the axes of the force in the tcp frame.
 
-
-def _mixture(rows: Rows, compliance: FloatArray, generators: FloatArray) -> FloatArray | None:
-    """Return the matrix, shape (3, 3), that undoes a mixture of axes in the tcp frame.
-
-    It is the exponential of a sum of generators, shape (n, 3, 3); None beyond any sensor's.
+    The exponential of the sum of generators, shape (number, 3, 3), times numbers is the matrix
+    that turns what was read into the force.
     """
-    X, c, A = rows.frames["tcp"], compliance, np.eye(3)
+    X = rows.frames["tcp"]
     own = np.einsum("rji,rj->ri", X, rows.readings.force)
-    blocks = rows.problem.O
-    for _ in range(_ROUNDS):
-        moved = np.einsum("rij,kjl,lm,rm->rik", X, generators, A, own)
-        columns = np.einsum("rijn,rjk,n->rik", rows.basis, moved, c)
-        widened = beside(replace(rows.problem, O=blocks), columns).take(rows.kept)
-        step = np.einsum("k,kij->ij", fitted(widened)[-len(generators) :], generators)
-        if not np.abs(step).max() < _LARGEST_MIXTURE:
-            return None
-        A = expm(step) @ A
-        blocks = rows.turned(X @ A @ np.swapaxes(X, 1, 2))
-        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
-    return A
+
+    def mixed(numbers: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("k,kij->ij", numbers, generators))
+
+    def blocks(numbers: FloatArray) -> FloatArray:
+        return rows.turned(X @ expm(mixed(numbers)) @ np.swapaxes(X, 1, 2))
+
+    def columns(numbers: FloatArray, c: FloatArray) -> FloatArray:
+        slopes = [expm_frechet(mixed(numbers), G, compute_expm=False) for G in generators]
+        return rows.moved(np.einsum("rij,kjl,rl->rik", X, slopes, own), c)
+
+    none = np.zeros(len(generators))
+    return _Unknown(none, blocks, columns, lambda x: bool(np.abs(x).max() < _LARGEST_MIXTURE))
 
 
-def _force_gains(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _force_gains(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings with one axis of the force scaled."""
-    for frame, X in rows.frames.items():
-        for axis, letter in enumerate(AXES):
-            found = _force_gain(rows, compliance, X[:, :, axis])
-            if found is None:
-                continue
-            yield OtherReading(
-                (
-                    "force_{axis} in the {frame} frame looks {gain} times too large: check the"
-                    " gain of the sensor's channel"
-                ).format(axis=letter, frame=frame, gain=f"{1.0 / found[0]:.2f}"),
-                found[1],
-                rows.problem.d,
-                _FITTED,
-                estimated=True,
-            )
+    each = [(frame, axis) for frame in rows.frames for axis in range(3)]
+    gains = [_force_gain(rows, rows.frames[frame][:, :, axis]) for frame, axis in each]
+    for (frame, axis), found in zip(each, _estimated(rows, gains, _ROUNDS), strict=True):
+        if found is None:
+            continue
+        (gain,), blocks = found
+        yield OtherReading(
+            (
+                "force_{axis} in the {frame} frame looks {gain} times too large: check the"
+                " gain of the sensor's channel"
+            ).format(axis=AXES[axis], frame=frame, gain=f"{1.0 / gain:.2f}"),
+            blocks,
+            rows.problem.d,
+            _FITTED,
+            estimated=True,
+        )
+
+
+def _force_gain(rows: Rows, x: FloatArray) -> _Unknown:
+    """Return the factor that undoes a gain of the force along axes, shape (reading, 3)."""
+    along = x[:, :, None] * x[:, None, :]
+    part = np.einsum("rij,rj->ri", along, rows.readings.force)
+    return _Unknown(
+        np.ones(1),
+        lambda gain: rows.turned(np.eye(3) + (gain - 1.0) * along),
+        lambda _, c: rows.moved(part[..., None], c),
+        lambda gain: bool(_LEAST_GAIN < gain[0] < 1.0 / _LEAST_GAIN),
+    )
 
 
 def _marker_gains(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings with one axis of the marker scaled, or all."""
-    columns = (
-        (f"marker_displacement_{each}", axis) for each, axis in zip(AXES, np.eye(3), strict=True)
-    )
-    for name, kept in (*columns, ("marker displacements", np.ones(3))):
-        seen = rows.readings.marker_displacement * kept
-        widened = beside(rows.problem, -seen[..., None]).take(rows.kept)
-        gain = 1.0 + float(fitted(widened)[-1])
+    names = (*(f"marker_displacement_{each}" for each in AXES), "marker displacements")
+    each = [rows.readings.marker_displacement * kept for kept in (*np.eye(3), np.ones(3))]
+    factors = _factors(rows, [-seen[..., None] for seen in each])
+    for name, seen, (more,) in zip(names, each, factors, strict=True):
+        gain = 1.0 + float(more)
         if not gain > 0.0:
             continue
         yield OtherReading(
@@ -661,39 +792,33 @@ def _marker_gains(rows: Rows) -> Iterator[OtherReading]:
         )
 
 
-def _force_gain(
-    rows: Rows, compliance: FloatArray, x: FloatArray
-) -> tuple[float, FloatArray] | None:
-    """Return the factor that undoes a gain along axes, shape (reading, 3), and rows with it."""
-    along = x[:, :, None] * x[:, None, :]
-    part = np.einsum("rij,rj->ri", along, rows.readings.force)
-    gain, blocks, c = 1.0, rows.problem.O, compliance
-    for _ in range(_ROUNDS):
-        column = np.einsum("rikn,rk,n->ri", rows.basis, part, c)[..., None]
-        widened = beside(replace(rows.problem, O=blocks), column).take(rows.kept)
-        gain += float(fitted(widened)[-1])
-        if not _LEAST_GAIN < gain < 1.0 / _LEAST_GAIN:
-            return None
-        blocks = rows.turned(np.eye(3) + (gain - 1.0) * along)
-        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
-    return gain, blocks
-
-
-def _force_lags(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _force_lags(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of forces without a part of what was read in a load case beside."""
-    r = rows.readings
-    for which, change in _since_beside(r, r.force):
-        late = _lag(rows, np.einsum("rikn,rk,n->ri", rows.basis, change, compliance))
-        if 0.0 < late < _LONGEST_LAG:
-            blocks = rows.blocks(r.force + late * change, r.reference_force)
+    each = [*_since_beside(rows.readings, rows.readings.force)]
+    lags = _estimated(rows, [_force_lag(rows, change) for _, change in each], _LAG_ROUNDS)
+    for (which, _), found in zip(each, lags, strict=True):
+        if found is not None:
+            (late,), blocks = found
             message = _lagging("forces", late, which)
             yield OtherReading(message, blocks, rows.problem.d, _FITTED, estimated=True)
 
 
+def _force_lag(rows: Rows, change: FloatArray) -> _Unknown:
+    """Return the factor of a change, shape (reading, 3), that the force lacks."""
+    r = rows.readings
+    return _Unknown(
+        np.zeros(1),
+        lambda late: rows.blocks(r.force + late * change, r.reference_force),
+        lambda _, c: rows.moved(change[..., None], c),
+        lambda late: bool(0.0 < late[0] < _LONGEST_LAG),
+    )
+
+
 def _marker_lags(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of markers without a part of what was read in a load case beside."""
-    for which, change in _since_beside(rows.readings, rows.readings.marker_displacement):
-        late = _lag(rows, -change)
+    each = [*_since_beside(rows.readings, rows.readings.marker_displacement)]
+    factors = _factors(rows, [-change[..., None] for _, change in each])
+    for (which, change), (late,) in zip(each, factors, strict=True):
         if 0.0 < late < _LONGEST_LAG:
             d = rows.problem.d + late * change
             message = _lagging("marker displacements", late, which)
@@ -707,9 +832,13 @@ def _since_beside(r: Readings, values: FloatArray) -> Iterator[tuple[str, FloatA
         yield which, np.where(alone[:, None], 0.0, values - np.roll(values, shift, axis=0))
 
 
-def _lag(rows: Rows, column: FloatArray) -> float:
-    """Return the factor of a column, shape (reading, 3), that is fitted beside the springs."""
-    return float(fitted(beside(rows.problem, column[..., None]).take(rows.kept))[-1])
+def _factors(rows: Rows, columns: Iterable[FloatArray]) -> FloatArray:
+    """Return the factors of columns that are fitted beside the springs, shape (fit, column).
+
+    Those of each fit have shape (reading, 3, column), as many for each.
+    """
+    wide = [rows.without_blunders(beside(rows.problem, each)) for each in columns]
+    return np.asarray(fit_each(wide)[:, rows.problem.columns :])
 
 
 def _lagging(name: str, late: float, which: str) -> str:
@@ -720,17 +849,18 @@ def _lagging(name: str, late: float, which: str) -> str:
     )
 
 
-def _marker_places(rows: Rows, compliance: FloatArray) -> Iterator[OtherReading]:
+def _marker_places(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings with the marker elsewhere on the tool, estimated."""
-    blocks, c = rows.problem.O, compliance
-    place = np.zeros(3)
-    for _ in range(_ROUNDS):
-        widened = beside(replace(rows.problem, O=blocks), np.einsum("rikn,n->rik", rows.lever, c))
-        place = place + fitted(widened.take(rows.kept))[-3:]
-        if not np.linalg.norm(place) < _FARTHEST:
-            return
-        blocks = rows.problem.O + np.einsum("rikn,k->rin", rows.lever, place)
-        c = fitted(replace(rows.problem, O=blocks).take(rows.kept))
+    elsewhere = _Unknown(
+        np.zeros(3),
+        lambda place: np.asarray(rows.problem.O + np.einsum("rikn,k->rin", rows.lever, place)),
+        lambda _, c: np.asarray(np.einsum("rikn,n->rik", rows.lever, c)),
+        lambda place: bool(np.linalg.norm(place) < _FARTHEST),
+    )
+    (found,) = _estimated(rows, [elsewhere], _ROUNDS)
+    if found is None:
+        return
+    place, blocks = found
     x, y, z = 1e3 * place
     message = (
         f"the marker seems to sit ({x:.0f}, {y:.0f}, {z:.0f}) mm in the tcp frame from where it is"
@@ -744,7 +874,7 @@ def _any_marker_frame(rows: Rows) -> Iterator[OtherReading]:
     r = rows.readings
     m = r.marker_displacement
     columns = -np.einsum("ij,rk->rijk", np.eye(3), m).reshape(len(r), 3, 9)
-    x = fitted(beside(rows.problem, columns).take(rows.kept))[-9:]
+    (x,) = _factors(rows, [columns])
     U, s, Vt = np.linalg.svd(np.eye(3) + x.reshape(3, 3))
     scale = float(np.median(s))
     if not s[2] > 0.0:
@@ -831,25 +961,21 @@ def find_undone(
         rows = Rows.of(robot, readings, marker_offset, contact)
     except IdentificationError:
         return ()
-    stated = rows.problem.take(rows.kept)
-    before = next(_residuals([stated]))
-    if not before > 1e-6 * float(np.linalg.norm(stated.d, axis=1).mean()):
+    before = _trimmed(rows.residual)
+    if not before > 1e-6 * float(np.linalg.norm(rows.stated.d, axis=1).mean()):
         return ()
-    compliance = fitted(stated)
     others = [
-        (number, each)
-        for number, each in enumerate(other_readings(rows, compliance))
-        if poses >= _FEWEST_ESTIMATED or not each.estimated
+        each for each in other_readings(rows) if poses >= _FEWEST_ESTIMATED or not each.estimated
     ]
-    left = _residuals(rows.read(each) for _, each in others)
+    left = _residuals(rows.read(each) for each in others)
     ranked = [
         (residual * max(each.louder, 1.0) / before, number, each)
-        for residual, (number, each) in zip(left, others, strict=True)
+        for number, (residual, each) in enumerate(zip(left, others, strict=True))
     ]
     possible = sorted(each for each in ranked if each[0] < each[2].least)[:_TRIED]
     tried = (_plainest(possible[number:]) for number in range(len(possible)))
-    undone = next(filter(None, (_judged(stated, rows, *each) for each in tried)), None)
-    changed = _parted(stated, readings.pose[rows.kept])
+    undone = next(filter(None, (_judged(rows, *each) for each in tried)), None)
+    changed = _parted(rows, readings.pose[rows.kept])
     found = [each for each in (undone, changed) if each is not None]
     return (min(found, key=lambda each: each.left).mistake,) if found else ()
 
@@ -891,17 +1017,14 @@ def _plainest(possible: Sequence[_Ranked]) -> tuple[OtherReading, Sequence[str]]
     return plainest, told[:1]
 
 
-def _judged(
-    stated: Problem, rows: Rows, reading: OtherReading, others: Sequence[str]
-) -> _Found | None:
+def _judged(rows: Rows, reading: OtherReading, others: Sequence[str]) -> _Found | None:
     """Return the mistake if errors at left-out poses say so too, with one that says the same."""
-    undone = rows.read(reading)
-    before, after = (leave_poses_out(each).error for each in (stated, undone))
-    after = after * max(reading.louder, 1.0)
-    left, chance = _left(stated, before, after)
+    undone, before = rows.read(reading), rows.held_out.error
+    after = leave_poses_out(undone).error * max(reading.louder, 1.0)
+    left, chance = _left(rows.stated, before, after)
     if not (left < reading.least and chance < _BY_CHANCE):
         return None
-    if reading.estimated and not _believed(left, chance, _change(stated, undone)):
+    if reading.estimated and not _believed(left, chance, _change(rows, undone)):
         return None
     deflection = float(np.linalg.norm(undone.d, axis=1).mean()) * max(reading.louder, 1.0)
     certain = reading.certain and left < _CERTAIN and float(after.mean()) < _FITS_WELL * deflection
@@ -913,11 +1036,11 @@ def _judged(
     return _Found(left, found)
 
 
-def _change(stated: Problem, undone: Problem) -> float:
+def _change(rows: Rows, undone: Problem) -> float:
     """Return the relative change of the deflections by the springs of the other interpretation."""
-    before, after = fitted(stated), fitted(undone)
-    moved = np.linalg.norm(stated.O @ (after - before), axis=1).mean()
-    return float(moved / max(np.linalg.norm(stated.O @ before, axis=1).mean(), 1e-12))
+    blocks, before = rows.stated.O, rows.compliance
+    moved = np.linalg.norm(blocks @ (fitted(undone) - before), axis=1).mean()
+    return float(moved / max(np.linalg.norm(blocks @ before, axis=1).mean(), 1e-12))
 
 
 def _believed(left: float, chance: float, change: float) -> bool:
@@ -937,20 +1060,31 @@ def _left(problem: Problem, before: FloatArray, after: FloatArray) -> tuple[floa
     return float(after.mean() / before.mean()), chance
 
 
-def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
+def _parted(rows: Rows, pose: IndexArray) -> _Found | None:
     """Return a finding that readings change midway, where the springs of both parts differ."""
-    blocks, first = np.unique(stated.block, return_index=True)
+    blocks, first = np.unique(rows.stated.block, return_index=True)
     if len(blocks) < _FEWEST_PARTED:
         return None
     order = blocks[np.argsort(first)]
-    place = np.argsort(np.argsort(first))[np.searchsorted(blocks, stated.block)]
+    place = np.argsort(np.argsort(first))[np.searchsorted(blocks, rows.stated.block)]
     # What is known beforehand would count for one fit and not for the other.
-    free = replace(stated, prior_rows=np.zeros((0, stated.columns + 1)))
-    before = leave_poses_out(free).error
+    is_known = len(rows.stated.prior_rows) > 0
+    free = rows.stated.without_prior() if is_known else rows.stated
+    before = (leave_poses_out(free) if is_known else rows.held_out).error
     found = []
     for part in _PARTS:
         late = place >= round(part * len(order))
-        after = leave_poses_out(apart(free, late)).error
+        halves = [(mine, free.take(mine)) for mine in (late, ~late)]
+        if any(_loaded_poses(half) < 2 for _, half in halves):
+            continue
+        after = np.empty_like(before)
+        # No fit is better at a pose that it leaves out than at the same pose fitted.
+        for mine, half in halves:
+            after[mine] = np.linalg.norm(half.residuals(fitted(half)), axis=1)
+        if not after.mean() < _LEFT_APART * before.mean():
+            continue
+        for mine, half in halves:
+            after[mine] = leave_poses_out(half).error
         left, chance = _left(free, before, after)
         if left < _LEFT_APART and chance < _BY_CHANCE:
             found.append((left, late, after))
@@ -961,10 +1095,19 @@ def _parted(stated: Problem, pose: IndexArray) -> _Found | None:
     return _Found(left * _ALIKE, parted)
 
 
+def _loaded_poses(problem: Problem) -> int:
+    """Return the number of pose blocks whose readings load a spring."""
+    return len(np.unique(problem.block[np.any(problem.O, axis=(1, 2))]))
+
+
 def _residuals(problems: Iterable[Problem]) -> Iterator[float]:
     """Yield the trimmed mean residual of the fit of each problem of a shape, in m."""
     remaining = iter(problems)
     while part := list(islice(remaining, _AT_ONCE)):
         for problem, compliance in zip(part, fit_each(part), strict=True):
-            size = np.sort(np.linalg.norm(problem.residuals(compliance), axis=1))
-            yield float(size[: max(1, int(_TRIMMED * len(size)))].mean())
+            yield _trimmed(np.linalg.norm(problem.residuals(compliance), axis=1))
+
+
+def _trimmed(norms: FloatArray) -> float:
+    """Return the mean of the smallest residuals."""
+    return float(np.sort(norms)[: max(1, int(_TRIMMED * len(norms)))].mean())

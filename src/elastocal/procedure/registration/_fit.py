@@ -17,7 +17,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
@@ -152,7 +151,10 @@ _ROUNDS = 3
 _MOST_STEPS = 20
 """Gauss-Newton steps that are taken at most."""
 _ARRIVED = 1e-12
-"""Step in rad and m below which Gauss-Newton has arrived."""
+"""Step in rad and m below which Gauss-Newton has arrived ..."""
+_ERRORS_ARRIVED = 1e-9
+"""... where those of the robot's errors, over their standard deviations, are below this one: each
+moves the marker by about a millimetre, and smaller steps are round-off."""
 _BOUNDS = [(math.log(1e-9), math.log(1e-2)), (math.log(0.05), math.log(20.0))]
 """Bounds of the two logarithms; weights need a scatter above zero."""
 
@@ -253,7 +255,8 @@ def _gauss_newton(
         step = np.asarray(-np.linalg.lstsq(A, e, rcond=None)[0], dtype=float)
         R, t = _moved(readings, group, R, t, step)
         lever, errors = lever + step[6 * len(R) :][:3], errors + step[6 * len(R) + 3 :]
-        if np.max(np.abs(step)) < _ARRIVED:
+        most = np.where(np.arange(len(step)) < 6 * len(R) + 3, _ARRIVED, _ERRORS_ARRIVED)
+        if np.all(np.abs(step) < most):
             break
     residual = _residual(readings, group, R, t, lever)
     e = _right_side(readings, residual, errors, weight, lever - lever_prior)
@@ -342,17 +345,20 @@ def _likeliest(result: Fit, readings: UnloadedReadings, start: FloatArray) -> Fl
     off[free + 3 :] = result.errors
     columns[:, -1] -= columns[:, :-1] @ off
 
+    seen, own = readings.variance, np.arange(free, columns.shape[1] - 1)
+
     def minus_twice_log(logs: FloatArray) -> float:
         scatter, size = np.exp(logs)
-        variance = readings.variance + scatter**2
-        G = columns.T @ (columns / np.repeat(variance, 3)[:, None])
+        variance = seen + scatter**2
+        M = columns.T @ (columns / np.repeat(variance, 3)[:, None])
         prior = np.concatenate([np.full(3, LEVER_SIGMA**-2), np.full(errors, size**-2)])
-        M, b = G[:-1, :-1].copy(), G[:-1, -1]
-        M[np.arange(free, len(M)), np.arange(free, len(M))] += prior
-        factor = np.linalg.cholesky(M)
-        half = solve_triangular(factor, b, lower=True)
+        M[own, own] += prior
+        # With the right-hand side as last column the last pivot is the root of what is left, of
+        # nothing, too: a one is added to its square.
+        M[-1, -1] += 1.0
+        pivots = np.linalg.cholesky(M).diagonal()
         value = 3.0 * np.log(variance).sum() - np.log(prior).sum()
-        value += 2.0 * np.log(np.diag(factor)).sum() + G[-1, -1] - half @ half
+        value += 2.0 * np.log(pivots[:-1]).sum() + pivots[-1] ** 2 - 1.0
         return float(value + (((logs - _LIKELY) / _FACTOR) ** 2).sum())
 
     found = minimize(
