@@ -22,6 +22,7 @@ def dome(tmp_path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["KR 300 R2700-2", "UR20", "RX160", "R-2000iC/210F"])
 def test_a_robot_and_a_mesh_make_a_cell_that_check_passes(tmp_path, dome, robot):
     cell = tmp_path / "cell.yaml"

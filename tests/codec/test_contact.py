@@ -26,6 +26,7 @@ def found(tmp_path_factory):
     return codec(Held(poses=10), out, springs="actuated,bearing"), out
 
 
+@pytest.mark.slow
 def test_training_sets_find_the_springs_behind_the_contact(found):
     data = found[0].data
     # Seven of ten poses in each split, and the contact is stated.

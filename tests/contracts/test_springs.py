@@ -194,6 +194,7 @@ class TestEverySpring(SpringSuite):
         np.testing.assert_allclose(displacement_blocks(arm, readings) @ found, exact, atol=1e-9)
         np.testing.assert_allclose(found, truth, rtol=1e-5)
 
+    @pytest.mark.slow
     def test_it_comes_back_from_noisy_readings_with_a_blunder(self, case):
         arm, truth = model(case), planted(case)
         readings = campaign()

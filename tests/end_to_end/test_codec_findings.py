@@ -19,6 +19,7 @@ SEEDS = range(200, 210)
 DOCS = Path(__file__).parents[2] / "docs"
 
 
+@pytest.mark.slow
 @needs_shared
 def test_six_and_eighteen_springs_cross_between_four_and_fifteen_poses(tmp_path):
     """Figures of shared/data/fanuc_r2000ic: 0.416 against 0.508 mm at 4 poses, 0.333 against

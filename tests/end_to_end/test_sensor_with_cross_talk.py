@@ -89,6 +89,7 @@ def deviation(load, sensor, calibrated_with_it=False):
     return float(np.linalg.norm(left, axis=1).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("free", [False, True])
 def test_the_rotation_is_within_its_interval_of_the_truth_of_none(tmp_path, seed, free):

@@ -63,6 +63,7 @@ def plan(made) -> PlanResult:
     return made.plan
 
 
+@pytest.mark.slow
 def test_the_best_next_pose_leaves_least_variance_on_production(cell, made):
     measured, postures = measured_of(made.plan), postures_of(made.pool)
     found = best_additions(cell, postures, measured, 3)
@@ -152,6 +153,7 @@ def test_the_error_to_expect_falls_with_every_pose(plan):
     assert errors == [each.noise for each in plan.production.expected]  # the floor is not known
 
 
+@pytest.mark.slow
 def test_a_wanted_accuracy_decides_the_number_of_poses(cell, plan):
     wanted = plan.production.expected_of(8).error
     found = make_plan(changed(cell, accuracy=1.1 * wanted, poses=None), jobs=1).plan.production

@@ -50,6 +50,7 @@ def test_the_counts_of_a_plan_add_up(plan):
     assert [each.id for each in plan.meetings] == list(range(25))
 
 
+@pytest.mark.slow
 def test_a_plan_is_the_same_when_it_is_made_again(plan, cell):
     again = plan_meetings(cell)
     for made, other in zip(again.meetings, plan.meetings, strict=True):

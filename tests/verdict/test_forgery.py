@@ -288,6 +288,7 @@ def test_a_forged_run_is_refused(tmp_path, kind):
     assert refusal(folder / RUN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", some_by_day(OF_WHAT_IS_SHOWN, 2))
 def test_what_a_report_shows_is_held_against_it(tmp_path, kind):
     folder = forged.copied(tmp_path / "all")

@@ -136,12 +136,14 @@ def test_what_is_named_and_damaged_is_refused(copied, key):
         gather_evidence(EvidenceOptions(folder, **{key: named}), MADE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["model", "tool", "codec", "process"])
 def test_what_is_named_and_not_there_is_refused(finished, tmp_path, key):
     with pytest.raises(FileAccessError, match="nowhere"):
         gather_evidence(EvidenceOptions(finished, **{key: tmp_path / "nowhere"}), MADE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "path"),
     [

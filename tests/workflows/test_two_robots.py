@@ -182,6 +182,7 @@ def test_a_folder_with_files_is_not_filled_again_unless_forced(done, tmp_path):
     ec.simulate_pair(*given, plan=done / "plan.json", out=out, force=True)
 
 
+@pytest.mark.slow
 def test_the_terminal_says_what_is_not_seen(done, tmp_path):
     run = done / "run"
     words = ("calibrate-pair", done / "cell.yaml", run / "left.nc", run / "right.nc")

@@ -120,6 +120,7 @@ def test_the_urdf_of_the_dataset_weighs_the_tool(run, derived):
     assert np.abs(tool).max() > 100.0
 
 
+@pytest.mark.slow
 def test_deriving_again_gives_the_same_files(run, derived):
     write_derived(run.path, derived)
     folder = RunFolder(run.path)

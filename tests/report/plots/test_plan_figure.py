@@ -24,6 +24,7 @@ def on_block(block, plan, pool, moved_onto):
     return block, *moved_onto(block, plan, pool)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["svg", "png", "pdf"])
 def test_same_plan_gives_the_same_bytes(tmp_path, on_block, suffix):
     paths = [write_plan_figure(tmp_path / f"{n}.{suffix}", *on_block) for n in "ab"]
