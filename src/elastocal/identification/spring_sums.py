@@ -181,5 +181,5 @@ def describe_briefly(group: Sequence[Term]) -> str:
 
 
 def _written(term: Term) -> str:
-    size = abs(term.weight)
-    return term.spring if size == 1.0 else f"{size:.3g} {term.spring}"
+    size = f"{abs(term.weight):.3g}"
+    return term.spring if size == "1" else f"{size} {term.spring}"
