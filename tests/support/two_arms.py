@@ -31,7 +31,7 @@ def _make(folder: Path) -> None:
     workflows.plan_pair(file, out=folder / "plan.json")
     workflows.simulate_pair(file, plan=folder / "plan.json", out=folder / "run")
     own = folder / "run" / "left.nc", folder / "run" / "right.nc"
-    workflows.calibrate_pair(file, *own, out=folder / "models", draws=60)
+    workflows.calibrate_pair(file, *own, out=folder / "models", draws=60, language="de")
     write_paths(folder, made)
 
 

@@ -1,11 +1,13 @@
 """Two robots through the public face: planted arms are found, and the deviation taken back."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 import elastocal as ec
+from elastocal.blocks import Bullets, Facts, Heading
 from elastocal.errors import (
     CompensationError,
     ConventionError,
@@ -78,18 +80,42 @@ def test_the_stated_contact_is_corrected_by_the_presses(result):
 
 def test_the_page_shows_both_arms_and_names_what_is_not_seen(done, result):
     page = (done / "models" / "pair.html").read_text(encoding="utf-8")
-    assert "<title>Two robots: " in page
+    assert "<title>Zwei Roboter: " in page
     assert all(f"{each.name}.json" in page for each in result.arms)
-    assert f"{result.held_out / result.deflection:.1%}".rstrip("%") in page
-    assert "both bases" in page
+    assert f"{result.held_out / result.deflection:.1%}".rstrip("%").replace(".", ",") in page
+    assert "Verbindungslinie beider Basen" in page
+    for title in ("Beide Arme", "Was die Pressungen nicht", "davor und danach"):
+        assert re.search(f"<h2 [^>]*>[^<]*{title}", page)
 
 
 def test_what_is_not_seen_is_named(result):
     (tilt,) = [each for each in result.findings if each.kind == "two-robots.tilt"]
     assert "how much each base tilts about the line that joins both bases is not seen" in tilt
     assert "name its model in the cell file" in tilt.advice
-    (idle,) = [each for each in result.findings if each.kind == "two-robots.unloaded"]
-    assert "left:joint_a6.axial" in idle
+
+
+def test_what_is_not_told_apart_has_a_line_each_by_arm(result):
+    (shown,) = [blocks for name, _, blocks in result.sections() if name == "unseen"]
+    blocks = list(shown)
+    heads = [each.text for each in blocks if isinstance(each, Heading)]
+    assert heads == ["Of both arms together", "Of left alone", "Of right alone"]
+    both, *alone = (each.items for each in blocks if isinstance(each, Bullets))
+    assert all("left:" in line or "right:" in line for line in both)
+    assert not any("left:" in line or "right:" in line for lines in alone for line in lines)
+    for lines in alone:
+        assert lines[0].startswith("no press loads these springs: joint_a6.axial")
+    groups = [each for each in (*result.unobservable, *result.hidden) if len(each) > 1]
+    assert len(both) + sum(len(lines) - 1 for lines in alone) == len(groups)
+
+
+def test_the_deviation_at_the_presses_is_that_before_and_after_a_correction(result):
+    found = result.cooperation
+    assert found.rows == result.readings
+    assert found.before == pytest.approx(result.deflection, rel=0.1)
+    assert found.after < 0.01 * found.before
+    assert found.limited == 0
+    (shown,) = [blocks for name, _, blocks in result.sections() if name == "deviation"]
+    assert [each for each in shown if isinstance(each, Facts)] == [Facts(found.facts())]
 
 
 def test_a_known_arm_makes_the_other_better(done, unseen, tmp_path):

@@ -167,6 +167,7 @@ from .solve import (
     solve as solve,
 )
 from .spring_sums import (
+    MOST_TERMS as MOST_TERMS,
     Term as Term,
     describe as describe,
     describe_briefly as describe_briefly,

@@ -1,4 +1,5 @@
 from .calibration import (
+    PairCalibration as PairCalibration,
     identify_pair as identify_pair,
 )
 from .cell import (

@@ -48,7 +48,7 @@ from elastocal.identification import (
 from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.two_robots.presses import PairModel, PairPrior, PairReadings, build_pair
-from elastocal.two_robots.tilts import unseen_findings
+from elastocal.two_robots.tilts import tilt_finding
 
 AUTO = "auto"
 TRIED = ("actuated", "bearing", "links", "gears")
@@ -309,7 +309,8 @@ def _certified(
     sizes = drives.sizes(fit.model.parameters)
     seen = _seen(plain, fit.model, springs, sizes)
     names = tuple(name for name in pair.names if name in known)
-    findings = list(unseen_findings(fit.model, pair.T_first_second, seen, names))
+    tilt = tilt_finding(fit.model, pair.T_first_second, names)
+    findings = [] if tilt is None else [tilt]
     unexplained = fit.held_out.mean / float(np.linalg.norm(problem.d, axis=1).mean())
     if not unexplained <= MOST_UNEXPLAINED:
         findings.insert(0, UNFIT(left=unexplained))

@@ -22,7 +22,7 @@ from elastocal.identification import CalibratedModel, interval
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
-from elastocal.robot.inverse import inverse_for, joints_along_path
+from elastocal.robot.inverse import joints_beside
 from elastocal.two_robots.presses import relative_blocks
 from elastocal.wording import mm, phrase
 
@@ -223,11 +223,10 @@ def correct_pair(
 
 
 def _shifted(robot: Robot, q: FloatArray, shift: FloatArray) -> FloatArray:
-    """Return joints whose tcp is shifted in base, its orientation kept."""
+    """Return joints whose tcp is shifted in base, its orientation and the posture kept."""
     T = robot.forward(q)
     T[:, :3, 3] += shift
-    external = q[:, : robot.external_axes]
-    return joints_along_path(inverse_for(robot), T, external, q[0], lambda row: f"row {row + 1}")
+    return joints_beside(robot, T, q, lambda row: f"row {row + 1}")
 
 
 def cooperation_summary(

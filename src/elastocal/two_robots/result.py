@@ -1,17 +1,21 @@
 """The result of a calibration of two robots: its record, and how it is shown."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from elastocal.arrays import FloatArray
 from elastocal.blocks import Block, Bullets, Facts, Heading, Paragraph, Table
 from elastocal.findings import Finding, Grade
-from elastocal.identification import Term
+from elastocal.identification import MOST_TERMS, Term, describe_briefly
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
 from elastocal.two_robots.calibration import PairCalibration
+from elastocal.two_robots.cooperation import CooperationSummary
 from elastocal.wording import counted, mm, phrase, phrases
+
+_LEAST_WEIGHT = 0.05
+"""Weight of a spring in a combination, of 1 at most, below which a line leaves it out."""
 
 
 @brief_repr
@@ -82,9 +86,27 @@ class PairResult(Result):
     hidden: tuple[tuple[Term, ...], ...]
     """Combinations that noise hides."""
     findings: tuple[Finding, ...]
+    cooperation: CooperationSummary | None = None
+    """Relative deviation at the presses, before and after a correction that the cell's weights and
+    limits share; none where a corrected press is out of reach."""
+
+    def sections(self) -> Iterator[tuple[str, str, Iterable[Block]]]:
+        """Yield identifier, title and contents of each section of the page."""
+        yield "result", phrase("Both arms"), self._result()
+        if self.unobservable or self.hidden:
+            yield "unseen", phrase("What the presses do not tell apart"), self._unseen()
+        title = phrase("Relative deviation of the tools, before and after")
+        yield "deviation", title, self._deviation()
 
     def show(self) -> Iterable[Block]:
-        """Return the error at left-out poses, each arm, the contact, and what is not seen."""
+        """Return the sections of the page under one another."""
+        for number, (_, title, blocks) in enumerate(self.sections()):
+            if number:
+                yield Heading(title)
+            yield from blocks
+
+    def _result(self) -> Iterator[Block]:
+        """Yield the error at left-out poses, each arm, the contact, and the findings."""
         measured = (
             phrase("A tracker measured both tools.")
             if self.tracked
@@ -148,16 +170,65 @@ class PairResult(Result):
             if each.advice:
                 yield Paragraph(each.advice, "advice")
         yield Bullets(tuple(notes))
-        if self.hidden:
+
+    def _unseen(self) -> Iterator[Block]:
+        """Yield the combinations that presses or noise leave open: of both arms, then of each."""
+        for arm in ("", *(each.name for each in self.arms)):
+            own = [
+                [group for group in groups if _arm_of(group) == arm]
+                for groups in (self.unobservable, self.hidden)
+            ]
+            lines = tuple(_lines(*own, prefix=f"{arm}:" if arm else ""))
+            if lines:
+                alone = (
+                    phrase("Of {arm} alone", arm=arm) if arm else phrase("Of both arms together")
+                )
+                yield Heading(alone)
+                yield Bullets(lines)
+        yield Paragraph(
+            phrase(
+                "Springs with less than {share} of the largest weight in a combination are not"
+                " written.",
+                share=f"{_LEAST_WEIGHT:.0%}",
+            )
+        )
+        yield Paragraph(
+            phrase(
+                "Do not use single values: what they predict together was tested, and nothing else."
+            )
+        )
+
+    def _deviation(self) -> Iterator[Block]:
+        """Yield what a correction with the weights and limits of the cell brings at the presses."""
+        found = self.cooperation
+        if found is None:
             yield Paragraph(
                 phrase(
-                    "Combinations of springs that noise hides, so that the prior decides: {count}.",
-                    count=len(self.hidden),
+                    "Nothing is said of a correction: with the cell's weights and limits, an arm"
+                    " cannot reach a corrected press."
                 )
             )
+            return
+        yield Paragraph(
+            phrase(
+                "How far the tools yield from each other at the presses of this campaign, against"
+                " unloaded arms, and what a correction by compensate-pair leaves, shared as the"
+                " cell file says. What is left is predicted by the same models: at left-out poses"
+                " these err by {error} on average, and that remains.",
+                error=mm(self.held_out),
+            ),
+            "sentence",
+        )
+        yield from found.show()
 
     @classmethod
-    def of(cls, cell: str, found: PairCalibration, files: tuple[str, str]) -> "PairResult":
+    def of(
+        cls,
+        cell: str,
+        found: PairCalibration,
+        files: tuple[str, str],
+        cooperation: CooperationSummary | None = None,
+    ) -> "PairResult":
         """Return the record of a calibration, with the names of both model files."""
         first, second = (
             ArmFigures(
@@ -190,7 +261,46 @@ class PairResult(Result):
             unobservable=found.seen.unobservable,
             hidden=found.seen.hidden,
             findings=found.findings,
+            cooperation=cooperation,
         )
+
+
+def _arm_of(group: Sequence[Term]) -> str:
+    """Return the arm whose springs a combination is of; nothing if it is of both."""
+    arms = {term.spring.partition(":")[0] for term in group}
+    return arms.pop() if len(arms) == 1 else ""
+
+
+def _lines(
+    unobservable: Sequence[Sequence[Term]], hidden: Sequence[Sequence[Term]], prefix: str
+) -> Iterator[str]:
+    """Yield a line a combination; springs that no press loads share one."""
+    idle = [group[0].spring for group in unobservable if len(group) == 1]
+    if idle:
+        springs = ", ".join(name.removeprefix(prefix) for name in idle)
+        yield phrase("no press loads these springs: {springs}", springs=springs)
+    for group in unobservable:
+        if len(group) > 1:
+            yield phrase("not told apart: {springs}", springs=_written(group, prefix))
+    for group in hidden:
+        yield phrase("hidden by noise: {springs}", springs=_written(group, prefix))
+
+
+def _written(group: Sequence[Term], prefix: str) -> str:
+    """Return a combination in the arm's own names; of a large one, the springs that lead it."""
+    plain = [
+        Term(term.spring.removeprefix(prefix), term.weight)
+        for term in group
+        if abs(term.weight) >= _LEAST_WEIGHT
+    ]
+    if len(plain) <= MOST_TERMS:
+        return describe_briefly(plain)
+    leading = sorted(plain, key=lambda term: -abs(term.weight))[:MOST_TERMS]
+    return phrase(
+        "{springs}, and {count} more with less weight",
+        springs=", ".join(term.spring for term in leading),
+        count=len(plain) - MOST_TERMS,
+    )
 
 
 def _grade(finding: Finding) -> Grade | None:

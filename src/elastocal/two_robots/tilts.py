@@ -20,7 +20,6 @@ import numpy as np
 from elastocal.arrays import FloatArray
 from elastocal.elastic import ElasticModel
 from elastocal.findings import Finding, Grade, Kind
-from elastocal.identification import Observability, describe_briefly
 from elastocal.two_robots.presses import PairModel
 
 _PROBES, _SEED = 40, 0
@@ -47,21 +46,6 @@ TILT_BY_AXES = Kind(
     " springs of {first} and {second} lie along the axes of their bases, and not along that line",
     advice="Where the axes of bearings are not those of the robot's description, calibrate one arm"
     " alone, by a tracker or on a plate, and name its model in the cell file (robots: model).",
-    grade=Grade.NOTE,
-)
-ALIKE = Kind(
-    "two-robots.alike",
-    "not seen, since they move both tools alike: {combinations}",
-    grade=Grade.NOTE,
-)
-OF_ONE_ARM = Kind(
-    "two-robots.of-one-arm",
-    "not told apart by forces and positions, of {arm} alone: {combinations}",
-    grade=Grade.NOTE,
-)
-UNLOADED = Kind(
-    "two-robots.unloaded",
-    "no press loads these springs: {springs}",
     grade=Grade.NOTE,
 )
 
@@ -132,38 +116,3 @@ def tilt_finding(
         return TILT_KNOWN(known=known[0]) if known else TILT(first=first, second=second)
     tilts = [any(expresses_tilt(arm, axis) for axis in np.eye(3)[:2]) for arm in model.models]
     return TILT_BY_AXES(first=first, second=second) if all(tilts) else None
-
-
-def unseen_findings(
-    model: PairModel,
-    T_first_second: FloatArray,
-    seen: Observability,
-    known: Sequence[str] = (),
-) -> tuple[Finding, ...]:
-    """Return in words what the presses of two arms do not see.
-
-    Parameters
-    ----------
-    model, T_first_second, known
-        As for `tilt_finding`.
-    seen : Observability
-        Of the presses alone, without any prior.
-    """
-    tilt = tilt_finding(model, T_first_second, known)
-    found = [] if tilt is None else [tilt]
-    groups = {name: list[str]() for name in ("", *model.names)}
-    unloaded = list[str]()
-    for group in seen.unobservable:
-        arms = sorted({term.spring.partition(":")[0] for term in group})
-        if len(group) == 1:
-            unloaded.append(group[0].spring)
-        else:
-            groups[arms[0] if len(arms) == 1 else ""].append(describe_briefly(group))
-    if groups[""]:
-        found.append(ALIKE(combinations="; ".join(groups[""])))
-    for arm in model.names:
-        if groups[arm]:
-            found.append(OF_ONE_ARM(arm=arm, combinations="; ".join(groups[arm])))
-    if unloaded:
-        found.append(UNLOADED(springs=", ".join(unloaded)))
-    return tuple(found)

@@ -17,18 +17,20 @@ from elastocal.dataset import (
     in_file,
     new_rows,
 )
-from elastocal.errors import CompensationError, DatasetError, SchemaError
+from elastocal.errors import CompensationError, DatasetError, PathError, SchemaError
 from elastocal.files import filling
 from elastocal.identification import CalibratedModel, CalibrateResult, read_model, write_model
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import read_json, schema_of, write_json
+from elastocal.report import language_of
 from elastocal.report.document import write_page
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.sim import Tips, press_together, true_arm
 from elastocal.two_robots import (
     CooperationSummary,
+    PairCalibration,
     PairCell,
     PairPlan,
     PairResult,
@@ -244,6 +246,8 @@ class CalibratePairSettings:
     """Seed of the bootstrap."""
     force: bool = False
     """Replace what is in the folder."""
+    language: Annotated[str, Option(choices="page language")] = "en"
+    """Language of ``pair.html``."""
 
 
 @workflow(CalibratePairSettings)
@@ -260,6 +264,8 @@ def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairR
         If the tools do not meet and face each other, or the forces are not opposite.
     IdentificationError
         If there are too few poses, or the springs imitate a contact of which nothing is known.
+    ReportError
+        If the page knows no such language.
     FileAccessError
         If a file cannot be read or written.
 
@@ -278,6 +284,7 @@ def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairR
     >>> [each.name for each in found.arms]
     ['left', 'right']
     """
+    language = language_of(settings.language)
     cell = load_pair_cell(settings.cell)
     own = tuple(
         _readings(path, robot)
@@ -288,15 +295,27 @@ def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairR
     rng = np.random.default_rng(settings.seed)
     found = identify_pair(pair, rng, cell.contact, settings.springs, known, settings.draws)
     files = f"{cell.arms[0]}.json", f"{cell.arms[1]}.json"
-    result = PairResult.of(cell.name, found, files)
+    result = PairResult.of(cell.name, found, files, _at_presses(cell, found))
     with filling(settings.out, PAIR_FILE, settings.force) as folder:
         for file, model in zip(files, found.models, strict=True):
             write_model(folder / file, model)
         write_json(folder / PAIR_FILE, result)
         title = phrase("Two robots: {cell}", cell=cell.name)
-        sections = [("result", phrase("Both arms"), result.show())]
-        write_page(folder / PAGE_FILE, title, sections, maker="elastocal calibrate-pair")
+        sections = tuple(result.sections())
+        write_page(folder / PAGE_FILE, title, sections, language, maker="elastocal calibrate-pair")
     return result
+
+
+def _at_presses(cell: PairCell, found: PairCalibration) -> CooperationSummary | None:
+    """Return the deviation at the presses before and after; none where an arm cannot correct it."""
+    pair, share = found.pair, cell.file.share
+    q = pair.first.joint_position, pair.second.joint_position
+    T, force = pair.T_first_second, pair.first.force
+    try:
+        corrected = correct_pair(found.models, T, q, force, share.weights, share.limits)
+    except PathError:
+        return None
+    return cooperation_summary(cell.arms, corrected, share.weights, share.limits)
 
 
 def _readings(path: Path, robot: Robot) -> Readings:

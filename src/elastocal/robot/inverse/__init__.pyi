@@ -11,6 +11,7 @@ from .path_joints import (
     RowName as RowName,
     check_limits as check_limits,
     joints_along_path as joints_along_path,
+    joints_beside as joints_beside,
     largest_move as largest_move,
     nearest_zero_posture as nearest_zero_posture,
     posture_jumps as posture_jumps,

@@ -6,10 +6,11 @@ import numpy as np
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import PathError
-from elastocal.robot import Robot
+from elastocal.robot import Robot, characteristic_length
 from elastocal.robot.inverse import InverseKinematics
 from elastocal.robot.inverse.arm import TURN
 from elastocal.robot.inverse.numerical import NumericalInverse
+from elastocal.robot.inverse.solver import reaches
 
 RowName = Callable[[int], str]
 """Function that names a row for a person, e.g. ``row 12``."""
@@ -127,6 +128,40 @@ def joints_along_path(
         raise _unreachable(robot, T_base_tcp[row], where(row))
     slots = _branches(robot, found.q, previous)
     return _unwound(robot, found.q[np.arange(len(slots)), slots], previous)
+
+
+def joints_beside(
+    robot: Robot, T_base_tcp: FloatArray, near: FloatArray, where: RowName
+) -> FloatArray:
+    """Return joints that reach poses, each in the posture of the joints that are beside it.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose joints they are.
+    T_base_tcp : ndarray, shape (row, 4, 4)
+        Poses, in m.
+    near : ndarray, shape (row, joint)
+        Joints of a pose beside each, in rad or m; external axes stay there.
+    where : callable
+        Names a row in a refusal.
+
+    Returns
+    -------
+    ndarray, shape (row, joint)
+        In rad or m.
+
+    Raises
+    ------
+    PathError
+        If a pose cannot be reached from there within the joint limits.
+    """
+    q = NumericalInverse(robot).descend(near, T_base_tcp, characteristic_length(robot))
+    found = reaches(robot, q, T_base_tcp) & (robot.limits.margin(q) >= -_ON_LIMIT).all(axis=1)
+    if not found.all():
+        row = int(np.argmin(found))
+        raise _unreachable(robot, T_base_tcp[row], where(row))
+    return q
 
 
 def _followed(
