@@ -186,27 +186,26 @@ def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(
     found = read_touches(folder / "cold", half)
     assert sorted(found.sessions[:, 1].tolist()) == [0] * 4 + [1] * 4
     assert not found.sessions[:, 0].any()
-    # The simulated cell's clock runs ahead of the wall's.
-    assert found.pause == 0.0
     read_run = touches_module.read_run
 
-    def read_a_day_later(path):
-        """Return the run as if it had been gone on with a day after it began."""
-        run = read_run(path)
-        later = (datetime.fromisoformat(run.record.started) + timedelta(days=1)).isoformat()
-        entries = (
-            replace_text(each, later) if each.event is Event.RESUME else each
-            for each in run.entries
-        )
-        return replace(run, entries=tuple(entries))
+    def pause(after: timedelta) -> float:
+        """Return the pause where the run was gone on with so long after it began."""
 
-    def replace_text(entry, text):
-        datetime.fromisoformat(entry.text)
-        return entry.model_copy(update={"text": text})
+        def read(path):
+            run = read_run(path)
+            text = (datetime.fromisoformat(run.record.started) + after).isoformat()
+            entries = (
+                each.model_copy(update={"text": text}) if each.event is Event.RESUME else each
+                for each in run.entries
+            )
+            return replace(run, entries=tuple(entries))
 
-    monkeypatch.setattr(touches_module, "read_run", read_a_day_later)
-    found = read_touches(folder / "cold", half)
-    assert 86400.0 - 3600.0 < found.pause < 86400.0
+        monkeypatch.setattr(touches_module, "read_run", read)
+        return read_touches(folder / "cold", half).pause
+
+    # The simulated cell's clock runs ahead of the wall's.
+    assert pause(timedelta(seconds=1)) == 0.0
+    assert 86400.0 - 3600.0 < pause(timedelta(days=1)) < 86400.0
 
 
 def test_a_warm_run_that_a_fault_has_ended_is_not_taken_for_all_of_it(touched, tmp_path):
