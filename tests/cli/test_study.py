@@ -70,7 +70,7 @@ def test_the_command_writes_tables_record_and_charts(tmp_path):
     part.unlink()
     again = study(tmp_path / "study", *options)
     assert again.code == 0
-    assert "no condition is shown" in " ".join(again.err.split())
+    assert "No condition is shown" in " ".join(again.err.split())
 
 
 @pytest.mark.slow

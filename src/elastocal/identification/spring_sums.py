@@ -155,6 +155,8 @@ def describe(group: Sequence[Term]) -> str:
 
     >>> describe([Term("a4.y", 1.0), Term("a4.z", 1.0), Term("a5.axial", -1.0)])
     '(a4.y + a4.z) - a5.axial'
+    >>> describe([Term("a4.y", 0.9998), Term("a5.x", -0.014)])
+    'a4.y - 0.014 a5.x'
     """
     sides = (
         [_written(term) for term in group if term.weight > 0],
@@ -181,5 +183,5 @@ def describe_briefly(group: Sequence[Term]) -> str:
 
 
 def _written(term: Term) -> str:
-    size = abs(term.weight)
-    return term.spring if size == 1.0 else f"{size:.3g} {term.spring}"
+    size = f"{abs(term.weight):.3g}"
+    return term.spring if size == "1" else f"{size} {term.spring}"

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from elastocal.arrays import FloatArray
-from elastocal.blocks import Block, Bullets, Facts, Paragraph, Table
+from elastocal.blocks import Block, Bullets, Facts, Heading, Paragraph, Table
 from elastocal.findings import Finding, Grade
 from elastocal.identification import Term
 from elastocal.records import record
@@ -111,7 +111,7 @@ class PairResult(Result):
                 tuple(
                     (
                         phrase(each.name),
-                        *(f"{1e9 * v:.3g}" for v in (each.compliance, each.low, each.high)),
+                        *(f"{1e9 * v:.1f}" for v in (each.compliance, each.low, each.high)),
                     )
                     for each in self.contact
                 ),
@@ -141,10 +141,12 @@ class PairResult(Result):
     def _findings(self) -> Iterable[Block]:
         grave = [each for each in self.findings if _grade(each) is not Grade.NOTE]
         notes = [each for each in self.findings if _grade(each) is Grade.NOTE]
-        advice = tuple(each.advice for each in grave if each.advice)
-        yield Bullets(tuple(grave), "warnings")
-        for each in advice:
-            yield Paragraph(each)
+        if grave or notes or self.hidden:
+            yield Heading(phrase("What the presses do not see"))
+        for each in grave:
+            yield Bullets((each,), "warnings")
+            if each.advice:
+                yield Paragraph(each.advice, "advice")
         yield Bullets(tuple(notes))
         if self.hidden:
             yield Paragraph(

@@ -49,7 +49,7 @@ def test_the_advice_is_the_fewest_poses_that_surely_reach_the_target():
 
 def test_too_few_samples_prove_nothing():
     found = summarise(settings(5), results([3e-5] * 10), 5e-5)
-    assert "no condition is shown" in advice(found, 5e-5)
+    assert "No condition is shown" in advice(found, 5e-5)
     assert advice(found, 5e-5).endswith("too few arms to prove it, take more --samples")
     poor = summarise(settings(5), results([9e-5] * 10), 5e-5)
     assert advice(poor, 5e-5).endswith("brings 0% of 10")

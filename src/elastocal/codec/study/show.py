@@ -33,9 +33,9 @@ def show_study(summary: StudySummary) -> Iterator[Block]:
     conditions = summary.conditions
     yield Table(
         caption,
-        (*(name.replace("_", " ") for name in factors), *heads),
+        (*(name.replace("_", " ").capitalize() for name in factors), *heads),
         tuple(_row(each, factors) for each in conditions[:_MOST_CONDITIONS]),
-        texts=0,
+        texts=len(factors),
     )
     if len(conditions) > _MOST_CONDITIONS:
         left = len(conditions) - _MOST_CONDITIONS

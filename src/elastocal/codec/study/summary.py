@@ -292,7 +292,7 @@ def advice(conditions: Sequence[ConditionSummary], target: float | None) -> str:
     shares = [(c.mean_reaches.share, c) for c in conditions if c.mean_reaches]
     most, best = max(shares, key=lambda each: each[0])
     text = (
-        f"no condition is shown to bring {_RELIABLE:.0%} of the arms to {wanted}; the best,"
+        f"No condition is shown to bring {_RELIABLE:.0%} of the arms to {wanted}; the best,"
         f" {best.name}, brings {most:.0%} of {best.n}"
     )
     if most >= _RELIABLE:

@@ -218,7 +218,12 @@ def finish_axes(axes: Axes, last: int, low: float, high: float, log: bool) -> No
 
 
 def draw_error_panel(
-    axes: Axes, boxes: Sequence[Boxes], styles: Sequence[VariantStyle], last: int, label: str
+    axes: Axes,
+    boxes: Sequence[Boxes],
+    styles: Sequence[VariantStyle],
+    last: int,
+    label: str,
+    level: float | None = None,
 ) -> None:
     """Draw boxes beside one another, their values in decades where that reads better.
 
@@ -234,8 +239,13 @@ def draw_error_panel(
         Number of groups.
     label : str
         Label of the values.
+    level : float, optional
+        Value that the axis holds too, marked by a dashed line.
     """
     low, high = extent(boxes)
+    if level is not None:
+        low, high = min(low, level), max(high, level)
+        axes.axhline(level, color=style.INK, lw=0.9, ls=(0, (5, 4)), zorder=1)
     log = reads_better_in_decades(low, high)
     for each, variant in zip(boxes, styles, strict=True):
         draw_boxes(axes, each, variant)

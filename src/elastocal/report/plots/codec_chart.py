@@ -304,6 +304,7 @@ def study_figure(
     styles = variant_styles(list(columns))
     rows = len(styles) if len(styles) > 1 else 0
     across = _STUDY_WIDTH - _LEFT - 0.2
+    target = None if record.target is None else _MM * record.target
     height = _STUDY_HEAD + 0.2 * rows + 2 * _STUDY_PANEL + _GAP + _STUDY_BOTTOM
     figure = style.new_figure(_STUDY_WIDTH, height)
     bottom = _STUDY_BOTTOM
@@ -314,14 +315,12 @@ def study_figure(
             _study_boxes(results, pairs, len(groups), which, name)
             for name, pairs in columns.items()
         ]
-        draw_error_panel(axes, boxes, styles, len(groups), label)
+        draw_error_panel(axes, boxes, styles, len(groups), label, target)
         lowest = bottom == _STUDY_BOTTOM
         axes.set_xticks(range(1, len(groups) + 1), groups if lowest else [""] * len(groups))
         if lowest:
             poses = along == "poses"
             axes.set_xlabel("Number of calibration poses" if poses else along.replace("_", " "))
-        if record.target is not None:
-            axes.axhline(_MM * record.target, color=style.INK, lw=0.9, ls=(0, (5, 4)), zorder=1)
         bottom += _STUDY_PANEL + _GAP
     _draw_study_frame(figure, record)
     if rows:
