@@ -66,3 +66,11 @@ def test_boxes_of_the_page_are_dark_where_the_page_is():
     assert svg.count(light) == 1  # where its name is defined
     assert f"--fill0:{dark}" in svg.split("dark)")[1]
     assert "fill: var(--fill0)" in svg
+
+
+def test_a_target_below_all_errors_is_within_the_axes():
+    made = settings()
+    figure = study_figure(made, RESULTS, study_summary(made, RESULTS, 1e-6))
+    for axes in figure.axes:
+        low, high = axes.get_ylim()
+        assert low < 1e-3 < high
