@@ -16,12 +16,16 @@ from elastocal.identification import (
     Contact,
     FitOptions,
     build,
+    calibrate,
     choose_model,
+    ladder as ladder_module,
     read_contact,
+    rung_of,
     solve,
     weigh_contact,
 )
 from elastocal.identification.contact import ContactFigure, untold_stacks, whitened
+from elastocal.identification.ladder import climb
 from elastocal.identification.mistakes import find_undone
 from support.cli import elastocal
 from support.held import PRESS, STIFFNESS, Held, held_by_contact, robot
@@ -72,6 +76,47 @@ def test_gears_are_refused_by_name_where_the_normal_compliance_is_free():
     options = weigh_contact(arm(), readings(), FitOptions(contact=Contact()))
     with pytest.raises(IdentificationError, match=r"contact\.normal is free.*most: joint_a"):
         choose_model(arm(), readings(), "gears", options)
+
+
+FREE = Held(noise=5e-6)
+
+
+@cache
+def climbed_free():
+    options = weigh_contact(arm(), readings(FREE), FitOptions(contact=Contact()))
+    rungs = tuple(rung_of(arm(), name) for name in ("bearing-gears", "gears"))
+    return climb(arm(), readings(FREE), rungs, ("bearing-gears",), options), options
+
+
+def test_gears_that_a_free_contact_leaves_out_count_as_doubt():
+    choice, options = climbed_free()
+    assert [each.name for each in choice.ladder] == ["bearing-gears"]
+    (gears,) = choice.lacked
+    assert gears.name == "gears"
+    assert gears.beside
+    assert not gears.chosen
+    alone, with_doubt = (
+        calibrate(choice.model, readings(FREE), np.random.default_rng(0), options, draws=40,
+                  ladder=ladder).calibrated
+        for ladder in (choice.ladder, (*choice.ladder, *choice.lacked))
+    )  # fmt: skip
+    assert with_doubt.compliance == pytest.approx(alone.compliance)
+    spread = [np.std(each.draws - each.compliance) for each in (alone, with_doubt)]
+    assert gears.apart > 0.0
+    assert spread[1] > 1.001 * spread[0]
+
+
+def test_a_doubt_that_cannot_be_fitted_is_said_and_refuses_nothing(monkeypatch):
+    def unsolved(*_):
+        raise IdentificationError("the solver stopped short of the optimum")
+
+    _, options = climbed_free()
+    rungs = tuple(rung_of(arm(), name) for name in ("bearing", "gears"))
+    monkeypatch.setattr(ladder_module, "_beside_contact_found", unsolved)
+    choice = climb(arm(), readings(FREE), rungs, ("bearing",), options)
+    assert choice.lacked == ()
+    assert [each.kind for each in choice.refused] == ["ladder.refused", "ladder.undoubted"]
+    assert "stopped short" in choice.refused[1]
 
 
 def test_presses_on_one_and_on_two_disks_leave_it_free_with_gears():

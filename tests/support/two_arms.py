@@ -28,7 +28,7 @@ def finished() -> Path:
 def _make(folder: Path) -> None:
     made = cell(folder)
     file = folder / "cell.yaml"
-    workflows.plan_pair(file, out=folder / "plan.json")
+    workflows.plan_pair(file, out=folder / "plan.json", language="de")
     workflows.simulate_pair(file, plan=folder / "plan.json", out=folder / "run")
     own = folder / "run" / "left.nc", folder / "run" / "right.nc"
     workflows.calibrate_pair(file, *own, out=folder / "models", draws=60, language="de")

@@ -60,6 +60,11 @@ REFUSED = Kind(
     "springs {springs} were not tried: {reason}",
     grade=Grade.NOTE,
 )
+UNDOUBTED = Kind(
+    "ladder.undoubted",
+    "intervals lack the doubt that the arm has {springs}, which were not fitted beside the contact"
+    " that was found: {reason}",
+)
 
 
 @brief_repr
@@ -288,9 +293,12 @@ def climb(
             reason = str(error)
             refused.append(REFUSED(springs=rung.name, reason=reason))
             if rung.name == _LACKED and options.contact is not None:
-                fit = _beside_contact_found(robot, model, readings, options)
-                found = try_rung(rung.name, model, build(model, readings, fit), judged)
-                lacked.append(replace(found, counted=counted, beside=True))
+                try:
+                    fit = _beside_contact_found(robot, model, readings, options)
+                    found = try_rung(rung.name, model, build(model, readings, fit), judged)
+                    lacked.append(replace(found, counted=counted, beside=True))
+                except IdentificationError as unsolved:
+                    refused.append(UNDOUBTED(springs=rung.name, reason=str(unsolved)))
     if not any(each.name in allowed for each in tried):
         raise IdentificationError(reason)
     return replace(_against(take_best(tried, allowed), lacked), refused=tuple(refused))

@@ -2,7 +2,11 @@ from .language import (
     Language as Language,
     language_of as language_of,
 )
-from .pages import write_codec_figures as write_codec_figures, write_plan_page as write_plan_page
+from .pages import (
+    write_codec_figures as write_codec_figures,
+    write_pair_plan_page as write_pair_plan_page,
+    write_plan_page as write_plan_page,
+)
 from .plots import (
     Curve as Curve,
     codec_chart as codec_chart,

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.blocks import Block, Facts, Table
+from elastocal.blocks import Block, Facts, PoseButton, Table
 from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import PlanningError
 from elastocal.planning.search import Candidates, technique
@@ -102,12 +102,13 @@ class PairPlan(Result):
             phrases("Pose", "x [mm]", "y [mm]", "z [mm]", "Normal"),
             tuple(
                 (
-                    each.id,
+                    PoseButton(each.id),
                     *(f"{1e3 * value:.0f}" for value in each.point),
                     " ".join(f"{value:.2f}" for value in each.normal),
                 )
                 for each in self.meetings
             ),
+            name="pose-table",
         )
 
 

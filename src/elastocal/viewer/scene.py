@@ -370,12 +370,50 @@ def cell_scene(
     )
 
 
-def _robot(robot: RobotSolids) -> Layer:
+def arms_scene(
+    arms: Sequence[tuple[str, RobotSolids, FloatArray]], points: FloatArray, up: FloatArray
+) -> Scene:
+    """Return the scene of arms that work on each other, a layer each.
+
+    Parameters
+    ----------
+    arms : sequence of (str, RobotSolids, ndarray)
+        Name, solids at the same postures of all, and base in the common frame, shape (4, 4).
+    points : ndarray, shape (point, 3)
+        Where they work, in the common frame, in m.
+    up : ndarray, shape (3,)
+        The world's vertical there.
+    """
+    layers, places, bodies = list[Layer](), list[FloatArray](), list[FloatArray]()
+    first = 0
+    for name, robot, T in arms:
+        layers.append(_robot(robot, name, first))
+        first += len(robot.parts)
+        places.append(T @ robot.places)
+        bodies.append(robot.at(0).placed(T).vertices)
+    bases = np.array([T[:3, 3] for _, _, T in arms])
+    along = np.ptp(bases, axis=0)
+    side = _unit(np.cross(up, along if np.linalg.norm(along) > 0.0 else np.roll(up, 1)))
+    whole = np.concatenate([*bodies, points])
+    views = (
+        (phrase("Both arms"), whole, side + 0.5 * up),
+        (phrase("Where they meet"), points, side + 0.5 * up),
+        (phrase("From the side"), whole, side + 0.1 * up),
+        (phrase("From above"), whole, up + 0.05 * side),
+    )
+    cameras = tuple(_camera(name, seen, _unit(towards), up) for name, seen, towards in views)
+    floor = float((np.concatenate(bodies) @ up).min())
+    light = _unit(0.6 * side + up)
+    return Scene(tuple(layers), cameras, light, up, floor, np.concatenate(places, axis=1))
+
+
+def _robot(robot: RobotSolids, name: str = phrase("Robot and tool"), first: int = 0) -> Layer:
+    """Return the layer of a robot whose parts are numbered from one on."""
     parts = tuple(
-        Paint(part, "--arm" if number < robot.tool else "--tool", number)
+        Paint(part, "--arm" if number < robot.tool else "--tool", first + number)
         for number, part in enumerate(robot.parts)
     )
-    return Layer(phrase("Robot and tool"), "--arm", parts, note=robot.note)
+    return Layer(name, "--arm", parts, note=robot.note)
 
 
 def _tooling(surface: Surface) -> Layer:

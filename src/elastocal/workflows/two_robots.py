@@ -18,12 +18,12 @@ from elastocal.dataset import (
     new_rows,
 )
 from elastocal.errors import CompensationError, DatasetError, PathError, SchemaError
-from elastocal.files import filling
+from elastocal.files import filling, require_place
 from elastocal.identification import CalibratedModel, CalibrateResult, read_model, write_model
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import read_json, schema_of, write_json
-from elastocal.report import language_of
+from elastocal.report import language_of, write_pair_plan_page
 from elastocal.report.document import write_page
 from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
@@ -67,6 +67,9 @@ PAGE_FILE = "pair.html"
 COOPERATION_FILE = "cooperation.json"
 """Record of a corrected cooperative process, in its folder."""
 
+_PLAN_PAGE = '<meta name="generator" content="elastocal plan-pair">'
+"""Mark in the page of a plan, in every language."""
+
 
 @dataclass(frozen=True)
 class PlanPairSettings:
@@ -75,12 +78,14 @@ class PlanPairSettings:
     cell: Annotated[Path, Option(argument=True)]
     """Cell file with the key ``robots``, ``.yaml``."""
     out: Annotated[Path, Option(metavar="PLAN.json")]
-    """Plan to write."""
+    """Plan to write; beside it its page, ``PLAN.html``: both arms at each meeting."""
     force: bool = False
     """Replace a file that is no former output of this command."""
+    language: Annotated[str, Option(choices="page language")] = "en"
+    """Language of the page."""
 
 
-@workflow(PlanPairSettings, marks=(schema_of(PairPlan),))
+@workflow(PlanPairSettings, marks=(schema_of(PairPlan), _PLAN_PAGE))
 def plan_pair(settings: PlanPairSettings, progress: Progress) -> PairPlan:  # noqa: ARG001 - seconds
     """Plan where two robots press on each other: postures that both reach, chosen by a search.
 
@@ -90,6 +95,10 @@ def plan_pair(settings: PlanPairSettings, progress: Progress) -> PairPlan:  # no
         If the cell is not one of two robots.
     PlanningError
         If the arms meet at too few places.
+    ReportError
+        If the page knows no such language.
+    RobotError
+        If the description of a robot has no collision shapes, which are what the page draws.
     FileAccessError
         If a file cannot be read or written.
 
@@ -102,8 +111,12 @@ def plan_pair(settings: PlanPairSettings, progress: Progress) -> PairPlan:  # no
     >>> len(plan.meetings)
     25
     """
-    found = plan_meetings(load_pair_cell(settings.cell))
+    language, cell = language_of(settings.language), load_pair_cell(settings.cell)
+    found = plan_meetings(cell)
+    page = Path(settings.out).with_suffix(".html")
+    require_place(page)
     write_json(settings.out, found)
+    write_pair_plan_page(page, cell, found, language)
     return found
 
 

@@ -1,0 +1,119 @@
+"""One HTML page that shows where two robots press on each other: a view to turn, and a table."""
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.arrays import FloatArray
+from elastocal.files import write_text
+from elastocal.planning import CollisionScene
+from elastocal.report.language import ENGLISH, Language
+from elastocal.report.pages.templating import render
+from elastocal.report.plots import style
+from elastocal.robot import Robot, inverse_transform
+from elastocal.shapes import Body, Cylinder
+from elastocal.two_robots import PairCell, PairPlan
+from elastocal.viewer import Layer, Strokes, Tags, arms_scene, packed, robot_solids, scene_data
+from elastocal.wording import millimetres, phrase
+
+_ROD = 0.02
+"""Radius of the rod that a tool is drawn as, in m."""
+
+
+def write_pair_plan_page(
+    path: Path, cell: PairCell, plan: PairPlan, language: Language = ENGLISH
+) -> Path:
+    """Write the interactive page of a plan of two robots, atomically; return its path.
+
+    Parameters
+    ----------
+    path : Path
+        An HTML file.
+    cell, plan : PairCell, PairPlan
+        That belong together.
+    language : Language
+        Language of the page's words.
+
+    Raises
+    ------
+    RobotError
+        If the description of a robot has no collision shapes, which are what is drawn.
+    FileAccessError
+        If the page cannot be written.
+    """
+    bases = np.eye(4), cell.T_first_second
+    arms = [
+        (name, robot_solids(_collisions(robot, entry.tcp.T), q[[0, *range(len(q))]]), T)
+        for name, robot, entry, q, T in zip(
+            cell.arms, cell.robots, cell.file.robots, plan.q(), bases, strict=True
+        )
+    ]
+    points = np.array([each.point for each in plan.meetings])
+    gravity = np.array(cell.robots[0].gravity)
+    scene = arms_scene(arms, points, -gravity / np.linalg.norm(gravity))
+    hints = tuple(
+        phrase("Meeting {pose}: {place} mm", pose=each.id, place=millimetres(each.point))
+        for each in plan.meetings
+    )
+    numbers = tuple(str(each.id) for each in plan.meetings)
+    # No surface hides a meeting: every tag is drawn as one that faces the reader.
+    tags = Tags(points, numbers, style.BLUE, hints, np.tile(scene.up, (len(points), 1)))
+    layers = (
+        *scene.layers,
+        Layer(phrase("Meetings, in visiting order"), style.BLUE, (tags,)),
+        Layer(phrase("Volume in which the tips meet"), "--region", (_volume(cell),)),
+    )
+    data = scene_data(replace(scene, layers=layers), language.say) | {
+        "sight": packed(np.full((len(points) + 1, 2, 3), np.nan)),
+        # The slider begins at the first meeting: posture 0 is that of it.
+        "postures": [language.say(each) for each in (hints[0], *hints)],
+    }
+    page = render(
+        "pair_plan.html",
+        language,
+        title=phrase("Plan of two robots: {cell}", cell=plan.cell),
+        subtitle=phrase("Lengths in the base frame of {arm}.", arm=plan.arms[0]),
+        styles=("page.css", "viewer.css"),
+        scripts=("viewer.js", "postures.js", "plan.js"),
+        data=data,
+        plan=plan,
+        notes=[
+            phrase("Tools are drawn as rods from the flange to the tip."),
+            *dict.fromkeys(layer.note for layer in layers if layer.note),
+        ],
+        version=__version__,
+    )
+    write_text(path, page)
+    return Path(path)
+
+
+def _collisions(robot: Robot, T_flange_tcp: FloatArray) -> CollisionScene:
+    """Return an arm with a rod from its flange to its tip."""
+    return CollisionScene(robot, _rods(T_flange_tcp), ())
+
+
+def _rods(T_flange_tcp: FloatArray) -> tuple[Body, ...]:
+    """Return the rod from flange to tip in the tcp frame; none where the tip is at the flange."""
+    flange = inverse_transform(T_flange_tcp)[:3, 3]
+    length = float(np.linalg.norm(flange))
+    if not length > _ROD:
+        return ()
+    T, z = np.eye(4), flange / length
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    T[:3, 3] = 0.5 * flange
+    return (Body("tool", Cylinder(_ROD, length), T),)
+
+
+def _volume(cell: PairCell) -> Strokes:
+    """Return the edges of the box in which the tips meet."""
+    volume = cell.file.volume
+    corners = np.array(list(product((-0.5, 0.5), repeat=3)))
+    ends = [
+        (a, b) for a, b in product(corners, corners) if np.sum(a != b) == 1 and np.sum(b - a) > 0.0
+    ]
+    return Strokes(np.array(ends) * volume.size + np.array(volume.centre), "--region", 1.5)
