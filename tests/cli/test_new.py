@@ -147,8 +147,11 @@ def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
     rail = ["sideways, 1 m, 2 m", "y, 1 m, -1 m", "y, -1 m, 1 m"]
     answers = [
         "UR 2",
+        "UR10e",
+        *rail[:1],
+        "back",
         "UR20",
-        *rail,
+        *rail[1:],
         "none.stl",
         str(dome),
         *[""] * 6,

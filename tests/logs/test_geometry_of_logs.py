@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import elastocal as ec
+from elastocal.errors import LogError
 from elastocal.geometry import GeometryProblem, geometry_model
 from elastocal.geometry.ladder import climb
 from elastocal.progress import silent
@@ -42,8 +43,19 @@ logs:
 """
 
 
-def write_logs(folder: Path, measured: Measured, seed: int) -> list[Path]:
-    """Write URDF, map and the three logs of presses on the arm as it is; return the logs."""
+def write_logs(
+    folder: Path,
+    measured: Measured,
+    seed: int,
+    *,
+    moves: tuple[float, float] = (0.7, 1.3),
+    presses: tuple[float, float] = (1.0, 1.0),
+) -> list[Path]:
+    """Write URDF, map and the three logs of presses on the arm as it is; return the logs.
+
+    Between the bounds of `moves` lies how long each takes, between those of `presses` how hard
+    each pose is pressed on, over what is usual.
+    """
     rng, drawn, true = np.random.default_rng(seed), measured.robot, measured.truth
     middle, reach = [0.0, -1.35, 1.15, 0.0, 0.95, 0.0], [1.2, 0.45, 0.55, 1.5, 0.45, 2.0]
     tools = np.array([[0, 0, 0], [0, 0, -900], [270, 0, -900], [0, 270, -900.0]])
@@ -51,9 +63,10 @@ def write_logs(folder: Path, measured: Measured, seed: int) -> list[Path]:
     knots = np.repeat(q_0, len(tools), axis=0)
     pressed = np.tile(np.arange(len(tools)) > 0, POSES)[:, None]
     knots = knots + pressed * rng.normal(0.0, 5e-4, knots.shape)  # the way of the controller
-    loads = np.tile(tools, (POSES, 1))
+    harder = np.random.default_rng(seed + 1).uniform(*presses, POSES)
+    loads = np.tile(tools, (POSES, 1)) * np.repeat(harder, len(tools))[:, None]
     # No two moves take equally long: clocks are found by what is not periodic.
-    took = np.where(pressed[:, 0], MOVE, 2.0 * MOVE) * rng.uniform(0.7, 1.3, len(knots))
+    took = np.where(pressed[:, 0], MOVE, 2.0 * MOVE) * rng.uniform(*moves, len(knots))
     begun = np.cumsum(HOLD + took) - (HOLD + took)
     time = np.arange(0.0, begun[-1], STEP)
     knot = np.searchsorted(begun, time, side="right") - 1
@@ -114,3 +127,27 @@ def test_springs_of_twenty_imported_campaigns_lie_inside_their_intervals(tmp_pat
     print("by spring", np.sum(as_built, axis=0), "as drawn", np.sum(as_drawn, axis=0))
     assert np.sum(as_built) >= 107
     assert np.sum(as_built) >= np.sum(as_drawn)
+
+
+OFFSET = -3.0
+"""Of the clock of the sensor's log, in s."""
+
+
+@pytest.mark.parametrize(("presses", "decided"), [((1.0, 1.0), False), ((0.5, 1.0), True)])
+def test_of_equally_long_moves_the_deflection_or_the_map_says_which_is_which(
+    tmp_path, presses, decided
+):
+    measured = measure(tooled(), 60, seed=0, noise=2e-5, error=1e-3)
+    files = write_logs(tmp_path, measured, 0, moves=(1.0, 1.0), presses=presses)
+    path = tmp_path / "map.yaml"
+    if not decided:
+        both = r"force\.csv: its clock fits arm\.csv at -3\.\d\d s and at \+9\.\d\d s about as well"
+        with pytest.raises(LogError, match=both):
+            ec.import_logs(files, map=path)
+        text = path.read_text(encoding="utf-8")
+        path.write_text(
+            text.replace("- log: force.csv", '- log: force.csv\n    offset: "-2.2 s"'),
+            encoding="utf-8",
+        )
+    clocks = {each.clock: each for each in ec.import_logs(files, map=path).figures.clocks}
+    assert clocks["force.csv"].offset == pytest.approx(OFFSET, abs=0.1)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 import elastocal as ec
 from elastocal.dataset import read_dataset, write
@@ -311,13 +312,14 @@ def test_what_no_log_contains_is_asked_for_and_refused_answers_are_asked_again(r
 
 def test_a_urdf_is_named_beside_the_map_with_its_link(rows, tmp_path):
     files = write_logs(_short(rows), tmp_path)
-    urdf = tmp_path / "arms" / "own.urdf"
+    urdf = tmp_path / "arms: old, # 2" / "own arm.urdf"
     urdf.parent.mkdir()
     urdf.write_text(catalogue.urdf("UR10e"), encoding="utf-8")
     answers = iter(["", "", str(urdf), "elbow", "", "skip"])
     out = tmp_path / "maps" / "map.yaml"
     text = ec.guess_map(files, out=out, ask=lambda _: next(answers)).text
-    assert "robot: {urdf: ../arms/own.urdf, flange: flange}" in text
+    robot = yaml.safe_load(text)["robot"]
+    assert robot == {"urdf": "../arms: old, # 2/own arm.urdf", "flange": "flange"}
 
 
 def test_what_a_guessed_map_leaves_open_is_refused_with_what_to_write(rows, tmp_path):

@@ -5,6 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import LogError
+from elastocal.logs import days_of
+from elastocal.logs.map import LogEntry, LogMap
 from elastocal.logs.streams import body_centre
 
 SHAPE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.15, 0.0], [0.02, 0.03, 0.12]])
@@ -35,3 +37,25 @@ def test_a_body_that_is_never_seen_whole_is_refused():
     position[:, 0] = np.nan
     with pytest.raises(LogError, match="no row sees all 4 markers"):
         body_centre(position)
+
+
+@pytest.mark.parametrize(
+    ("unit", "times", "days"),
+    [
+        (None, ("27.11.2026 09:41:11.750", "27.11.2026 17:00:00"), "2026-11-27"),
+        (None, ("2026-11-27T23:59:00", "2026-11-28T00:10:00"), "2026-11-27/2026-11-28"),
+        (None, ("09:41:11", "09:41:12"), None),
+        ("s", ("0.0", "86401.0"), None),
+        ("ms", ("1795772471750", "1795772471760"), "2026-11-27"),
+    ],
+)
+def test_the_days_of_logs_are_those_of_their_dates(tmp_path, unit, times, days):
+    path = tmp_path / "arm.csv"
+    path.write_text("t;A1;X\n" + "".join(f"{time};1.0;2.0\n" for time in times))
+    entry = {
+        "log": "arm.csv",
+        "time": {"column": "t", "unit": unit},
+        "joints": [{"columns": ["A1"], "unit": "deg"}],
+    }
+    entry = LogEntry.model_validate(entry)
+    assert days_of(LogMap(robot={"model": "UR20"}, logs=(entry,)), [path]) == days

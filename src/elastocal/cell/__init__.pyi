@@ -21,6 +21,7 @@ from ._quantities import (
     Share as Share,
     ShareBelowHalf as ShareBelowHalf,
     SignedForce as SignedForce,
+    SignedTime as SignedTime,
     StiffnessOrNone as StiffnessOrNone,
     Time as Time,
     TranslationalStiffness as TranslationalStiffness,

@@ -105,6 +105,10 @@ Time = Annotated[float, _read("time"), Field(ge=0.0, le=1e6)]
 """In s, 0 or above."""
 
 
+SignedTime = Annotated[float, _read("time")]
+"""In s."""
+
+
 PositiveTime = Annotated[float, _read("time"), _POSITIVE]
 """In s, above 0."""
 

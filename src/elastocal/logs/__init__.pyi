@@ -25,3 +25,6 @@ from .positions import (
     ImportedPositions as ImportedPositions,
     import_positions as import_positions,
 )
+from .streams import (
+    days_of as days_of,
+)

@@ -3,9 +3,10 @@
 Each log is reduced to its *activity*, the logarithm of the speed at which its values change. The
 marker moves when the arm does. A force changes when the arm yields to it, at a few mm/s at most;
 for a force, faster motion of the arm is left out. The offset is where the activities correlate
-most. Presses resemble one another, so a force may fit several offsets: then the one is taken at
-which the tool's weight alone explains the force between the poses. Sections of the recording, each
-correlated separately, show how the offset drifts:
+most. Poses and presses resemble one another, so a log may fit several offsets: then the one is
+taken at which forces, marker and joints are those of one arm (`elastocal.logs._misfits`). Where
+none is, because all moves take equally long, the map must state the offset. Sections of the
+recording, each correlated separately, show how the offset drifts:
 
     t = t_log + offset + drift (t_log - t_first).
 
@@ -22,6 +23,8 @@ import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, present
+from elastocal.logs._misfits import LONGEST_GAP, PRESSING, misfits
+from elastocal.logs.map import Site
 from elastocal.logs.streams import LogStreams
 from elastocal.records import record
 from elastocal.results import brief_repr
@@ -32,19 +35,17 @@ _SMOOTH = 5
 """Samples over which values are averaged before they are differenced."""
 _BLUR = 15
 """The same of an activity: about 0.3 s."""
-_PRESSING = 2e-3
-"""Speed in m/s above which an arm travels; below, it is at rest or yields to a force."""
 _SLOWEST = 1e-5
 """Speed in m/s below which an arm that may yield is at rest."""
 _CLOSE, _APART, _MOST_CANDIDATES = 0.15, 1.0, 40
 """Correlation below the best that is still a candidate, least distance of candidates in s, and
 their greatest number."""
-_TRAVELLING = 10e-3
-"""Speed in m/s above which the tool touches nothing."""
-_LEAST_TRAVELLED = 20
-"""Samples by which a weight is judged."""
-_LONGEST_GAP = 1.0
-"""Time without a sample from which on nothing is known of a log, in s."""
+_TOLD_APART = 0.7
+"""Largest misfit of an offset over that of another by which they are told apart."""
+_ALIKE = 0.05
+"""Difference of correlations that does not tell offsets apart."""
+_NEAR = 2.0
+"""Distance from the offset of the map within which the best fit is taken, in s."""
 _LEAST_OVERLAP = 0.3
 """Least part of the shorter log that the other must overlap."""
 _LEAST_CORRELATION = 0.5
@@ -117,7 +118,7 @@ class ClockFit:
 
 
 def align(
-    logs: Sequence[LogStreams], lever: FloatArray
+    logs: Sequence[LogStreams], site: Site
 ) -> tuple[tuple[LogStreams, ...], tuple[ClockFit, ...]]:
     """Return the logs in the time of the joints, and the fit of each clock.
 
@@ -125,38 +126,45 @@ def align(
     ----------
     logs : sequence of LogStreams
         One of them with joints.
-    lever : ndarray, shape (3,)
-        Roughly the marker in the tcp frame, in m.
+    site : Site
+        Robot, sensor and marker.
 
     Raises
     ------
     LogError
-        If a log has nothing in common with the joints: no motion, no overlap, other work.
+        If a log has nothing in common with the joints: no motion, no overlap, other work; or if
+        several offsets explain it about as well.
     """
     reference = next(log for log in logs if log.arm is not None)
     fits: dict[str, ClockFit] = {}
-    aligned: list[LogStreams] = []
-    for log in logs:
+    aligned: dict[int, LogStreams] = {}
+    # By the markers the deflection is known, which tells offsets of a force apart.
+    for index in sorted(range(len(logs)), key=lambda index: logs[index].wrench is not None):
+        log = logs[index]
         if log.clock == reference.clock:
-            aligned.append(log)
+            aligned[index] = log
         elif log.handshake is not None and reference.handshake is not None:
             time, fits[log.clock] = _by_handshake(log, reference)
-            aligned.append(log.at(time))
+            aligned[index] = log.at(time)
         else:
             if log.entry.time is None:
                 raise LogError(
                     f"{log.entry.log}: it has no time, and {reference.entry.log} no handshake"
                 )
             if log.clock not in fits:
-                fits[log.clock] = _fit_or_unit(log, reference, lever)
-            aligned.append(log.at(fits[log.clock].shifted(log.time)))
-    return tuple(aligned), tuple(fits.values())
+                seen = [each for each in aligned.values() if each.points is not None]
+                fits[log.clock] = _fit_or_unit(log, reference, site, seen)
+            aligned[index] = log.at(fits[log.clock].shifted(log.time))
+    clocks = dict.fromkeys(log.clock for log in logs if log.clock in fits)
+    return tuple(aligned[index] for index in range(len(logs))), tuple(fits[c] for c in clocks)
 
 
-def _fit_or_unit(log: LogStreams, reference: LogStreams, lever: FloatArray) -> ClockFit:
+def _fit_or_unit(
+    log: LogStreams, reference: LogStreams, site: Site, markers: Sequence[LogStreams]
+) -> ClockFit:
     """Return the fit of a clock; a refusal names the unit that may be the reason."""
     try:
-        return fit_clock(log, reference, lever)
+        return fit_clock(log, reference, site, markers)
     except LogError as error:
         ours, theirs = float(np.ptp(log.time)), float(np.ptp(reference.time))
         if min(ours, theirs) > max(ours, theirs) / _OTHER_UNIT:
@@ -167,28 +175,36 @@ def _fit_or_unit(log: LogStreams, reference: LogStreams, lever: FloatArray) -> C
         ) from error
 
 
-def fit_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> ClockFit:
+def fit_clock(
+    log: LogStreams, reference: LogStreams, site: Site, markers: Sequence[LogStreams] = ()
+) -> ClockFit:
     """Return the fit of the clock of a log to that of the joints, by their common activity.
+
+    Parameters
+    ----------
+    log, reference : LogStreams
+        The log, and that of the joints.
+    site : Site
+        Robot, sensor and marker.
+    markers : sequence of LogStreams
+        Logs of markers by the clock of the joints.
 
     Raises
     ------
     LogError
-        If they do not correlate.
+        If they do not correlate, or several offsets explain the log about as well.
     """
     longest = max(float(np.ptp(each.time)) for each in (log, reference))
     step = max(_STEP, longest / _LONGEST)
-    fastest = None if log.wrench is None else _PRESSING
+    fastest = None if log.wrench is None else PRESSING
+    lever = site.marker
     ours, theirs = _activity(log, lever, step), _activity(reference, lever, step, fastest)
-    lags, correlations = _best_lags(ours, theirs)
-    best = 0
-    if log.wrench is not None and len(lags) > 1:
-        shifts = theirs.start - ours.start + lags * step
-        best = int(np.argmin([weight_misfit(log, reference, each) for each in shifts]))
-    lag, correlation = int(lags[best]), float(correlations[best])
+    lag, correlation = _best_lag(log, reference, (ours, theirs), site, markers)
     if not correlation >= _LEAST_CORRELATION:
+        where = "at best" if log.entry.offset is None else "near the offset of the map"
         raise LogError(
             f"{log.entry.log} and {reference.entry.log} do not seem to be of the same work: their"
-            f" motions correlate by {correlation:.2f} at best, {_LEAST_CORRELATION} is the least;"
+            f" motions correlate by {correlation:.2f} {where}, {_LEAST_CORRELATION} is the least;"
             " give both the same clock if they share one"
         )
     coarse = theirs.start - ours.start + lag * step
@@ -236,7 +252,7 @@ def _activity(
     )
     speed = np.linalg.norm(np.gradient(smooth, step, axis=0), axis=1)
     after = np.searchsorted(time, grid, side="right").clip(1, len(time) - 1)
-    known = time[after] - time[after - 1] <= _LONGEST_GAP
+    known = time[after] - time[after - 1] <= LONGEST_GAP
     known[:_BLUR] = known[-_BLUR:] = False
     if not known.any() or not speed[known].max() > 0.0:
         raise LogError(f"{log.entry.log}: nothing changes in it, so that its clock cannot be told")
@@ -266,10 +282,58 @@ def _values(log: LogStreams, lever: FloatArray) -> FloatArray:
     return present(log.wrench, "wrench").force
 
 
-def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArray]:
+def _best_lag(
+    log: LogStreams,
+    reference: LogStreams,
+    activities: tuple[_Activity, _Activity],
+    site: Site,
+    markers: Sequence[LogStreams],
+) -> tuple[int, float]:
+    """Return by how many steps the log may begin after the joints, and the correlation.
+
+    Raises
+    ------
+    LogError
+        If several lags explain the log about as well.
+    """
+    ours, theirs = activities
+    begins = theirs.start - ours.start
+    lags, correlations = _best_lags(ours, theirs, log.entry.offset)
+    if len(lags) == 1:
+        return int(lags[0]), float(correlations[0])
+    shifts = begins + lags * ours.step
+    misfit = misfits(log, reference, shifts, site, markers)
+    best = int(np.argmin(misfit))
+    alike = (misfit * _TOLD_APART <= misfit[best]) & (correlations >= correlations[0] - _ALIKE)
+    alike[best] = True
+    if np.count_nonzero(alike) > 1:
+        # Who records starts and stops his instruments together, more or less.
+        middle = 0.5 * (len(theirs.value) - len(ours.value))
+        likely = np.flatnonzero(alike)[np.argsort(np.abs(lags[alike] - middle))][:2]
+        raise LogError(_offsets_alike(log, reference, shifts[likely], correlations[likely]))
+    return int(lags[best]), float(correlations[best])
+
+
+def _offsets_alike(
+    log: LogStreams, reference: LogStreams, shifts: FloatArray, correlations: FloatArray
+) -> str:
+    """Return the refusal of a clock that fits at several offsets."""
+    (one, other), (r_one, r_other) = shifts.tolist(), correlations.tolist()
+    return (
+        f"{log.entry.log}: its clock fits {reference.entry.log} at {one:+.2f} s and at"
+        f" {other:+.2f} s about as well (correlation {r_one:.2f} and {r_other:.2f}), as moves that"
+        " take equally long do: state the right one in the map, to 1 s or so"
+        f' (offset: "{one:.2f} s")'
+    )
+
+
+def _best_lags(
+    ours: _Activity, theirs: _Activity, stated: float | None
+) -> tuple[IndexArray, FloatArray]:
     """Return by how many steps ours may begin after theirs, the best first, and the correlations.
 
-    Each correlation is over the samples that are known in both.
+    Each correlation is over the samples that are known in both. Near an offset that is stated, in
+    s, there is one.
     """
     from scipy.signal import correlate, find_peaks
 
@@ -282,39 +346,16 @@ def _best_lags(ours: _Activity, theirs: _Activity) -> tuple[IndexArray, FloatArr
     enough = overlap >= _LEAST_OVERLAP * min(seen.sum(), there.sum())
     scale = np.sqrt(np.maximum(power_theirs * power_ours, 1e-12))
     correlation = np.where(enough, product / scale, -1.0)
+    if stated is not None:
+        near = np.abs(theirs.start - ours.start + lags * ours.step - stated) <= _NEAR
+        best = np.array([np.argmax(np.where(near, correlation, -1.0))])
+        return lags[best], correlation[best]
     peaks, _ = find_peaks(correlation, distance=max(round(_APART / ours.step), 1))
     peaks = peaks[np.argsort(correlation[peaks])[::-1]][:_MOST_CANDIDATES]
     if not len(peaks):
         peaks = np.array([np.argmax(correlation)])
     peaks = peaks[correlation[peaks] >= correlation[peaks[0]] - _CLOSE]
     return lags[peaks], correlation[peaks]
-
-
-def weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float:
-    """Return the residual of the force while the arm travels, explained by weight alone, in N.
-
-    The model is ``F = A R_base_tcp^T g + b`` with any ``A``, so that the sensor may have any
-    rotation; the median residual is returned.
-    """
-    arm, wrench = reference.arm, log.wrench
-    arm = present(arm, "arm")
-    wrench = present(wrench, "wrench")
-    time, place = arm.time, arm.T_base_tcp[:, :3, 3]
-    speed = np.linalg.norm(np.gradient(place, axis=0), axis=1) / np.maximum(np.gradient(time), 1e-9)
-    own = time[speed > _TRAVELLING] - shift
-    own = own[(own > wrench.time[0]) & (own < wrench.time[-1])]
-    after = np.searchsorted(wrench.time, own)
-    # Across a gap the next sample belongs to another posture.
-    near = wrench.time[after] - own <= _LONGEST_GAP
-    own, after = own[near], after[near]
-    if len(own) < _LEAST_TRAVELLED:
-        return np.inf
-    force = wrench.force[after]
-    down = arm.T_base_tcp[np.searchsorted(time, own + shift).clip(0, len(time) - 1), 2, :3]
-    columns = np.column_stack([down, np.ones(len(down))])
-    known = np.isfinite(force).all(axis=1)
-    left = force[known] - columns[known] @ np.linalg.lstsq(columns[known], force[known])[0]
-    return float(np.median(np.linalg.norm(left, axis=1)))
 
 
 def _stretch_offsets(ours: _Activity, theirs: _Activity, lag: int) -> tuple[FloatArray, FloatArray]:

@@ -40,6 +40,7 @@ from elastocal.cell import (
     RobotEntry,
     SensorLoad,
     SignedForce,
+    SignedTime,
     Tool,
     load_cell,
     mounted_robot,
@@ -162,6 +163,9 @@ class LogEntry(StrictModel):
     """Topic of a recording, or sheet of a workbook."""
     clock: str = ""
     """Logs with the same word share a clock; by default each file has its own."""
+    offset: SignedTime | None = None
+    """What is to be added to its first time to have that of the joints, to 1 s or so; by default
+    it is found by the motion of the cell."""
     time: TimeColumn | None = None
     """Left out where a handshake is the only order."""
     handshake: _ColumnName | None = None

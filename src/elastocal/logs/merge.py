@@ -36,7 +36,8 @@ from elastocal.errors import CompensationError, LogError, present
 from elastocal.files import sha256
 from elastocal.geometry import Payload, Positions, position_mistake
 from elastocal.logs._frames import sensor_doubts
-from elastocal.logs.clocks import ClockFit, align, fit_clock, handshake_spans, weight_misfit
+from elastocal.logs._misfits import weight_misfit
+from elastocal.logs.clocks import ClockFit, align, fit_clock, handshake_spans
 from elastocal.logs.map import LogMap, Site
 from elastocal.logs.plateaus import Plateau, averaged_part, name_loads, number_poses, standing_spans
 from elastocal.logs.streams import LogStreams, Stream, joined_streams, read_streams_of, stream_rows
@@ -88,7 +89,7 @@ _MISFIT = 0.3
 
 
 def stream_doubts(
-    logs: Sequence[LogStreams], clocks: Sequence[ClockFit], lever: FloatArray
+    logs: Sequence[LogStreams], clocks: Sequence[ClockFit], site: Site
 ) -> Iterator[str]:
     """Yield what is odd about streams by the clock of the joints.
 
@@ -98,8 +99,8 @@ def stream_doubts(
         One of them with joints.
     clocks : sequence of ClockFit
         Fits of their clocks to that of the joints.
-    lever : ndarray, shape (3,)
-        Roughly the marker in the tcp frame, in m.
+    site : Site
+        Robot, sensor and marker.
     """
     reference = next(log for log in logs if log.arm is not None)
     for log in logs:
@@ -107,7 +108,7 @@ def stream_doubts(
             yield from _interruption(log, reference)
             yield from _other_run(log, reference, clocks)
         if log.wrench is not None and log is not reference and log.clock == reference.clock:
-            yield from _other_clock(log, reference, lever)
+            yield from _other_clock(log, reference, site)
 
 
 def still_columns(logs: Sequence[LogStreams], robot: Robot) -> Iterator[str]:
@@ -198,10 +199,10 @@ def _other_run(log: LogStreams, reference: LogStreams, clocks: Sequence[ClockFit
         )
 
 
-def _other_clock(log: LogStreams, reference: LogStreams, lever: FloatArray) -> Iterator[str]:
+def _other_clock(log: LogStreams, reference: LogStreams, site: Site) -> Iterator[str]:
     """Yield by how much clocks are apart that the map says are one."""
     try:
-        offset = fit_clock(log, reference, lever).offset
+        offset = fit_clock(log, reference, site).offset
     except LogError:
         return
     now, then = (weight_misfit(log, reference, each) for each in (0.0, offset))
@@ -390,7 +391,7 @@ def import_streams(
     progress("clocks", 1, 4)
     still = tuple(still_columns(logs, site.robot))
     try:
-        logs, clocks = align(logs, site.marker)
+        logs, clocks = align(logs, site)
     except LogError as error:
         raise LogError(f"{still[0]} ({error})") if still else error from error
     streams = merged(logs, site)
@@ -409,7 +410,7 @@ def import_streams(
     astray = () if still else tuple(marker_contradictions(streams, spans, site))
     judged = None if still or astray else postures
     sensor = () if judged is None else tuple(sensor_contradictions(judged, site))
-    doubts = (*still, *astray, *sensor, *stream_doubts(logs, clocks, site.marker))
+    doubts = (*still, *astray, *sensor, *stream_doubts(logs, clocks, site))
     try:
         judge = not (still or sensor)
         found = _imported(streams, at_rest, log_map, site, files, postures, judge, progress)

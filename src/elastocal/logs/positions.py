@@ -118,7 +118,7 @@ def import_positions(
         )
     progress("clocks", 1, 3)
     still = tuple(still_columns(logs, site.robot))
-    logs, clocks = align(logs, site.marker)
+    logs, clocks = align(logs, site)
     progress("plateaus", 2, 3)
     streams = merged(logs, site)
     by_word = next((log for log in logs if log.arm is not None and log.handshake), None)
@@ -147,7 +147,7 @@ def import_positions(
         pose=np.array(pose),
         clocks=clocks,
         plateaus=len(at_rest.bare),
-        warnings=(*still, *astray, *stream_doubts(logs, clocks, site.marker)),
+        warnings=(*still, *astray, *stream_doubts(logs, clocks, site)),
     )
 
 

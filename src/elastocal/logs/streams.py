@@ -3,6 +3,7 @@
 import fnmatch
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
@@ -22,6 +23,8 @@ from elastocal.units import factor
 _WORKBOOKS = (".xlsx", ".xlsm")
 _NO_READING = ("", "0", "nan", "none", "false")
 """Words of a handshake column between readings."""
+_EARLIEST_DATE = 3e8
+"""Seconds since 1970 from which on a time is a date: mid 1979. No device runs for as long."""
 _BEYOND_LIMITS = 0.2
 """Share of a joint's travel by which a log may be outside its limits."""
 _K = 2.0
@@ -159,12 +162,7 @@ def _streams(entry: LogEntry, tables: Sequence[LogTable], robot: Robot) -> LogSt
 def _stream(entry: LogEntry, table: LogTable, robot: Robot) -> LogStreams:
     if not len(table):
         raise LogError(f"{table.name}: there are no rows in it")
-    if entry.time is None:
-        time = np.arange(len(table), dtype=float)
-    elif entry.time.unit is None:
-        time = table.seconds(entry.time.column)
-    else:
-        time = table.numbers(entry.time.column) * factor(entry.time.unit, "time")
+    time = _time(entry, table)
     words = None
     if entry.handshake is not None:
         texts = table.texts(entry.handshake)
@@ -179,6 +177,39 @@ def _stream(entry: LogEntry, table: LogTable, robot: Robot) -> LogStreams:
         _wrench(entry, table, time) if entry.force else None,
         *(_points(entry, table, time) if entry.markers else (None, None)),
     )
+
+
+def _time(entry: LogEntry, table: LogTable) -> FloatArray:
+    """Return the time of each row, shape (row,), in s; its number where there is none."""
+    if entry.time is None:
+        return np.arange(len(table), dtype=float)
+    if entry.time.unit is None:
+        return table.seconds(entry.time.column)
+    return table.numbers(entry.time.column) * factor(entry.time.unit, "time")
+
+
+def days_of(log_map: LogMap, files: Sequence[Path]) -> str | None:
+    """Return the day on which the joints were logged, of several the first and the last.
+
+    As ISO 8601 has it, ``2026-11-27`` or ``2026-11-27/2026-11-28``, by the clock of the log. None
+    where its times are no dates.
+
+    Raises
+    ------
+    LogError
+        If the log of the joints cannot be read as the map says.
+    FileAccessError
+        If a file cannot be read.
+    """
+    entry = next(each for each in log_map.logs if each.joints)
+    own = [path for path in files if _is_named(path, entry.log)]
+    times = [_time(entry, read_table(path, entry.topic)) for path in own]
+    seconds = [float(each) for time in times if len(time) for each in (time.min(), time.max())]
+    if not seconds or not min(seconds) > _EARLIEST_DATE:
+        return None
+    ends = (min(seconds), max(seconds))
+    days = dict.fromkeys(datetime.fromtimestamp(each, UTC).date().isoformat() for each in ends)
+    return "/".join(days)
 
 
 def _joined(parts: Sequence[LogStreams]) -> LogStreams:

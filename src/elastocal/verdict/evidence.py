@@ -151,6 +151,8 @@ class Evidence:
     journal: tuple[Entry, ...] | None = None
     logs: tuple[Path, ...] = ()
     """Files of imported readings: their map, then the logs; none of those of a run."""
+    measured: str | None = None
+    """Day of imported readings, or the first and the last, where their logs have dates."""
     dataset: Dataset | None = None
     campaigns: tuple[Campaign, ...] = ()
     """Other datasets that the model was made from, beside this one; none where it was made from

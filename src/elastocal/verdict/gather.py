@@ -21,7 +21,7 @@ from elastocal.errors import CodecError, ElastocalError, present
 from elastocal.files import read_text
 from elastocal.identification import CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
-from elastocal.logs import IMPORTED, read_map
+from elastocal.logs import IMPORTED, days_of, read_map
 from elastocal.planning import (
     PLAN,
     POOL,
@@ -161,7 +161,7 @@ def _with_readings(evidence: Evidence, reader: PartReader, options: EvidenceOpti
         reader.note_missing("run", _NO_LOGS)
         return _with_cell(evidence, reader, reader.folders.default(_CELL))
     logs = tuple(path.parent / name for name in stated)
-    evidence = replace(evidence, logs=logs)
+    evidence = replace(evidence, logs=logs, measured=_measured(logs))
     for log in logs:
         if log.exists():
             reader.use(log)
@@ -174,6 +174,14 @@ def _stated_datasets(model: Path) -> list[str]:
         return [Path(name).name for name in read_json(model, CalibrateResult).made_from]
     except ElastocalError:
         return []
+
+
+def _measured(logs: tuple[Path, ...]) -> str | None:
+    """Return the day of imported readings; None where map or log cannot be read."""
+    try:
+        return days_of(read_map(logs[0]), logs[1:])
+    except ElastocalError:
+        return None
 
 
 def _mapped_cell(logs: tuple[Path, ...]) -> Path | None:

@@ -3,6 +3,7 @@
 Asked for are the units that sizes do not tell, then robot, tool, sensor and marker.
 """
 
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -58,7 +59,7 @@ def map_text(logs: Sequence[GuessedLog], site: Mapping[str, str], cell: Path | N
         Cell file that says all of it.
     """
     if cell is not None:
-        return write_guess(logs, [f"cell: {cell}"])
+        return write_guess(logs, [f"cell: {_quoted(cell)}"])
     lines = []
     for key, (blank, what) in _ENTRIES.items():
         left_out = "# " if key == "tool" and key not in site else ""
@@ -139,7 +140,9 @@ class _Asked:
         found: dict[str, str] = {k: said[k] for k in ("tcp", "sensor", "marker") if k in said}
         if "robot" in said:
             flange = said.get("flange", self._flange)
-            found["robot"] = f"{{{said['robot']}{f', flange: {flange}' if flange else ''}}}"
+            found["robot"] = (
+                f"{{{said['robot']}{f', flange: {_quoted(flange)}' if flange else ''}}}"
+            )
         if "mass" in said:
             centre = said.get("centre", _ORIGIN)
             found["tool"] = f'{{mass: "{said["mass"]}", centre_of_mass: {centre}}}'
@@ -187,4 +190,9 @@ class _Asked:
             self._flange = tool_link(urdf)
         self._links = tuple(link.get("name", "") for link in parse_urdf(urdf).findall("link"))
         place = Path(os.path.relpath(path, self._folder)).as_posix()
-        return f"urdf: {place}"
+        return f"urdf: {_quoted(place)}"
+
+
+def _quoted(text: object) -> str:
+    """Return a text as YAML, as it is in JSON: it may hold blanks, commas and number signs."""
+    return json.dumps(str(text), ensure_ascii=False)

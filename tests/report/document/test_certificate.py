@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from openpyxl import load_workbook
 
+from elastocal.blocks import Stamp
 from elastocal.report import language_of
 from elastocal.report.document import section_blocks, write_workbook
 from elastocal.report.document.certificate import _scale, certificate_of_evidence
@@ -45,6 +46,15 @@ def test_what_is_stated_stands_there_and_the_rest_is_said_to_be_missing_in_one_l
     assert rows["Tracker"] == ["serial 750123"]
     assert "Place" not in rows
     assert "Tracker (type, calibration certificate), Place" in certificate.not_entered
+
+
+@pytest.mark.parametrize("stated", [{}, {"date": "1999-01-01"}])
+def test_the_date_is_that_of_imported_logs(stated):
+    logs = Evidence(made=MADE, measured="2026-11-27", stated=stated)
+    found = certificate_of_evidence(logs, judge_evidence(logs))
+    rows = {str(name): parts for name, parts in found.identity}
+    assert rows["Date of the measurement"] == (Stamp("2026-11-27"),)
+    assert "Date" not in found.not_entered
 
 
 def test_the_picture_names_the_reading_with_the_largest_error(certificate, parts):

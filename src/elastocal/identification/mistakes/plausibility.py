@@ -32,8 +32,8 @@ _RATIO, _RATIO_SPREAD = np.log(1.3), np.log(2.0)
 """Logarithm of the measured deflection over the rule's, and its spread over arms."""
 _SHARE, _SHARE_SPREAD = np.log(0.2), np.log(2.2)
 """The same of the part of its torques that a campaign loads an arm with."""
-_TOO_MUCH = 1.5
-"""Share of its torques that no arm carries."""
+_TOO_MUCH, _FAR_TOO_MUCH = 1.5, 10.0
+"""Share of its torques that no arm carries: of those of its URDF, and by a rule of thumb."""
 _LIKELIER = 3.5
 """Increase of twice the log-likelihood from which a wrong unit is suspected."""
 _FORCE_UNITS = (
@@ -44,6 +44,8 @@ _FORCE_UNITS = (
 _WEIGHTS = 1.6
 _REACHES = 40.0
 """In N·m per m to the fifth."""
+_SHORTEST, _LONGEST = 1.4, 3.6
+"""Reach of the arms for which this holds, in m."""
 
 
 UNIT_OF_FORCE = Kind(
@@ -90,7 +92,7 @@ def find_wrong_units(
         likeliest = units[:2] if likelier["kN"] < likelier["lbf"] else units[-1:]
         yield UNIT_OF_FORCE(unit=" or ".join(likeliest), share=share, times=ratio)
         return
-    if share > _TOO_MUCH:
+    if share > (_TOO_MUCH if _states_torques(robot) else _FAR_TOO_MUCH):
         yield COUNTS(share=share)
         return
     for word, k in (
@@ -123,24 +125,33 @@ def _sizes(
 
 
 def usual_torques(robot: Robot) -> FloatArray | None:
-    """Return the torque that each joint may use, shape (joint,), in N·m; None for small arms.
+    """Return the torque that each joint may use, shape (joint,), in N·m; None where none is known.
 
     As the URDF says it; else 1.6 times the largest torque of the arm's own weight about its second
     joint, which is what 17 arms of the catalogue have within 1.1 to 2.7; else by the reach to its
-    fifth power, which holds for arms of 1.4 to 3.6 m.
+    fifth power, which holds for arms of 1.4 to 3.6 m: nothing is known of others.
     """
     first, count = robot.external_axes, len(robot.joint_names)
-    known = np.nan_to_num(robot.limits.effort)
-    arm = known[first:]
+    arm = robot.limits.effort[first:]
     if len(arm) != len(_TORQUES):
         return None
+    if not _states_torques(robot):
+        shoulder = _shoulder_torque(robot)
+        if shoulder is None:
+            return None
+        arm = _TORQUES * shoulder
     torque = np.full(count, np.inf)
-    torque[first:] = arm if np.all(arm > 0.0) else _TORQUES * _shoulder_torque(robot)
+    torque[first:] = arm
     return torque
 
 
-def _shoulder_torque(robot: Robot) -> float:
-    """Return the torque that the second joint of an arm may use, in N·m."""
+def _states_torques(robot: Robot) -> bool:
+    """Return whether the URDF states the torque of each joint of the arm."""
+    return bool(np.isfinite(robot.limits.effort[robot.external_axes :]).all())
+
+
+def _shoulder_torque(robot: Robot) -> float | None:
+    """Return the torque that the second joint of an arm may use, in N·m; None if unknown."""
     first = robot.external_axes
     if robot.has_masses:
         turns = np.linspace(-np.pi, np.pi, 13)
@@ -150,7 +161,8 @@ def _shoulder_torque(robot: Robot) -> float:
         if held > 0.0:
             return _WEIGHTS * held
     lengths = [np.linalg.norm(each.placement[:3, 3]) for each in robot.chain.joints[first + 1 :]]
-    return _REACHES * float(sum(lengths)) ** 5
+    reach = float(sum(lengths))
+    return _REACHES * reach**5 if _SHORTEST <= reach <= _LONGEST else None
 
 
 _DEAD = 5e-3

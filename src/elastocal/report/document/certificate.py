@@ -167,7 +167,8 @@ def _identity(evidence: Evidence) -> tuple[tuple[_Row, ...], list[Phrase]]:
         names = sentences(lacking, ", ")
         missing += [phrase("{thing} ({names})", thing=name, names=names)] if lacking else []
     record = evidence.run_record
-    began = None if record is None else Stamp(record.started)
+    measured = evidence.measured if record is None else record.started
+    began = None if measured is None else Stamp(measured)
     day = (
         phrase("Date of the simulated run")
         if evidence.simulated
