@@ -299,7 +299,7 @@ def _best_lag(
     ours, theirs = activities
     begins = theirs.start - ours.start
     lags, correlations = _best_lags(ours, theirs, log.entry.offset)
-    if len(lags) == 1:
+    if len(lags) == 1 or not correlations[0] >= _LEAST_CORRELATION:
         return int(lags[0]), float(correlations[0])
     shifts = begins + lags * ours.step
     misfit = misfits(log, reference, shifts, site, markers)

@@ -164,8 +164,8 @@ class LogEntry(StrictModel):
     clock: str = ""
     """Logs with the same word share a clock; by default each file has its own."""
     offset: SignedTime | None = None
-    """What is to be added to its first time to have that of the joints, to 1 s or so; by default
-    it is found by the motion of the cell."""
+    """What is to be added to its times to have those of the joints, to 1 s or so; by default it is
+    found by the motion of the cell."""
     time: TimeColumn | None = None
     """Left out where a handshake is the only order."""
     handshake: _ColumnName | None = None
