@@ -301,7 +301,7 @@ def _best_lag(
     lags, correlations = _best_lags(ours, theirs, log.entry.offset)
     if len(lags) == 1 or not correlations[0] >= _LEAST_CORRELATION:
         return int(lags[0]), float(correlations[0])
-    shifts = begins + lags * ours.step
+    shifts = np.asarray(begins + lags * ours.step, dtype=np.float64)
     misfit = misfits(log, reference, shifts, site, markers)
     best = int(np.argmin(misfit))
     alike = (misfit * _TOLD_APART <= misfit[best]) & (correlations >= correlations[0] - _ALIKE)
