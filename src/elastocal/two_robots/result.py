@@ -174,11 +174,11 @@ class PairResult(Result):
     def _unseen(self) -> Iterator[Block]:
         """Yield the combinations that presses or noise leave open: of both arms, then of each."""
         for arm in ("", *(each.name for each in self.arms)):
-            own = [
+            unobservable, hidden = (
                 [group for group in groups if _arm_of(group) == arm]
                 for groups in (self.unobservable, self.hidden)
-            ]
-            lines = tuple(_lines(*own, prefix=f"{arm}:" if arm else ""))
+            )
+            lines = tuple(_lines(unobservable, hidden, f"{arm}:" if arm else ""))
             if lines:
                 alone = (
                     phrase("Of {arm} alone", arm=arm) if arm else phrase("Of both arms together")
