@@ -1,6 +1,7 @@
 from .scene import (
     Dots as Dots,
     Layer as Layer,
+    RobotSolids as RobotSolids,
     Scene as Scene,
     Strokes as Strokes,
     Tags as Tags,
@@ -10,4 +11,5 @@ from .scene import (
     packed_places as packed_places,
     robot_solids as robot_solids,
     scene_data as scene_data,
+    triangles_of as triangles_of,
 )

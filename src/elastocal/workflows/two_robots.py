@@ -97,8 +97,6 @@ def plan_pair(settings: PlanPairSettings, progress: Progress) -> PairPlan:  # no
         If the arms meet at too few places.
     ReportError
         If the page knows no such language.
-    RobotError
-        If the description of a robot has no collision shapes, which are what the page draws.
     FileAccessError
         If a file cannot be read or written.
 

@@ -8,15 +8,26 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.arrays import FloatArray
+from elastocal.errors import RobotError
 from elastocal.files import write_text
 from elastocal.planning import CollisionScene
 from elastocal.report.language import ENGLISH, Language
 from elastocal.report.pages.templating import render
 from elastocal.report.plots import style
 from elastocal.robot import Robot, inverse_transform
-from elastocal.shapes import Body, Cylinder
+from elastocal.shapes import Body, Cylinder, Sphere
 from elastocal.two_robots import PairCell, PairPlan
-from elastocal.viewer import Layer, Strokes, Tags, arms_scene, packed, robot_solids, scene_data
+from elastocal.viewer import (
+    Layer,
+    RobotSolids,
+    Strokes,
+    Tags,
+    arms_scene,
+    packed,
+    robot_solids,
+    scene_data,
+    triangles_of,
+)
 from elastocal.wording import millimetres, phrase
 
 _ROD = 0.02
@@ -39,14 +50,12 @@ def write_pair_plan_page(
 
     Raises
     ------
-    RobotError
-        If the description of a robot has no collision shapes, which are what is drawn.
     FileAccessError
         If the page cannot be written.
     """
     bases = np.eye(4), cell.T_first_second
     arms = [
-        (name, robot_solids(_collisions(robot, entry.tcp.T), q[[0, *range(len(q))]]), T)
+        (name, _solids(robot, entry.tcp.T, q[[0, *range(len(q))]]), T)
         for name, robot, entry, q, T in zip(
             cell.arms, cell.robots, cell.file.robots, plan.q(), bases, strict=True
         )
@@ -90,23 +99,29 @@ def write_pair_plan_page(
     return Path(path)
 
 
-def _collisions(robot: Robot, T_flange_tcp: FloatArray) -> CollisionScene:
-    """Return an arm with a rod from its flange to its tip."""
-    return CollisionScene(robot, _rods(T_flange_tcp), ())
+def _solids(robot: Robot, T_flange_tcp: FloatArray, q: FloatArray) -> RobotSolids:
+    """Return an arm with its tool at postures; the tool alone where the arm has no shapes."""
+    tool = _tool(T_flange_tcp)
+    try:
+        return robot_solids(CollisionScene(robot, (tool,), ()), q)
+    except RobotError:
+        places = (robot.forward(q) @ tool.T_frame_body)[:, None]
+        note = phrase("An arm whose description has no collision shapes is drawn as its tool.")
+        return RobotSolids((triangles_of(tool.solid),), 0, places, note)
 
 
-def _rods(T_flange_tcp: FloatArray) -> tuple[Body, ...]:
-    """Return the rod from flange to tip in the tcp frame; none where the tip is at the flange."""
+def _tool(T_flange_tcp: FloatArray) -> Body:
+    """Return the rod from flange to tip in the tcp frame; a ball where the tip is at the flange."""
     flange = inverse_transform(T_flange_tcp)[:3, 3]
     length = float(np.linalg.norm(flange))
     if not length > _ROD:
-        return ()
+        return Body("tool", Sphere(_ROD), np.eye(4))
     T, z = np.eye(4), flange / length
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
     x /= np.linalg.norm(x)
     T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
     T[:3, 3] = 0.5 * flange
-    return (Body("tool", Cylinder(_ROD, length), T),)
+    return Body("tool", Cylinder(_ROD, length), T)
 
 
 def _volume(cell: PairCell) -> Strokes:
