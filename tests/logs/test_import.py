@@ -331,11 +331,11 @@ def test_another_robot_forgets_the_link_of_the_first_and_a_refused_one_keeps_it(
         text = ec.guess_map(files, out=tmp_path / "map.yaml", force=True, ask=lambda _: next(said))
         return yaml.safe_load(text.text)["robot"]
 
-    first = {"urdf": urdf.name, "flange": "tool0"}
-    assert robot(str(urdf), "tool0", "skip") == first
-    assert robot(str(urdf), "tool0", "back", "back", "none.urdf", "r" * 3000, "skip") == first
-    assert robot(str(urdf), "tool0", "back", "back", "UR20", "skip") == {"model": "UR20"}
-    assert robot(str(urdf), "tool0", "back", "back", "", "skip") == {"model": "?"}
+    first = {"urdf": urdf.name, "flange": "link_5"}
+    assert robot(str(urdf), "link_5", "skip") == first
+    assert robot(str(urdf), "link_5", "back", "back", "none.urdf", "r" * 3000, "skip") == first
+    assert robot(str(urdf), "link_5", "back", "back", "UR20", "skip") == {"model": "UR20"}
+    assert robot(str(urdf), "link_5", "back", "back", "", "skip") == {"model": "?"}
 
 
 def test_a_unit_of_joints_and_a_mass_are_asked_again_until_they_are_one(tmp_path):
