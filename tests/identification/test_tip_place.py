@@ -107,8 +107,13 @@ def test_a_model_file_keeps_where_the_draws_have_the_tip(tmp_path):
     write_json(tmp_path / "model.json", calibrated())
     read = read_json(tmp_path / "model.json", CalibrateResult)
     np.testing.assert_array_equal(read.tip, calibrated().tip)
-    with pytest.raises(SchemaError, match="a place for each of the draws"):
+    with pytest.raises(SchemaError, match=r"tip \(\d+, 3\) must be \(\d+, 3\): one a draw"):
         replace(calibrated(), tip=calibrated().tip[1:])
+    with pytest.raises(SchemaError, match="tip is nan m: it must be finite"):
+        replace(calibrated(), tip=np.full_like(calibrated().tip, np.nan))
+    for rows in (calibrated().draws[:1], calibrated().draws[:0]):
+        with pytest.raises(SchemaError, match=f"{len(rows)} spring_draws: as many as draws"):
+            replace(calibrated(), spring_draws=rows)
 
 
 def test_a_report_makes_the_same_fit_again():

@@ -322,6 +322,42 @@ def test_a_urdf_is_named_beside_the_map_with_its_link(rows, tmp_path):
     assert robot == {"urdf": "../arms: old, # 2/own arm.urdf", "flange": "flange"}
 
 
+def test_another_robot_forgets_the_link_of_the_first_and_a_refused_one_keeps_it(rows, tmp_path):
+    files = write_logs(_short(rows), tmp_path)
+    urdf = tmp_path / "own, {2}.urdf"
+    urdf.write_text(catalogue.urdf("UR10e"), encoding="utf-8")
+
+    def robot(*answers: str) -> dict[str, str]:
+        said = iter(["kN", "N*mm", *answers])
+        text = ec.guess_map(files, out=tmp_path / "map.yaml", force=True, ask=lambda _: next(said))
+        return yaml.safe_load(text.text)["robot"]
+
+    first = {"urdf": urdf.name, "flange": "link_5"}
+    assert robot(str(urdf), "link_5", "skip") == first
+    assert robot(str(urdf), "link_5", "back", "back", "none.urdf", "r" * 3000, "skip") == first
+    assert robot(str(urdf), "link_5", "back", "back", "UR20", "skip") == {"model": "UR20"}
+    assert robot(str(urdf), "link_5", "back", "back", "", "skip") == {"model": "?"}
+
+
+def test_a_unit_of_joints_and_a_mass_are_asked_again_until_they_are_one(tmp_path):
+    log, questions = tmp_path / "trace.csv", []
+    head = "time[s]," + ",".join(f"J{n}" for n in range(1, 7))
+    lines = (f"{0.1 * k:.1f},{4 + 0.1 * k:.1f},2,3,4,5,6" for k in range(9))
+    log.write_text("\n".join([head, *lines]), encoding="utf-8")
+    answers = iter(["N", "deg", "", "", "-5 kg", "skip"])
+
+    def ask(question: str) -> str:
+        questions.append(question)
+        return next(answers)
+
+    text = ec.guess_map([log], ask=ask).text
+    assert "unit: deg}" in text
+    assert "# tool:" in text
+    refused = [each.splitlines()[0] for each in questions if each.startswith("   ")]
+    assert refused[0].startswith("   unit 'N' is not an angle: allowed are")
+    assert "must not be negative" in refused[1]
+
+
 def test_what_a_guessed_map_leaves_open_is_refused_with_what_to_write(rows, tmp_path):
     files = write_logs(_short(rows), tmp_path)
     path = tmp_path / "map.yaml"

@@ -460,7 +460,7 @@ class _Import:
 def _import(given: Given) -> None:
     asked, here = given.settings, given.here
     if here["guess"]:
-        ask = _ask if sys.stdin.isatty() else None
+        ask = _ask if sys.stdin.isatty() and not given.as_json else None
         settings = workflows.GuessMapSettings(
             asked["logs"], out=here["map"], cell=here["cell"], force=asked["force"], ask=ask
         )

@@ -124,12 +124,16 @@ class CalibrateResult(Result):
             raise SchemaError(f"{len(self.draws)} draws, at least {MINIMUM_DRAWS} are needed")
         numbers = {"compliance": self.compliance[None], "draws": self.draws}
         numbers |= {} if self.spring_draws is None else {"spring_draws": self.spring_draws}
+        if self.spring_draws is not None and len(self.spring_draws) != len(self.draws):
+            raise SchemaError(
+                f"{len(self.spring_draws)} spring_draws: as many as draws ({len(self.draws)}) are"
+                " needed"
+            )
         for name, rows in numbers.items():
             if rows.ndim != 2 or rows.shape[1] != n:
                 raise SchemaError(f"{name} must have one number for each of {n} parameters")
             require_possible([p for s in self.springs for p in s.parameters], rows, name)
-        if self.tip is not None and self.tip.shape != (len(self.draws), 3):
-            raise SchemaError(f"tip {self.tip.shape} must have a place for each of the draws")
+        self._require_tip()
         gravity = impossible("acceleration", *(self.robot.gravity or ()))
         if gravity is not None:
             raise SchemaError(f"robot.gravity is {gravity}")
@@ -179,6 +183,16 @@ class CalibrateResult(Result):
             spring_draws=calibrated.spring_draws,
             tip=calibrated.tip,
         )
+
+    def _require_tip(self) -> None:
+        """Refuse places of the tip that are not those of the draws, or no tool's."""
+        if self.tip is None:
+            return
+        if self.tip.shape != (len(self.draws), 3):
+            raise SchemaError(f"tip {self.tip.shape} must be {(len(self.draws), 3)}: one a draw")
+        wrong = impossible("length", *self.tip.ravel().tolist())
+        if wrong is not None:
+            raise SchemaError(f"tip is {wrong}")
 
     @cached_property
     def calibrated(self) -> CalibratedModel:

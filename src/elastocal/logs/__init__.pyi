@@ -4,6 +4,7 @@ from .clocks import (
 from .guess import (
     GuessedLog as GuessedLog,
     guess_logs as guess_logs,
+    quoted as quoted,
     write_guess as write_guess,
 )
 from .map import (

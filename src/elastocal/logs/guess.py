@@ -104,12 +104,12 @@ class GuessedColumns:
     @property
     def yaml(self) -> str:
         """The columns as the map has them."""
-        names = ", ".join(_quoted(name) for name in self.columns)
+        names = ", ".join(quoted(name) for name in self.columns)
         if self.key == "handshake":
             return names
         if self.key == "pose.quaternion":
             return f"[{names}]"
-        unit = "" if self.unit is None else f", unit: {_quoted(self.unit)}"
+        unit = "" if self.unit is None else f", unit: {quoted(self.unit)}"
         if self.key == "time":
             return f"{{column: {names}{unit}}}"
         counts = "" if self.counts == 1.0 else f", counts: {self.counts:.9g}"
@@ -129,8 +129,8 @@ class GuessedLog:
 
     def lines(self) -> list[str]:
         """Return its entry of the map, with the reasons as comments."""
-        topic = [] if self.topic is None else [f"    topic: {_quoted(self.topic)}"]
-        found = [f"  - log: {_quoted(self.log)}", *topic]
+        topic = [] if self.topic is None else [f"    topic: {quoted(self.topic)}"]
+        found = [f"  - log: {quoted(self.log)}", *topic]
         for key in ("time", "handshake", "joints", "pose", "force", "moment", "markers"):
             own = [each for each in self.columns if each.key.split(".")[0] == key]
             if key in ("joints", "markers") and own:
@@ -530,9 +530,14 @@ def _time_unit(table: LogTable, name: str) -> tuple[str | None, str]:
     return unit, f"steps of {step:.4g}"
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """Return a text as one value of YAML, inside braces too.
+
+    >>> quoted("../arms/own.urdf"), quoted("a, b.urdf")
+    ('../arms/own.urdf', "'a, b.urdf'")
+    """
     return (
         text
-        if re.fullmatch(r"[A-Za-z_][\w./-]*|\d+", text)
+        if re.fullmatch(r"(?:\.\.?/)*[A-Za-z_][\w./-]*|\d+", text)
         else "'" + text.replace("'", "''") + "'"
     )

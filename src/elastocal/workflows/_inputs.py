@@ -508,12 +508,12 @@ def _find_urdf(robot: str | None, dataset: Dataset | None) -> tuple[str, Path | 
             )
         return dataset.robot_urdf, None
     path = Path(robot)
-    if path.suffix.lower() in ROBOT_SUFFIXES or _is_file(path):
+    if path.suffix.lower() in ROBOT_SUFFIXES or is_file(path):
         return read_urdf(path), path
     return catalogue.urdf(robot), None
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
     try:
         return path.is_file()
     except OSError:  # a name that is too long for a file

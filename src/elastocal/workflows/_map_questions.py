@@ -10,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from elastocal.asking import HELP, ask_in_turn
-from elastocal.errors import ElastocalError, RobotError
-from elastocal.logs import UNKNOWN, GuessedLog, write_guess
+from elastocal.errors import ElastocalError, RobotError, UnitError
+from elastocal.logs import UNKNOWN, GuessedLog, quoted, write_guess
 from elastocal.robot import catalogue, parse_urdf, read_urdf, refusals_naming, tool_link
-from elastocal.units import factor, parse_point, parse_quantity
+from elastocal.units import dimension_of_unit, factor, impossible, parse_point, parse_quantity
 from elastocal.wording import listed
-from elastocal.workflows._inputs import ROBOT_SUFFIXES, parse_frame
+from elastocal.workflows._inputs import ROBOT_SUFFIXES, is_file, parse_frame
 
 _ORIGIN = '["0 mm", "0 mm", "0 mm"]'
 _ENTRIES = {
@@ -37,13 +37,12 @@ _QUESTIONS = {
 }
 """Questions in their order."""
 
-
 _THREE = '["{}", "{}", "{}"]'
 _DIMENSIONS = {
     "time": "time", "force": "force", "moment": "moment", "markers": "length",
     "pose.position": "length", "pose.angles": "angle",
 }  # fmt: skip
-"""Dimension of columns by their key in a map; those of joints may be lengths."""
+"""Dimension of columns by their key in a map; those of joints are angles or lengths."""
 
 
 def map_text(logs: Sequence[GuessedLog], site: Mapping[str, str], cell: Path | None) -> str:
@@ -108,6 +107,7 @@ class _Asked:
         self._said = dict[str, str]()
         self._links: tuple[str, ...] = ()
         self._flange = ""
+        """Link that carries the tool by the URDF that was given; empty: there is none."""
 
     def put(self, question: _Question) -> str | None:
         if isinstance(question, str):
@@ -124,12 +124,12 @@ class _Asked:
     def take(self, question: _Question, answer: str) -> None:
         if not isinstance(question, str):
             self._take_unit(*question, answer)
+        elif question == "robot":
+            self._take_robot(answer)
         elif answer:
             self._said[question] = self._read(question, answer)
         else:
             self._said.pop(question, None)
-            if question == "robot":
-                self._flange = ""
 
     def refuse(self, error: ElastocalError) -> None:
         self._before = f"   {error}\n"
@@ -138,11 +138,10 @@ class _Asked:
         """Return the entries of the map that were answered."""
         said = self._said
         found: dict[str, str] = {k: said[k] for k in ("tcp", "sensor", "marker") if k in said}
-        if "robot" in said:
+        if said.get("robot"):
             flange = said.get("flange", self._flange)
-            found["robot"] = (
-                f"{{{said['robot']}{f', flange: {_quoted(flange)}' if flange else ''}}}"
-            )
+            link = f", flange: {quoted(flange)}" if flange else ""
+            found["robot"] = f"{{{said['robot']}{link}}}"
         if "mass" in said:
             centre = said.get("centre", _ORIGIN)
             found["tool"] = f'{{mass: "{said["mass"]}", centre_of_mass: {centre}}}'
@@ -156,21 +155,22 @@ class _Asked:
     def _take_unit(self, number: int, place: int, answer: str) -> None:
         log = self.logs[number]
         columns = list(log.columns)
-        if answer and (dimension := _DIMENSIONS.get(columns[place].key)):
-            factor(answer, dimension)
+        if answer:
+            of_joint = "length" if dimension_of_unit(answer) == "length" else "angle"
+            factor(answer, _DIMENSIONS.get(columns[place].key, of_joint))
         columns[place] = replace(columns[place], unit=answer or UNKNOWN)
         self.logs[number] = replace(log, columns=tuple(columns))
 
     def _read(self, key: str, answer: str) -> str:
         """Return an answer as the map has it."""
-        if key == "robot":
-            return self._robot(answer)
         if key == "flange":
             if answer not in self._links:
                 raise RobotError(f"the robot has no link {answer!r} (links: {listed(self._links)})")
             return answer
         if key == "mass":
-            parse_quantity(answer, "mass")
+            wrong = impossible("mass", parse_quantity(answer, "mass"))
+            if wrong is not None:
+                raise UnitError(f"the mass is {wrong}")
             return answer
         parts = [part.strip() for part in answer.split(",")]
         if key in ("centre", "marker") or len(parts) == 3:
@@ -180,19 +180,16 @@ class _Asked:
         parse_frame(answer, rule="must be three lengths, or three lengths and three angles")
         return f"{{xyz: {_THREE.format(*parts[:3])}, abc: {_THREE.format(*parts[3:])}}}"
 
-    def _robot(self, answer: str) -> str:
-        self._links, self._flange = (), ""
-        path = Path(answer)
-        if path.suffix.lower() not in ROBOT_SUFFIXES and not path.is_file():
-            return f'model: "{catalogue.entry(answer).name}"'
-        urdf = read_urdf(path)
-        with refusals_naming(path):
-            self._flange = tool_link(urdf)
-        self._links = tuple(link.get("name", "") for link in parse_urdf(urdf).findall("link"))
-        place = Path(os.path.relpath(path, self._folder)).as_posix()
-        return f"urdf: {_quoted(place)}"
-
-
-def _quoted(text: object) -> str:
-    """Return a text as YAML, as it is in JSON: it may hold blanks, commas and number signs."""
-    return json.dumps(str(text), ensure_ascii=False)
+    def _take_robot(self, answer: str) -> None:
+        """Take a robot, or none; the link that carried the tool of another one is forgotten."""
+        path, entry, flange, links = Path(answer), "", "", tuple[str, ...]()
+        if path.suffix.lower() in ROBOT_SUFFIXES or is_file(path):
+            urdf = read_urdf(path)
+            with refusals_naming(path):
+                flange = tool_link(urdf)
+            links = tuple(link.get("name", "") for link in parse_urdf(urdf).findall("link"))
+            entry = f"urdf: {quoted(Path(os.path.relpath(path, self._folder)).as_posix())}"
+        elif answer:
+            entry = f'model: "{catalogue.entry(answer).name}"'
+        self._said.pop("flange", None)
+        self._said["robot"], self._flange, self._links = entry, flange, links
