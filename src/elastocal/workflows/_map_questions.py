@@ -3,7 +3,6 @@
 Asked for are the units that sizes do not tell, then robot, tool, sensor and marker.
 """
 
-import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -58,7 +57,7 @@ def map_text(logs: Sequence[GuessedLog], site: Mapping[str, str], cell: Path | N
         Cell file that says all of it.
     """
     if cell is not None:
-        return write_guess(logs, [f"cell: {_quoted(cell)}"])
+        return write_guess(logs, [f"cell: {quoted(cell)}"])
     lines = []
     for key, (blank, what) in _ENTRIES.items():
         left_out = "# " if key == "tool" and key not in site else ""
