@@ -57,7 +57,7 @@ def map_text(logs: Sequence[GuessedLog], site: Mapping[str, str], cell: Path | N
         Cell file that says all of it.
     """
     if cell is not None:
-        return write_guess(logs, [f"cell: {quoted(cell)}"])
+        return write_guess(logs, [f"cell: {quoted(str(cell))}"])
     lines = []
     for key, (blank, what) in _ENTRIES.items():
         left_out = "# " if key == "tool" and key not in site else ""
