@@ -44,6 +44,8 @@ _TOLD_APART = 0.7
 """Largest misfit of an offset over that of another by which they are told apart."""
 _ALIKE = 0.05
 """Difference of correlations that does not tell offsets apart."""
+_AS_MUCH = 0.8
+"""Part of the time that is common at another offset, from which as much is common."""
 _NEAR = 2.0
 """Distance from the offset of the map within which the best fit is taken, in s."""
 _LEAST_OVERLAP = 0.3
@@ -303,14 +305,18 @@ def _best_lag(
         return int(lags[0]), float(correlations[0])
     shifts = np.asarray(begins + lags * ours.step, dtype=np.float64)
     misfit = misfits(log, reference, shifts, site, markers)
-    best = int(np.argmin(misfit))
-    alike = (misfit * _TOLD_APART <= misfit[best]) & (correlations >= correlations[0] - _ALIKE)
-    alike[best] = True
+    alike = misfit * _TOLD_APART <= np.min(misfit)
+    alike &= correlations >= correlations[0] - _ALIKE
+    alike[np.argmin(misfit)] = True
+    # Fewer presses are explained sooner, so the offset at which more is common goes before.
+    common = np.minimum(len(theirs.value), lags + len(ours.value)) - np.maximum(lags, 0)
+    alike &= common >= _AS_MUCH * np.max(common[alike])
     if np.count_nonzero(alike) > 1:
         # Who records starts and stops his instruments together, more or less.
         middle = 0.5 * (len(theirs.value) - len(ours.value))
         likely = np.flatnonzero(alike)[np.argsort(np.abs(lags[alike] - middle))][:2]
         raise LogError(_offsets_alike(log, reference, shifts[likely], correlations[likely]))
+    best = int(np.argmax(alike))
     return int(lags[best]), float(correlations[best])
 
 
