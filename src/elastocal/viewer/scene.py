@@ -54,6 +54,7 @@ class Solid:
         return Solid(self.vertices @ T[:3, :3].T + T[:3, 3], self.faces)
 
 
+@brief_repr
 @dataclass(frozen=True, eq=False)
 class RobotSolids:
     """Links and tool of a robot, and where they are in some postures."""
