@@ -23,7 +23,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from elastocal.asking import HELP, SKIP, ask_in_turn
+from elastocal.asking import HELP, ask_in_turn
 from elastocal.cell import DeviceReading, read_statements
 from elastocal.cli import output
 from elastocal.errors import ProcedureError
@@ -326,8 +326,7 @@ class TerminalOperator:
 
         def put(name: str) -> str:
             shown = f"{missing.index(name) + 1} of {len(missing)}  {name.replace('.', ', ')}"
-            self._console.print(f"  {shown}: ", end="")
-            return sys.stdin.readline() or SKIP
+            return output.asked(self._console, f"  {shown}")
 
         def take(name: str, answer: str) -> None:
             found.pop(name, None)

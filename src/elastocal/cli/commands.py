@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elastocal import workflows
-from elastocal.asking import SKIP
 from elastocal.cli import output
 from elastocal.cli.generator import Command, Given
 from elastocal.options import CHOICES, Option, settings_class
@@ -485,10 +484,8 @@ def _import(given: Given) -> None:
 
 
 def _ask(question: str) -> str:
-    """Return the answer given on the terminal; the end of input leaves out all that follow."""
-    screen = output.console()
-    screen.print(f"{question}: ", end="", soft_wrap=True, markup=False, highlight=False)
-    return sys.stdin.readline() or SKIP
+    """Return the answer given on the terminal."""
+    return output.asked(output.console(), question)
 
 
 plain("Identify", "tool", _as_file)

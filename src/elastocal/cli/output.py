@@ -17,6 +17,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from elastocal.asking import SKIP
 from elastocal.errors import FileAccessError
 from elastocal.findings import group_alike
 from elastocal.progress import Progress
@@ -79,6 +80,12 @@ def console(**options: Any) -> "Console":
             return shown
 
     return Screen(**{"stderr": True, "highlight": False, "soft_wrap": False, **options})
+
+
+def asked(screen: "Console", question: str) -> str:
+    """Return the answer typed to a question; the end of input leaves out all that follow."""
+    screen.print(f"{question}: ", end="", soft_wrap=True, markup=False, highlight=False)
+    return sys.stdin.readline() or SKIP
 
 
 _PARTS = re.compile(f"([{''.join(_STARTS)}{_END}])")

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import FloatArray, triple
 from elastocal.elastic import ElasticModel, ModelPosture, check_vectors
 from elastocal.errors import RobotError, SpringError
+from elastocal.identification.displacement import slopes_by_shift
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
 from elastocal.identification.encoders import EncoderZero
 from elastocal.identification.extrapolation import CalibratedTorques
@@ -143,8 +144,6 @@ def _new_link(urdf: str) -> str:
     return link
 
 
-_SHIFT = 2e-3
-"""Half the difference of two tips by which a derivative is taken, in m."""
 _CHUNK = 2000
 """Configurations predicted at a time, so that the draws of a long path fit into memory."""
 
@@ -420,17 +419,13 @@ class CalibratedModel:
         """
         R = self.model.robot.forward(posture.q)[:, :3, :3]
         base = np.zeros_like(force) if moment is None else moment
-        found = np.empty((len(force), 3, 3))
-        for axis, step in enumerate(_SHIFT * np.eye(3)):
-            ahead, behind = (
-                self.model.observation_blocks(
-                    posture, force, base + np.cross(R @ by, force), by, friction
-                )
-                @ self.compliance
-                for by in (step, -step)
-            )
-            found[:, :, axis] = (ahead - behind) / (2.0 * _SHIFT)
-        return found
+
+        def displacement(by: FloatArray) -> FloatArray:
+            m = base + np.cross(R @ by, force)
+            blocks = self.model.observation_blocks(posture, force, m, by, friction)
+            return np.asarray(blocks @ self.compliance)
+
+        return slopes_by_shift(displacement)
 
     @cached_property
     def _calibrated_torques(self) -> CalibratedTorques | None:

@@ -359,23 +359,24 @@ def _contact_warnings(found: ContactSummary | None, options: FitOptions) -> list
     ]
 
 
-def _as_of_arms(draws: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:
-    """Return draws no larger than compliances of any arm are.
+def _as_of_arms(problem: Problem, draws: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:
+    """Return draws whose springs are no larger than compliances of any arm are.
 
     A spring that some choice of the poses does not turn takes any value in it.
     """
     dimensions = (present(dimension_of_unit(each.unit.si), "dimension") for each in parameters)
     most = np.array([largest(each)[0] for each in dimensions])
-    return np.clip(draws, -most, most)
+    found = draws.copy()
+    found[:, problem.springs] = np.clip(draws[:, problem.springs], -most, most)
+    return found
 
 
 def _resampled(
     problem: Problem, count: int, rng: Generator, parameters: Sequence[Parameter]
 ) -> FloatArray:
-    """Return the bootstrap draws, their springs no larger than those of any arm."""
+    """Return the bootstrap draws."""
     draws = bootstrap(PoseGrams.of(problem), count, rng, problem.prior_error)
-    draws[:, problem.springs] = _as_of_arms(draws[:, problem.springs], parameters)
-    return draws
+    return _as_of_arms(problem, draws, parameters)
 
 
 def _stretched(
@@ -385,10 +386,8 @@ def _stretched(
     by: float,
     parameters: Sequence[Parameter],
 ) -> FloatArray:
-    """Return draws stretched about the estimate, as `_resampled` made them."""
-    found = widen_draws(problem, compliance, draws, by)
-    found[:, problem.springs] = _as_of_arms(found[:, problem.springs], parameters)
-    return found
+    """Return draws stretched about the estimate."""
+    return _as_of_arms(problem, widen_draws(problem, compliance, draws, by), parameters)
 
 
 def _widening(

@@ -23,6 +23,9 @@ from elastocal.elastic import ElasticModel, ModelPosture
 from elastocal.identification.contact import counts_from_other_stack
 from elastocal.robot import Robot
 
+_SHIFT = 2e-3
+"""Half the difference of two places of the tip by which a derivative is taken, in m."""
+
 _ROUNDS = 3
 """Newton steps to the reference; each squares the error of some millimetres."""
 _DAMPING = 1e-9
@@ -213,3 +216,21 @@ def _visits(readings: Readings) -> Iterator[IndexArray]:
     for each in np.unique(readings.pose):
         rows = np.flatnonzero(pose == each)
         yield rows[np.argsort(order[rows], kind="stable")]
+
+
+def slopes_by_shift(displacement: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return how a displacement changes with a shift of the tip along each axis of the tcp.
+
+    Parameters
+    ----------
+    displacement : callable
+        Returns the displacement at a shift, shape (row, 3), in m.
+
+    Returns
+    -------
+    ndarray, shape (row, 3, 3)
+        In m per m, the axis of the shift last.
+    """
+    steps = _SHIFT * np.eye(3)
+    changes = [displacement(step) - displacement(-step) for step in steps]
+    return np.stack(changes, axis=-1) / (2.0 * _SHIFT)

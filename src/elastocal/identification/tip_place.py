@@ -24,7 +24,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError, present
 from elastocal.identification.contact import Contact, TipPlace, TipShift
-from elastocal.identification.displacement import displacement_blocks
+from elastocal.identification.displacement import displacement_blocks, slopes_by_shift
 from elastocal.identification.knowledge import DriveCompliances, weigh_contact, with_knowledge
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
@@ -33,8 +33,6 @@ from elastocal.identification.solve import solve
 from elastocal.identification.uncertainty import CONFIDENCE, interval
 from elastocal.robot import Robot, fixed_joint_of, with_joint_origins
 
-_STEP = 2e-3
-"""Half the difference of two places by which a derivative is taken, in m."""
 _NORMAL = float(ndtri(0.5 * (1.0 + CONFIDENCE)))
 _STEPS, _SETTLED = 6, 1e-4
 """Most steps, and the length of the last one, in m."""
@@ -131,13 +129,12 @@ def with_tip_open(
     contact = present(options.contact, "contact")
     found = present(contact.tip_found, "tip_found")
     c = solve(problem, options.loss).compliance[problem.springs]
-    columns = np.empty((len(readings), 3, 3))
-    for axis, step in enumerate(_STEP * np.eye(3)):
-        ahead, behind = (
-            displacement_blocks(ElasticModel(_moved(model.robot, by), model.springs), readings) @ c
-            for by in (step, -step)
-        )
-        columns[:, :, axis] = (ahead - behind) / (2.0 * _STEP)
+
+    def displacement(by: FloatArray) -> FloatArray:
+        moved = ElasticModel(_moved(model.robot, by), model.springs)
+        return np.asarray(displacement_blocks(moved, readings) @ c)
+
+    columns = slopes_by_shift(displacement)
     known = TipShift(-np.array(found.place), found.stated, contact.row_noise)
     return problem.with_tip(columns, model.parameters[0].scale, known)
 

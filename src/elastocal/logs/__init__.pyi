@@ -10,6 +10,7 @@ from .guess import (
 from .map import (
     SCHEMA as SCHEMA,
     UNKNOWN as UNKNOWN,
+    LogMap as LogMap,
     read_map as read_map,
     site as site,
 )

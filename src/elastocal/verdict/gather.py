@@ -21,7 +21,7 @@ from elastocal.errors import CodecError, ElastocalError, present
 from elastocal.files import read_text
 from elastocal.identification import CalibrateResult, reproduce_calibration
 from elastocal.identification.recertification import recertify_files
-from elastocal.logs import IMPORTED, days_of, read_map
+from elastocal.logs import IMPORTED, LogMap, days_of, read_map
 from elastocal.planning import (
     PLAN,
     POOL,
@@ -161,11 +161,14 @@ def _with_readings(evidence: Evidence, reader: PartReader, options: EvidenceOpti
         reader.note_missing("run", _NO_LOGS)
         return _with_cell(evidence, reader, reader.folders.default(_CELL))
     logs = tuple(path.parent / name for name in stated)
-    evidence = replace(evidence, logs=logs, measured=_measured(logs))
+    log_map = _map_of(logs)
+    evidence = replace(evidence, logs=logs, measured=_measured(log_map, logs))
     for log in logs:
         if log.exists():
             reader.use(log)
-    return _with_cell(evidence, reader, _mapped_cell(logs) or reader.folders.default(_CELL))
+    cell = None if log_map is None else log_map.cell
+    file = reader.folders.default(_CELL) if cell is None else logs[0].parent / cell
+    return _with_cell(evidence, reader, file)
 
 
 def _stated_datasets(model: Path) -> list[str]:
@@ -176,21 +179,20 @@ def _stated_datasets(model: Path) -> list[str]:
         return []
 
 
-def _measured(logs: tuple[Path, ...]) -> str | None:
+def _map_of(logs: tuple[Path, ...]) -> LogMap | None:
+    """Return the map of some logs; None if it cannot be read."""
+    try:
+        return read_map(logs[0])
+    except ElastocalError:
+        return None
+
+
+def _measured(log_map: LogMap | None, logs: tuple[Path, ...]) -> str | None:
     """Return the day of imported readings; None where map or log cannot be read."""
     try:
-        return days_of(read_map(logs[0]), logs[1:])
+        return None if log_map is None else days_of(log_map, logs[1:])
     except ElastocalError:
         return None
-
-
-def _mapped_cell(logs: tuple[Path, ...]) -> Path | None:
-    """Return the cell file that the map of some logs names."""
-    try:
-        cell = read_map(logs[0]).cell if logs else None
-    except ElastocalError:
-        return None
-    return None if cell is None else logs[0].parent / cell
 
 
 def _with_cell(evidence: Evidence, reader: PartReader, path: Path | None) -> Evidence:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import PathError
 from elastocal.robot import Robot, characteristic_length
 from elastocal.robot.inverse import InverseKinematics
@@ -123,9 +123,7 @@ def joints_along_path(
         external = np.broadcast_to(external, (len(T_base_tcp), robot.external_axes))
         return _followed(solver, T_base_tcp, external, previous, where)
     found = solver.solve_many(T_base_tcp, external)
-    if not found.reachable.all():
-        row = int(np.argmin(found.reachable))
-        raise _unreachable(robot, T_base_tcp[row], where(row))
+    _require_reached(robot, T_base_tcp, found.reachable, where)
     slots = _branches(robot, found.q, previous)
     return _unwound(robot, found.q[np.arange(len(slots)), slots], previous)
 
@@ -158,9 +156,7 @@ def joints_beside(
     """
     q = NumericalInverse(robot).descend(near, T_base_tcp, characteristic_length(robot))
     found = reaches(robot, q, T_base_tcp) & (robot.limits.margin(q) >= -_ON_LIMIT).all(axis=1)
-    if not found.all():
-        row = int(np.argmin(found))
-        raise _unreachable(robot, T_base_tcp[row], where(row))
+    _require_reached(robot, T_base_tcp, found, where)
     return q
 
 
@@ -183,6 +179,15 @@ def _followed(
             q[row] = options[largest_move(solver.robot, options - start).argmin()]
         previous = q[row]
     return q
+
+
+def _require_reached(
+    robot: Robot, T_base_tcp: FloatArray, reached: BoolArray, where: RowName
+) -> None:
+    """Refuse the first pose that is not reached."""
+    if not reached.all():
+        row = int(np.argmin(reached))
+        raise _unreachable(robot, T_base_tcp[row], where(row))
 
 
 def _unreachable(robot: Robot, T_base_tcp: FloatArray, row: str) -> PathError:
