@@ -40,19 +40,8 @@ TOLD = {
 """Of each example: what is looked for in its output, and the range of the number found."""
 
 
-BY_DAY = ("01", "02", "03", "04", "08", "09", "11")
-"""The others are run at night."""
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "path",
-    [
-        pytest.param(each, marks=[] if each.name.startswith(BY_DAY) else [pytest.mark.slow])
-        for each in EXAMPLES
-    ],
-    ids=lambda path: path.name,
-)
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
 def test_an_example_runs_cleanly_and_prints_the_number_that_it_is_about(path, tmp_path):
     here, out, temporary = (tmp_path / name for name in ("here", "out", "temporary"))
     here.mkdir()

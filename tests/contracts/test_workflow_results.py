@@ -28,6 +28,8 @@ from support import (
     two_arms,
 )
 
+pytestmark = pytest.mark.slow
+
 CLASSES = {
     name: getattr(workflows, name)
     for name in dir(workflows)

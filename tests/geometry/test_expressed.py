@@ -17,6 +17,7 @@ from elastocal.geometry.solve import register
 from elastocal.progress import silent
 from elastocal.records import read_json
 from elastocal.robot import Robot
+from support.by_day import some_by_day
 from support.cli import elastocal
 from support.measured_arms import (
     ARMS,
@@ -73,7 +74,7 @@ def hold_the_law(seed: int) -> float:
     return written / nominal
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", some_by_day(range(12)))
 def test_a_written_arm_is_never_worse_than_the_nominal_one(seed):
     hold_the_law(seed)
 
@@ -84,7 +85,7 @@ def test_two_hundred_written_arms_are_never_worse_than_the_nominal_ones():
     print(f"written / nominal: median {np.median(parts):.2f}, worst {parts.max():.2f}")
 
 
-@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("arm", some_by_day(ARMS))
 def test_an_arm_whose_gears_are_bad_is_written_without_what_they_stood_in_for(arm):
     """In a narrow range shifts, zeros and harmonics stand in for one another."""
     measured = measure(

@@ -8,6 +8,7 @@ import pytest
 from elastocal.geometry import GeometryModel, GeometryProblem, geometry_model
 from elastocal.geometry.ladder import climb
 from elastocal.progress import silent
+from support.by_day import some_by_day
 from support.measured_arms import ARMS, MARKERS, Measured, kuka, measure, universal
 
 NOISE = 3e-5
@@ -88,7 +89,7 @@ def test_a_cluster_by_the_sum_of_two_joints_is_named():
     assert "where j2 + j3 is" in said
 
 
-@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("arm", some_by_day(ARMS))
 @pytest.mark.parametrize("markers", [1, 3])
 def test_six_bad_poses_of_twenty_are_found(arm, markers):
     for seed in range(4):

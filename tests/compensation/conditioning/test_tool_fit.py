@@ -38,6 +38,7 @@ def test_without_noise_the_planted_tool_is_found_exactly():
     assert fit.undetermined == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [6, 15])
 def test_intervals_cover_planted_values_about_as_often_as_they_say(count):
     rng = np.random.default_rng(1)

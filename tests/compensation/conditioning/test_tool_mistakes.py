@@ -2,6 +2,7 @@
 
 import pytest
 
+from support.by_day import some_by_day
 from support.mistake_table import rates, tabulate
 from support.tool_mistakes import tool_alarms
 from support.walk_mistakes import WALKS, require_same, require_whole
@@ -22,7 +23,7 @@ REFUSED = (
 WARNED = ("forces in kgf", "contact in every third posture", "bias drifts by 60 N")
 
 
-@pytest.mark.parametrize("name", [*REFUSED, *WARNED])
+@pytest.mark.parametrize("name", some_by_day([*REFUSED, *WARNED]))
 def test_a_mistake_in_postures_is_named_as_the_documentation_shows(name):
     found = require_same("tool", 1, name)
     assert found.named, found.said

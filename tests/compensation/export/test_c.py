@@ -130,7 +130,6 @@ def test_example_robots_one_of_them_on_a_rail(tmp_path, like, count):
     "name",
     [
         "on a rail",
-        "axes between the coordinate axes",
         *(pytest.param(name, marks=pytest.mark.slow) for name in ARMS if name != "on a rail"),
     ],
 )
@@ -163,7 +162,7 @@ def course(rng, joints, count=2000):
     ("frame", "median", "calibrated"),
     [
         pytest.param("base", 3, "hinges", marks=pytest.mark.slow),
-        ("tcp", 1, "hinges"),
+        pytest.param("tcp", 1, "hinges", marks=pytest.mark.slow),
         ({"abc": ["30 deg", "-20 deg", "170 deg"]}, 5, "hinges"),
         ("base", 3, "gears"),
         pytest.param("tcp", 1, "gears", marks=pytest.mark.slow),

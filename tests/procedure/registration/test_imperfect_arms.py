@@ -11,6 +11,7 @@ from elastocal.procedure.registration import Registration, UnloadedReadings, reg
 from elastocal.procedure.registration._fit import fit
 from elastocal.sim import PRESETS
 from elastocal.sim.workcell import CampaignSimulator, ContactPoses
+from support.by_day import some_by_day
 from support.simulated import example_cell, places
 from support.stations import SIGMA, made, station
 
@@ -61,7 +62,7 @@ def odd(found: Registration) -> bool:
     return bool(found.moves or found.blunders)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", some_by_day(PRESETS))
 def test_errors_of_the_arm_are_not_taken_for_a_station_that_moved(preset):
     readings, lever, _ = unloaded(preset, 0)
     found = register(readings, lever)
@@ -70,7 +71,7 @@ def test_errors_of_the_arm_are_not_taken_for_a_station_that_moved(preset):
     assert 0.7 * stops < found.scatter < 2.0 * stops
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", some_by_day(PRESETS))
 def test_a_bump_of_half_a_millimetre_half_way_is_found_and_has_an_interval(preset):
     readings, lever, _ = unloaded(preset, 0)
     found = register(bumped(readings, 15, 0.5e-3, 0), lever)

@@ -9,6 +9,7 @@ from elastocal.dataset import Dataset
 from elastocal.elastic import ElasticModel, layout
 from elastocal.identification import calibrate
 from elastocal.sim.workcell._robot import TrueRobot
+from support.by_day import some_by_day
 from support.simulated import example_cell, places
 
 
@@ -50,7 +51,7 @@ def error(like, springs):
     return calibration.held_out.mean / np.linalg.norm(found.deflection, axis=1).mean()
 
 
-@pytest.mark.parametrize("like", ["afp", "machining"])
+@pytest.mark.parametrize("like", some_by_day(["afp", "machining"]))
 class TestHiddenTruth:
     def test_eighteen_springs_predict_unseen_poses_better_than_six(self, like):
         assert error(like, "bearing") < 0.85 * error(like, "actuated")
