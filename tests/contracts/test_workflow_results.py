@@ -28,8 +28,6 @@ from support import (
     two_arms,
 )
 
-pytestmark = pytest.mark.slow
-
 CLASSES = {
     name: getattr(workflows, name)
     for name in dir(workflows)
