@@ -58,8 +58,8 @@ _NOISE = re.compile(
 
 _LINKS = re.compile(r"^(whole|broken|not signed|not verifiable) +[^:\n]+: .*\n", re.M)
 """What verify prints before its reason: a line a link."""
-_QUESTION = re.compile(r"^.*\n(?=elastocal: nobody answers)")
-"""What new prints before its reason, where it asks."""
+_QUESTION = re.compile(r"\A(?:.*\n){1,3}(?=elastocal: nobody answers)")
+"""What new prints before its reason, where it asks: how to answer, and the first question."""
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ def kind(arm: str) -> Kind:
         return Kind(_tooled(seven_axes().urdf, "tcp", 0.15), gears, middle, 40.0)
     small = opw_arm_urdf(0.0, -0.07, 0.0, 0.29, 0.27, 0.302, 0.072, name="3 kg")
     gears = 25.0, 30.0, 40.0, 120.0, 150.0, 250.0
-    return Kind(_tooled(small, "tcp", 0.1), gears, (0.0, 0.4, 0.3, 0.2, 1.0, 0.0), 60.0)
+    return Kind(_tooled(small, "tcp", 0.1), gears, (0.0, 0.4, 0.9, 0.2, 1.0, 0.0), 60.0)
 
 
 ARMS = ("parallel axes", "210 kg", "seven axes", "3 kg")
