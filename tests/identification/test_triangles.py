@@ -36,9 +36,9 @@ def test_refits_have_the_prior_of_the_problem():
         scale = 1e-10 * np.abs(wanted).max()
         np.testing.assert_allclose(compliance, wanted, rtol=0, atol=scale)
         assert np.abs(compliance - solve(part.without_prior()).compliance).max() > 1e3 * scale
-        stacked = triangles.stacked(choice)
-        rows = np.vstack([part.weighted().reshape(-1, stacked.shape[1]), prior])
-        np.testing.assert_allclose(stacked.T @ stacked, rows.T @ rows, rtol=1e-9, atol=1e-20)
+        (triangle,) = triangles.grown([choice])
+        rows = np.vstack([part.weighted().reshape(-1, triangle.shape[1]), prior])
+        np.testing.assert_allclose(triangle.T @ triangle, rows.T @ rows, rtol=1e-9, atol=1e-20)
 
 
 def test_a_full_rank_refit_is_that_of_plain_nnls():

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.codec.data import CodecData
-from elastocal.codec.splits import Campaign, CodecOptions, Split, drawn_poses, make_campaign
+from elastocal.codec.splits import Campaign, CodecOptions, Split, checked_campaign, drawn_poses
 from elastocal.codec.variants import ALL_LOADS, Variant, training_cases
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
@@ -236,7 +236,7 @@ def prepared_variants(
     CodecError
         If the readings have other poses than the codec, or a layout has other springs.
     DatasetError
-        If the data lack a load case, or joints are not this robot's.
+        If the data lack a load case.
     """
     readings = drawn_poses(readings, data.options)
     kept = usable_for_choice(robot, readings, _fit_options(data.options), marker_offset)
@@ -251,7 +251,7 @@ def prepared_variants(
                 f"variant {each.name!r} was made with {len(labels.names)} springs;"
                 f" {name!r} now has {len(found)}, or others"
             )
-    campaign = make_campaign(list(models.values()), readings, data.options, marker_offset)
+    campaign = checked_campaign(list(models.values()), readings, data.options, marker_offset)
     contact = campaign.contact
     if contact.shape != data.contact.shape or not np.all(np.abs(contact - data.contact) <= _SAME):
         raise CodecError(

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import BoolArray, FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.codec._prepared import PreparedVariant, prepared_variants
 from elastocal.codec.data import NO_POSE, CodecData
 from elastocal.codec.indices import Correlation, IndexValues, correlate, index_values
 from elastocal.dataset import Readings
-from elastocal.identification import Term, factor, observability, rank, unit_columns
+from elastocal.identification import Term, column_scaling, factor, observability, rank
 from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
@@ -95,18 +95,26 @@ def _spring_observability(data: CodecData, prepared: PreparedVariant) -> SpringO
     variant, problem = prepared.variant, prepared.problem
     chosen, springs = data.chosen[data.index(variant.name)], problem.springs
 
-    def determines(poses: IndexArray) -> BoolArray:
-        rows = prepared.triangles.stacked(poses[poses != NO_POSE])
-        return _determined(rows, problem.size, springs)
-
-    determined = np.array([[determines(poses) for poses in row] for row in chosen])
+    determined = np.array(
+        [
+            _determined(
+                prepared.triangles.grown([poses[poses != NO_POSE] for poses in row]),
+                problem.size,
+                springs,
+            )
+            for row in chosen
+        ]
+    )
     system = factor(problem.take(prepared.trains).of_springs())
     found = observability(system, prepared.model.springs)
     return SpringObservability(variant.name, determined, found.unobservable)
 
 
-def _determined(rows: FloatArray, size: FloatArray | float, springs: slice) -> BoolArray:
-    """Return which springs rows ``[O d]`` of some poses determine, shape (spring,)."""
-    (scaled,) = unit_columns(rows[None, :, :-1], size).rows
-    _, s, Vt = np.linalg.svd(np.linalg.qr(scaled, mode="r"), full_matrices=True)
-    return np.asarray(np.linalg.norm(Vt[rank(s) :, springs], axis=0) <= _SHARE)
+def _determined(triangles: FloatArray, size: FloatArray | float, springs: slice) -> BoolArray:
+    """Return which springs each of some triangles of ``[O d]`` determines, (triangle, spring)."""
+    n = triangles.shape[2] - 1
+    rows = triangles[:, :n, :n]
+    gain, _ = column_scaling(np.linalg.norm(rows, axis=1), size)
+    _, s, Vt = np.linalg.svd(rows * gain[:, None])
+    unseen = [Vt[number, rank(s[number]) :, springs] for number in range(len(s))]
+    return np.array([np.linalg.norm(each, axis=0) <= _SHARE for each in unseen])

@@ -5,7 +5,7 @@ set aside first, for all variants alike.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -182,21 +182,38 @@ def make_campaign(
     held = np.unique(readings.pose[readings.by_contact])
     if len(held):
         findings.append(HELD_BY_CONTACT(count=len(held)))
-    fit = FitOptions(contact=options.contact)
     try:
+        fit = FitOptions(contact=options.contact)
         check_conventions(models[0], readings, marker_offset, fit)
     except ConventionError as error:
         if not options.trust_conventions:
             raise
         findings.append(IN_SPITE(error=str(error)))
-    if options.set_blunders_aside:
-        blunder = _blunders(models, readings, fit, marker_offset)
-        findings += [
-            SET_ASIDE(pose=int(readings.pose[row]), load_case=str(readings.load_case[row]))
-            for row in np.flatnonzero(blunder)
-        ]
-        readings = readings.set_aside(blunder)
-    return _group_by_pose(models[0].robot, readings, findings)
+    campaign = checked_campaign(models, readings, options, marker_offset)
+    return replace(campaign, findings=(*findings, *campaign.findings))
+
+
+def checked_campaign(
+    models: Sequence[ElasticModel],
+    readings: Readings,
+    options: CodecOptions,
+    marker_offset: ArrayLike | None = None,
+) -> Campaign:
+    """Return the poses of a dataset whose joints, signs and frames `make_campaign` has checked.
+
+    Parameters
+    ----------
+    models, readings, options, marker_offset
+        As for `make_campaign`.
+    """
+    if not options.set_blunders_aside:
+        return _group_by_pose(models[0].robot, readings, [])
+    blunder = _blunders(models, readings, FitOptions(contact=options.contact), marker_offset)
+    findings = [
+        SET_ASIDE(pose=int(readings.pose[row]), load_case=str(readings.load_case[row]))
+        for row in np.flatnonzero(blunder)
+    ]
+    return _group_by_pose(models[0].robot, readings.set_aside(blunder), findings)
 
 
 def _group_by_pose(robot: Robot, readings: Readings, findings: list[Finding]) -> Campaign:

@@ -114,11 +114,11 @@ from .problem import (
     MINIMUM_BLOCKS as MINIMUM_BLOCKS,
     Problem as Problem,
     build as build,
+    column_scaling as column_scaling,
     contact_visibility_of as contact_visibility_of,
     pose_blocks as pose_blocks,
     relative_sizes as relative_sizes,
     same_configuration as same_configuration,
-    unit_columns as unit_columns,
 )
 from .production import (
     JOINT_REACH as JOINT_REACH,

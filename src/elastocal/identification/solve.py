@@ -315,24 +315,20 @@ class PoseTriangles:
             filled[: len(triangle)] = triangle
         return cls(rows, problem.prior_rows, problem.lower, problem.upper, problem.size)
 
-    def stacked(self, choice: IndexArray) -> FloatArray:
-        """Return the rows of a choice of poses with those of the prior, shape (row, spring + 1)."""
-        return np.concatenate([self.prior, *self.rows[choice]])
-
-    def fit(self, choices: Sequence[IndexArray]) -> FloatArray:
-        """Return the compliances of each choice of poses, shape (choice, spring).
+    def grown(self, choices: Sequence[IndexArray]) -> FloatArray:
+        """Return the triangle of ``[O d]`` of each choice of poses and of the prior.
 
         A choice that begins with the one before it costs only the poses that it adds.
 
         Parameters
         ----------
         choices : sequence of ndarray of int
-            Rows of `rows`, at least one choice.
+            Rows of `rows`.
 
-        Raises
-        ------
-        IdentificationError
-            If a choice determines nothing, or the solver did not reach the optimum.
+        Returns
+        -------
+        ndarray, shape (choice, spring + 1, spring + 1)
+            Filled up with zeros where there are fewer rows than columns.
         """
         width = self.rows.shape[2]
         triangles = np.zeros((len(choices), width, width))
@@ -343,7 +339,22 @@ class PoseTriangles:
             stacked = np.concatenate([known, *self.rows[choice[len(before) :]]])
             known, before = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=float), choice
             triangle[: len(known)] = known
-        return _minimised(triangles, self.lower, self.upper, self.size)
+        return triangles
+
+    def fit(self, choices: Sequence[IndexArray]) -> FloatArray:
+        """Return the compliances of each choice of poses, shape (choice, spring).
+
+        Parameters
+        ----------
+        choices : sequence of ndarray of int
+            Rows of `rows`, at least one choice; see `grown` for their order.
+
+        Raises
+        ------
+        IdentificationError
+            If a choice determines nothing, or the solver did not reach the optimum.
+        """
+        return _minimised(self.grown(choices), self.lower, self.upper, self.size)
 
 
 def _minimised(

@@ -17,6 +17,8 @@ from elastocal.report.plots.style import Page, VariantStyle, literal, tint
 
 REACH = 1.5
 """Longest reach of a whisker, in heights of the box."""
+_QUARTILES = (25.0, 50.0, 75.0)
+"""In percent."""
 _LABEL = 0.26
 """Width of the label of a number of training poses, in inches."""
 PALE = 0.55
@@ -96,7 +98,11 @@ def make_boxes(values: FloatArray, what: str, finding: BoolArray | None = None) 
         )
     values, finite = values[:, drawn], finite[:, drawn]
     known = np.where(finite, values, np.nan)
-    q1, median, q3 = np.nanpercentile(known, (25.0, 50.0, 75.0), axis=0)
+    # All boxes at once but those with a value missing: `nanpercentile` takes each box alone.
+    quartiles = np.percentile(known, _QUARTILES, axis=0)
+    for number in np.flatnonzero(~finite.all(axis=0)):
+        quartiles[:, number] = np.percentile(known[finite[:, number], number], _QUARTILES)
+    q1, median, q3 = quartiles
     reach = REACH * (q3 - q1)
     near: BoolArray = finite & (values >= q1 - reach) & (values <= q3 + reach)
     box, verification_set = np.nonzero((finite & ~near).T)
