@@ -75,7 +75,7 @@ def test_three_configurations_are_enough():
 
 
 @pytest.mark.parametrize(
-    "page", ["how-to/when-it-refuses/readings.md", "explanation/uncertainty.md"]
+    "page", ["how-to/when-it-refuses.md", "explanation/uncertainty.md"]
 )
 def test_the_pages_state_the_distance_of_the_code(page):
     stated = f"closer than {1e3 * _SAME_CONFIGURATION:g}e-3 rad"
