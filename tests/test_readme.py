@@ -357,11 +357,10 @@ def test_every_default_of_the_procedure_is_the_one_that_the_reference_tells():
         assert value == pytest.approx(getattr(defaults, key)), key
 
 
-def test_every_kind_of_fault_is_on_both_pages_that_list_them():
-    kinds = set(get_args(FaultKind))
-    page = (ROOT / "docs/explanation/simulated-cell.md").read_text(encoding="utf-8")
-    assert kinds <= shown_words(cell_file_section("Section faults"))
-    assert kinds == set(re.findall(r"^\| `(\w+)` \|", page, flags=re.MULTILINE))
+def test_every_kind_of_fault_has_its_row_in_the_reference():
+    section = cell_file_section("Section faults")
+    rows = set(re.findall(r"^\| `(\w+)` \| .* \| .* \| .* \|$", section, flags=re.MULTILINE))
+    assert rows == set(get_args(FaultKind))
 
 
 def test_every_fault_that_ends_an_attempt_or_a_run_is_explained():
