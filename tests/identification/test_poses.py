@@ -74,9 +74,7 @@ def test_three_configurations_are_enough():
     assert len(np.unique(pose_blocks(with_joints([0.0, 0.1, 0.2])))) == MINIMUM_BLOCKS
 
 
-@pytest.mark.parametrize(
-    "page", ["how-to/when-it-refuses.md", "explanation/uncertainty.md"]
-)
+@pytest.mark.parametrize("page", ["how-to/when-it-refuses.md", "explanation/uncertainty.md"])
 def test_the_pages_state_the_distance_of_the_code(page):
     stated = f"closer than {1e3 * _SAME_CONFIGURATION:g}e-3 rad"
     assert stated in (Path(__file__).parents[2] / "docs" / page).read_text("utf-8")

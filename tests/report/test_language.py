@@ -145,6 +145,10 @@ class TestEveryCatalogue:
             assert re.findall("`[^`]+`", english) == re.findall("`[^`]+`", other), english
 
 
+def test_french_has_one_apostrophe():
+    assert not [text for text in CATALOGUES["fr"].values() if re.search(r"\w'[\w{«]", text)]
+
+
 def test_there_are_hundreds_of_phrases():
     assert len(all_phrases()) > 300
 

@@ -12,6 +12,7 @@ from elastocal.codec import read_codec, write_codec
 from elastocal.errors import ElastocalError
 from elastocal.procedure import file_sha256
 from elastocal.records import read_arrays, write_arrays
+from elastocal.report import language_of
 from elastocal.verdict import EvidenceOptions, Light, LinkState, find_everything, gather_evidence
 from elastocal.verdict._files import read_hash
 from elastocal.verdict.evidence import Seal
@@ -210,6 +211,14 @@ def test_a_run_of_before_keeps_its_light_and_is_called_not_verifiable(copied):
     # Readings are made again from the streams, however old the dataset is.
     scale_residuals(folder)
     assert judged(gathered(folder)).light is not Light.GREEN
+
+
+@pytest.mark.parametrize("code", ["de", "fr"])
+def test_every_link_is_said_in_other_languages(finished, code):
+    chain = gathered(finished).chain
+    assert len(chain) > 5
+    for link in chain:
+        assert 'lang="en"' not in str(language_of(code).markup(link.text)), link.text
 
 
 def test_a_dataset_derived_with_a_tool_file_needs_that_file(copied):

@@ -35,7 +35,7 @@ from elastocal.progress import silent
 from elastocal.records import read_json_data, record, require_written, to_data
 from elastocal.verdict.evidence import Evidence, Seal
 from elastocal.verdict.signing import OF_RUN, check_signature, read_signature
-from elastocal.wording import counted
+from elastocal.wording import counted, phrase
 
 _SAME = 1e-4
 """Difference, by the largest number of its kind, below which two derivations are one: versions and
@@ -54,7 +54,7 @@ def changed_text(stated: Dataset, found: Dataset) -> str:
         mine, again = stated.attributes.get(name), found.attributes.get(name)
         # The marker's place alone is fitted; what is copied comes back to the letter.
         if mine != again and not (name == "marker" and _is_same_text(mine, again)):
-            return f"its attribute {name} is another"
+            return phrase("its attribute {name} is another", name=name)
     return ""
 
 
@@ -86,18 +86,20 @@ def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> 
         return ""
     for name in ("poses", "load_cases", "joint_names", "joint_units", "campaigns"):
         if getattr(stated, name) != getattr(found, name):
-            return f"its {name.replace('_', ' ')} are others"
+            return phrase("its {what} are others", what=name.replace("_", " "))
     mine, again = stated.to_labelled(), found.to_labelled()
     for name, array in again.variables.items():
         if array.values.dtype.kind not in "iuf" or (name not in mine and (old or name in _LATER)):
             continue
         if name not in mine:
-            return f"it has no {name}"
+            return phrase("it has no {name}", name=name)
         unit = str(array.attributes.get("units", ""))
         if text := _largest_difference(stated, mine[name].values, array.values, unit, source):
-            return f"{name} {text}"
+            return phrase("{name} {difference}", name=name, difference=text)
     added = sorted(mine.variables.keys() - again.variables.keys())
-    return f"it has {added[0]}, which the {source} do not give" if added else ""
+    if not added:
+        return ""
+    return phrase("it has {name}, which the {source} do not give", name=added[0], source=source)
 
 
 def _largest_difference(
@@ -111,9 +113,19 @@ def _largest_difference(
     if not np.any(gap > _SAME * size):
         return ""
     place = np.unravel_index(int(np.argmax(gap)), gap.shape)
-    pose = f"of pose {dataset.poses[place[0]]}" if place else ""
+    pose = dataset.poses[place[0]] if place else ""
     case = f" {dataset.load_cases[place[1]]}" if dataset.status.shape == gap.shape[:2] else ""
-    return f"{pose}{case} is {a[place]:.6g} {unit}, the {source} give {b[place]:.6g} {unit}"
+    return phrase(
+        "of pose {pose}{case} is {stated} {unit}, the {source} give {found} {unit}"
+        if place
+        else "is {stated} {unit}, the {source} give {found} {unit}",
+        pose=pose,
+        case=case,
+        stated=f"{a[place]:.6g}",
+        found=f"{b[place]:.6g}",
+        unit=unit,
+        source=source,
+    )
 
 
 def changed_place(stated: object, found: object, place: str = "") -> str:
@@ -137,8 +149,7 @@ def _is_close(a: object, b: object) -> bool:
 
 
 CHANGED_RECORDING = Kind("verdict.changed-recording", "{reason}")
-_OLD = "made before files stated it"
-_ADVICE = "; `elastocal {command}` makes it again"
+_OLD = phrase("made before files stated it")
 
 
 class LinkState(Enum):
@@ -229,8 +240,10 @@ def _is_old(evidence: Evidence) -> bool:
 def _unstated(evidence: Evidence, name: str, text: str) -> Link:
     """Return a link without a statement, which only files from before hashes may lack."""
     if _is_old(evidence):
-        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD})")
-    return _broken(name, f"{text}, although other parts state theirs: make it again")
+        return Link(name, LinkState.UNSTATED, phrase("{text} ({reason})", text=text, reason=_OLD))
+    return _broken(
+        name, phrase("{text}, although other parts state theirs: make it again", text=text)
+    )
 
 
 def _seals(evidence: Evidence) -> Iterator[Link]:
@@ -239,13 +252,20 @@ def _seals(evidence: Evidence) -> Iterator[Link]:
         if file.seal is Seal.BROKEN:
             yield _broken(
                 file.name,
-                f"{file.name} was changed after it was written: its checksum does not match its"
-                " content",
+                phrase(
+                    "{name} was changed after it was written: its checksum does not match its"
+                    " content",
+                    name=file.name,
+                ),
             )
     if silent := [file.name for file in evidence.files if file.seal is Seal.ABSENT]:
-        more = f" and {counted(len(silent) - 1, 'other file')}" if silent[1:] else ""
-        verb = "do" if more else "does"
-        text = f"{silent[0]}{more} {verb} not state the SHA-256 of their content"
+        text = phrase(
+            "{name} and {more} do not state the SHA-256 of their content"
+            if silent[1:]
+            else "{name} does not state the SHA-256 of its content",
+            name=silent[0],
+            more=counted(len(silent) - 1, "other file"),
+        )
         yield _unstated(evidence, "content", text)
 
 
@@ -254,18 +274,21 @@ def _signed(run: RunFolder, record: RunRecord, files: ChainFiles) -> Link:
     place, trusted = run.signature, files.signer or record.signer
     if not place.exists():
         if trusted is None:
-            text = (
+            text = phrase(
                 "the run is not signed: whoever edits its record can renew the hashes"
                 " (run --sign KEY signs one while it is recorded)"
             )
             return Link("signature", LinkState.UNSIGNED, text)
-        return _broken("signature", f"the run should be signed, and there is no {place.name}")
+        return _broken(
+            "signature",
+            phrase("the run should be signed, and there is no {name}", name=place.name),
+        )
     try:
         found = read_signature(place)
         check_signature(found, OF_RUN, file_sha256(run.journal), trusted)
     except ElastocalError as error:
         return _broken("signature", files.plain(error))
-    return _whole("signature", f"the journal is signed by key {found.signer}")
+    return _whole("signature", phrase("the journal is signed by key {key}", key=found.signer))
 
 
 def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
@@ -278,12 +301,11 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         cell, _ = read_copies(run, record)
         # The fingerprint leaves out the tolerance, by which the light is given.
         if record.cell_sha256 not in (None, sha256(read_text(cell.path))):
-            text = f"cell/{record.cell_file} was changed after the run began"
-            yield _broken("cell and plan", text)
+            yield _broken("cell and plan", _after_the_start(f"cell/{record.cell_file}"))
         elif changed := _changed_copy(run, record):
-            yield _broken("cell and plan", f"{changed} was changed after the run began")
+            yield _broken("cell and plan", _after_the_start(changed))
         else:
-            yield _whole("cell and plan", "cell and plan are those that the run began with")
+            yield _whole("cell and plan", phrase("cell and plan are those that the run began with"))
     except ElastocalError as error:
         yield _broken("cell and plan", files.plain(error))
     known = {e.log.streams: e.streams_sha256 for e in entries if e.log is not None}
@@ -297,17 +319,25 @@ def _recorded(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
         yield from (_broken("streams", text) for text in group_alike(wrong))
     else:
         found = counted(len(known), "recording")
-        yield _whole("streams", f"{found}: those that the journal names, by their SHA-256")
+        text = phrase("{found}: those that the journal names, by their SHA-256", found=found)
+        yield _whole("streams", text)
     stated = _made_from(evidence).get(JOURNAL)
     if evidence.dataset is None:
         return
     if stated is None:
-        text = "the dataset does not state which journal it was derived from"
+        text = phrase("the dataset does not state which journal it was derived from")
         yield _unstated(evidence, "journal", text)
     elif stated == file_sha256(run.journal):
-        yield _whole("journal", "the journal is the one that the dataset was derived from")
+        yield _whole("journal", phrase("the journal is the one that the dataset was derived from"))
     else:
-        yield _broken("journal", f"{JOURNAL} was changed after the dataset was derived from it")
+        yield _broken(
+            "journal",
+            phrase("{name} was changed after the dataset was derived from it", name=JOURNAL),
+        )
+
+
+def _after_the_start(name: str) -> str:
+    return phrase("{name} was changed after the run began", name=name)
 
 
 def _changed_copy(run: RunFolder, record: RunRecord) -> str:
@@ -320,11 +350,20 @@ def _logged(evidence: Evidence) -> Link:
     """Return whether map and logs are those that an imported dataset was made from."""
     for path, (name, stated) in zip(evidence.logs, _made_from(evidence).items(), strict=True):
         if not path.exists():
-            return _broken("logs", f"{name}, which the dataset was made from, is not here")
+            return _broken(
+                "logs", phrase("{name}, which the dataset was made from, is not here", name=name)
+            )
         if log_sha256(path) != stated:
-            return _broken("logs", f"{name} was changed after the dataset was made from it")
+            return _broken(
+                "logs", phrase("{name} was changed after the dataset was made from it", name=name)
+            )
     found = counted(len(evidence.logs) - 1, "log")
-    return _whole("logs", f"{found} and their map: those that the dataset names, by their SHA-256")
+    return _whole(
+        "logs",
+        phrase(
+            "{found} and their map: those that the dataset names, by their SHA-256", found=found
+        ),
+    )
 
 
 def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -> Iterator[Link]:
@@ -332,31 +371,35 @@ def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -
     dataset, summary = evidence.dataset, evidence.summary
     if dataset is None:
         return
-    old, source = _is_old(evidence), "logs" if evidence.logs else "streams"
-    advice = _ADVICE.format(command="import" if evidence.logs else "derive")
+    old, source = _is_old(evidence), phrase("logs" if evidence.logs else "streams")
+    advice = _made_again("import" if evidence.logs else "derive")
     try:
         again, again_summary = _derive(evidence, dataset, files)
     except ElastocalError as error:
-        text, reason = f"the dataset cannot be made again from the {source}", files.plain(error)
-        again_told = Link("dataset", LinkState.UNSTATED, f"{text}, see above")
-        yield again_told if reason in reported else _broken("dataset", f"{text}: {reason}")
+        text = phrase("the dataset cannot be made again from the {source}", source=source)
+        reason = files.plain(error)
+        above = Link("dataset", LinkState.UNSTATED, phrase("{text}, see above", text=text))
+        yield above if reason in reported else _broken("dataset", _with_reason(text, reason))
         return
-    text = f"the dataset is not what the {source} give"
+    text = phrase("the dataset is not what the {source} give", source=source)
     if difference := changed_reading(dataset, again, old, source):
-        yield _broken("dataset", f"{text}: {difference}{advice}")
+        yield _broken("dataset", _with_advice(_with_reason(text, difference), advice))
     elif difference := changed_text(dataset, again):
-        yield _unlike(old, "dataset", f"{text}: {difference}", advice)
+        yield _unlike(old, "dataset", _with_reason(text, difference), advice)
     else:
-        yield _whole("dataset", f"the dataset is what the {source} give, made again from them")
+        text = phrase("the dataset is what the {source} give, made again from them", source=source)
+        yield _whole("dataset", text)
     if summary is None:
         return
     if again_summary is not None:
         again_summary = replace(again_summary, dataset_sha256=summary.dataset_sha256)
     if place := changed_place(to_data(summary), to_data(again_summary)):
-        text = f"the summary of the run is not what the streams give: {place} differs"
+        text = phrase(
+            "the summary of the run is not what the streams give: {place} differs", place=place
+        )
         yield _unlike(old, "summary", text, advice)
     else:
-        yield _whole("summary", "the summary of the run is what the streams give")
+        yield _whole("summary", phrase("the summary of the run is what the streams give"))
     if files.run is not None and summary.dataset_sha256:
         yield from _rewritten(files.run, summary)
 
@@ -364,41 +407,65 @@ def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -
 def _campaigns(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
     """Yield whether each further campaign is what the streams of its own run give."""
     for each in evidence.campaigns:
-        run, name = RunFolder(each.path.parent), f"campaign {each.path.parent.name}"
+        run, name = (
+            RunFolder(each.path.parent),
+            phrase("campaign {name}", name=each.path.parent.name),
+        )
         if run.dataset.name != each.path.name or not run.journal.is_file():
-            text = f"{name}: its dataset lies in no folder of a run"
+            text = _with_reason(name, phrase("its dataset lies in no folder of a run"))
             yield Link("dataset", LinkState.UNSTATED, text)
             continue
         try:
             again = derive_run(run.path, _sensor(evidence, each.dataset, files)).dataset
         except ElastocalError as error:
-            text = f"{name}: its dataset cannot be made again from the streams"
-            yield _broken("dataset", f"{text}: {files.plain(error)}")
+            text = phrase("its dataset cannot be made again from the streams")
+            reason = _with_reason(text, files.plain(error))
+            yield _broken("dataset", _with_reason(name, reason))
             continue
-        if difference := changed_reading(each.dataset, again, False, "streams"):
-            text = f"{name}: its dataset is not what the streams give"
-            yield _broken("dataset", f"{text}: {difference}")
+        if difference := changed_reading(each.dataset, again, False, phrase("streams")):
+            reason = _with_reason(phrase("its dataset is not what the streams give"), difference)
+            yield _broken("dataset", _with_reason(name, reason))
         else:
-            yield _whole("dataset", f"{name}: its dataset is what its streams give")
+            text = phrase("its dataset is what its streams give")
+            yield _whole("dataset", _with_reason(name, text))
 
 
 def _rewritten(run: RunFolder, summary: RunSummary) -> Iterator[Link]:
     """Yield what was written again, or edited too little to say something else."""
     if file_sha256(run.dataset) != summary.dataset_sha256:
-        text = f"{run.dataset.name} was changed after it was derived: its SHA-256 is not the one"
-        advice = _ADVICE.format(command="derive")
-        yield _broken("dataset", f"{text} in {run.summary.name}{advice}")
+        text = phrase(
+            "{name} was changed after it was derived: its SHA-256 is not the one in {summary}",
+            name=run.dataset.name,
+            summary=run.summary.name,
+        )
+        yield _broken("dataset", _with_advice(text, _made_again("derive")))
     try:
         require_written(run.summary, read_json_data(run.summary))
     except SchemaError:
-        yield _broken("summary", f"{run.summary.name} was changed after it was derived")
+        yield _broken(
+            "summary", phrase("{name} was changed after it was derived", name=run.summary.name)
+        )
 
 
 def _unlike(old: bool, name: str, text: str, advice: str) -> Link:
     """Return the link of a difference beside the readings: earlier versions wrote other remarks."""
     if old:
-        return Link(name, LinkState.UNSTATED, f"{text} ({_OLD}, by another version){advice}")
-    return _broken(name, f"{text}{advice}")
+        reason = phrase("made before files stated it, by another version")
+        text = phrase("{text} ({reason})", text=text, reason=reason)
+        return Link(name, LinkState.UNSTATED, _with_advice(text, advice))
+    return _broken(name, _with_advice(text, advice))
+
+
+def _made_again(command: str) -> str:
+    return phrase("`elastocal {command}` makes it again", command=command)
+
+
+def _with_reason(text: str, reason: str) -> str:
+    return phrase("{text}: {reason}", text=text, reason=reason)
+
+
+def _with_advice(text: str, advice: str) -> str:
+    return phrase("{text}; {advice}", text=text, advice=advice)
 
 
 def _derive(
@@ -430,15 +497,20 @@ def _model(evidence: Evidence, dataset: str) -> Iterator[Link]:
         return
     stated = evidence.calibrated.made_from
     if evidence.merged is not None:
-        yield _whole("model", f"the model was made from these {len(stated)} datasets")
+        yield _whole(
+            "model", phrase("the model was made from these {number} datasets", number=len(stated))
+        )
     elif len(stated) > 1 and dataset in stated.values():
-        others = f"the model was made from {len(stated)} datasets, of which only one is here"
+        others = phrase(
+            "the model was made from {number} datasets, of which only one is here",
+            number=len(stated),
+        )
         yield Link("model", LinkState.UNSTATED, others)
     else:
         yield _made_of(evidence, dataset, "model", _MODEL, stated)
 
 
-_MODEL = "the model"
+_MODEL = phrase("the model")
 
 
 def _codecs(evidence: Evidence, dataset: str) -> Iterator[Link]:
@@ -451,14 +523,21 @@ def _made_of(
 ) -> Link:
     """Return whether a part was made from the dataset of this hash."""
     if not stated:
-        return _unstated(evidence, name, f"{what} does not state which dataset it is made from")
+        text = phrase("{what} does not state which dataset it is made from", what=what)
+        return _unstated(evidence, name, text)
     if dataset not in stated.values():
-        text = f"{what} was made from another dataset ({', '.join(stated)}) than this one"
+        text = phrase(
+            "{what} was made from another dataset ({others}) than this one",
+            what=what,
+            others=", ".join(stated),
+        )
         return _broken(name, text)
     if _is_broken(evidence, what):
-        text = f"{what} names this dataset; its content is not confirmed, see above"
+        text = phrase(
+            "{what} names this dataset; its content is not confirmed, see above", what=what
+        )
         return Link(name, LinkState.UNSTATED, text)
-    return _whole(name, f"{what} was made from this dataset")
+    return _whole(name, phrase("{what} was made from this dataset", what=what))
 
 
 def _is_broken(evidence: Evidence, what: str) -> bool:
@@ -473,19 +552,23 @@ def _process(evidence: Evidence) -> Iterator[Link]:
     own = [run for run in runs if run.model_sha256 == evidence.calibrated.sha256]
     tools = {run.tool_sha256 for run in own}
     if not own:
-        text = "the process was run with another model than the one of this report"
+        text = phrase("the process was run with another model than the one of this report")
         yield _broken("process", text)
     elif tools - {None} and evidence.tool_sha256 is None:
-        yield _broken("process", "the process was run with a tool file that is not here")
+        yield _broken("process", phrase("the process was run with a tool file that is not here"))
     elif evidence.tool_sha256 not in tools:
-        text = "the process was run with another tool file than the one of this report"
+        text = phrase("the process was run with another tool file than the one of this report")
         yield _broken("process", text)
     else:
-        yield _whole("process", "the process was run with this model and this tool file")
+        yield _whole("process", phrase("the process was run with this model and this tool file"))
     record = evidence.run_record
     if own and evidence.simulated and record and record.seed not in {run.seed for run in own}:
         yield _broken(
             "process",
-            f"the process was run on the simulated cell of seed {own[0].seed}, the run on that of"
-            f" seed {record.seed}",
+            phrase(
+                "the process was run on the simulated cell of seed {process}, the run on that of"
+                " seed {run}",
+                process=own[0].seed,
+                run=record.seed,
+            ),
         )

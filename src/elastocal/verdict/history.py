@@ -76,17 +76,36 @@ def history_link(record: RunRecord, run: RunFolder, cell: str) -> Link | None:
     if record.run_number is None:
         return None
     known = [each.run for each in read_history(run.path.absolute().parent, cell)]
-    text = f"run {record.identity[:_SHOWN]}, number {record.run_number} of its cell"
+    own, number = record.identity[:_SHOWN], record.run_number
     if record.identity not in known:
-        text += f"; no {HISTORY} that names it lies beside it, so later runs would not be seen"
+        text = phrase(
+            "run {run}, number {number} of its cell; no {history} that names it lies beside it, so"
+            " later runs would not be seen",
+            run=own,
+            number=number,
+            history=HISTORY,
+        )
         return Link("history", LinkState.WHOLE, text)
     lost = [each.run for each in record.earlier_runs if each.run not in known]
     if lost:
-        text = f"{HISTORY} was cut: it does not name run {lost[0][:_SHOWN]}, which was before this"
+        text = phrase(
+            "{history} was cut: it does not name run {run}, which was before this",
+            history=HISTORY,
+            run=lost[0][:_SHOWN],
+        )
         return Link("history", LinkState.BROKEN, text)
     later = known[known.index(record.identity) + 1 :]
-    text += f"; {HISTORY} names {len(later) or 'none'} after it"
-    text += f", the last of them {later[-1][:_SHOWN]}" if later else ""
+    text = phrase(
+        "run {run}, number {number} of its cell; {history} names {later} after it, the last of"
+        " them {last}"
+        if later
+        else "run {run}, number {number} of its cell; {history} names none after it",
+        run=own,
+        number=number,
+        history=HISTORY,
+        later=len(later),
+        last=later[-1][:_SHOWN] if later else "",
+    )
     return Link("history", LinkState.WHOLE, text)
 
 

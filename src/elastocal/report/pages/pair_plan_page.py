@@ -70,8 +70,10 @@ def write_pair_plan_page(
     numbers = tuple(str(each.id) for each in plan.meetings)
     # No surface hides a meeting: every tag is drawn as one that faces the reader.
     tags = Tags(points, numbers, style.BLUE, hints, np.tile(scene.up, (len(points), 1)))
+    feet = Tags(np.array([T[:3, 3] for T in bases]), plan.arms, "--ink", plan.arms)
     layers = (
         *scene.layers,
+        Layer(phrase("Names of the arms"), "--ink", (feet,)),
         Layer(phrase("Meetings, in visiting order"), style.BLUE, (tags,)),
         Layer(phrase("Volume in which the tips meet"), "--region", (_volume(cell),)),
     )

@@ -207,8 +207,8 @@ def _median_texts(boxes: Boxes, what: str, unit: str) -> list[str]:
     """Return the median of each box in words, its quartiles, and how far values go."""
     lowest, highest = boxes.ends()
     return [
-        f"{what} {boxes.median[k]:.3g} {unit} (quartiles {boxes.q1[k]:.3g} and {boxes.q3[k]:.3g};"
-        f" {boxes.count[k]} sets, {lowest[k]:.3g} to {highest[k]:.3g})"
+        f"{what} {boxes.median[k]:#.3g} {unit} (quartiles {boxes.q1[k]:#.3g} and"
+        f" {boxes.q3[k]:#.3g}; {boxes.count[k]} sets, {lowest[k]:#.3g} to {highest[k]:#.3g})"
         + (", not told apart" if boxes.hollow[k] else "")
         for k in range(len(boxes.n))
     ]
