@@ -129,9 +129,12 @@ def require_place(path: Path) -> None:
     Raises
     ------
     FileAccessError
-        If its folder cannot be made or written into, or it is itself no file.
+        If its folder cannot be made or written into, it is itself no file, or the command at work
+        must not write there.
     """
     path = Path(path)
+    if (rule := current_rule()) is not None:
+        rule.require(path)
     try:
         folder = next((each for each in path.parents if os.path.lexists(each)), Path())
         if not stat.S_ISDIR(folder.stat().st_mode):

@@ -161,3 +161,12 @@ def test_a_contact_file_states_the_width(tmp_path):
     assert read_contact(path) == Contact(normal=50e6, tip=5e-3)
     with pytest.raises(IdentificationError, match=r"contact\.tip is 0\.2: it must be above 0"):
         Contact(tip=0.2)
+
+
+def test_readings_with_moments_are_refused_with_it():
+    # About the tcp that is stated: taken as those about the tip, they led to half of its place.
+    readings = held_by_contact(NOISY).readings(robot().joint_names)
+    R = described(WRONG).forward(readings.joint_position)[:, :3, :3]
+    readings = replace(readings, moment=np.cross(R @ -WRONG, readings.force))
+    with pytest.raises(IdentificationError, match=r"leave the columns of the moment out, or conta"):
+        with_tip_found(described(WRONG), readings, FitOptions(contact=KNOWN))

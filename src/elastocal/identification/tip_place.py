@@ -17,7 +17,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtri
 
 from elastocal.arrays import FloatArray, triple
 from elastocal.dataset import Readings
@@ -30,10 +29,9 @@ from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.rungs import bearing_gears, gears
 from elastocal.identification.solve import solve
-from elastocal.identification.uncertainty import CONFIDENCE, interval
+from elastocal.identification.uncertainty import NORMAL_QUANTILE, interval
 from elastocal.robot import Robot, fixed_joint_of, with_joint_origins
 
-_NORMAL = float(ndtri(0.5 * (1.0 + CONFIDENCE)))
 _STEPS, _SETTLED = 6, 1e-4
 """Most steps, and the length of the last one, in m."""
 
@@ -55,7 +53,7 @@ def with_tip_found(
     Raises
     ------
     IdentificationError
-        If no fixed joint holds the tcp, or a tracker measured any reading.
+        If no fixed joint holds the tcp, a tracker measured any reading, or readings have moments.
     """
     contact = options.contact
     if contact is None or contact.tip is None:
@@ -64,6 +62,12 @@ def with_tip_found(
         raise IdentificationError(
             "contact.tip is for campaigns that no tracker measured: where one did, the place of the"
             " marker depends on that of the tip; leave contact.tip out"
+        )
+    if readings.moment is not None:
+        raise IdentificationError(
+            "contact.tip is for readings of forces alone: moments are about the tcp that is stated,"
+            " and about the tip they are others; leave the columns of the moment out, or"
+            " contact.tip"
         )
     nowhere = TipPlace((0.0, 0.0, 0.0), contact.tip, (0.0, 0.0, 0.0))
     options = replace(options, contact=replace(contact, tip_found=nowhere))
@@ -154,7 +158,7 @@ def tip_with_interval(contact: Contact, draws: FloatArray) -> Contact:
     """
     found = present(contact.tip_found, "tip_found")
     place = np.array(found.place)
-    apart = _NORMAL * (place - np.array(found.beside_gears))
+    apart = NORMAL_QUANTILE * (place - np.array(found.beside_gears))
     below, above = (np.hypot(end, apart) for end in interval(draws))
     ends = triple(place - below), triple(place + above)
     return replace(contact, tip_found=replace(found, low=ends[0], high=ends[1]))
