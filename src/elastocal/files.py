@@ -123,6 +123,14 @@ def replacing(path: Path) -> Iterator[Path]:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+def path_from(folder: Path, file: str | os.PathLike[str]) -> str:
+    """Return the path of a file from a folder, as every system reads it."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # on another drive
+        return Path(file).resolve().as_posix()
+
+
 def require_place(path: Path) -> None:
     """Refuse a place at which no file can be written, before there is anything to write.
 

@@ -188,8 +188,8 @@ class PairCellFile(StrictModel):
         for each in robots:
             if {"/", "\\", ":"} & {*each.name} or f"{each.name}.json".casefold() == PAIR_FILE:
                 raise ValueError(
-                    f"name {each.name!r}: files of the arm are called so: / \\ : are not allowed, and"
-                    f" beside them is {PAIR_FILE}"
+                    f"name {each.name!r}: files of the arm are called so: / \\ : are not allowed,"
+                    f" and beside them is {PAIR_FILE}"
                 )
         # Two of three operating systems take ``Left.json`` for ``left.json``.
         if robots[0].name.casefold() == robots[1].name.casefold():
