@@ -15,6 +15,7 @@ from elastocal.identification import (
     FitOptions,
     read_contact,
     reproduce_calibration,
+    tip_place,
     with_tip_found,
 )
 from elastocal.records import read_json, write_json
@@ -170,3 +171,11 @@ def test_readings_with_moments_are_refused_with_it():
     readings = replace(readings, moment=np.cross(R @ -WRONG, readings.force))
     with pytest.raises(IdentificationError, match=r"leave the columns of the moment out, or conta"):
         with_tip_found(described(WRONG), readings, FitOptions(contact=KNOWN))
+
+
+def test_why_the_tip_is_not_found_beside_gears_is_said(monkeypatch):
+    monkeypatch.setattr(tip_place, "bearing_gears", tip_place.gears)
+    readings = held_by_contact(NOISY).readings(robot().joint_names)
+    free = FitOptions(contact=Contact(lateral=NOISY.lateral, tip=5e-3))
+    with pytest.raises(IdentificationError, match=r"contact\.normal is free, and the springs imi"):
+        with_tip_found(described(WRONG), readings, free)

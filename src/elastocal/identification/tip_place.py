@@ -12,7 +12,6 @@ first found beside gears that stiffen: springs without them make up by the tip f
 See docs/decisions/0137-place-of-the-tip.md and 0146-draws-move-the-tip.md.
 """
 
-import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -86,14 +85,15 @@ def _beside_gears(
     robot: Robot, readings: Readings, options: FitOptions, drives: DriveCompliances
 ) -> tuple[Problem, ElasticModel]:
     """Return the problem of the tip beside gears; on bearings, where links imitate the contact."""
+    reason = ""
     for springs in (gears, bearing_gears):
         model = ElasticModel(robot, springs(robot, readings))
-        with contextlib.suppress(IdentificationError):
+        try:
             known = with_knowledge(options, drives.known_springs(model), model, readings)
             return with_tip_open(build(model, readings, known), model, readings, known), model
-    raise IdentificationError(
-        "contact.tip needs a normal compliance that gears do not imitate: state contact.normal"
-    )
+        except IdentificationError as error:
+            reason = str(error)
+    raise IdentificationError(f"contact.tip is found beside gears: {reason}")
 
 
 def settle_tip(
