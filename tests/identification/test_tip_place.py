@@ -179,3 +179,18 @@ def test_why_the_tip_is_not_found_beside_gears_is_said(monkeypatch):
     free = FitOptions(contact=Contact(lateral=NOISY.lateral, tip=5e-3))
     with pytest.raises(IdentificationError, match=r"contact\.normal is free, and the springs imi"):
         with_tip_found(described(WRONG), readings, free)
+
+
+def test_one_blunder_does_not_move_the_tip():
+    displacement = elsewhere().controller_displacement.copy()
+    displacement[4, 1, 2] += 3e-3
+    found = ec.calibrate(
+        replace(elsewhere(), controller_displacement=displacement),
+        contact=KNOWN, springs="actuated", draws=40,
+    )  # fmt: skip
+    without = calibrated().calibration.contact.tip
+    # It was found 44 mm away, and predictions were off by an eighth.
+    np.testing.assert_allclose(found.calibration.contact.tip.place, without.place, atol=0.5e-3)
+    q, force = np.full((1, 6), 0.3), np.array([[0.0, 100.0, -900.0]])
+    there, here = (each.calibrated.predict(q, force).deflection for each in (found, calibrated()))
+    assert np.linalg.norm(there - here) < 0.005 * np.linalg.norm(here)

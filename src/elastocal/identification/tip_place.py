@@ -24,10 +24,12 @@ from elastocal.errors import IdentificationError, present
 from elastocal.identification.contact import Contact, TipPlace, TipShift
 from elastocal.identification.displacement import displacement_blocks, slopes_by_shift
 from elastocal.identification.knowledge import DriveCompliances, weigh_contact, with_knowledge
+from elastocal.identification.ladder import usable_for_choice
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.rungs import bearing_gears, gears
 from elastocal.identification.solve import solve
+from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import NORMAL_QUANTILE, interval
 from elastocal.robot import Robot, fixed_joint_of, with_joint_origins
 
@@ -70,11 +72,13 @@ def with_tip_found(
         )
     nowhere = TipPlace((0.0, 0.0, 0.0), contact.tip, (0.0, 0.0, 0.0))
     options = replace(options, contact=replace(contact, tip_found=nowhere))
+    # A single blunder would move the tip by centimetres.
+    readings = usable_for_choice(robot, readings, options)
     for _ in range(_STEPS):
         weighed = weigh_contact(robot, readings, options)
         drives = DriveCompliances.of(robot, readings, weighed)
         problem, model = _beside_gears(robot, readings, weighed, drives)
-        shift = solve(problem).compliance[problem.tip_columns]
+        shift = _shift_of(problem, options)
         robot, options = _shifted(model.robot, options, shift, beside_gears=True)
         if np.linalg.norm(shift) < _SETTLED:
             break
@@ -90,7 +94,9 @@ def _beside_gears(
         model = ElasticModel(robot, springs(robot, readings))
         try:
             known = with_knowledge(options, drives.known_springs(model), model, readings)
-            return with_tip_open(build(model, readings, known), model, readings, known), model
+            problem = build(model, readings, known)
+            c = _springs_of(problem, known)
+            return with_tip_open(problem, model, readings, known, c), model
         except IdentificationError as error:
             reason = str(error)
     raise IdentificationError(f"contact.tip is found beside gears: {reason}")
@@ -108,35 +114,48 @@ def settle_tip(
     ----------
     model, readings, options, marker_offset
         As for `elastocal.identification.build`, with the tip found (`with_tip_found`); without one
-        the model stays as it is.
+        the model stays as it is. Blunders are passed over where the options set them aside.
     """
     problem = build(model, readings, options, marker_offset)
     if options.contact is None or options.contact.tip_found is None:
         return model, options, problem
-    for _ in range(_STEPS):
-        problem = with_tip_open(problem, model, readings, options)
-        shift = solve(problem, options.loss).compliance[problem.tip_columns]
-        if np.linalg.norm(shift) < _SETTLED:
+    kept = ~(screen(problem).blunder & options.set_blunders_aside)
+    for left in range(_STEPS, -1, -1):
+        c = _springs_of(problem.take(kept), options)
+        problem = with_tip_open(problem, model, readings, options, c)
+        shift = _shift_of(problem.take(kept), options)
+        if not left or np.linalg.norm(shift) < _SETTLED:
             break
         robot, options = _shifted(model.robot, options, shift, beside_gears=False)
         model = ElasticModel(robot, model.springs)
         problem = build(model, readings, options, marker_offset)
-    else:
-        problem = with_tip_open(problem, model, readings, options)
     return model, options, problem
 
 
+def _springs_of(problem: Problem, options: FitOptions) -> FloatArray:
+    """Return the compliances that fit a problem, shape (spring,), in rad/(N·m) or m/N."""
+    return np.asarray(solve(problem, options.loss).compliance[problem.springs])
+
+
+def _shift_of(problem: Problem, options: FitOptions) -> FloatArray:
+    """Return the shift of the tip that fits a problem, shape (3,), in m."""
+    return np.asarray(solve(problem, options.loss).compliance[problem.tip_columns])
+
+
 def with_tip_open(
-    problem: Problem, model: ElasticModel, readings: Readings, options: FitOptions
+    problem: Problem,
+    model: ElasticModel,
+    readings: Readings,
+    options: FitOptions,
+    compliance: FloatArray,
 ) -> Problem:
-    """Return a problem with columns of a shift of the tip, about the springs that it has alone."""
+    """Return a problem with columns of a shift of the tip, about some compliances."""
     contact = present(options.contact, "contact")
     found = present(contact.tip_found, "tip_found")
-    c = solve(problem, options.loss).compliance[problem.springs]
 
     def displacement(by: FloatArray) -> FloatArray:
         moved = ElasticModel(_moved(model.robot, by), model.springs)
-        return np.asarray(displacement_blocks(moved, readings) @ c)
+        return np.asarray(displacement_blocks(moved, readings) @ compliance)
 
     columns = slopes_by_shift(displacement)
     known = TipShift(-np.array(found.place), found.stated, contact.row_noise)
