@@ -123,15 +123,26 @@ def replacing(path: Path) -> Iterator[Path]:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+def path_from(folder: Path, file: str | os.PathLike[str]) -> str:
+    """Return the path of a file from a folder, as every system reads it."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # on another drive
+        return Path(file).resolve().as_posix()
+
+
 def require_place(path: Path) -> None:
     """Refuse a place at which no file can be written, before there is anything to write.
 
     Raises
     ------
     FileAccessError
-        If its folder cannot be made or written into, or it is itself no file.
+        If its folder cannot be made or written into, it is itself no file, or the command at work
+        must not write there.
     """
     path = Path(path)
+    if (rule := current_rule()) is not None:
+        rule.require(path)
     try:
         folder = next((each for each in path.parents if os.path.lexists(each)), Path())
         if not stat.S_ISDIR(folder.stat().st_mode):

@@ -10,7 +10,9 @@ import pytest
 
 from elastocal.cell import load_cell
 from elastocal.cell.examples import binary_stl, block_mesh, dome_section
+from elastocal.cli.questions import answered
 from elastocal.robot import catalogue
+from elastocal.workflows import NewSettings
 from support.cli import elastocal
 
 
@@ -178,6 +180,20 @@ def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
     assert (file.robot.rail.axis, file.robot.rail.travel) == ((0.0, 1.0, 0.0), (-1.0, 1.0))
     assert found.robot.joint_names[0] == "rail"
     assert found.home[0] == 0.0
+
+
+def test_another_robot_forgets_the_link_that_was_answered_for_the_first(tmp_path):
+    for name in ("UR10e", "UR20"):
+        urdf = catalogue.urdf(name).replace('"flange"', f'"hand of {name}"')
+        (tmp_path / f"{name}.urdf").write_text(urdf)
+    answers = [str(tmp_path / "UR10e.urdf"), "link_3", "back", "back", str(tmp_path / "UR20.urdf")]
+    for more, flange in ((["", "skip"], "hand of UR20"), (["back", "UR20", "skip"], None)):
+        with mock.patch.object(sys, "stdin", io.StringIO("\n".join([*answers, *more, ""]))):
+            found = answered(NewSettings())
+        assert found.flange == flange
+    given = NewSettings(flange="link_3")
+    with mock.patch.object(sys, "stdin", io.StringIO("UR10e\nback\nUR20\nskip\n")):
+        assert answered(given).flange == "link_3"
 
 
 def test_questions_that_nobody_answers_end_in_a_refusal(tmp_path):

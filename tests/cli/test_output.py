@@ -54,3 +54,13 @@ def test_progress_in_a_log_is_a_line_every_ten_seconds():
         "candidates for poses: 2 of 1500 after 11 s",
         "candidates for poses: 4 of 1500 after 25 s",
     ]
+
+
+@pytest.mark.parametrize(("typed", "answer", "ends"), [("a b\n", "a b\n", ""), ("", "skip", "\n")])
+def test_a_question_at_the_end_of_input_leaves_the_rest_and_ends_its_line(
+    monkeypatch, typed, answer, ends
+):
+    shown = io.StringIO()
+    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+    assert output.asked(console(file=shown, stderr=False), "Marker [mm]") == answer
+    assert shown.getvalue() == f"Marker [mm]: {ends}"

@@ -15,6 +15,7 @@ from elastocal.identification import (
     FitOptions,
     read_contact,
     reproduce_calibration,
+    tip_place,
     with_tip_found,
 )
 from elastocal.records import read_json, write_json
@@ -161,3 +162,35 @@ def test_a_contact_file_states_the_width(tmp_path):
     assert read_contact(path) == Contact(normal=50e6, tip=5e-3)
     with pytest.raises(IdentificationError, match=r"contact\.tip is 0\.2: it must be above 0"):
         Contact(tip=0.2)
+
+
+def test_readings_with_moments_are_refused_with_it():
+    # About the tcp that is stated: taken as those about the tip, they led to half of its place.
+    readings = held_by_contact(NOISY).readings(robot().joint_names)
+    R = described(WRONG).forward(readings.joint_position)[:, :3, :3]
+    readings = replace(readings, moment=np.cross(R @ -WRONG, readings.force))
+    with pytest.raises(IdentificationError, match=r"leave the columns of the moment out, or conta"):
+        with_tip_found(described(WRONG), readings, FitOptions(contact=KNOWN))
+
+
+def test_why_the_tip_is_not_found_beside_gears_is_said(monkeypatch):
+    monkeypatch.setattr(tip_place, "bearing_gears", tip_place.gears)
+    readings = held_by_contact(NOISY).readings(robot().joint_names)
+    free = FitOptions(contact=Contact(lateral=NOISY.lateral, tip=5e-3))
+    with pytest.raises(IdentificationError, match=r"contact\.normal is free, and the springs imi"):
+        with_tip_found(described(WRONG), readings, free)
+
+
+def test_one_blunder_does_not_move_the_tip():
+    displacement = elsewhere().controller_displacement.copy()
+    displacement[4, 1, 2] += 3e-3
+    found = ec.calibrate(
+        replace(elsewhere(), controller_displacement=displacement),
+        contact=KNOWN, springs="actuated", draws=40,
+    )  # fmt: skip
+    without = calibrated().calibration.contact.tip
+    # It was found 44 mm away, and predictions were off by an eighth.
+    np.testing.assert_allclose(found.calibration.contact.tip.place, without.place, atol=0.5e-3)
+    q, force = np.full((1, 6), 0.3), np.array([[0.0, 100.0, -900.0]])
+    there, here = (each.calibrated.predict(q, force).deflection for each in (found, calibrated()))
+    assert np.linalg.norm(there - here) < 0.005 * np.linalg.norm(here)

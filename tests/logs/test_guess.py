@@ -1,6 +1,9 @@
 """What the headings of makers' logs are taken for."""
 
+from pathlib import Path
+
 import pytest
+import yaml
 
 import elastocal as ec
 from elastocal.logs.streams import _is_named
@@ -104,3 +107,11 @@ def test_what_is_not_used_is_listed_in_the_map(tmp_path):
 )  # fmt: skip
 def test_a_log_is_named_by_its_file_or_its_path_from_the_map(tmp_path, log, means):
     assert _is_named(tmp_path / "day1" / "krc.csv", log) is means
+
+
+def test_a_map_names_the_cell_file_from_its_own_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    cell = ec.init("cells", kind="afp").cell
+    (tmp_path / "arm.csv").write_text("time;A1;A2;A3;A4;A5;A6\n" + "1;1;2;3;4;5;6\n" * 9)
+    guessed = ec.guess_map("arm.csv", out=Path("maps") / "map.yaml", cell=cell)
+    assert yaml.safe_load(guessed.text)["cell"] == "../cells/cell.yaml"

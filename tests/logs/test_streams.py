@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import LogError
-from elastocal.logs import days_of
+from elastocal.logs import ClockFit, days_of
 from elastocal.logs.map import LogEntry, LogMap
 from elastocal.logs.streams import body_centre
 
@@ -46,6 +46,7 @@ def test_a_body_that_is_never_seen_whole_is_refused():
         (None, ("2026-11-27T23:59:00", "2026-11-28T00:10:00"), "2026-11-27/2026-11-28"),
         (None, ("09:41:11", "09:41:12"), None),
         ("s", ("0.0", "86401.0"), None),
+        ("s", ("1795772471750", "1795772471760"), None),
         ("ms", ("1795772471750", "1795772471760"), "2026-11-27"),
     ],
 )
@@ -59,3 +60,45 @@ def test_the_days_of_logs_are_those_of_their_dates(tmp_path, unit, times, days):
     }
     entry = LogEntry.model_validate(entry)
     assert days_of(LogMap(robot={"model": "UR20"}, logs=(entry,)), [path]) == days
+
+
+ENTRIES = {
+    "arm.csv": {"joints": [{"columns": ["A1"], "unit": "deg"}]},
+    "force.csv": {"force": {"columns": ["Fx", "Fy", "Fz"], "unit": "N"}},
+    "marker.csv": {"markers": [{"columns": ["X", "Y", "Z"], "unit": "mm"}]},
+}
+
+
+@pytest.mark.parametrize(
+    ("keys", "reason"),
+    [
+        ({"arm.csv": {"offset": "3 s"}}, "arm.csv has the clock of the joints: leave its offset"),
+        (
+            {"arm.csv": {"clock": "plc"}, "force.csv": {"clock": "plc", "offset": "3 s"}},
+            "force.csv has the clock of the joints: leave its offset out",
+        ),
+        (
+            {"force.csv": {"clock": "box", "offset": "3 s"}, "marker.csv": {"clock": "box"}},
+            "force.csv and marker.csv share a clock: state the same offset at both",
+        ),
+        (
+            {"arm.csv": {"handshake": "n"}, "force.csv": {"handshake": "n", "offset": "3 s"}},
+            "force.csv has a handshake: leave its offset out",
+        ),
+        ({"force.csv": {"offset": "3 s"}, "marker.csv": {"offset": "-4 s"}}, None),
+    ],
+)
+def test_an_offset_that_would_be_passed_over_is_refused(keys, reason):
+    time = {"column": "t", "unit": "s"}
+    logs = [{"log": log, "time": time, **own, **keys.get(log, {})} for log, own in ENTRIES.items()]
+    data = {"robot": {"model": "UR20"}, "logs": logs}
+    if reason is None:
+        assert [each.offset for each in LogMap.model_validate(data).logs] == [None, 3.0, -4.0]
+        return
+    with pytest.raises(ValueError, match=reason):
+        LogMap.model_validate(data)
+
+
+def test_a_clock_far_from_any_date_is_said_in_seconds():
+    fit = ClockFit("box", "arm", -1.8e15, 0.1, 0.0, None, 0.9, 1.8e15)
+    assert fit.sentence.startswith("box: -1800000000000000.000 s")

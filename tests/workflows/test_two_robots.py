@@ -233,3 +233,12 @@ def test_a_refusal_is_one_line(done, tmp_path):
 def test_check_knows_every_file(done, file):
     shown = elastocal("check", done / file)
     assert shown.code == 0, shown.err
+
+
+def test_a_plan_named_as_its_page_and_a_page_of_another_are_refused_before_the_work(done, tmp_path):
+    with pytest.raises(FileAccessError, match=r"--out .*plan\.html: its name must end in \.json"):
+        ec.plan_pair(done / "cell.yaml", out=tmp_path / "plan.html")
+    (tmp_path / "plan.html").write_text("mine", encoding="utf-8")
+    with pytest.raises(FileAccessError, match=r"plan\.html: it is there already"):
+        ec.plan_pair(done / "cell.yaml", out=tmp_path / "plan.json")
+    assert not (tmp_path / "plan.json").exists()

@@ -85,7 +85,10 @@ def console(**options: Any) -> "Console":
 def asked(screen: "Console", question: str) -> str:
     """Return the answer typed to a question; the end of input leaves out all that follow."""
     screen.print(f"{question}: ", end="", soft_wrap=True, markup=False, highlight=False)
-    return sys.stdin.readline() or SKIP
+    answer = sys.stdin.readline()
+    if not answer:
+        screen.print()  # the question has no end of its line
+    return answer or SKIP
 
 
 _PARTS = re.compile(f"([{''.join(_STARTS)}{_END}])")

@@ -50,8 +50,10 @@ def answered(settings: "NewSettings") -> "NewSettings":
 
     def take(name: str, answer: str) -> None:
         nonlocal settings
-        settings.require_answer(name, answer)
         said: dict[str, Any] = {name: answer}
+        if name == "robot" and answer != settings.robot:
+            said["flange"] = given.flange  # a link of another robot
+        replace(settings, **said).require_answer(name, answer)
         settings = replace(settings, **said)
 
     screen.print(_HELP)

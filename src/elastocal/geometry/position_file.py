@@ -326,7 +326,8 @@ def _require_last_link(columns: _Columns, robot: Robot) -> None:
             if names:
                 raise GeometryError(
                     f"tcp {robot.tip!r} is a link in the middle of the arm: joints move behind it"
-                    f" in the table ({listed(names)}); give --tcp {tip!r}"
+                    f" in the table ({listed(names)}); give --tcp {tip!r}, or leave their columns"
+                    " out where the markers sit before them"
                 )
 
 

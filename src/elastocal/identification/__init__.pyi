@@ -179,6 +179,7 @@ from .tip_place import with_tip_found as with_tip_found
 from .uncertainty import (
     CONFIDENCE as CONFIDENCE,
     MOST_UNEXPLAINED as MOST_UNEXPLAINED,
+    NORMAL_QUANTILE as NORMAL_QUANTILE,
     HeldOut as HeldOut,
     bootstrap as bootstrap,
     interval as interval,

@@ -74,9 +74,6 @@ _LONGEST = 1e-3
 """Largest standard deviation of a stop and of a slip, in m."""
 _FARTHEST = 0.05
 """Largest standard deviation of the tip's place, in m: farther off is another tool."""
-_TOLD, _NORMAL_95 = 0.5, 1.96
-"""Part of the interval of what was stated of the tip's place below which the readings tell it, and
-that interval's half width in standard deviations."""
 _IMITATORS = 3
 """Springs that are named as those that imitate a compliance of the contact."""
 
@@ -157,11 +154,14 @@ class TipPlace:
     """Upper ends of them, in m."""
 
     def told(self) -> tuple[bool, ...]:
-        """Return along which axes the readings tell the place, beyond what was stated."""
+        """Return along which axes the readings tell the place: to half of what was stated.
+
+        Half of its 95 % interval then is shorter than the standard deviation that was stated.
+        """
         if self.low is None or self.high is None:
             return False, False, False
-        least = _TOLD * 2.0 * _NORMAL_95 * self.stated
-        return tuple(high - low < least for low, high in zip(self.low, self.high, strict=True))
+        most = 2.0 * self.stated
+        return tuple(high - low < most for low, high in zip(self.low, self.high, strict=True))
 
     def sentence(self) -> Phrase:
         """Return in words where the tip is."""

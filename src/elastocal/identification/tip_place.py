@@ -12,12 +12,10 @@ first found beside gears that stiffen: springs without them make up by the tip f
 See docs/decisions/0137-place-of-the-tip.md and 0146-draws-move-the-tip.md.
 """
 
-import contextlib
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtri
 
 from elastocal.arrays import FloatArray, triple
 from elastocal.dataset import Readings
@@ -26,14 +24,15 @@ from elastocal.errors import IdentificationError, present
 from elastocal.identification.contact import Contact, TipPlace, TipShift
 from elastocal.identification.displacement import displacement_blocks, slopes_by_shift
 from elastocal.identification.knowledge import DriveCompliances, weigh_contact, with_knowledge
+from elastocal.identification.ladder import usable_for_choice
 from elastocal.identification.options import FitOptions
 from elastocal.identification.problem import Problem, build
 from elastocal.identification.rungs import bearing_gears, gears
 from elastocal.identification.solve import solve
-from elastocal.identification.uncertainty import CONFIDENCE, interval
+from elastocal.identification.suspicious import screen
+from elastocal.identification.uncertainty import NORMAL_QUANTILE, interval
 from elastocal.robot import Robot, fixed_joint_of, with_joint_origins
 
-_NORMAL = float(ndtri(0.5 * (1.0 + CONFIDENCE)))
 _STEPS, _SETTLED = 6, 1e-4
 """Most steps, and the length of the last one, in m."""
 
@@ -55,7 +54,7 @@ def with_tip_found(
     Raises
     ------
     IdentificationError
-        If no fixed joint holds the tcp, or a tracker measured any reading.
+        If no fixed joint holds the tcp, a tracker measured any reading, or readings have moments.
     """
     contact = options.contact
     if contact is None or contact.tip is None:
@@ -65,13 +64,21 @@ def with_tip_found(
             "contact.tip is for campaigns that no tracker measured: where one did, the place of the"
             " marker depends on that of the tip; leave contact.tip out"
         )
+    if readings.moment is not None:
+        raise IdentificationError(
+            "contact.tip is for readings of forces alone: moments are about the tcp that is stated,"
+            " and about the tip they are others; leave the columns of the moment out, or"
+            " contact.tip"
+        )
     nowhere = TipPlace((0.0, 0.0, 0.0), contact.tip, (0.0, 0.0, 0.0))
     options = replace(options, contact=replace(contact, tip_found=nowhere))
+    # A single blunder would move the tip by centimetres.
+    readings = usable_for_choice(robot, readings, options)
     for _ in range(_STEPS):
         weighed = weigh_contact(robot, readings, options)
         drives = DriveCompliances.of(robot, readings, weighed)
         problem, model = _beside_gears(robot, readings, weighed, drives)
-        shift = solve(problem).compliance[problem.tip_columns]
+        shift = _shift_of(problem, options)
         robot, options = _shifted(model.robot, options, shift, beside_gears=True)
         if np.linalg.norm(shift) < _SETTLED:
             break
@@ -82,14 +89,17 @@ def _beside_gears(
     robot: Robot, readings: Readings, options: FitOptions, drives: DriveCompliances
 ) -> tuple[Problem, ElasticModel]:
     """Return the problem of the tip beside gears; on bearings, where links imitate the contact."""
+    reason = ""
     for springs in (gears, bearing_gears):
         model = ElasticModel(robot, springs(robot, readings))
-        with contextlib.suppress(IdentificationError):
+        try:
             known = with_knowledge(options, drives.known_springs(model), model, readings)
-            return with_tip_open(build(model, readings, known), model, readings, known), model
-    raise IdentificationError(
-        "contact.tip needs a normal compliance that gears do not imitate: state contact.normal"
-    )
+            problem = build(model, readings, known)
+            c = _springs_of(problem, known)
+            return with_tip_open(problem, model, readings, known, c), model
+        except IdentificationError as error:
+            reason = str(error)
+    raise IdentificationError(f"contact.tip is found beside gears: {reason}")
 
 
 def settle_tip(
@@ -104,35 +114,48 @@ def settle_tip(
     ----------
     model, readings, options, marker_offset
         As for `elastocal.identification.build`, with the tip found (`with_tip_found`); without one
-        the model stays as it is.
+        the model stays as it is. Blunders are passed over where the options set them aside.
     """
     problem = build(model, readings, options, marker_offset)
     if options.contact is None or options.contact.tip_found is None:
         return model, options, problem
-    for _ in range(_STEPS):
-        problem = with_tip_open(problem, model, readings, options)
-        shift = solve(problem, options.loss).compliance[problem.tip_columns]
-        if np.linalg.norm(shift) < _SETTLED:
+    kept = ~(screen(problem).blunder & options.set_blunders_aside)
+    for left in range(_STEPS, -1, -1):
+        c = _springs_of(problem.take(kept), options)
+        problem = with_tip_open(problem, model, readings, options, c)
+        shift = _shift_of(problem.take(kept), options)
+        if not left or np.linalg.norm(shift) < _SETTLED:
             break
         robot, options = _shifted(model.robot, options, shift, beside_gears=False)
         model = ElasticModel(robot, model.springs)
         problem = build(model, readings, options, marker_offset)
-    else:
-        problem = with_tip_open(problem, model, readings, options)
     return model, options, problem
 
 
+def _springs_of(problem: Problem, options: FitOptions) -> FloatArray:
+    """Return the compliances that fit a problem, shape (spring,), in rad/(N·m) or m/N."""
+    return np.asarray(solve(problem, options.loss).compliance[problem.springs])
+
+
+def _shift_of(problem: Problem, options: FitOptions) -> FloatArray:
+    """Return the shift of the tip that fits a problem, shape (3,), in m."""
+    return np.asarray(solve(problem, options.loss).compliance[problem.tip_columns])
+
+
 def with_tip_open(
-    problem: Problem, model: ElasticModel, readings: Readings, options: FitOptions
+    problem: Problem,
+    model: ElasticModel,
+    readings: Readings,
+    options: FitOptions,
+    compliance: FloatArray,
 ) -> Problem:
-    """Return a problem with columns of a shift of the tip, about the springs that it has alone."""
+    """Return a problem with columns of a shift of the tip, about some compliances."""
     contact = present(options.contact, "contact")
     found = present(contact.tip_found, "tip_found")
-    c = solve(problem, options.loss).compliance[problem.springs]
 
     def displacement(by: FloatArray) -> FloatArray:
         moved = ElasticModel(_moved(model.robot, by), model.springs)
-        return np.asarray(displacement_blocks(moved, readings) @ c)
+        return np.asarray(displacement_blocks(moved, readings) @ compliance)
 
     columns = slopes_by_shift(displacement)
     known = TipShift(-np.array(found.place), found.stated, contact.row_noise)
@@ -154,7 +177,7 @@ def tip_with_interval(contact: Contact, draws: FloatArray) -> Contact:
     """
     found = present(contact.tip_found, "tip_found")
     place = np.array(found.place)
-    apart = _NORMAL * (place - np.array(found.beside_gears))
+    apart = NORMAL_QUANTILE * (place - np.array(found.beside_gears))
     below, above = (np.hypot(end, apart) for end in interval(draws))
     ends = triple(place - below), triple(place + above)
     return replace(contact, tip_found=replace(found, low=ends[0], high=ends[1]))

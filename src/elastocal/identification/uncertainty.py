@@ -30,6 +30,8 @@ from elastocal.records import record
 from elastocal.results import brief_repr
 
 CONFIDENCE = 0.95
+NORMAL_QUANTILE = float(ndtri(0.5 * (1.0 + CONFIDENCE)))
+"""Half of a 95 % interval of a normal distribution, in standard deviations."""
 MOST_UNEXPLAINED = 0.5
 """Share of the deflection that a model may leave unexplained at left-out poses. Beyond it, it is
 no model of this arm: its bias, which no resampling sees, is larger than what it explains."""
@@ -324,8 +326,7 @@ def widening_factor(
     jackknife = _variance(problem, left_out - compliance) * (folds - 1) / folds
     if not bootstrap > 0.0:
         return 1.0
-    tail = 0.5 * (1.0 + CONFIDENCE)
-    student = stdtrit(folds - 1, tail) / ndtri(tail)
+    student = stdtrit(folds - 1, 0.5 * (1.0 + CONFIDENCE)) / NORMAL_QUANTILE
     return max(1.0, float(student * np.sqrt(jackknife / bootstrap)))
 
 

@@ -25,7 +25,7 @@ from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import LogError, present
 from elastocal.logs._misfits import LONGEST_GAP, PRESSING, misfits
 from elastocal.logs.map import Site
-from elastocal.logs.streams import LogStreams
+from elastocal.logs.streams import DATES, LogStreams
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -111,7 +111,8 @@ class ClockFit:
         known = f"± {1e3 * 2.0 * self.offset_sigma:.0f} ms{drift}"
         seen = f"(correlation {self.correlation:.2f})"
         zero = -self.offset
-        if not (zero > _DAY or (zero > _HOUR and abs(zero - self.first) < _HOUR)):
+        of_day = zero > _DAY or (zero > _HOUR and abs(zero - self.first) < _HOUR)
+        if not (of_day and zero < DATES[1]):
             return f"{self.clock}: {self.offset:+.3f} s {known} to {self.reference} {seen}"
         # For dates and times of day beside seconds, the difference of years is not shown.
         date, clock = datetime.fromtimestamp(zero, UTC).isoformat(" ", "milliseconds")[:23].split()

@@ -185,6 +185,11 @@ class LogEntry(StrictModel):
     markers: tuple[MarkerColumns, ...] = ()
     """Reflectors of one rigid body."""
 
+    @property
+    def own_clock(self) -> str:
+        """Word of its clock."""
+        return self.clock or self.log
+
     @field_validator("force", "moment")
     @classmethod
     def _known_unit(cls, value: Vector | None, info: object) -> Vector | None:
@@ -238,11 +243,26 @@ class LogMap(StrictModel):
             )
         if not any(each.joints for each in self.logs):
             raise ValueError("no log holds joints")
+        self._require_offsets_used()
         if self.check is not None and self.check not in self.load_cases:
             raise ValueError(f"check {self.check!r} is none of the load cases")
         if CONDITIONING in self.load_cases:
             raise ValueError(f"load case {CONDITIONING!r} is a word of our own: name it otherwise")
         return self
+
+    def _require_offsets_used(self) -> None:
+        """Refuse an offset that would be passed over."""
+        joints = next(each for each in self.logs if each.joints)
+        for each in self.logs:
+            twin = next(other for other in self.logs if other.own_clock == each.own_clock)
+            if each.offset is not None and each.own_clock == joints.own_clock:
+                raise ValueError(f"{each.log} has the clock of the joints: leave its offset out")
+            if each.offset is not None and each.handshake and joints.handshake:
+                raise ValueError(f"{each.log} has a handshake: leave its offset out")
+            if each.offset != twin.offset:
+                raise ValueError(
+                    f"{twin.log} and {each.log} share a clock: state the same offset at both"
+                )
 
 
 @brief_repr

@@ -23,8 +23,9 @@ from elastocal.units import factor
 _WORKBOOKS = (".xlsx", ".xlsm")
 _NO_READING = ("", "0", "nan", "none", "false")
 """Words of a handshake column between readings."""
-_EARLIEST_DATE = 3e8
-"""Seconds since 1970 from which on a time is a date: mid 1979. No device runs for as long."""
+DATES = 3e8, 4e9
+"""Seconds since 1970 between which a time is a date: mid 1979 to 2096. No device runs for as
+long."""
 _BEYOND_LIMITS = 0.2
 """Share of a joint's travel by which a log may be outside its limits."""
 _K = 2.0
@@ -40,7 +41,6 @@ class LogStreams:
     """Content of one entry of the map; None where its logs do not contain it."""
 
     name: str
-    clock: str
     entry: LogEntry
     time: FloatArray
     """Time of each row, shape (row,), in s of the log's clock; the row's number without one."""
@@ -52,6 +52,11 @@ class LogStreams:
     """The marker, of several on one body its centre."""
     markers: FloatArray | None = None
     """Each marker, shape (row, marker, 3), in m; NaN where hidden."""
+
+    @property
+    def clock(self) -> str:
+        """Word of its clock."""
+        return self.entry.own_clock
 
     def at(self, time: FloatArray) -> "LogStreams":
         """Return the same with other times, shape (row,)."""
@@ -169,7 +174,6 @@ def _stream(entry: LogEntry, table: LogTable, robot: Robot) -> LogStreams:
         words = tuple("" if text.lower() in _NO_READING else text for text in texts)
     return LogStreams(
         table.name,
-        entry.clock or entry.log,
         entry,
         time,
         words,
@@ -205,9 +209,9 @@ def days_of(log_map: LogMap, files: Sequence[Path]) -> str | None:
     own = [path for path in files if _is_named(path, entry.log)]
     times = [_time(entry, read_table(path, entry.topic)) for path in own]
     seconds = [float(each) for time in times if len(time) for each in (time.min(), time.max())]
-    if not seconds or not min(seconds) > _EARLIEST_DATE:
+    ends = (min(seconds, default=0.0), max(seconds, default=0.0))
+    if not DATES[0] < ends[0] <= ends[1] < DATES[1]:
         return None
-    ends = (min(seconds), max(seconds))
     days = dict.fromkeys(datetime.fromtimestamp(each, UTC).date().isoformat() for each in ends)
     return "/".join(days)
 
@@ -223,7 +227,6 @@ def _joined(parts: Sequence[LogStreams]) -> LogStreams:
     words = tuple(word for part in parts for word in part.handshake or ())
     return LogStreams(
         first.entry.log,
-        first.entry.clock or first.entry.log,
         first.entry,
         np.concatenate([part.time for part in parts]),
         words if first.handshake is not None else None,

@@ -3,6 +3,7 @@ from .calibration import (
     identify_pair as identify_pair,
 )
 from .cell import (
+    PAIR_FILE as PAIR_FILE,
     SCHEMA as SCHEMA,
     PairCell as PairCell,
     is_pair_cell as is_pair_cell,

@@ -40,6 +40,8 @@ from elastocal.results import brief_repr
 from elastocal.robot import Robot
 
 SCHEMA = "elastocal.cell/1"
+PAIR_FILE = "pair.json"
+"""Record of a calibration of two robots, in one folder with the model file of each arm."""
 _LEAST_APART = 0.2
 """Distance of two bases in m below which they would stand in each other."""
 
@@ -183,7 +185,14 @@ class PairCellFile(StrictModel):
     def _two_by_name(cls, robots: tuple[ArmEntry, ...]) -> tuple[ArmEntry, ...]:
         if len(robots) != 2:
             raise ValueError(f"{len(robots)} robots: two are needed")
-        if robots[0].name == robots[1].name:
+        for each in robots:
+            if {"/", "\\", ":"} & {*each.name} or f"{each.name}.json".casefold() == PAIR_FILE:
+                raise ValueError(
+                    f"name {each.name!r}: files of the arm are called so: / \\ : are not allowed,"
+                    f" and beside them is {PAIR_FILE}"
+                )
+        # Two of three operating systems take ``Left.json`` for ``left.json``.
+        if robots[0].name.casefold() == robots[1].name.casefold():
             raise ValueError(f"both robots are named {robots[0].name!r}")
         return robots
 

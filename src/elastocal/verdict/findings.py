@@ -208,8 +208,7 @@ NO_BEARINGS = Kind(
 
 UPDATED = Kind(
     "verdict.springs-updated",
-    "production has moved the springs since ({readings} readings): the errors are those of the"
-    " springs before",
+    "production has moved the springs since: the errors are those of the springs before",
     advice="Calibrate anew for errors of the springs as they are.",
 )
 
@@ -220,7 +219,7 @@ def compliance_findings(evidence: Evidence) -> Iterator[Finding]:
         return
     update = evidence.calibrated.update
     if update is not None and update.calibrated is not None:
-        yield UPDATED(readings=update.readings)
+        yield UPDATED()
     ladder = evidence.figures.ladder if evidence.figures else ()
     worse = [rung for rung in ladder if rung.chosen and rung.difference.low > 0.0]
     if worse:

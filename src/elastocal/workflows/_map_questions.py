@@ -3,13 +3,13 @@
 Asked for are the units that sizes do not tell, then robot, tool, sensor and marker.
 """
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from elastocal.asking import HELP, ask_in_turn
 from elastocal.errors import ElastocalError, RobotError, UnitError
+from elastocal.files import path_from
 from elastocal.logs import UNKNOWN, GuessedLog, quoted, write_guess
 from elastocal.robot import catalogue, parse_urdf, read_urdf, refusals_naming, tool_link
 from elastocal.units import dimension_of_unit, factor, impossible, parse_point, parse_quantity
@@ -44,7 +44,9 @@ _DIMENSIONS = {
 """Dimension of columns by their key in a map; those of joints are angles or lengths."""
 
 
-def map_text(logs: Sequence[GuessedLog], site: Mapping[str, str], cell: Path | None) -> str:
+def map_text(
+    logs: Sequence[GuessedLog], site: Mapping[str, str], cell: Path | None, folder: Path
+) -> str:
     """Return the text of a map with the cell file, or with what is known about the cell.
 
     Parameters
@@ -55,9 +57,11 @@ def map_text(logs: Sequence[GuessedLog], site: Mapping[str, str], cell: Path | N
         Entries of the map by key, as `answered` returns them; others are left to be written.
     cell : Path or None
         Cell file that says all of it.
+    folder : Path
+        Folder of the map, to which the file is relative in it.
     """
     if cell is not None:
-        return write_guess(logs, [f"cell: {quoted(str(cell))}"])
+        return write_guess(logs, [f"cell: {quoted(path_from(folder, cell))}"])
     lines = []
     for key, (blank, what) in _ENTRIES.items():
         left_out = "# " if key == "tool" and key not in site else ""
@@ -187,7 +191,7 @@ class _Asked:
             with refusals_naming(path):
                 flange = tool_link(urdf)
             links = tuple(link.get("name", "") for link in parse_urdf(urdf).findall("link"))
-            entry = f"urdf: {quoted(Path(os.path.relpath(path, self._folder)).as_posix())}"
+            entry = f"urdf: {quoted(path_from(self._folder, path))}"
         elif answer:
             entry = f'model: "{catalogue.entry(answer).name}"'
         self._said.pop("flange", None)

@@ -302,11 +302,11 @@ def guess_map(settings: GuessMapSettings, progress: Progress) -> GuessMapResult:
     joints = None if arm is None else dict(zip(arm.joint_names, arm.revolute, strict=True))
     guessed = foreign.guess_logs(files, joints)
     site: Mapping[str, str] = {}
+    folder = Path() if out is None else out.parent
     if settings.ask is not None:
-        folder = Path.cwd() if out is None else out.parent
         guessed, site = answered(guessed, settings.ask, folder, about_cell=settings.cell is None)
     progress("logs", 1, 1)
-    text = map_text(guessed, site, settings.cell)
+    text = map_text(guessed, site, settings.cell, folder)
     if out is not None:
         write_text(out, text)
     return GuessMapResult(guessed, text)
@@ -320,7 +320,8 @@ def _files(logs: Sequence[str | PathLike[str]]) -> list[Path]:
     LogError
         If there is none, or two have the same name, which the map could not distinguish.
     """
-    files = list(dict.fromkeys(Path(log) for log in logs))
+    several = (logs,) if isinstance(logs, str | PathLike) else logs
+    files = list(dict.fromkeys(Path(log) for log in several))
     if not files:
         raise LogError("no log is given")
     names = [file.name for file in files]

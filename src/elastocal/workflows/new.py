@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ from elastocal import planning
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, load_cell
 from elastocal.errors import ElastocalError, PlanningError, SchemaError, of_kind
-from elastocal.files import replacing
+from elastocal.files import path_from, replacing
 from elastocal.planning.checks import TorqueCheck
 from elastocal.planning.motion import Mover, mover_for
 from elastocal.planning.surface import Surface, SurfaceError, sample_uniform
@@ -206,7 +205,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
     press = parse_quantity(settings.press, "force")
     text = templates("elastocal.cell").get_template("new.yaml").render(
         name=_quoted(out.stem if out.stem.isidentifier() else "cell"),
-        urdf=_quoted(_relative(str(settings.robot), out)) if settings.is_urdf else "",
+        urdf=_quoted(path_from(out.parent, str(settings.robot))) if settings.is_urdf else "",
         robot=_quoted(robot.name),
         flange=_quoted(settings.flange),
         masses=_masses(robot),
@@ -218,7 +217,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         moment_range=_listed(str(settings.moment_range)),
         tracker="" if settings.tracker == NONE else _listed(str(settings.tracker)),
         marker=_listed(str(settings.marker_place)),
-        mesh=_quoted(_relative(str(settings.mesh), out)),
+        mesh=_quoted(path_from(out.parent, str(settings.mesh))),
         unit=settings.unit,
         place=_frame(str(settings.place)),
         low=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in low)),
@@ -236,7 +235,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         speed=_speed_entry(settings),
         rail=_rail(settings.travel),
         poses=settings.poses,
-        process="" if process == NONE else _quoted(_relative(process, out)),
+        process="" if process == NONE else _quoted(path_from(out.parent, process)),
         tolerance="" if tolerance == NONE else _quoted(tolerance),
     )  # fmt: skip
     return _REMARK.sub(lambda found: f"{found[1]:<{_COLUMN - 3}}   {found[2]}", text)
@@ -301,14 +300,6 @@ def _shape(tip: FloatArray, radius: float) -> str:
     b = in_unit(math.atan2(aside, tip[2]), "deg")
     turn = "" if b < 0.5 else f', abc: ["{a:.1f} deg", "{b:.1f} deg", "0 deg"]'
     return f"{{name: tool, cylinder: {rod}, pose: {{xyz: [{middle}]{turn}}}}}"
-
-
-def _relative(file: str, out: Path) -> str:
-    """Return the path of a file from the folder of the cell file, as every system reads it."""
-    try:
-        return Path(os.path.relpath(file, out.parent)).as_posix()
-    except ValueError:  # on another drive
-        return Path(file).resolve().as_posix()
 
 
 def _two_digits(value: float) -> str:

@@ -29,6 +29,7 @@ from elastocal.results import Result, brief_repr
 from elastocal.robot import Robot
 from elastocal.sim import Tips, press_together, true_arm
 from elastocal.two_robots import (
+    PAIR_FILE,
     CooperationSummary,
     PairCalibration,
     PairCell,
@@ -60,8 +61,6 @@ __all__ = [
     "simulate_pair",
 ]
 
-PAIR_FILE = "pair.json"
-"""Record of a calibration of two robots, in its folder."""
 PAGE_FILE = "pair.html"
 """Report of a calibration of two robots, in its folder."""
 COOPERATION_FILE = "cooperation.json"
@@ -77,7 +76,7 @@ class PlanPairSettings:
 
     cell: Annotated[Path, Option(argument=True)]
     """Cell file with the key ``robots``, ``.yaml``."""
-    out: Annotated[Path, Option(metavar="PLAN.json")]
+    out: Annotated[Path, Option(metavar="PLAN.json", ends=(".json",))]
     """Plan to write; beside it its page, ``PLAN.html``: both arms at each meeting."""
     force: bool = False
     """Replace a file that is no former output of this command."""
@@ -110,9 +109,9 @@ def plan_pair(settings: PlanPairSettings, progress: Progress) -> PairPlan:  # no
     25
     """
     language, cell = language_of(settings.language), load_pair_cell(settings.cell)
-    found = plan_meetings(cell)
     page = Path(settings.out).with_suffix(".html")
     require_place(page)
+    found = plan_meetings(cell)
     write_json(settings.out, found)
     write_pair_plan_page(page, cell, found, language)
     return found

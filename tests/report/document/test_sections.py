@@ -270,6 +270,8 @@ def test_springs_that_production_has_moved_since_hold_back(parts):
         assert len([text for text in told if "errors are those of the springs before" in text]) == (
             count
         )
+        # The readings are those of the last production, whether it moved the springs or not.
+        assert "180" not in str(told)
 
 
 def test_more_springs_that_predict_worse_hold_back(parts):

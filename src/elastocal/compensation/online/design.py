@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from elastocal.arrays import FloatArray
 from elastocal.cell import SENSOR_CORRECTED, SensorLoad
@@ -26,7 +25,7 @@ from elastocal.compensation.kernel import (
 from elastocal.compensation.settings import CompensatorSettings
 from elastocal.elastic import require_possible
 from elastocal.errors import CompensationError, SpringError, nearest
-from elastocal.identification import CalibratedModel, draws_factor
+from elastocal.identification import NORMAL_QUANTILE, CalibratedModel, draws_factor
 from elastocal.results import brief_repr
 
 LONG_AGO = -1.0e300
@@ -40,7 +39,6 @@ _PUSHING = 1e-12
 """Compliance below its smallest by which rounding may have brought it there, in SI."""
 _NOTHING = 1e-9
 """Smaller deflections, in m, are rounding."""
-_Z = float(ndtri(0.975))
 
 
 @brief_repr
@@ -186,7 +184,7 @@ def design(
     frame = settings.R_base_frame
     model = calibrated.model
     grown = state is not None and state.corrects
-    spread = _Z * draws_factor(calibrated.draws)
+    spread = NORMAL_QUANTILE * draws_factor(calibrated.draws)
     links, rest_spread = _of_encoders(calibrated, settings.encoders.joints, spread)
     return Design(
         calibrated=calibrated,

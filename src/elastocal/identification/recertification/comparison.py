@@ -72,7 +72,7 @@ from elastocal.identification.recertification.result import (
     Verdict,
 )
 from elastocal.identification.spring_sums import sum_text, sum_weights
-from elastocal.identification.uncertainty import CONFIDENCE, interval
+from elastocal.identification.uncertainty import CONFIDENCE, NORMAL_QUANTILE, interval
 from elastocal.records import read_json
 from elastocal.robot import Robot
 from elastocal.units import in_unit, quantity
@@ -84,8 +84,6 @@ _CHUNK = 100
 """Rows at a time, so that the pairs of a long path fit into memory."""
 _ONE_SIDE = 50.0 * (1.0 + CONFIDENCE)
 """Percentile that leaves out half of what a 95 % interval leaves out."""
-_NORMAL = 1.959964
-"""Normal quantile at that percentile; the draws are stretched for few poses already."""
 _Blocks = tuple[FloatArray, FloatArray]
 """Rows of the old and of the new model that times its parameters are deflections."""
 
@@ -268,7 +266,8 @@ def compare_rows(
     size = np.linalg.norm(deflection[1] - deflection[0], axis=1)
     missed = np.zeros(count) if alike else _misfit((old, new), deflection)
     t = np.percentile(farthest, _ONE_SIDE)
-    high = size + np.hypot(_NORMAL * above, missed)
+    # The draws are stretched for few poses already.
+    high = size + np.hypot(NORMAL_QUANTILE * above, missed)
     surely = size - np.hypot(t * scale, missed)
     # What springs cannot express is no noise: it does not average out over rows.
     off = float(np.hypot(np.percentile(total / count, 100.0 * CONFIDENCE), missed.mean()))
