@@ -51,7 +51,7 @@ from elastocal.identification.problem import (
 from elastocal.identification.rungs import low_loads
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
-from elastocal.identification.tip_place import settle_tip, tip_with_interval
+from elastocal.identification.tip_place import as_described, settle_tip, tip_with_interval
 from elastocal.identification.uncertainty import (
     MOST_UNEXPLAINED,
     Coverage,
@@ -425,7 +425,8 @@ def _data_warnings(
     """Return a finding for each oddity of the data, or refuse them."""
     seen = _implausible(model, readings, marker_offset)
     warnings = _stated(seen, options)
-    warnings += list(check_joints(model.robot, readings)) + [
+    # Recorded positions of the tcp are of the description.
+    warnings += list(check_joints(as_described(model.robot, options), readings)) + [
         SAME_CONFIGURATION(poses=group) for group in same_configuration(readings, problem.block)
     ]
     if gap := model.robot.chain.weight_gap:
