@@ -407,7 +407,8 @@ def _widening(
     open_to_choice = [each for each in ladder if np.isfinite(each.apart)]
     figures = [(each.difference, each.standard_error, each.apart) for each in open_to_choice]
     beside = np.array([each.beside for each in open_to_choice], dtype=bool)
-    moved = doubt(*np.array(figures).reshape(-1, 3).T, beside=beside)
+    difference, error, apart = np.array(figures).reshape(-1, 3).T
+    moved = doubt(difference, error, apart, beside)
     by = few * doubt_factor(problem, compliance, stretched, moved)
     if not unexplained <= MOST_UNEXPLAINED:
         # No model of this arm: its springs are as far off as its predictions.
