@@ -65,7 +65,7 @@ UNTIL ?= -max_total_time=6
 fuzz-lines: $(VENV)/installed-fuzz
 	cd tests && ../$(BIN)/python -m fuzz.lines $(UNTIL) -max_len=4096 -verbosity=0 -print_final_stats=1
 
-nightly: slow site notebooks process-figures coverage lowest package mutation
+nightly: slow site notebooks process-figures stopping coverage lowest package mutation
 
 slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
@@ -79,6 +79,11 @@ notebooks: $(VENV)/installed-nightly
 # in docs/hooks/gallery/process_figures.json, or all of it with ANEW=--anew. Up to an hour.
 process-figures: $(VENV)/installed-dev
 	cd docs/hooks && OMP_NUM_THREADS=1 ../../$(BIN)/python -m gallery.process_figures $(ANEW)
+
+# Campaigns that stop by themselves: what is not yet written down in docs/hooks/gallery/stopping.json.
+# An hour for all.
+stopping: $(VENV)/installed-dev
+	cd docs/hooks && OMP_NUM_THREADS=1 ../../$(BIN)/python -m gallery.stopping
 
 # Tests that count imported modules would count those of coverage.
 coverage: $(VENV)/installed-nightly

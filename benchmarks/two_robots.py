@@ -1,10 +1,11 @@
 """Two robots by presses on each other: error at unseen meetings, for docs/decisions/0127.
 
-``python benchmarks/two_robots.py [VARIANT …]``; half a minute a variant. The truth is simulated:
-bending links, stiffening gears, arms that differ by 20 %, meetings of unequal stiffness.
+``python benchmarks/two_robots.py [VARIANT …] [--seeds SEED …]``; half a minute a variant. The
+truth is simulated: bending links, stiffening gears, arms that differ by 20 %, meetings of unequal
+stiffness.
 """
 
-import sys
+import argparse
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -32,7 +33,7 @@ from elastocal.two_robots import (
 )
 from elastocal.two_robots.meetings import meeting_pool
 
-SEEDS, UNSEEN = 5, 60
+SEEDS, UNSEEN = range(5), 60
 OBLIQUE = ('["3600 mm", "0 mm", "0 mm"], abc', '["3600 mm", "300 mm", "0 mm"], abc')
 CLAMPED = ('light: "50 N"', 'light: "50 N", clamped: true')
 OTHER = ("name: right\n    robot: {model: KR 210 R2700-2}",
@@ -102,9 +103,9 @@ def _share(found: np.ndarray, true: np.ndarray) -> float:
     return float(error / size)
 
 
-def main(variants: list[str]) -> None:
+def main(variants: list[str], seeds: list[int]) -> None:
     """Print mean and worst figures of each variant over the seeds."""
-    for variant in variants or list(VARIANTS):
+    for variant in variants:
         with tempfile.TemporaryDirectory() as folder:
             cell = cell_of(variant, Path(folder))
         plan = plan_meetings(cell)
@@ -119,9 +120,7 @@ def main(variants: list[str]) -> None:
             (q[:UNSEEN], f, arm.equilibrium(q[:UNSEEN], f).deflection)
             for arm, q, f in zip(arms, pool.q, (force, -force @ T[:3, :3]), strict=True)
         ]
-        rows = np.array(
-            [campaign(variant, cell, arms, plan, unseen, seed) for seed in range(SEEDS)]
-        )
+        rows = np.array([campaign(variant, cell, arms, plan, unseen, seed) for seed in seeds])
         names = ("first", "second", "relative", "inside first", "inside second")
         for name, mean, worst in zip(names, rows.mean(axis=0), _worst(rows), strict=True):
             print(f"{variant:18} {name:14} mean {mean:7.2%}  worst {worst:7.2%}", flush=True)
@@ -132,4 +131,8 @@ def _worst(rows: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("variants", nargs="*", metavar="VARIANT", default=list(VARIANTS))
+    parser.add_argument("--seeds", nargs="*", type=int, default=list(SEEDS))
+    given = parser.parse_args()
+    main(given.variants, given.seeds)

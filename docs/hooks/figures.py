@@ -32,7 +32,17 @@ CACHE = ROOT / ".cache" / "figures"
 DRAWN = os.environ.get("SITE_FIGURES") != "false"
 PROCESSES = (
     ("placement", "notebooks"),
-    ("machining", "small", "budget", "demos", "instruments", "faults", "mistakes", "studio"),
+    (
+        "machining",
+        "small",
+        "budget",
+        "demos",
+        "instruments",
+        "faults",
+        "mistakes",
+        "stopping",
+        "studio",
+    ),
 )
 """Modules of ``gallery``, by the process that runs them."""
 TOLD = "told.json"

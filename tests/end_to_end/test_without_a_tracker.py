@@ -6,6 +6,7 @@ import shutil
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from elastocal.errors import ElastocalError
 from elastocal.planning import read_plan
 from elastocal.planning.untracked import TURN, doubled_findings, require_doubled
 from elastocal.sim.workcell._contact import ContactLaw, PlaceSpread
+from elastocal.verdict.findings import _missing_poses
 from elastocal.workflows._operator_and_devices import Supervision, Unattended
 from support import drivers
 from support.cli import elastocal
@@ -112,6 +114,17 @@ def test_the_springs_and_the_disk_are_found(story):
 def test_the_report_says_that_no_tracker_measured(story):
     ec.report(story / "run", out=story / "report.html")
     assert "No tracker measured" in (story / "report.html").read_text()
+
+
+def test_a_place_on_two_disks_is_missing_only_where_it_was_not_pressed(story):
+    assert "no usable reading" not in (story / "report.html").read_text()
+    plan, data = read_plan(story / "plan"), read(story / "run" / "dataset.nc")
+    place = plan.poses[7].doubles
+    status = data.status.copy()
+    status[data.poses.index(place), data.contacts[place] == 2] = 4
+    spoilt = SimpleNamespace(plan=plan, dataset=replace(data, status=status), journal=None)
+    (finding,) = _missing_poses(spoilt)
+    assert "1 of 10 planned poses has no usable reading (pose 7)" in str(finding)
 
 
 def test_codec_refuses_readings_that_no_tracker_took_in_one_line(story):

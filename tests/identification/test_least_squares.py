@@ -4,7 +4,12 @@ from scipy.optimize import lsq_linear
 
 from elastocal.errors import IdentificationError
 from elastocal.identification import RANK_TOLERANCE, rank
-from elastocal.identification._least_squares import kkt_violation, minimise
+from elastocal.identification._least_squares import (
+    OPTIMALITY,
+    kkt_violation,
+    minimise,
+    minimise_certified,
+)
 
 BOUNDS = ["lower", "upper", "box", "some fixed", "mixed", "free"]
 OPTIMAL = 1e-9
@@ -150,3 +155,19 @@ def test_arguments_are_not_changed():
     s, y = np.array([1.0, 0.0]), np.array([1.0, 1.0])
     minimise(s, np.eye(2), y, np.zeros(2), np.ones(2))
     np.testing.assert_array_equal([s, y], [[1.0, 0.0], [1.0, 1.0]])
+
+
+def test_a_minimum_that_held_directions_have_moved_is_reached_by_further_steps():
+    n, heavy = 12, 3e3
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        Vt = np.linalg.qr(rng.normal(size=(n, n)))[0]
+        # Much is known of three sums, and they are zero: beside them the others weigh little.
+        s = np.concatenate([[heavy] * 3, np.geomspace(1.0, 1e-6 * heavy / 30.0, n - 3)])
+        y = np.where(s == heavy, 0.0, s * rng.normal(size=n))
+        bounded = s, Vt, y, np.zeros(n), np.full(n, np.inf)
+        once = minimise(*bounded)
+        assert kkt_violation(s, Vt, y, once, *bounded[3:]) > OPTIMALITY
+        found, violation = minimise_certified(*bounded)
+        assert violation <= OPTIMALITY
+        assert np.all(found >= 0.0)

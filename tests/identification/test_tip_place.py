@@ -64,14 +64,16 @@ def test_without_a_width_the_place_is_exact():
 
 
 @cache
-def elsewhere() -> Dataset:
-    data = held_by_contact(NOISY)
-    return replace(data, attributes={**data.attributes, "robot_urdf": described(WRONG).urdf})
+def elsewhere(seed: int = 0) -> Dataset:
+    data, arm = held_by_contact(NOISY, seed), described(WRONG)
+    said = arm.forward(data.reference_joint_position)[:, :3, 3]
+    attributes = {**data.attributes, "robot_urdf": arm.urdf}
+    return replace(data, attributes=attributes, tcp_position=said)
 
 
 @cache
-def calibrated() -> CalibrateResult:
-    return ec.calibrate(elsewhere(), contact=KNOWN, springs="actuated", draws=40)
+def calibrated(seed: int = 0) -> CalibrateResult:
+    return ec.calibrate(elsewhere(seed), contact=KNOWN, springs="actuated", draws=40)
 
 
 def test_calibrate_says_where_the_tip_is_with_an_interval_that_holds_it():
@@ -115,6 +117,19 @@ def test_a_model_file_keeps_where_the_draws_have_the_tip(tmp_path):
     for rows in (calibrated().draws[:1], calibrated().draws[:0]):
         with pytest.raises(SchemaError, match=f"{len(rows)} spring_draws: as many as draws"):
             replace(calibrated(), spring_draws=rows)
+
+
+def test_positions_of_the_described_tcp_are_no_sign_of_another_tool():
+    assert np.linalg.norm(WRONG) > 5e-3
+    assert not [each for each in calibrated().calibration.warnings if "tcp_position" in each]
+
+
+def test_two_campaigns_of_one_arm_have_not_moved_where_each_has_found_its_tip():
+    found = ec.compare(calibrated(), calibrated(1)).summary
+    assert found.moved == ()
+    said = [each for each in found.notes if "its tip where it was found beside the springs" in each]
+    assert len(said) == 1
+    assert not [each for each in found.notes if "another tool" in each]
 
 
 def test_a_report_makes_the_same_fit_again():

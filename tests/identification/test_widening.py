@@ -112,3 +112,10 @@ def test_models_that_the_poses_do_not_tell_apart_are_a_doubt_about_the_chosen_on
     # One that is far behind says nothing of a prediction.
     assert doubt(np.array([0.0, 9.0]), np.ones(2), apart) == pytest.approx(0.0, abs=1e-15)
     assert doubt(np.zeros(0), np.zeros(0), np.zeros(0)) == 0.0
+
+
+def test_a_model_that_could_not_be_chosen_is_a_doubt_in_full():
+    apart, beside = np.array([0.0, 2.0, 3.0]), np.array([False, False, True])
+    assert doubt(np.zeros(3), np.ones(3), apart, beside) == pytest.approx(2.0 + 9.0)
+    behind = doubt(np.array([0.0, 0.0, 9.0]), np.ones(3), apart, beside)
+    assert behind == pytest.approx(2.0)

@@ -13,7 +13,7 @@ import pytest
 import elastocal as ec
 from elastocal.dataset import Dataset
 from elastocal.errors import IdentificationError
-from elastocal.identification import Contact
+from elastocal.identification import CalibratedModel, Contact
 from elastocal.robot import Robot, fixed_joint_of, with_joint_origins
 from independent.arms import drawing, poses
 from independent.contact_truth import STEEL, URETHANE, Plate, contact_campaign
@@ -26,6 +26,9 @@ ARMS = ("kuka", "ur", "seven")
 POSES, UNSEEN = 31, 50
 KNOWN = Contact(normal=1.25 * STEEL.normal, lateral=0.8 * STEEL.lateral)
 """Stiffnesses of a gauge that was off, within the 30 % that are stated."""
+OFF = 5e-3, -4e-3, 6e-3
+"""From the true tip to the described one, in m."""
+TIP_OPEN = replace(KNOWN, tip=5e-3)
 
 
 @cache
@@ -52,13 +55,26 @@ def judged(
     """Return the mean error over the mean deflection, and the share inside the interval."""
     if isinstance(data, Plate):
         data = dataset(arm, data)
-    found = ec.calibrate(data, contact=contact, springs=springs).calibrated
+    return judged_model(arm, ec.calibrate(data, contact=contact, springs=springs).calibrated)
+
+
+def judged_model(arm: str, found: CalibratedModel) -> tuple[float, float]:
+    """Return the same of a model."""
     q, force, true = unseen(arm)
     predicted = found.predict(q, force)
     error = np.linalg.norm(predicted.deflection - true, axis=1).mean()
     inside = float(np.mean((predicted.low <= true) & (true <= predicted.high)))
     print(arm, f"{error / np.linalg.norm(true, axis=1).mean():.2%}, {inside:.0%} inside")
     return float(error / np.linalg.norm(true, axis=1).mean()), inside
+
+
+def with_tip_off(data: Dataset) -> Dataset:
+    """Return the dataset of a tip that is 8.8 mm from where the robot's description has it."""
+    T = np.eye(4)
+    T[:3, 3] = OFF
+    joint = fixed_joint_of(data.robot_urdf, "tcp")
+    urdf = with_joint_origins(data.robot_urdf, {joint: T})
+    return replace(data, attributes={**data.attributes, "robot_urdf": urdf})
 
 
 def test_steel_that_is_known_to_30_percent_leaves_less_than_one_percent():
@@ -84,7 +100,7 @@ def test_a_free_steel_contact_leaves_gears_that_stiffen_and_takes_the_links_out(
     errors, inside = zip(*(judged(arm, STEEL, Contact()) for arm in ARMS), strict=True)
     assert np.mean(errors) < 0.019
     assert max(errors) < 0.019
-    assert np.mean(inside) > 0.75
+    assert np.mean(inside) >= 0.85
 
 
 def test_gears_with_a_free_normal_and_presses_along_the_normal_alone_are_refused():
@@ -95,15 +111,8 @@ def test_gears_with_a_free_normal_and_presses_along_the_normal_alone_are_refused
 
 
 def test_a_tip_9_mm_off_is_found_beside_the_springs():
-    T = np.eye(4)
-    T[:3, 3] = 5e-3, -4e-3, 6e-3
-    found = []
-    for arm in ARMS:
-        data = dataset(arm, STEEL)
-        joint = fixed_joint_of(data.robot_urdf, "tcp")
-        urdf = with_joint_origins(data.robot_urdf, {joint: T})
-        off = replace(data, attributes={**data.attributes, "robot_urdf": urdf})
-        found.append(judged(arm, off, replace(KNOWN, tip=5e-3)))
+    data = [with_tip_off(dataset(arm, STEEL)) for arm in ARMS]
+    found = [judged(arm, each, TIP_OPEN) for arm, each in zip(ARMS, data, strict=True)]
     errors, inside = zip(*found, strict=True)
     assert np.mean(errors) < 0.011
     assert 0.85 <= np.mean(inside) <= 0.99

@@ -10,6 +10,7 @@
 `demos`      every example cell on every truth
 `instruments`  a process after corrections by a tracker, without one, and with encoders
 `faults`     what every fault does in every phase of a press, from data that is kept
+`stopping`   campaigns that stop by themselves, from data that is kept
 `notebooks`  the notebooks of the site, run
 `process_figures`  Table 1 over truths and seeds, measured by one command and quoted
 ===========  ====================================================================

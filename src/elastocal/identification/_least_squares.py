@@ -22,6 +22,9 @@ OPTIMALITY = 1e-7
 _FLOOR = 1e-6
 """Weight, relative to the largest singular value, that holds undetermined directions small."""
 
+_REFINEMENTS = 10
+"""Most steps from a minimum that the held directions have moved."""
+
 _BVLS_SWEEPS = 50
 """Largest number of iterations a variable."""
 _BVLS_TOLERANCE = 1e-15
@@ -98,6 +101,13 @@ def minimise_certified(
     """
     x = minimise(s, Vt, y, lower, upper)
     violation = float(np.max(kkt_violation(s, Vt, y, x, lower, upper)))
+    for _ in range(_REFINEMENTS):
+        if violation <= OPTIMALITY:
+            break
+        # What holds undetermined directions small has moved the others: now it holds the step.
+        left = y - s * np.einsum("...ij,...j->...i", Vt, x)
+        x = np.clip(x + minimise(s, Vt, left, lower - x, upper - x), lower, upper)
+        violation = float(np.max(kkt_violation(s, Vt, y, x, lower, upper)))
     if not violation <= OPTIMALITY:
         raise IdentificationError(
             f"the solver stopped short of the optimum (violation {violation:.1e})"

@@ -51,7 +51,7 @@ from elastocal.identification.problem import (
 from elastocal.identification.rungs import low_loads
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
-from elastocal.identification.tip_place import settle_tip, tip_with_interval
+from elastocal.identification.tip_place import as_described, settle_tip, tip_with_interval
 from elastocal.identification.uncertainty import (
     MOST_UNEXPLAINED,
     Coverage,
@@ -406,7 +406,9 @@ def _widening(
     stretched = compliance + few * (draws - compliance)
     open_to_choice = [each for each in ladder if np.isfinite(each.apart)]
     figures = [(each.difference, each.standard_error, each.apart) for each in open_to_choice]
-    moved = doubt(*np.array(figures).reshape(-1, 3).T)
+    beside = np.array([each.beside for each in open_to_choice], dtype=bool)
+    difference, error, apart = np.array(figures).reshape(-1, 3).T
+    moved = doubt(difference, error, apart, beside)
     by = few * doubt_factor(problem, compliance, stretched, moved)
     if not unexplained <= MOST_UNEXPLAINED:
         # No model of this arm: its springs are as far off as its predictions.
@@ -425,7 +427,8 @@ def _data_warnings(
     """Return a finding for each oddity of the data, or refuse them."""
     seen = _implausible(model, readings, marker_offset)
     warnings = _stated(seen, options)
-    warnings += list(check_joints(model.robot, readings)) + [
+    # Recorded positions of the tcp are of the description.
+    warnings += list(check_joints(as_described(model.robot, options), readings)) + [
         SAME_CONFIGURATION(poses=group) for group in same_configuration(readings, problem.block)
     ]
     if gap := model.robot.chain.weight_gap:

@@ -3,16 +3,22 @@
 Two parts add up in quadrature to the root mean square of the error's length over production,
 
     error² = model² + fit²,
-    model² = (m - v - s²) P² / D²,       fit² = mean variance of the predictions on production:
+    model² = (m - v - s²) g,             fit² = mean variance of the predictions on production:
 
 ``m`` is the mean square error of readings at left-out poses, ``v`` the part of it that another
-choice of poses would change, ``s`` the noise of a reading as it states it, and ``P² / D²`` the
-ratio of the mean squares of the deflections on production and at those readings, since what the
-springs cannot express grows with the load. Both ``v`` and the variance on production are those of
-the jackknife over poses. Noise that no reading states, such as where the arm stops, stays in ``m``:
-the error is overstated by it rather than understated.
+choice of poses would change, ``s`` the noise of a reading as it states it, and ``g`` what the loads
+of production make of it. What the springs cannot express grows with the load, friction and noise
+hardly. With ``P² / D²`` the ratio of the mean squares of the deflections on production and at those
+readings, ``g`` is that ratio where production is loaded as much or more; where it is loaded less,
 
-The interval is that of the mean of ``m`` over poses, on a logarithmic scale, with Student's
+    g = 1 - b (1 - P² / D²),
+
+with ``b`` the part of ``m`` that grows with the load: the slope of the square error over the square
+deflection among the readings of one pose, times ``D² / m``, within 0 and 1. Both ``v`` and the
+variance on production are those of the jackknife over poses. Noise that no reading states, such as
+where the arm stops, stays in ``m``: the error is overstated by it rather than understated.
+
+The interval is that of ``m g`` over poses (jackknife), on a logarithmic scale, with Student's
 distribution; its lower end is of ``fit`` alone, as unstated noise may be all the rest. A campaign
 that looks after each pose and stops at the first good news looks at chance as often. So the level
 of one look is the nominal level of repeated significance tests, at which the probability that any
@@ -29,6 +35,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri, stdtrit
 
+from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.errors import IdentificationError, present
 from elastocal.identification.budget import stated_noise
@@ -147,26 +154,54 @@ def production_error(
     held_out, compliance = leave_poses_out(problem), solve(problem).compliance
     blocks, index = np.unique(problem.block, return_inverse=True)
     count = np.bincount(index)
-    squares = np.bincount(index, np.square(held_out.error)) / count
-    sizes = np.bincount(index, np.square(held_out.size)) / count
+    errors, deflections = np.square(held_out.error), np.square(held_out.size)
+    squares, sizes = (np.bincount(index, each) / count for each in (errors, deflections))
+    apart = deflections - sizes[index]
     moved = np.sum(np.square(problem.O @ (held_out.compliance - compliance).T), axis=(1, 2))
     chance = np.bincount(index, moved) / count * (held_out.folds - 1) / held_out.folds
     # A pose far from all others is predicted by extrapolation when it is left out.
     near = poses_in_company(robot, readings.joint_position, problem.block)
-    squares, sizes, chance = squares[near], sizes[near], chance[near]
+    by_pose = np.stack([
+        squares, sizes, np.bincount(index, apart * errors), np.bincount(index, np.square(apart)),
+    ])[:, near]  # fmt: skip
+    squares, chance = squares[near], chance[near]
     forecast = ProductionForecast.of(choice.model, problem, present(production.few(), "rows"))
     loaded = float(np.mean(np.sum(np.square(forecast.deflection), axis=1)))
     noise = stated_noise(choice.model, readings, compliance[problem.springs]).error or 0.0
     left = max(float(squares.mean() - chance.mean()) - noise**2, 0.0)
-    own = Overlap.leaving_one_out(len(squares)).variance * float(squares.var(ddof=1))
+    there = _under_load(by_pose, loaded)
+    others = [_under_load(np.delete(by_pose, k, axis=1), loaded) for k in range(len(squares))]
+    own = Overlap.leaving_one_out(len(squares)).variance * float(
+        np.var((len(squares) - 1) * np.array(others), ddof=1)
+    )
     return ProductionError.of(
         poses=len(blocks),
         springs=choice.taken,
-        model=math.sqrt(left / float(sizes.mean()) * loaded),
+        model=math.sqrt(left * there / float(squares.mean())),
         fit=math.sqrt(forecast.variance),
-        spread=math.sqrt(own) / float(squares.mean()),
+        spread=math.sqrt(own) / there,
         level=level,
     )
+
+
+def _under_load(by_pose: FloatArray, loaded: float) -> float:
+    """Return the mean square error to expect under the loads of production, in m².
+
+    Parameters
+    ----------
+    by_pose : ndarray, shape (4, pose)
+        Of the readings of each pose that was left out: mean square error and mean square deflection
+        in m², then the sums of products and of squares whose ratio is the slope of one over the
+        other, in m⁴.
+    loaded : float
+        Mean square deflection on production, in m².
+    """
+    square, size = by_pose[:2].mean(axis=1).tolist()
+    together, varied = by_pose[2:].sum(axis=1).tolist()
+    if loaded >= size:
+        return float(square * loaded / size)
+    growing = together / varied * size / square if varied > 0.0 else 0.0
+    return float(square * (1.0 - min(max(growing, 0.0), 1.0) * (1.0 - loaded / size)))
 
 
 @lru_cache

@@ -183,6 +183,13 @@ def tip_with_interval(contact: Contact, draws: FloatArray) -> Contact:
     return replace(contact, tip_found=replace(found, low=ends[0], high=ends[1]))
 
 
+def as_described(robot: Robot, options: FitOptions) -> Robot:
+    """Return the robot with its tcp where the description has it, and not where the tip is."""
+    if options.contact is None or options.contact.tip_found is None:
+        return robot
+    return _moved(robot, -np.array(options.contact.tip_found.place))
+
+
 def _shifted(
     robot: Robot, options: FitOptions, shift: FloatArray, beside_gears: bool
 ) -> tuple[Robot, FitOptions]:

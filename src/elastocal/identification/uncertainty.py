@@ -330,13 +330,19 @@ def widening_factor(
     return max(1.0, float(student * np.sqrt(jackknife / bootstrap)))
 
 
-def doubt(difference: FloatArray, standard_error: FloatArray, apart: FloatArray) -> float:
+def doubt(
+    difference: FloatArray,
+    standard_error: FloatArray,
+    apart: FloatArray,
+    beside: BoolArray | None = None,
+) -> float:
     """Return the mean square change of a prediction by the choice of a model, in m².
 
     With other poses, another model might have been chosen. Each allowed model has the weight
     ``exp(-z^2 / 2)``, with its distance ``z`` from the best in standard errors; 1 if it predicts
     better (S. T. Buckland, K. P. Burnham, N. H. Augustin, "Model selection: an integral part of
-    inference", Biometrics 53, 1997).
+    inference", Biometrics 53, 1997). A model that could not be chosen, whatever it predicts, takes
+    no weight from the others: its own part counts in full.
 
     Parameters
     ----------
@@ -344,13 +350,17 @@ def doubt(difference: FloatArray, standard_error: FloatArray, apart: FloatArray)
         Error at left-out poses less that of the best of them, the chosen one included, in m.
     apart : ndarray, shape (model,)
         Distance of its predictions there from those of the chosen one, in m.
+    beside : ndarray of bool, shape (model,), optional
+        Models that could not be chosen; none by default.
     """
     if not len(apart):
         return 0.0
     behind = np.maximum(difference, 0.0)
     z = np.divide(behind, standard_error, out=np.zeros_like(behind), where=standard_error > 0.0)
     weight = np.exp(-0.5 * np.square(z))
-    return float(weight @ np.square(apart) / weight.sum())
+    moved = weight * np.square(apart)
+    lacked = np.zeros(len(apart), dtype=bool) if beside is None else beside
+    return float(moved[~lacked].sum() / weight[~lacked].sum() + moved[lacked].sum())
 
 
 def doubt_factor(

@@ -138,8 +138,14 @@ STOPPED_EARLY = Kind(
 def _missing_poses(evidence: Evidence) -> Iterator[Finding]:
     if evidence.plan is None or evidence.dataset is None:
         return
-    usable = evidence.dataset.readings(evidence.dataset.joint_names).pose
-    missing = sorted({pose.id for pose in evidence.plan.poses} - set(map(int, usable)))
+    usable = evidence.dataset.readings(evidence.dataset.joint_names)
+    # A place that is pressed on two disks has its readings under the pose that it doubles.
+    found = set(zip(usable.pose.tolist(), (usable.disks > 1).tolist(), strict=True))
+    missing = sorted(
+        pose.id
+        for pose in evidence.plan.poses
+        if ((pose.id, False) if pose.doubles is None else (pose.doubles, True)) not in found
+    )
     if not missing:
         return
     committed = {log.pose for log in commits(evidence.journal)} if evidence.journal else None

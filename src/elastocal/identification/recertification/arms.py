@@ -117,7 +117,12 @@ def arm_notes(
     for calibrated, name in zip(models, names, strict=True):
         robot = calibrated.model.robot
         gap = tool_gap(robot, arm)
-        if not gap.closed:
+        if not gap.closed and calibrated.tip is not None:
+            notes.append(
+                f"{name} has its tip where it was found beside the springs, {gap} from the tcp"
+                f" compared at, {arm.tip}: its springs are taken to be those of the arm alone"
+            )
+        elif not gap.closed:
             notes.append(
                 f"{name} was calibrated with another tool (tcp {robot.tip}, {gap} from the one"
                 f" compared at, {arm.tip}): its springs are taken to be those of the arm alone"
