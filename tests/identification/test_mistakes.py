@@ -7,7 +7,8 @@ from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import ConventionError
 from elastocal.findings import Grade
 from elastocal.identification import FitOptions, calibrate
-from elastocal.identification.mistakes import find_implausible, find_undone
+from elastocal.identification.mistakes.plausibility import find_implausible
+from elastocal.identification.mistakes.undoing import find_undone
 from support.by_day import some_by_day
 from support.campaigns import Sound, campaign, sounds
 from support.further_mistakes import FURTHER

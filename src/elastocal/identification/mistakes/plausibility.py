@@ -272,9 +272,7 @@ def _dead_bands(robot: Robot, readings: Readings) -> Iterator[Finding]:
             steps = rest / np.abs(rest).min()
             is_rounded = np.abs(steps - steps.round()).max() < _OF_A_STEP
             if not is_rounded and _varies(rest[:, None], case, _TIED * largest):
-                yield DEAD_BAND(
-                    axis=AXES[axis], frame=name, count=int(count[axis]), total=len(own)
-                )
+                yield DEAD_BAND(axis=AXES[axis], frame=name, count=int(count[axis]), total=len(own))
                 return
 
 

@@ -241,8 +241,6 @@ least such part; correct arms seem to have 0.07."""
 _SLIPPED, _LEAST_SLIP, _STUCK = 0.85, 1e-4, 0.1
 """Part of the error that may be left by a tool that slips, the least way in m, and the part of the
 median force below which friction holds it."""
-_ELSEWHERE = 0.9
-"""Part of the error that may be left by a marker elsewhere on the tool."""
 _BETTER, _POLLUTED_ROUNDS = 0.7, 4
 """Part of the error of a pose that another reading leaves where it may be the right one, and fits
 by which the poses settle at which it is."""
@@ -450,16 +448,16 @@ def _wrong_at_some(rows: Rows, whole: Iterable[OtherReading]) -> Iterator[OtherR
 
     A file of several was exported otherwise, or a person typed some of them.
     """
-    O, d = rows.problem.O, rows.problem.d
+    stated, d = rows.problem.O, rows.problem.d
     labels, pose = np.unique(rows.readings.pose, return_inverse=True)
 
     def left(blocks: FloatArray, moved: FloatArray, c: FloatArray) -> FloatArray:
         norms = np.linalg.norm(blocks @ c - moved, axis=1)
         return np.asarray(np.bincount(pose[rows.kept], norms[rows.kept], len(labels)))
 
-    stated = left(O, d, rows.compliance)
+    before = left(stated, d, rows.compliance)
     for reading in whole:
-        there = left(reading.blocks, reading.d, rows.compliance) < _BETTER * stated
+        there = left(reading.blocks, reading.d, rows.compliance) < _BETTER * before
         for _ in range(_POLLUTED_ROUNDS):
             if not 2 <= np.count_nonzero(there) <= len(labels) // 2:
                 break
@@ -467,15 +465,15 @@ def _wrong_at_some(rows: Rows, whole: Iterable[OtherReading]) -> Iterator[OtherR
             partly = replace(
                 reading,
                 message=f"at poses {spans(labels[there].tolist())} {reading.message}",
-                blocks=np.where(at[:, None, None], reading.blocks, O),
+                blocks=np.where(at[:, None, None], reading.blocks, stated),
                 d=np.where(at[:, None], reading.d, d),
                 least=_FITTED,
                 certain=False,
                 estimated=True,
             )
-            c, before = fitted(rows.read(partly)), there
-            there = left(reading.blocks, reading.d, c) < _BETTER * left(O, d, c)
-            if np.array_equal(there, before):
+            c, last = fitted(rows.read(partly)), there
+            there = left(reading.blocks, reading.d, c) < _BETTER * left(stated, d, c)
+            if np.array_equal(there, last):
                 yield partly
                 break
 
@@ -958,11 +956,11 @@ def _lagging(name: str, late: float, which: str) -> str:
 
 def _preloaded_references(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of markers whose reference was read under a part of the pose's first press."""
-    O, first = rows.problem.O, _first_of_pose(rows.readings)
+    stated, first = rows.problem.O, _first_of_pose(rows.readings)
     under = _Unknown(
         np.zeros(1),
-        lambda part: np.asarray(O - part * O[first]),
-        lambda _, c: -(O @ c)[first][..., None],
+        lambda part: np.asarray(stated - part * stated[first]),
+        lambda _, c: -(stated @ c)[first][..., None],
         lambda part: bool(0.0 < part[0] < 1.0),
     )
     (found,) = _estimated(rows, [under], _ROUNDS)
@@ -1009,7 +1007,7 @@ def _marker_places(rows: Rows) -> Iterator[OtherReading]:
         f"the marker seems to sit ({x:.0f}, {y:.0f}, {z:.0f}) mm in the tcp frame from where it is"
         " said to be: check its place and unit"
     )
-    yield OtherReading(message, blocks, rows.problem.d, _ELSEWHERE, estimated=True)
+    yield OtherReading(message, blocks, rows.problem.d, _FITTED, estimated=True)
 
 
 def _any_marker_frame(rows: Rows) -> Iterator[OtherReading]:
