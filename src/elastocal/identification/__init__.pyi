@@ -29,7 +29,6 @@ from .contact import (
     read_contact as read_contact,
     require_seen as require_seen,
 )
-from .conventions import check_joints as check_joints
 from .displacement import (
     displacement_blocks as displacement_blocks,
     reference_joints as reference_joints,
