@@ -1,13 +1,15 @@
 """Verification sets: sizes, seeds, refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from elastocal.codec import CodecOptions
-from elastocal.codec.splits import drawn_poses, make_splits, split_sizes
-from elastocal.errors import CodecError
+from elastocal.codec.splits import drawn_poses, make_campaign, make_splits, split_sizes
+from elastocal.errors import CodecError, ConventionError
 from elastocal.planning.search import Candidates, Cover
-from support.problems import campaign
+from support.problems import campaign, elastic
 
 
 @pytest.mark.parametrize(
@@ -64,3 +66,18 @@ def test_of_a_large_dataset_as_many_poses_are_drawn_as_asked_for_the_same_for_a_
     np.testing.assert_array_equal(few.pose, again.pose)
     assert set(few.pose) != set(other.pose)
     assert drawn_poses(readings, CodecOptions(poses=31)) is readings
+
+
+def test_a_mistake_in_readings_is_named_as_calibrate_names_it():
+    """Poses were counted on a dead axis and on forces in another frame, without a word."""
+    sound, springs = campaign(12), [elastic()]
+    marker = sound.marker_displacement * [1.0, 1.0, 0.0]
+    dead = replace(sound, marker_displacement=marker)
+    found = make_campaign(springs, dead, CodecOptions()).findings
+    assert any("marker_displacement_z is dead" in str(each) for each in found)
+    turned = replace(sound, force=sound.force[:, [1, 0, 2]])
+    with pytest.raises(ConventionError):
+        make_campaign(springs, turned, CodecOptions())
+    trusted = CodecOptions(trust_conventions=True)
+    found = make_campaign(springs, turned, trusted).findings
+    assert any(str(each).startswith("fitted in spite of this: ") for each in found)

@@ -109,6 +109,17 @@ def test_swapped_markers_are_named_with_their_rows():
     )
 
 
+def test_rounded_joints_are_named_and_postures_in_whole_degrees_are_not():
+    """0.1 deg left 1.7 mm in place of 0.05, without a word."""
+    whole = np.radians(np.round(np.degrees(measure(kuka(), 40).data.q)))
+    sound = measure(kuka(), 40, joints=whole).data
+    assert findings(sound) == ()
+    data = measure(kuka(), 40).data
+    rounded = np.radians(np.round(np.degrees(data.q), 1))
+    (found,) = findings(replace(data, q=rounded))
+    assert found.startswith("joints are rounded to 0.1 deg, which moves the markers by 1.5 mm")
+
+
 def test_an_arm_without_masses_is_said_to_be_one():
     bare = re.sub(r"<inertial>.*?</inertial>", "", kuka().urdf, flags=re.DOTALL)
     robot = Robot.from_urdf(bare, kuka().tip)

@@ -26,7 +26,7 @@ from elastocal.identification import (
 )
 from elastocal.identification.contact import ContactFigure, untold_stacks, whitened
 from elastocal.identification.ladder import climb
-from elastocal.identification.mistakes import find_undone
+from elastocal.identification.mistakes.undoing import find_undone
 from support.cli import elastocal
 from support.held import PRESS, STIFFNESS, Held, held_by_contact, robot
 

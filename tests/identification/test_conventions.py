@@ -7,7 +7,7 @@ import pytest
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import ConventionError, IdentificationError
-from elastocal.identification import check_conventions
+from elastocal.identification.conventions import check_conventions
 from elastocal.robot import Robot
 from elastocal.sim.arm import (
     Linkage,

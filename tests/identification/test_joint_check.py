@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elastocal.errors import DatasetError
-from elastocal.identification import check_joints
+from elastocal.identification.conventions import check_joints
 from elastocal.robot import Robot
 from support.problems import campaign, elastic
 from support.urdfs import sliding_arm_urdf

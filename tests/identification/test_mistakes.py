@@ -7,14 +7,15 @@ from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import ConventionError
 from elastocal.findings import Grade
 from elastocal.identification import FitOptions, calibrate
-from elastocal.identification.mistakes import find_implausible, find_undone
+from elastocal.identification.mistakes.plausibility import find_implausible
+from elastocal.identification.mistakes.undoing import find_undone
 from support.by_day import some_by_day
 from support.campaigns import Sound, campaign, sounds
 from support.further_mistakes import FURTHER
 from support.mistake_table import alarms, outcome, rates, tabulate
 from support.mistakes import MISTAKES, changed
 from support.outside_mistakes import OUTSIDE
-from support.walk_mistakes import MADE_IN, require_whole
+from support.walk_mistakes import MADE_IN, MADE_OUTSIDE, require_whole
 
 KNOWN = {each.name: each for each in (*MISTAKES, *FURTHER, *OUTSIDE)}
 ON_RAIL, SMALL = Sound(poses=15, seed=1), Sound(like="ur20", poses=12, seed=2)
@@ -96,6 +97,7 @@ def seen_at_once(name):
         ("forces clipped at 80 % of the largest", "the force stops at"),
         ("force axes of tcp clipped at 80 %", "force_z in the tcp frame stops at"),
         ("force axes of base clipped at 80 %", "force_z in the base frame stops at"),
+        ("dead band of 20 %", "force_x in the tcp frame is exactly zero in 75 of 105 readings"),
         ("joints of two poses exchanged", "the joints of poses 4 and 12 look exchanged"),
         ("joints and references of two poses exchanged", "poses 4 and 12 look exchanged"),
         (
@@ -180,6 +182,10 @@ def test_forces_that_are_wrong_for_a_part_or_drift_are_named(sound, name, said):
             ("a row of the markers lost half way", "from pose 8 on marker displacements are"),
             ("forces 30 % of the next load case", "forces run ahead: they seem to hold 30%"),
             ("cross-talk of 25 % from force_z", "cross-talk, 25% in force_x and -28% in force_y"),
+            ("sensor warms up, 40 %", "at the begin of the campaign: let the sensor warm up"),
+            ("sensor compressed by 35 %", "the force sensor's gain seems to fall with its load"),
+            ("forces of every fourth pose reversed", "at poses 0, 4, 8, 12 the force (or the"),
+            ("a file of markers in inches", "poses 8 to 10 marker displacements are in inches"),
         )
     ),
 )
@@ -199,6 +205,32 @@ def test_a_sensor_that_is_tilted_is_named_with_its_tilt():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("campaign_of", "name", "said"),
+    [
+        (1, "markers counted from a preload", "read under 21% of the first press of each pose"),
+        (2, "tool slips by 0.4 mm", "the tool seems to slip by 0.29 mm with the force across it"),
+        (2, "sensor compressed by 35 %", "gain seems to fall with its load, by 50% at the largest"),
+    ],
+)
+def test_what_presses_and_references_hide_is_named(campaign_of, name, said):
+    made = KNOWN[name].make(campaign(MADE_OUTSIDE[campaign_of]))
+    (found,) = find_undone(made.robot, made.readings, made.marker)
+    assert said in str(found)
+
+
+def test_what_is_dropped_below_a_threshold_is_no_load_cell_of_one_axis_and_no_rounding():
+    made = campaign(ON_RAIL)
+    R = made.robot.forward(made.readings.joint_position)[:, :3, :3]
+    own = np.einsum("rji,rj->ri", R, made.readings.force)
+    one = np.where(np.abs(own) == np.abs(own).max(axis=1, keepdims=True), own, 0.0)
+    for kept in (one, np.round(own, -1)):
+        force = np.einsum("rij,rj->ri", R, kept)
+        found = find_implausible(made.robot, changed(made, force=force).readings, made.marker)
+        assert not any("exactly zero" in str(each) for each in found)
+
+
+@pytest.mark.slow
 def test_200_sound_campaigns_of_all_presets_raise_two_alarms_at_most():
     raised = {sound: alarms(campaign(sound)) for sound in sounds(200)}
     assert sum(map(bool, raised.values())) <= 2, {k: v for k, v in raised.items() if v}
@@ -215,6 +247,10 @@ def test_of_the_harmful_mistakes_nine_of_ten_are_found_and_named():
 
 def test_the_documentation_shows_every_mistake_in_campaigns():
     require_whole("calibrate", found=0.9, named=0.9, most_alarms=0.01)
+
+
+def test_the_documentation_shows_every_mistake_from_outside():
+    require_whole("outside", found=0.88, named=0.9, most_alarms=0.0)
 
 
 def test_a_tool_weight_is_named_once():

@@ -7,7 +7,7 @@ import pytest
 
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, actuated
-from elastocal.identification.mistakes import find_wrong_units
+from elastocal.identification.mistakes.plausibility import find_wrong_units
 from elastocal.robot import Robot, catalogue
 
 POSES = 12

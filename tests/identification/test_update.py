@@ -138,7 +138,7 @@ def test_mistaken_production_is_refused_with_the_mistake(few, mistake, said):
     ("mistake", "kind"),
     [
         (_of_force(lambda f: 1.3 * f), "update.no-arm-changes-so-much"),
-        (_of_force(lambda f: f * [1.0, 1.0, 0.0]), "update.unexplained"),
+        (_of_force(lambda f: f * [1.0, 1.0, 0.0]), "update.read-otherwise"),
         (_of_force(lambda f: f[:, [1, 0, 2]]), "update.unexplained"),
     ],
     ids=["gain", "dead axis", "swapped axes"],
@@ -147,6 +147,47 @@ def test_production_that_the_model_hardly_explains_moves_no_spring(few, mistake,
     moved, worth = update_springs(few, mistake(production()), np.random.default_rng(1))
     assert moved is few
     assert worth.refusal.kind == kind
+
+
+def _weight_left_in(readings):
+    return replace(readings, force=readings.force - [0.0, 0.0, 600.0])
+
+
+def _forces_lag(readings):
+    late = 0.7 * readings.force + 0.3 * np.roll(readings.force, 1, axis=0)
+    return replace(readings, force=late)
+
+
+def _a_row_of_markers_late(readings):
+    late = np.roll(readings.marker_displacement, 1, axis=0)
+    return replace(readings, marker_displacement=late)
+
+
+def _marker_y_dead(readings):
+    return replace(readings, marker_displacement=readings.marker_displacement * [1.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("mistake", "said"),
+    [
+        (_weight_left_in, "hold a constant force too much or too little in the base frame"),
+        (_forces_lag, "hold forces that lag"),
+        (_a_row_of_markers_late, "hold marker displacements that run ahead"),
+        (_marker_y_dead, "marker_displacement_y does not change along courses"),
+    ],
+)
+def test_springs_learn_nothing_from_production_with_a_mistake(few, mistake, said):
+    """They moved predictions of a model of five poses by 6 to 11 %."""
+    moved, worth = update_springs(few, mistake(production(softer=1.25)), np.random.default_rng(1))
+    assert moved is few
+    assert said in worth.refusal
+
+
+@pytest.mark.parametrize("softer", [0.9, 1.0, 1.25])
+def test_an_arm_that_has_worn_or_not_is_no_mistake(few, softer):
+    for seed in (2, 3):
+        _, worth = update_springs(few, production(seed, softer), np.random.default_rng(1))
+        assert worth.refusal is None or worth.refusal.kind == "update.no-gain"
 
 
 def test_noise_alone_moves_nothing_or_next_to_nothing(few):

@@ -14,15 +14,14 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
-from elastocal.errors import CodecError, ConventionError
+from elastocal.errors import CodecError
 from elastocal.findings import Finding, Kind
 from elastocal.identification import (
     MINIMUM_BLOCKS,
     Contact,
     FitOptions,
     build,
-    check_conventions,
-    check_joints,
+    find_mistakes,
     pose_blocks,
     poses_in_company,
     same_configuration,
@@ -125,7 +124,6 @@ def drawn_poses(readings: Readings, options: CodecOptions) -> Readings:
     return readings.take(np.isin(readings.pose, drawn))
 
 
-IN_SPITE = Kind("codec.fitted-in-spite", "fitted in spite of this: {error}")
 SET_ASIDE = Kind(
     "codec.set-aside",
     "pose {pose}, load case {load_case} is set aside: it cannot be a measurement of this robot",
@@ -178,17 +176,11 @@ def make_campaign(
     IdentificationError
         If there are fewer than three distinct poses.
     """
-    findings = list(check_joints(models[0].robot, readings))
+    fit = FitOptions(contact=options.contact, trust_conventions=options.trust_conventions)
+    findings = list(find_mistakes(models[0], readings, fit, marker_offset))
     held = np.unique(readings.pose[readings.by_contact])
     if len(held):
         findings.append(HELD_BY_CONTACT(count=len(held)))
-    try:
-        fit = FitOptions(contact=options.contact)
-        check_conventions(models[0], readings, marker_offset, fit)
-    except ConventionError as error:
-        if not options.trust_conventions:
-            raise
-        findings.append(IN_SPITE(error=str(error)))
     campaign = checked_campaign(models, readings, options, marker_offset)
     return replace(campaign, findings=(*findings, *campaign.findings))
 

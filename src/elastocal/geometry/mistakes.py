@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from elastocal.arrays import IndexArray
-from elastocal.findings import Finding, Kind, as_count
+from elastocal.findings import Finding, Kind, as_count, as_number
 from elastocal.geometry.left_out import left_out_findings
 from elastocal.geometry.positions import Positions
 from elastocal.geometry.problem import GeometryProblem
@@ -15,6 +15,13 @@ from elastocal.geometry.solve import GeometryFit
 _SIGMAS = 7.0
 """Distance within which a swapped marker is where another one is expected."""
 _MOST_NAMED = 8
+_STEPS = (1.0, 0.5, 0.1, 0.05, 0.01)
+"""Steps to which angles of joints are rounded, in deg."""
+_OF_A_STEP = 1e-5
+"""Part of a step by which rounded angles miss its multiples."""
+_BY_ROUNDING = 0.5
+"""Part of what rounding moves the markers by, from which it is what a fit leaves: postures that
+were asked for in whole degrees, and reached, leave less."""
 
 
 NO_MASSES = Kind(
@@ -37,10 +44,18 @@ COPIED = Kind(
 )
 
 
+ROUNDED = Kind(
+    "geometry.rounded-joints",
+    "joints are rounded to {step} deg, which moves the markers by {moved} mm; the fit leaves {left}"
+    " mm: export more digits",
+    shown={"step": as_number("g"), **dict.fromkeys(("moved", "left"), as_number(".2g", 1e3))},
+)
+
+
 def findings(problem: GeometryProblem, fit: GeometryFit) -> tuple[Finding, ...]:
     """Return the findings about the positions of a fit."""
     notes = [] if problem.robot.has_masses else [NO_MASSES(name=problem.robot.name)]
-    notes += _copied_rows(problem.data)
+    notes += [*_copied_rows(problem.data), *_rounded_joints(problem, fit)]
     notes += [*_swapped_markers(problem, fit), *(moved := tuple(session_findings(problem, fit)))]
     # A station or a marker that moved leaves out rows whose markers agree, too.
     return (*notes, *(() if moved else left_out_findings(problem, fit)))
@@ -54,6 +69,24 @@ def _copied_rows(data: Positions) -> list[Finding]:
     )
     rows = np.flatnonzero(first[group.ravel()] != np.arange(len(data)))
     return [COPIED(rows=len(rows), numbers=_named(rows))] if len(rows) else []
+
+
+def _rounded_joints(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:
+    """Return that angles are rounded to a step that explains what the fit leaves."""
+    robot, q = problem.robot, problem.data.q
+    turns = np.flatnonzero(robot.revolute)
+    degrees = np.degrees(q[:, turns])
+    at = robot.forward(q)[:, :3, 3]
+    for step in _STEPS:
+        if not np.abs(degrees / step - np.round(degrees / step)).max() < _OF_A_STEP:
+            continue
+        # An angle that is rounded is off by the step over the root of 12, whatever the others are.
+        off = np.radians(step) / np.sqrt(12.0) * np.eye(q.shape[1])[turns]
+        ways = np.array([robot.forward(q + each)[:, :3, 3] - at for each in off])
+        moved = float(np.median(np.sqrt(np.square(ways).sum(axis=(0, 2)))))
+        left = float(np.median(np.linalg.norm(fit.residual[fit.used], axis=1)))
+        return [ROUNDED(step=step, moved=moved, left=left)] if left > _BY_ROUNDING * moved else []
+    return []
 
 
 def _swapped_markers(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]:

@@ -29,10 +29,6 @@ from .contact import (
     read_contact as read_contact,
     require_seen as require_seen,
 )
-from .conventions import (
-    check_conventions as check_conventions,
-    check_joints as check_joints,
-)
 from .displacement import (
     displacement_blocks as displacement_blocks,
     reference_joints as reference_joints,
@@ -76,6 +72,7 @@ from .ladder import (
     usable_for_choice as usable_for_choice,
 )
 from .load_check import LoadCheck as LoadCheck, check_loads as check_loads
+from .mistakes import find_mistakes as find_mistakes
 from .model_file import (
     CalibrateResult as CalibrateResult,
     ModelSource as ModelSource,

@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike
 from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Parameter
-from elastocal.errors import ConventionError, IdentificationError, present
-from elastocal.findings import Finding, Grade, Kind, as_number
+from elastocal.errors import IdentificationError, present
+from elastocal.findings import Finding, Kind, as_number
 from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.contact import ContactSummary, contact_summary, untold_stacks
-from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.encoders import (
     EncoderSummary,
@@ -30,11 +29,7 @@ from elastocal.identification.encoders import (
 from elastocal.identification.frames import FrameSummary, frame_summaries
 from elastocal.identification.knowledge import expected_sizes
 from elastocal.identification.ladder import Climbed
-from elastocal.identification.mistakes import (
-    find_implausible,
-    find_undone,
-    find_wrong_units,
-)
+from elastocal.identification.mistakes import find_mistakes
 from elastocal.identification.observability import (
     Observability,
     attainable_rank,
@@ -51,7 +46,7 @@ from elastocal.identification.problem import (
 from elastocal.identification.rungs import low_loads
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
-from elastocal.identification.tip_place import as_described, settle_tip, tip_with_interval
+from elastocal.identification.tip_place import settle_tip, tip_with_interval
 from elastocal.identification.uncertainty import (
     MOST_UNEXPLAINED,
     Coverage,
@@ -85,12 +80,6 @@ WEIGHT_GAP = Kind(
     "calibration.weight-gap",
     "robot {name}: {gap}: the arm's own weight bends it otherwise at the reference"
     " than under load, and here that passes as deflection",
-)
-IN_SPITE = Kind("calibration.fitted-in-spite", "fitted in spite of this: {error}")
-POORLY_FITTED = Kind(
-    "calibration.poorly-fitted",
-    "the springs leave {left} of the median deflection unexplained",
-    shown={"left": as_number(".0%")},
 )
 NOT_DETERMINED = Kind(
     "calibration.not-determined",
@@ -425,25 +414,13 @@ def _data_warnings(
     marker_offset: ArrayLike | None,
 ) -> list[Finding]:
     """Return a finding for each oddity of the data, or refuse them."""
-    seen = _implausible(model, readings, marker_offset)
-    warnings = _stated(seen, options)
-    # Recorded positions of the tcp are of the description.
-    warnings += list(check_joints(as_described(model.robot, options), readings)) + [
+    warnings: list[Finding] = [
         SAME_CONFIGURATION(poses=group) for group in same_configuration(readings, problem.block)
     ]
     if gap := model.robot.chain.weight_gap:
         warnings.append(WEIGHT_GAP(name=model.robot.name, gap=gap))
     warnings += _held_oddities(model, readings)
-    warnings += _fitted_mistakes(model, readings, options, marker_offset, seen)
-    try:
-        left = check_conventions(model, readings, marker_offset, options)
-    except ConventionError as error:
-        if not options.trust_conventions:
-            raise
-        return [*warnings, IN_SPITE(error=str(error))]
-    if left > POOR_FIT:
-        warnings.append(POORLY_FITTED(left=left))
-    return warnings
+    return [*find_mistakes(model, readings, options, marker_offset), *warnings]
 
 
 def _held_oddities(model: ElasticModel, readings: Readings) -> list[Finding]:
@@ -457,56 +434,6 @@ def _held_oddities(model: ElasticModel, readings: Readings) -> list[Finding]:
     if readings.reference_force is None or not np.any(readings.reference_force[held]):
         found.append(NO_LIGHT_FORCE())
     return found
-
-
-def _implausible(
-    model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None
-) -> tuple[Finding, ...]:
-    """Return the mistakes that readings show; those by contact are of the tcp, not of a marker."""
-    held = readings.by_contact
-    if not held.any():
-        return find_implausible(model.robot, readings, marker_offset)
-    parts = ((readings.take(~held), marker_offset), (readings.take(held), None))
-    found = [find_implausible(model.robot, own, at) for own, at in parts if len(own)]
-    return tuple(dict.fromkeys(each for part in found for each in part))
-
-
-def _fitted_mistakes(
-    model: ElasticModel,
-    readings: Readings,
-    options: FitOptions,
-    marker_offset: ArrayLike | None,
-    seen: Sequence[Finding],
-) -> list[Finding]:
-    """Return mistakes that fits show, beside those that readings show by themselves."""
-    if options.free_frame != "none" or any(each.grade is Grade.REFUSAL for each in seen):
-        return []
-    held = readings.by_contact
-    alike = held.all() or not held.any()
-    at = None if held.all() else marker_offset
-    found = find_undone(model.robot, readings, at, options.contact) if alike else ()
-    if not (seen or found):
-        found = tuple(find_wrong_units(model.robot, readings, marker_offset))
-    return _stated(found, options)
-
-
-def _stated(found: Sequence[Finding], options: FitOptions) -> list[Finding]:
-    """Return mistakes that readings seem to contain as warnings; refuse them where one is certain.
-
-    Raises
-    ------
-    ConventionError
-        With the first that is certain, unless the options trust the conventions.
-    """
-    warnings: list[Finding] = []
-    for each in found:
-        if each.grade is not Grade.REFUSAL:
-            warnings.append(each)
-        elif options.trust_conventions:
-            warnings.append(IN_SPITE(error=each))
-        else:
-            raise ConventionError(each)
-    return warnings
 
 
 def _fit_warnings(calibrated: CalibratedModel, reach: int, problem: Problem) -> list[Finding]:

@@ -174,6 +174,8 @@ _BENT = 0.3
 _PRESSED_ALONG = (("north", "south"), ("east", "west"), ("normal",))
 """Load cases that press along each axis of the tcp (docs/conventions.md)."""
 _STEPS = (1e-3, 1e-4, 1e-5)
+_OF_A_STEP = 1e-3
+"""Part of a step by which rounded values miss its multiples."""
 _GRAIN = 0.05
 """Part of the median deflection that a step of rounding may have."""
 
@@ -197,7 +199,7 @@ def find_implausible(
         return tuple(found)
     dead = [*_dead_forces(robot, readings)]
     found += dead or [*_zero_loads(readings)]
-    found += _clipped(robot, readings)
+    found += [*_clipped(robot, readings), *_dead_bands(robot, readings)]
     found += [*_rounded(readings)] or [*_dead_markers(readings)]
     return (*found, *_repeated(readings))
 
@@ -234,11 +236,44 @@ CLIPPED = Kind(
     " a sensor with a larger range",
     shown={"size": as_number(".0f")},
 )
+DEAD_BAND = Kind(
+    "mistakes.dead-band",
+    "force_{axis} in the {frame} frame is exactly zero in {count} of {total} readings, where a"
+    " sensor has noise: does a dead band drop or lessen small forces? Switch it off in the sensor"
+    " or controller",
+)
 ROUNDED = Kind(
     "mistakes.rounded-displacements",
     "displacements are rounded to {step} mm, {part} of the median deflection: export more digits",
     shown={"step": as_number("g", 1e3), "part": as_number(".0%")},
 )
+
+
+_EXACTLY = 1e-9
+"""Part of the largest force below which an axis reads exactly zero."""
+_FEWEST_ZEROS = 5
+
+
+def _dead_bands(robot: Robot, readings: Readings) -> Iterator[Finding]:
+    """Yield that an axis of the force is exactly zero where others, and other readings, are not.
+
+    A sensor has noise: zeros are made by who drops or shrinks small forces. What no sensor measured
+    (weights, forces that were asked for) is the same in each load case, a load cell of one axis
+    reads one axis at a time, and values of few digits are multiples of the smallest.
+    """
+    largest = float(np.abs(readings.force).max(initial=0.0))
+    for name, X in sensor_frames(robot, readings.joint_position).items():
+        own = np.einsum("rji,rj->ri", X, readings.force)
+        zero = np.abs(own) < _EXACTLY * largest
+        count, several = zero.sum(axis=0), np.count_nonzero(~zero, axis=1) > 1
+        of_band = (count >= _FEWEST_ZEROS) & (count < len(own)) & (zero & several[:, None]).any(0)
+        for axis in np.flatnonzero(of_band).tolist():
+            rest, case = own[~zero[:, axis], axis], readings.load_case[~zero[:, axis]]
+            steps = rest / np.abs(rest).min()
+            is_rounded = np.abs(steps - steps.round()).max() < _OF_A_STEP
+            if not is_rounded and _varies(rest[:, None], case, _TIED * largest):
+                yield DEAD_BAND(axis=AXES[axis], frame=name, count=int(count[axis]), total=len(own))
+                return
 
 
 def _dead_forces(robot: Robot, readings: Readings) -> Iterator[Finding]:
@@ -372,6 +407,6 @@ def _rounded(readings: Readings) -> Iterator[Finding]:
     values = np.concatenate([readings.marker_displacement, readings.controller_displacement])
     for step in _STEPS:
         steps = values / step
-        if np.abs(steps - np.round(steps)).max() < 1e-3 and step > _GRAIN * size:
+        if np.abs(steps - np.round(steps)).max() < _OF_A_STEP and step > _GRAIN * size:
             yield ROUNDED(step=step, part=step / size)
             return

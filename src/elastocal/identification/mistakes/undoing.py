@@ -41,6 +41,7 @@ from elastocal.identification.solve import fit_each, grams_of, least_squares_lef
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import HeldOut, leave_poses_out
 from elastocal.robot import Robot
+from elastocal.wording import spans
 
 _TRACKER = FitOptions(encoders=False)
 """What a force or a frame read otherwise changes is the tracker's: encoders would hide it."""
@@ -229,6 +230,20 @@ correct arms creep, which leaves 0.7 of the error but is a drift of less than a 
 _TILTED, _CROSS_TALK = np.radians(8.0), 0.15
 """Tilt of a sensor, and part of one axis in another, from which they are reported; where the
 springs miss much, correct arms seem to have 6 deg and 9 %."""
+_COMPRESSED, _LOST = 0.92, 0.1
+"""Part of the error that may be left by a sensor whose gain falls with its load, and least part of
+the largest force that it loses."""
+_WARMED = 0.1
+"""Part of the campaign after which a sensor that warms up is near its end."""
+_PRELOADED, _LEAST_PRELOAD = 0.93, 0.15
+"""Part of the error that may be left by a reference that was read under a part of a press, and the
+least such part; correct arms seem to have 0.07."""
+_SLIPPED, _LEAST_SLIP, _STUCK = 0.85, 1e-4, 0.1
+"""Part of the error that may be left by a tool that slips, the least way in m, and the part of the
+median force below which friction holds it."""
+_BETTER, _POLLUTED_ROUNDS = 0.7, 4
+"""Part of the error of a pose that another reading leaves where it may be the right one, and fits
+by which the poses settle at which it is."""
 _HOPELESS = 2.0
 """Root mean square residual over that of the readings as stated above which others are hopeless:
 what leaves twice as much in all does not leave clearly less in nine tenths of the rows."""
@@ -256,6 +271,8 @@ _UPRIGHT = 0.95
 _HEAVY = 0.7
 """Part of the median force above which it is hardly one."""
 _LEAST_GAIN = 0.05
+_MOST_LOST = 3.0
+"""Force that a sensor at its largest reading loses, over that reading, still believed."""
 _LARGEST_MIXTURE = 1.0
 """Angle in rad of a tilt about an axis, and part of one axis in another, still believed."""
 _LONGEST_LAG = 2.0
@@ -271,11 +288,14 @@ def other_readings(rows: Rows) -> Iterator[OtherReading]:
 
     Those of markers where there are any.
     """
+    forces, markers = ([*turned(rows, plain=True)] for turned in (_turned_forces, _turned_markers))
     each = (
         (_possible(rows, _turned_forces(rows)), False),
         (_possible(rows, _turned_markers(rows)), True),
-        (_wrong_for_a_part(rows, _turned_forces(rows, plain=True)), False),
-        (_wrong_for_a_part(rows, _turned_markers(rows, plain=True)), True),
+        (_wrong_for_a_part(rows, forces), False),
+        (_wrong_for_a_part(rows, markers), True),
+        (_wrong_at_some(rows, forces), False),
+        (_wrong_at_some(rows, [*_marker_units(rows), *markers]), True),
         (_wrong_for_a_part(rows, _other_force_rows(rows, plain=True)), False),
         (_wrong_for_a_part(rows, _other_marker_rows(rows, plain=True)), True),
         (_possible(rows, _other_force_rows(rows)), False),
@@ -285,10 +305,13 @@ def other_readings(rows: Rows) -> Iterator[OtherReading]:
         (_marker_drifts(rows), True),
         (_force_drifts(rows), False),
         (_force_gains(rows), False),
+        (_compressed_forces(rows), False),
         (_mixed_forces(rows), False),
         (_marker_gains(rows), True),
         (_force_lags(rows), False),
         (_marker_lags(rows), True),
+        (_preloaded_references(rows), True),
+        (_slips(rows), True),
         (_marker_places(rows), True),
         (_any_marker_frame(rows), True),
     )
@@ -371,7 +394,7 @@ def _mixed(whole: str, known: Sequence[FloatArray]) -> Iterator[tuple[str, Float
                 yield f"x, y, z of {whole} look mixed up: they read as {read}", A
 
 
-def _wrong_for_a_part(rows: Rows, whole: Iterator[OtherReading]) -> Iterator[OtherReading]:
+def _wrong_for_a_part(rows: Rows, whole: Iterable[OtherReading]) -> Iterator[OtherReading]:
     """Yield the reading that holds before a pose, or from one on, and leaves least.
 
     A plug was changed in a break, or a row was lost.
@@ -418,6 +441,53 @@ def _wrong_for_a_part(rows: Rows, whole: Iterator[OtherReading]) -> Iterator[Oth
     finer = _residuals(rows.read(partly(best, start, late)) for start in starts)
     _, start = min(zip(finer, starts, strict=True))
     yield partly(best, start, late)
+
+
+def _wrong_at_some(rows: Rows, whole: Iterable[OtherReading]) -> Iterator[OtherReading]:
+    """Yield readings that hold at the poses at which they leave less, at half of them at most.
+
+    A file of several was exported otherwise, or a person typed some of them.
+    """
+    stated, d = rows.problem.O, rows.problem.d
+    labels, pose = np.unique(rows.readings.pose, return_inverse=True)
+
+    def left(blocks: FloatArray, moved: FloatArray, c: FloatArray) -> FloatArray:
+        norms = np.linalg.norm(blocks @ c - moved, axis=1)
+        return np.asarray(np.bincount(pose[rows.kept], norms[rows.kept], len(labels)))
+
+    before = left(stated, d, rows.compliance)
+    for reading in whole:
+        there = left(reading.blocks, reading.d, rows.compliance) < _BETTER * before
+        for _ in range(_POLLUTED_ROUNDS):
+            if not 2 <= np.count_nonzero(there) <= len(labels) // 2:
+                break
+            at = there[pose]
+            partly = replace(
+                reading,
+                message=f"at poses {spans(labels[there].tolist())} {reading.message}",
+                blocks=np.where(at[:, None, None], reading.blocks, stated),
+                d=np.where(at[:, None], reading.d, d),
+                least=_FITTED,
+                certain=False,
+                estimated=True,
+            )
+            c, last = fitted(rows.read(partly)), there
+            there = left(reading.blocks, reading.d, c) < _BETTER * left(stated, d, c)
+            if np.array_equal(there, last):
+                yield partly
+                break
+
+
+def _marker_units(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of markers in another unit of length."""
+    r = rows.readings
+    for name, factor in (("inches", 25.4), ("metres", 1e3)):
+        yield OtherReading(
+            f"marker displacements are in {name} in a column of mm: check the unit of that file",
+            rows.problem.O,
+            factor * r.marker_displacement - r.controller_displacement,
+            _LIKELY,
+        )
 
 
 def _other_force_rows(rows: Rows, plain: bool = False) -> Iterator[OtherReading]:
@@ -659,8 +729,11 @@ def _time_in_pose(rows: Rows) -> FloatArray:
 def _force_drifts(rows: Rows) -> Iterator[OtherReading]:
     """Yield readings of forces without a constant that grew in the order of time."""
     size = median_norm(rows.readings.force)
+    warm = 1.0 - np.exp(-_time(rows) / _WARMED)
+    begins = "at the begin of the campaign: let the sensor warm up, and zero it before each pose"
     courses = (
         _Course(_time(rows), "over the campaign: zero the sensor before each pose"),
+        _Course(warm, begins, _IN_POSE, _GROWN),
         _Course(_time_in_pose(rows), "in each pose: let the sensor warm up", _IN_POSE, _GROWN),
     )
     each = [*product(courses, ("tcp", "base"))]
@@ -757,6 +830,38 @@ def _force_gains(rows: Rows) -> Iterator[OtherReading]:
         )
 
 
+def _compressed_forces(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of a sensor whose gain falls with the force on it, estimated."""
+    r, light = rows.readings, rows.readings.reference_force
+    largest = float(np.linalg.norm(r.force, axis=1).max())
+
+    def squared(force: FloatArray) -> FloatArray:
+        size = np.linalg.norm(force, axis=1, keepdims=True)
+        return np.asarray(force * size / max(largest, 1e-12))
+
+    less = None if light is None else squared(light)
+    more = squared(r.force)
+
+    def blocks(lost: FloatArray) -> FloatArray:
+        zero = light if light is None or less is None else light + lost * less
+        return rows.blocks(r.force + lost * more, zero)
+
+    lost = _Unknown(
+        np.zeros(1),
+        blocks,
+        lambda _, c: rows.moved(more[..., None], c),
+        lambda lost: bool(abs(lost[0]) < _MOST_LOST),
+    )
+    (found,) = _estimated(rows, [lost], _ROUNDS)
+    if found is None or not (part := float(found[0][0] / (1.0 + found[0][0]))) > _LOST:
+        return
+    message = (
+        f"the force sensor's gain seems to fall with its load, by {part:.0%} at the largest force"
+        " (not linear, or near the end of its range): check it with known weights, press with less"
+    )
+    yield OtherReading(message, found[1], rows.problem.d, _COMPRESSED, estimated=True)
+
+
 def _force_gain(rows: Rows, x: FloatArray) -> _Unknown:
     """Return the factor that undoes a gain of the force along axes, shape (reading, 3)."""
     along = x[:, :, None] * x[:, None, :]
@@ -847,6 +952,42 @@ def _lagging(name: str, late: float, which: str) -> str:
         f"{name} {how}: they seem to hold {late / (1.0 + late):.0%} of the load case {which}; let"
         " each press settle, and read all devices at the same time"
     )
+
+
+def _preloaded_references(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of markers whose reference was read under a part of the pose's first press."""
+    stated, first = rows.problem.O, _first_of_pose(rows.readings)
+    under = _Unknown(
+        np.zeros(1),
+        lambda part: np.asarray(stated - part * stated[first]),
+        lambda _, c: -(stated @ c)[first][..., None],
+        lambda part: bool(0.0 < part[0] < 1.0),
+    )
+    (found,) = _estimated(rows, [under], _ROUNDS)
+    if found is None or not (part := float(found[0][0])) > _LEAST_PRELOAD:
+        return
+    message = (
+        f"the reference of the marker seems to be read under {part:.0%} of the first press of each"
+        " pose (a preload): read it in the air, or in a contact whose force is recorded"
+    )
+    yield OtherReading(message, found[1], rows.problem.d, _PRELOADED, estimated=True)
+
+
+def _slips(rows: Rows) -> Iterator[OtherReading]:
+    """Yield readings of a tool that slips in its holder with the sign of the force across it."""
+    X, r = rows.frames["tcp"], rows.readings
+    own = np.einsum("rji,rj->ri", X, r.force)
+    across = np.tanh(own / max(_STUCK * median_norm(r.force), 1e-12)) * [1.0, 1.0, 0.0]
+    column = np.einsum("rij,rj->ri", X, across)
+    ((way,),) = _factors(rows, [column[..., None]])
+    if not way > _LEAST_SLIP:
+        return
+    message = (
+        f"the tool seems to slip by {1e3 * way:.2f} mm with the force across it: check the clamp"
+        " of the tool, and the screws of the marker"
+    )
+    d = rows.problem.d - way * column
+    yield OtherReading(message, rows.problem.O, d, _SLIPPED, estimated=True)
 
 
 def _marker_places(rows: Rows) -> Iterator[OtherReading]:
