@@ -19,9 +19,9 @@ _STEPS = (1.0, 0.5, 0.1, 0.05, 0.01)
 """Steps to which angles of joints are rounded, in deg."""
 _OF_A_STEP = 1e-5
 """Part of a step by which rounded angles miss its multiples."""
-_BY_ROUNDING = 0.5
-"""Part of what rounding moves the markers by, from which it is what a fit leaves: postures that
-were asked for in whole degrees, and reached, leave less."""
+_BY_ROUNDING = 0.5, 2.0
+"""Parts of what rounding moves the markers by, between which it is what a fit leaves: postures that
+were asked for in whole degrees, and reached, leave less, and errors of the arm more."""
 
 
 NO_MASSES = Kind(
@@ -75,6 +75,8 @@ def _rounded_joints(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]
     """Return that angles are rounded to a step that explains what the fit leaves."""
     robot, q = problem.robot, problem.data.q
     turns = np.flatnonzero(robot.revolute)
+    if not turns.size:
+        return []
     degrees = np.degrees(q[:, turns])
     at = robot.forward(q)[:, :3, 3]
     for step in _STEPS:
@@ -85,7 +87,9 @@ def _rounded_joints(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]
         ways = np.array([robot.forward(q + each)[:, :3, 3] - at for each in off])
         moved = float(np.median(np.sqrt(np.square(ways).sum(axis=(0, 2)))))
         left = float(np.median(np.linalg.norm(fit.residual[fit.used], axis=1)))
-        return [ROUNDED(step=step, moved=moved, left=left)] if left > _BY_ROUNDING * moved else []
+        low, high = _BY_ROUNDING
+        explained = low * moved < left < high * moved
+        return [ROUNDED(step=step, moved=moved, left=left)] if explained else []
     return []
 
 
