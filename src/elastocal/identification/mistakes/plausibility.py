@@ -100,7 +100,10 @@ def find_wrong_units(
         (phrase("mm in a column of inches"), -np.log(25.4)),
     ):
         gain = (r**2 - (r + k) ** 2) / _RATIO_SPREAD**2
-        if gain > _LIKELIER:
+        if gain > _LIKELIER and k > 0.0 and share > _TOO_MUCH:
+            # Forces that are too large make an arm look as stiff, and load it besides.
+            yield COUNTS(share=share)
+        elif gain > _LIKELIER:
             yield UNIT_OF_DISPLACEMENT(unit=word, times=ratio)
 
 
