@@ -6,12 +6,20 @@ import numpy as np
 import pytest
 
 from elastocal import dataset
+from elastocal.blocks import Bullets
 from elastocal.elastic import ElasticModel, bearing, layout
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.identification import Contact
 from elastocal.records import read_json
 from elastocal.sim.two_arms import Tips, press_together, true_arm
-from elastocal.two_robots import PairPlan, identify_pair, load_pair_cell, pair_readings
+from elastocal.two_robots import (
+    PairPlan,
+    PairResult,
+    identify_pair,
+    load_pair_cell,
+    pair_readings,
+)
+from elastocal.two_robots.calibration import LOOKS_WRONG, SET_ASIDE, _screened
 from elastocal.two_robots.presses import PairModel, build_pair, pair_blocks
 from support import two_arms
 
@@ -143,3 +151,69 @@ def test_a_free_contact_is_refused_beside_springs_that_imitate_it(cell, pair):
 def test_a_model_of_an_arm_that_is_not_there_is_refused(pair):
     with pytest.raises(IdentificationError, match="no arm 'third'"):
         identify_pair(pair, np.random.default_rng(0), Contact(5e7, 4e7), known={"third": None})
+
+
+def moved(pair, rows, by):
+    """Return the presses with what the first controller says moved at some of them, by metres."""
+    said = pair.first.controller_displacement.copy()
+    said[rows] += by
+    return replace(pair, first=replace(pair.first, controller_displacement=said))
+
+
+def predicted(found, pair):
+    """Return the deflections that both models predict at presses, (arm, press, 3), in m."""
+    own = zip(found.models, (pair.first, pair.second), strict=True)
+    return np.stack([each.predict(r.joint_position, r.force).deflection for each, r in own])
+
+
+@pytest.fixture(scope="module")
+def sound(cell, pair):
+    return identify_pair(pair, np.random.default_rng(0), cell.contact, "gears", draws=40)
+
+
+def test_presses_without_blunders_are_all_kept(pair, sound):
+    assert len(sound.pair) == len(pair)
+    assert not {SET_ASIDE.name, LOOKS_WRONG.name} & {each.kind for each in sound.findings}
+
+
+@pytest.mark.parametrize("off", [50e-3, 3e-3, 1e-3])
+def test_a_blunder_is_set_aside_named_and_moves_neither_arm(cell, pair, sound, off):
+    wrong = moved(pair, 40, [0.0, 0.6 * off, 0.8 * off])
+    found = identify_pair(wrong, np.random.default_rng(0), cell.contact, "gears", draws=40)
+    (named,) = [each for each in found.findings if each.kind == SET_ASIDE.name]
+    assert f"pose {pair.first.pose[40]} {pair.first.load_case[40]} was set aside" in named
+    assert named.values["error"] == pytest.approx(off, rel=0.1)
+    for kept, own in ((found.pair.first, pair.first), (found.pair.second, pair.second)):
+        assert np.array_equal(kept.force, np.delete(own.force, 40, axis=0))
+    before = predicted(sound, pair)
+    error = np.linalg.norm(predicted(found, pair) - before, axis=2).mean(axis=1)
+    assert np.all(error < 0.004 * np.linalg.norm(before, axis=2).mean(axis=1))
+    shown = PairResult.of("cell", found, ("left.json", "right.json"))
+    assert (shown.readings, shown.set_aside) == (len(pair) - 1, 1)
+    assert dict(shown.facts())["Presses"] == "149, and 1 set aside as blunders"
+    bullets = [each.items for each in shown.show() if isinstance(each, Bullets)]
+    assert (named,) in bullets
+
+
+def test_every_press_of_a_meeting_after_a_slip_is_set_aside(cell, pair):
+    rows = pair.first.pose == pair.first.pose[40]
+    kept, findings = _screened(moved(pair, rows, [3e-3, 0.0, 0.0]), cell.contact)
+    assert len(kept) == len(pair) - 6
+    assert len(findings) == 6
+
+
+def test_where_too_many_presses_are_wrong_none_is_set_aside_and_the_worst_is_named(cell, pair):
+    some = np.arange(0, len(pair), 7)
+    wrong = moved(moved(pair, some, [0.0, 0.0, 10e-3]), 21, [0.0, 0.0, 2e-3])
+    kept, (named,) = _screened(wrong, cell.contact)
+    assert len(kept) == len(pair)
+    assert named.kind == LOOKS_WRONG.name
+    assert named.values["count"] == len(some)
+    assert f"the worst at pose {pair.first.pose[21]} {pair.first.load_case[21]} (" in named
+
+
+def test_a_press_too_little_off_to_be_set_aside_is_named_and_kept(cell, pair):
+    kept, (named,) = _screened(moved(pair, 40, [0.0, 0.0, 0.6e-3]), cell.contact)
+    assert len(kept) == len(pair)
+    assert (named.kind, named.values["count"]) == (LOOKS_WRONG.name, 1)
+    assert f"pose {pair.first.pose[40]} {pair.first.load_case[40]}" in named

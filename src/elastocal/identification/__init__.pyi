@@ -170,6 +170,8 @@ from .spring_sums import (
     describe_briefly as describe_briefly,
 )
 from .suspicious import (
+    BLUNDER_SCORE as BLUNDER_SCORE,
+    BLUNDER_SIZE as BLUNDER_SIZE,
     screen as screen,
 )
 from .tip_place import with_tip_found as with_tip_found

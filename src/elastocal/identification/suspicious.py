@@ -22,7 +22,7 @@ _FALSE_ALARM = 0.01
 
 BLUNDER_SCORE = 25.0
 """Robust score above which a reading may be set aside ..."""
-_BLUNDER_SIZE = 0.25
+BLUNDER_SIZE = 0.25
 """... if its residual is also above this part of the median deflection. Both together are
 beyond any model error: a broken beam, a marker knocked off, a reading of another pose."""
 _MOST_BLUNDERS = 0.1
@@ -66,7 +66,7 @@ def screen(problem: Problem) -> Screening:
     score = normalised_residuals(problem, robust.compliance, np.sqrt(1.0 - h))
     residual = np.linalg.norm(problem.residuals(robust.compliance), axis=1)
     typical = float(np.median(np.linalg.norm(problem.d, axis=1)))
-    blunder = (score > BLUNDER_SCORE) & (residual > _BLUNDER_SIZE * typical)
+    blunder = (score > BLUNDER_SCORE) & (residual > BLUNDER_SIZE * typical)
     if blunder.mean() > _MOST_BLUNDERS:
         blunder = np.zeros_like(blunder)
     # The scale is a median itself, with about twice the variance of an estimate from all residuals.

@@ -4,10 +4,13 @@ The prior says what is known beside the presses. Of an arm that was calibrated b
 which the draws alone spread; of another one, that no spring is softer by far than the drive of
 its joint (`elastocal.identification.DriveCompliances`). Where the presses see only the sum of a
 tilt of both bases, the prior shares it out.
+
+Blunders are set aside before anything is chosen, since one would move both arms: a press that fits
+neither springs at the bearings nor gears, as `elastocal.identification.screen` judges it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -17,6 +20,8 @@ from elastocal.elastic import ElasticModel, actuated
 from elastocal.errors import IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification import (
+    BLUNDER_SCORE,
+    BLUNDER_SIZE,
     CUT,
     MOST_UNEXPLAINED,
     RANK_TOLERANCE,
@@ -40,6 +45,7 @@ from elastocal.identification import (
     observability,
     robust_fit,
     rung_of,
+    screen,
     solve,
     weighed_contact,
     widen_draws,
@@ -49,6 +55,7 @@ from elastocal.parallel import one_blas_thread
 from elastocal.results import brief_repr
 from elastocal.two_robots.presses import PairModel, PairPrior, PairReadings, build_pair
 from elastocal.two_robots.tilts import tilt_finding
+from elastocal.wording import mm, phrase
 
 AUTO = "auto"
 TRIED = ("actuated", "bearing", "links", "gears")
@@ -75,6 +82,19 @@ UNMATCHED = Kind(
     "{count} readings were left out: the other arm recorded none of that pose and load case",
     grade=Grade.NOTE,
 )
+SET_ASIDE = Kind(
+    "two-robots.press-set-aside",
+    "the press at {name} was set aside as a blunder, the readings of both arms ({error} off)",
+    advice="Press at {name} again: what the controllers said there is no press of these arms.",
+    grade=Grade.NOTE,
+    shown={"error": mm},
+)
+LOOKS_WRONG = Kind(
+    "two-robots.presses-look-wrong",
+    "presses beyond any noise were kept in the fit: {count}, the worst at {name} ({error} off)",
+    advice="Look at {name}, and leave its rows out of the datasets if they are wrong.",
+    shown={"error": mm},
+)
 
 
 @brief_repr
@@ -83,6 +103,7 @@ class PairCalibration:
     """Models of both arms, with the evidence of their quality."""
 
     pair: PairReadings
+    """The presses that were fitted."""
     springs: str
     """Name of the springs that were fitted."""
     models: tuple[CalibratedModel, CalibratedModel]
@@ -149,12 +170,51 @@ def identify_pair(
     """
     before = dict(known or {})
     _require_known(pair, before)
+    pair, wrong = _screened(pair, contact)
     contact, noise = _weighed(pair, contact)
     drives = _drives(pair, contact)
     names = TRIED if springs == AUTO else (springs,)
     fits = [_fit(pair, name, before, (contact, noise), drives) for name in names]
     fit = fits[_best(fits)]
-    return _certified(pair, fit, fits, before, drives, rng, draws)
+    found = _certified(pair, fit, fits, before, drives, rng, draws)
+    return replace(found, findings=(*found.findings, *wrong))
+
+
+def _screened(
+    pair: PairReadings, contact: Contact | None
+) -> tuple[PairReadings, tuple[Finding, ...]]:
+    """Return the presses without blunders, and findings on those that look wrong.
+
+    First by springs at the bearings, as for one arm; then by gears, which fit closer and so find
+    smaller ones. Either may imitate a free contact: it is taken as a first fit has it. A press that
+    has one of the two marks of a blunder is kept, and said.
+    """
+    stated = None if contact is None else as_fitted(contact)
+    typical = float(np.median(np.linalg.norm(pair.relative, axis=1)))
+    findings: list[Finding] = []
+    for name in ("bearing", "gears"):
+        found = screen(build_pair(_model(pair, name, {}), pair, stated))
+        order = np.argsort(-found.residual, kind="stable")
+        findings += [
+            SET_ASIDE(name=_press(pair, row), error=float(found.residual[row]))
+            for row in order[found.blunder[order]].tolist()
+        ]
+        marked = (found.score > BLUNDER_SCORE) | (found.residual > BLUNDER_SIZE * typical)
+        kept = order[(found.suspicious & marked & ~found.blunder)[order]].tolist()
+        left = [(_press(pair, row), float(found.residual[row])) for row in kept]
+        pair = pair.set_aside(found.blunder)
+    if left:
+        findings.append(LOOKS_WRONG(count=len(left), name=left[0][0], error=left[0][1]))
+    return pair, tuple(findings)
+
+
+def _press(pair: PairReadings, row: int) -> str:
+    """Return the meeting and load case of a press, in words."""
+    return phrase(
+        "pose {pose} {load_case}",
+        pose=int(pair.first.pose[row]),
+        load_case=str(pair.first.load_case[row]),
+    )
 
 
 def _require_known(pair: PairReadings, known: Mapping[str, CalibratedModel]) -> None:

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.arrays import FloatArray
+from elastocal.arrays import BoolArray, FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Parameter, Spring
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
@@ -96,6 +96,17 @@ class PairReadings:
         if self.tracked:
             return np.asarray(own.deflection - other.deflection @ self.R.T)
         return np.asarray(other.controller_displacement @ self.R.T - own.controller_displacement)
+
+    def set_aside(self, index: BoolArray) -> "PairReadings":
+        """Return the presses without some, of both arms (`elastocal.dataset.Readings.set_aside`).
+
+        Parameters
+        ----------
+        index : ndarray of bool, shape (press,)
+            Those to set aside.
+        """
+        first, second = self.first.set_aside(index), self.second.set_aside(index)
+        return replace(self, first=first, second=second)
 
 
 def pair_readings(

@@ -10,12 +10,14 @@ from elastocal.findings import Finding, Grade
 from elastocal.identification import MOST_TERMS, Term, describe_briefly
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.two_robots.calibration import PairCalibration
+from elastocal.two_robots.calibration import LOOKS_WRONG, SET_ASIDE, PairCalibration
 from elastocal.two_robots.cooperation import CooperationSummary
 from elastocal.wording import counted, mm, phrase, phrases
 
 _LEAST_WEIGHT = 0.05
 """Weight of a spring in a combination, of 1 at most, below which a line leaves it out."""
+_WRONG = (SET_ASIDE.name, LOOKS_WRONG.name)
+"""Kinds of findings on single presses."""
 
 
 @brief_repr
@@ -89,6 +91,8 @@ class PairResult(Result):
     cooperation: CooperationSummary | None = None
     """Relative deviation at the presses, before and after a correction that the cell's weights and
     limits share; none where a corrected press is out of reach."""
+    set_aside: int = 0
+    """Presses beside `readings` that were left out of the fit as blunders."""
 
     def sections(self) -> Iterator[tuple[str, str, Iterable[Block]]]:
         """Yield identifier, title and contents of each section of the page."""
@@ -143,8 +147,15 @@ class PairResult(Result):
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the presses, and the error at left-out poses."""
         share = self.held_out / self.deflection
+        presses = str(self.readings)
+        if self.set_aside:
+            presses = phrase(
+                "{count}, and {aside} set aside as blunders",
+                count=self.readings,
+                aside=self.set_aside,
+            )
         return (
-            (phrase("Presses"), str(self.readings)),
+            (phrase("Presses"), presses),
             (phrase("Poses"), str(self.poses)),
             (phrase("Springs"), self.springs),
             (phrase("Relative displacement, mean"), mm(self.deflection)),
@@ -161,8 +172,15 @@ class PairResult(Result):
         )
 
     def _findings(self) -> Iterable[Block]:
-        grave = [each for each in self.findings if _grade(each) is not Grade.NOTE]
-        notes = [each for each in self.findings if _grade(each) is Grade.NOTE]
+        wrong = [each for each in self.findings if each.kind in _WRONG]
+        if wrong:
+            yield Heading(phrase("Presses that look wrong"))
+        for each in wrong:
+            yield Bullets((each,), "warnings")
+            yield Paragraph(each.advice, "advice")
+        others = [each for each in self.findings if each not in wrong]
+        grave = [each for each in others if _grade(each) is not Grade.NOTE]
+        notes = [each for each in others if _grade(each) is Grade.NOTE]
         if grave or notes or self.hidden:
             yield Heading(phrase("What the presses do not see"))
         for each in grave:
@@ -262,6 +280,7 @@ class PairResult(Result):
             hidden=found.seen.hidden,
             findings=found.findings,
             cooperation=cooperation,
+            set_aside=sum(each.kind == SET_ASIDE.name for each in found.findings),
         )
 
 
