@@ -82,6 +82,12 @@ def triple(vector: FloatArray) -> Triple:
     return x, y, z
 
 
+def are_multiples(values: FloatArray, step: float, within: float) -> bool:
+    """Return whether values, one at least, miss multiples of a step by less than a part of it."""
+    steps = values / step
+    return bool(np.abs(steps - np.round(steps)).max() < within)
+
+
 def longest_run(values: FloatArray) -> slice:
     """Return the most rows, one after the other, that hold the same number."""
     ends = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]])

@@ -12,6 +12,7 @@
 `faults`     what every fault does in every phase of a press, from data that is kept
 `stopping`   campaigns that stop by themselves, from data that is kept
 `notebooks`  the notebooks of the site, run
+`kept`       how figures that take long to measure are kept
 `process_figures`  Table 1 over truths and seeds, measured by one command and quoted
 ===========  ====================================================================
 """

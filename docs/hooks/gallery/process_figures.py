@@ -15,7 +15,6 @@ deflection at left-out poses is measured, and what its prediction leaves of it.
 """
 
 import argparse
-import json
 import re
 import sys
 import tempfile
@@ -35,7 +34,7 @@ from elastocal.errors import CompensationError
 from elastocal.identification import CalibrateResult, Contact
 from elastocal.procedure import RunFolder, read_summary
 from elastocal.progress import silent
-from elastocal.records import from_data, record, to_data
+from elastocal.records import record
 from elastocal.robot import Robot
 from elastocal.workflows import (
     ProcessTrial,
@@ -48,6 +47,7 @@ from elastocal.workflows import (
     touch,
 )
 from elastocal.workflows.simulate_process import with_encoders
+from gallery.kept import read_kept, rounded, write_kept
 
 QUOTED = Path(__file__).with_name("process_figures.json")
 KINDS = (*process.PROCESSES, "ur20")
@@ -186,14 +186,7 @@ def all_turns() -> Iterator[tuple[Case, tuple[Campaign, ...]]]:
 
 def quoted() -> list[ProcessFigures]:
     """Return the figures as they are written down."""
-    data = json.loads(QUOTED.read_text(encoding="utf-8")) if QUOTED.exists() else []
-    return [from_data(ProcessFigures, figures, QUOTED.name) for figures in data]
-
-
-def write(figures: list[ProcessFigures]) -> None:
-    """Write figures down, a line each."""
-    lines = ",\n".join(json.dumps(to_data(each)) for each in figures)
-    QUOTED.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    return read_kept(QUOTED, ProcessFigures)
 
 
 @dataclass(frozen=True)
@@ -219,7 +212,7 @@ class _Model:
         taken = [rung.springs for rung in found.ladder if rung.chosen]
         return ProcessFigures(
             case, self.campaign.name, self.springs, taken[0] if taken else self.springs,
-            self.poses, self.minutes, _rounded(found.held_out.mean), tuple(self.deviations),
+            self.poses, self.minutes, rounded(found.held_out.mean), tuple(self.deviations),
             None if self.state is None else round(self.state.seconds / 60.0, 2),
             self.landing_seconds,
         )  # fmt: skip
@@ -346,25 +339,20 @@ def _left_out(result: CalibrateResult) -> Deviation:
     """Return what a prediction takes away of the deflection at poses that the fit has not seen."""
     found = result.calibration
     assert found is not None
-    mean = _rounded(found.deflection.mean), _rounded(found.held_out.mean)
-    largest = _rounded(found.deflection.max), _rounded(found.held_out.max)
+    mean = rounded(found.deflection.mean), rounded(found.held_out.mean)
+    largest = rounded(found.deflection.max), rounded(found.held_out.max)
     return Deviation("left out", 1.0, mean, largest)
 
 
 def _deviation(line: DeviationComparison, load: float) -> Deviation:
     mean, largest = (
-        (_rounded(before), _rounded(after))
+        (rounded(before), rounded(after))
         for before, after in (
             (line.before.mean, line.after.mean),
             (line.before.max, line.after.max),
         )
     )
     return Deviation(line.name, load, mean, largest)
-
-
-def _rounded(length: float) -> float:
-    """Return a length in m to 10 nm: what is quoted is small, and alike on all machines."""
-    return round(length, 8)
 
 
 def measure(seeds: int, kinds: list[str], anew: bool, keep: Path | None) -> None:
@@ -378,7 +366,7 @@ def measure(seeds: int, kinds: list[str], anew: bool, keep: Path | None) -> None
             if not missing or case.kind not in kinds or case.seed > seeds:
                 continue
             figures += measurement.of(case, missing)
-            write(figures)
+            write_kept(QUOTED, figures)
             renew_readme()
             sys.stdout.write(f"{case}\n")
             sys.stdout.flush()

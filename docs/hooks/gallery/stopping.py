@@ -10,7 +10,6 @@ production, at places spread evenly over its path, without noise and friction of
 """
 
 import argparse
-import json
 import sys
 import tempfile
 from pathlib import Path
@@ -33,10 +32,11 @@ from elastocal.identification import (
     with_knowledge,
 )
 from elastocal.planning import plan_coverage, read_plan
-from elastocal.records import from_data, record, to_data
+from elastocal.records import record
 from elastocal.sim.workcell import CampaignErrors, CampaignSimulator, ContactPoses
 from elastocal.sim.workcell.campaign_errors import ErrorDraws, ErrorScales
 from elastocal.workflows import init, plan
+from gallery.kept import read_kept, rounded, write_kept
 
 QUOTED = Path(__file__).with_name("stopping.json")
 WANTED = {
@@ -117,7 +117,7 @@ class Example:
             )
             if stopped:
                 break
-        lengths = round(found.high, 8), round(self._true_error(arm, mine, 2 * seed + 1), 8)
+        lengths = rounded(found.high), rounded(self._true_error(arm, mine, 2 * seed + 1))
         return Stopped(self.kind, self.preset, seed, stopped, poses, *lengths)
 
     def _measured(self, arm: CampaignSimulator, rng: np.random.Generator, seed: int) -> Readings:
@@ -149,8 +149,7 @@ class Example:
 
 def quoted() -> list[Stopped]:
     """Return the campaigns as they are written down."""
-    data = json.loads(QUOTED.read_text(encoding="utf-8")) if QUOTED.exists() else []
-    return [from_data(Stopped, each, QUOTED.name) for each in data]
+    return read_kept(QUOTED, Stopped)
 
 
 def measure(folder: Path, campaigns: int, kinds: list[str]) -> None:
@@ -165,8 +164,7 @@ def measure(folder: Path, campaigns: int, kinds: list[str]) -> None:
             if (kind, preset) not in examples:
                 examples[kind, preset] = Example(folder, kind, preset)
             done.append(examples[kind, preset].campaign(seed, wanted))
-            lines = ",\n".join(json.dumps(to_data(each)) for each in done)
-            QUOTED.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+            write_kept(QUOTED, done)
             sys.stdout.write(f"{done[-1]}\n")
             sys.stdout.flush()
 

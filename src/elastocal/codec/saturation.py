@@ -4,11 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
-from scipy.special import ndtri
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.errors import CodecError
-from elastocal.identification import CONFIDENCE, MOST_UNEXPLAINED, Overlap
+from elastocal.identification import CONFIDENCE, MOST_UNEXPLAINED, NORMAL_QUANTILE, Overlap
 from elastocal.records import record
 from elastocal.wording import um
 
@@ -264,7 +263,7 @@ def median_draws(values: FloatArray, overlap: Overlap, rng: Generator) -> FloatA
     drawn = np.array([_log_median(values[draw]) for draw in chosen])
     # Draws spread as the population of the sets does, (1 - 1 / J) / J of the sample variance.
     by = np.sqrt(overlap.variance * sets * sets / (sets - 1.0))
-    by *= overlap.student / float(ndtri(0.5 * (1.0 + CONFIDENCE)))
+    by *= overlap.student / NORMAL_QUANTILE
     return np.asarray(np.exp(estimate + by * (drawn - estimate)))
 
 

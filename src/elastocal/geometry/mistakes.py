@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from elastocal.arrays import IndexArray
+from elastocal.arrays import IndexArray, are_multiples
 from elastocal.findings import Finding, Kind, as_count, as_number
 from elastocal.geometry.left_out import left_out_findings
 from elastocal.geometry.positions import Positions
@@ -78,14 +78,13 @@ def _rounded_joints(problem: GeometryProblem, fit: GeometryFit) -> list[Finding]
     if not turns.size:
         return []
     degrees = np.degrees(q[:, turns])
-    at = robot.forward(q)[:, :3, 3]
     for step in _STEPS:
-        if not np.abs(degrees / step - np.round(degrees / step)).max() < _OF_A_STEP:
+        if not are_multiples(degrees, step, _OF_A_STEP):
             continue
         # An angle that is rounded is off by the step over the root of 12, whatever the others are.
-        off = np.radians(step) / np.sqrt(12.0) * np.eye(q.shape[1])[turns]
-        ways = np.array([robot.forward(q + each)[:, :3, 3] - at for each in off])
-        moved = float(np.median(np.sqrt(np.square(ways).sum(axis=(0, 2)))))
+        off = np.radians(step) / np.sqrt(12.0)
+        lever = np.linalg.norm(robot.jacobian(q).translation[..., turns], axis=(1, 2))
+        moved = float(off * np.median(lever))
         left = float(np.median(np.linalg.norm(fit.residual[fit.used], axis=1)))
         low, high = _BY_ROUNDING
         explained = low * moved < left < high * moved

@@ -27,7 +27,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike
 from scipy.optimize import lsq_linear
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import BoolArray, FloatArray, IndexArray
 from elastocal.dataset import Readings
 from elastocal.errors import ConventionError, IdentificationError
 from elastocal.findings import Finding, Grade, Kind, as_number
@@ -203,6 +203,13 @@ class _Rows:
             z = lsq_linear(rows, target, (-_FARTHEST, _FARTHEST)).x
         return z, self.weight(z)
 
+    def left_out(self) -> Iterator[tuple[BoolArray, FloatArray]]:
+        """Yield which rows are of each course, and how far the others move the directions."""
+        for number in range(int(self.course.max()) + 1):
+            own = self.course == number
+            z, _ = self.take(np.flatnonzero(~own)).moved()
+            yield own, z
+
 
 def update_springs(
     calibrated: CalibratedModel,
@@ -252,9 +259,7 @@ def update_springs(
     rows = _Rows(blocks @ L, measured - predicted, course)
     z, weight = rows.moved()
     before, after = np.zeros((2, len(courses), 1))
-    for number in range(len(courses)):
-        own = course == number
-        others, _ = rows.take(np.flatnonzero(~own)).moved()
+    for number, (own, others) in enumerate(rows.left_out()):
         move = blocks[own] @ (_springs(calibrated, c + L @ others) - c)
         before[number] = np.linalg.norm(rows.r[own], axis=1).mean()
         after[number] = np.linalg.norm(rows.r[own] - move, axis=1).mean()
@@ -318,19 +323,18 @@ def _mistake(
         if reads < _DEAD * moves:
             return DEAD_MARKER(axis="xyz"[axis])
     softer = _beside(rows, predicted[..., None])
-    before, *_ = _left_out(softer)
+    before = _left_out(softer)
     found = []
     for message, least, columns in _mistakes(calibrated, readings, rows.course, marker_offset):
         wide = _beside(softer, columns)
-        after, numbers = _left_out(wide)
+        after = _left_out(wide)
         gain = paired_difference(before, after, Overlap.leaving_one_out(len(before)))
         is_sure = gain.mean[0] > _SURE_ERRORS * gain.standard_error[0]
+        if not (is_sure and after.mean() < _BY_MISTAKE * before.mean()):
+            continue
+        numbers, _ = wide.moved()
         size = numbers[-columns.shape[2] :] * _scale(softer, columns)
-        if (
-            after.mean() < _BY_MISTAKE * before.mean()
-            and is_sure
-            and float(abs(size).max()) > least
-        ):
+        if float(abs(size).max()) > least:
             found.append((float(after.mean()), message))
     if not found:
         return None
@@ -356,15 +360,10 @@ def _beside(rows: _Rows, columns: FloatArray) -> _Rows:
     return replace(rows, A=np.concatenate([rows.A, columns * _scale(rows, columns)], axis=2))
 
 
-def _left_out(rows: _Rows) -> tuple[FloatArray, FloatArray]:
-    """Return the mean error at each course by the others, shape (course, 1), and all numbers."""
-    courses = range(int(rows.course.max()) + 1)
-    error = np.zeros((len(courses), 1))
-    for number in courses:
-        own = rows.course == number
-        z, _ = rows.take(np.flatnonzero(~own)).moved()
-        error[number] = np.linalg.norm(rows.r[own] - rows.A[own] @ z, axis=1).mean()
-    return error, rows.moved()[0]
+def _left_out(rows: _Rows) -> FloatArray:
+    """Return the mean error at each course by the others, shape (course, 1)."""
+    left = (rows.r[own] - rows.A[own] @ z for own, z in rows.left_out())
+    return np.array([[np.linalg.norm(each, axis=1).mean()] for each in left])
 
 
 def _mistakes(

@@ -193,18 +193,18 @@ def _screened(
     typical = float(np.median(np.linalg.norm(pair.relative, axis=1)))
     findings: list[Finding] = []
     for name in ("bearing", "gears"):
-        found = screen(build_pair(_model(pair, name, {}), pair, stated))
+        seen, found = pair, screen(build_pair(_model(pair, name, {}), pair, stated))
         order = np.argsort(-found.residual, kind="stable")
         findings += [
             SET_ASIDE(name=_press(pair, row), error=float(found.residual[row]))
             for row in order[found.blunder[order]].tolist()
         ]
-        marked = (found.score > BLUNDER_SCORE) | (found.residual > BLUNDER_SIZE * typical)
-        kept = order[(found.suspicious & marked & ~found.blunder)[order]].tolist()
-        left = [(_press(pair, row), float(found.residual[row])) for row in kept]
         pair = pair.set_aside(found.blunder)
-    if left:
-        findings.append(LOOKS_WRONG(count=len(left), name=left[0][0], error=left[0][1]))
+    marked = (found.score > BLUNDER_SCORE) | (found.residual > BLUNDER_SIZE * typical)
+    kept = order[(found.suspicious & marked & ~found.blunder)[order]].tolist()
+    if kept:
+        error = float(found.residual[kept[0]])
+        findings.append(LOOKS_WRONG(count=len(kept), name=_press(seen, kept[0]), error=error))
     return pair, tuple(findings)
 
 

@@ -407,10 +407,8 @@ def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -
 def _campaigns(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
     """Yield whether each further campaign is what the streams of its own run give."""
     for each in evidence.campaigns:
-        run, name = (
-            RunFolder(each.path.parent),
-            phrase("campaign {name}", name=each.path.parent.name),
-        )
+        run = RunFolder(each.path.parent)
+        name = phrase("campaign {name}", name=each.path.parent.name)
         if run.dataset.name != each.path.name or not run.journal.is_file():
             text = _with_reason(name, phrase("its dataset lies in no folder of a run"))
             yield Link("dataset", LinkState.UNSTATED, text)

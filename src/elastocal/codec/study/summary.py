@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.special import bdtr, ndtri
+from scipy.special import bdtr
 
 from elastocal.arrays import FloatArray
 from elastocal.codec.study.conditions import FACTORS, Condition, value_text
 from elastocal.codec.study.samples import SampleResult, StudyDesign
 from elastocal.errors import CodecError, present
-from elastocal.identification import CONFIDENCE
+from elastocal.identification import CONFIDENCE, NORMAL_QUANTILE
 from elastocal.records import read_json, record, write_json
 from elastocal.results import brief_repr
 from elastocal.tables import write_table
@@ -257,7 +257,7 @@ def share(successes: int, n: int) -> Share:
     >>> share(10, 10).low > 0.7
     True
     """
-    z = float(ndtri(0.5 + 0.5 * CONFIDENCE))
+    z = NORMAL_QUANTILE
     p, spread = successes / n, z * z / n
     middle = (p + 0.5 * spread) / (1.0 + spread)
     half = np.sqrt(p * (1.0 - p) * spread + 0.25 * spread**2) / (1.0 + spread)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from elastocal.arrays import BoolArray, FloatArray
+from elastocal.arrays import BoolArray, FloatArray, are_multiples
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, actuated
 from elastocal.findings import Finding, Grade, Kind, as_number
@@ -272,8 +272,7 @@ def _dead_bands(robot: Robot, readings: Readings) -> Iterator[Finding]:
         of_band = (count >= _FEWEST_ZEROS) & (count < len(own)) & (zero & several[:, None]).any(0)
         for axis in np.flatnonzero(of_band).tolist():
             rest, case = own[~zero[:, axis], axis], readings.load_case[~zero[:, axis]]
-            steps = rest / np.abs(rest).min()
-            is_rounded = np.abs(steps - steps.round()).max() < _OF_A_STEP
+            is_rounded = are_multiples(rest, float(np.abs(rest).min()), _OF_A_STEP)
             if not is_rounded and _varies(rest[:, None], case, _TIED * largest):
                 yield DEAD_BAND(axis=AXES[axis], frame=name, count=int(count[axis]), total=len(own))
                 return
@@ -409,7 +408,6 @@ def _rounded(readings: Readings) -> Iterator[Finding]:
     size = median_norm(readings.deflection)
     values = np.concatenate([readings.marker_displacement, readings.controller_displacement])
     for step in _STEPS:
-        steps = values / step
-        if np.abs(steps - np.round(steps)).max() < _OF_A_STEP and step > _GRAIN * size:
+        if step > _GRAIN * size and are_multiples(values, step, _OF_A_STEP):
             yield ROUNDED(step=step, part=step / size)
             return
