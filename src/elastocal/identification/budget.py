@@ -25,7 +25,7 @@ from scipy.special import chdtri
 from elastocal.arrays import FloatArray
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Gear, Spring
-from elastocal.identification.displacement import reference_joints, with_references
+from elastocal.identification.displacement import sag_blocks_between, with_references
 from elastocal.identification.options import FitOptions
 from elastocal.identification.paired import Overlap, corrected_mean
 from elastocal.identification.problem import Problem, build
@@ -249,9 +249,8 @@ class _Ablation:
         problem = build(self.model, self.readings, self.options, self.marker_offset)
         if term == "registration":
             return _with_turn(problem, self.readings, self.model.parameters[0].scale)
-        q, q_0 = self.readings.joint_position, reference_joints(self.model.robot, self.readings)
-        sag = [self.model.sag_blocks(each, self.marker_offset) for each in (q, q_0)]
-        return problem.with_springs(problem.O[:, :, problem.springs] - sag[0] + sag[1])
+        sag = sag_blocks_between(self.model, self.readings, self.marker_offset)
+        return problem.with_springs(problem.O[:, :, problem.springs] - sag)
 
     def _other_springs(self, term: TermName) -> tuple[Spring, ...]:
         richest = "gears+friction" if has_levels(self.readings) else "gears"

@@ -44,6 +44,7 @@ from elastocal.identification.problem import (
     same_configuration,
 )
 from elastocal.identification.rungs import low_loads
+from elastocal.identification.sag_share import with_sag_open
 from elastocal.identification.solve import PoseGrams, Solution, factor, solve
 from elastocal.identification.suspicious import Screening, screen
 from elastocal.identification.tip_place import settle_tip, tip_with_interval
@@ -231,7 +232,7 @@ def calibrate(
     """
     model, options, problem = settle_tip(model, readings, options or FitOptions(), marker_offset)
     warnings = _data_warnings(model, readings, problem, options, marker_offset)
-    screening, used = _screened(problem, options)
+    screening, used, problem = _screened(problem, model, readings, options, marker_offset)
     kept, fitted = problem.take(used), readings.take(used)
     solution = solve(kept, options.loss)
     weighted = kept.reweighted(solution.reading_weight)
@@ -281,10 +282,17 @@ def calibrate(
     )
 
 
-def _screened(problem: Problem, options: FitOptions) -> tuple[Screening, BoolArray]:
-    """Return the blunders among readings, and which readings are fitted."""
+def _screened(
+    problem: Problem,
+    model: ElasticModel,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None,
+) -> tuple[Screening, BoolArray, Problem]:
+    """Return the blunders, which readings are fitted, and their problem, the sag's share open."""
     found = screen(problem)
-    return found, ~found.blunder if options.set_blunders_aside else np.ones_like(found.blunder)
+    used = ~found.blunder if options.set_blunders_aside else np.ones_like(found.blunder)
+    return found, used, with_sag_open(problem, model, readings, used, options, marker_offset)
 
 
 def _seen(

@@ -125,18 +125,6 @@ class ContactFile(StrictModel):
     contact: ContactEntry
 
 
-@dataclass(frozen=True, eq=False)
-class TipShift:
-    """What is known of a shift of the tip beside a fit, along each axis of the tcp."""
-
-    expected: FloatArray
-    """Shape (3,), in m."""
-    sigma: float
-    """Its standard deviation, in m."""
-    noise: float
-    """Standard deviation of one component of a row, in m."""
-
-
 @brief_repr
 @record()
 class TipPlace:

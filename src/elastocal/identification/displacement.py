@@ -7,8 +7,9 @@ differently at the two. With the sag ``S c`` (`ElasticModel.sag_blocks`) a readi
     d = (O(q, f) + S(q) - S(q_0) - O(q_0, f_0)) c
 
 at loaded joints ``q`` and reference joints ``q_0``, the last term where the reference itself was
-loaded. Friction has a memory: its elements are evaluated over the loads at the pose, in time order,
-starting from the state that a free motion leaves.
+loaded. A controller that takes the sag out of the positions that it reports shows less of it:
+`elastocal.identification.sag_share`. Friction has a memory: its elements are evaluated over the
+loads at the pose, in time order, starting from the state that a free motion leaves.
 """
 
 from collections.abc import Callable, Iterator
@@ -52,12 +53,32 @@ def displacement_blocks(
     ndarray, shape (reading, 3, parameter)
         In m per unit of each parameter.
     """
-    between = Between.of(model, readings)
+    return _of_points(Between.of(model, readings).of_point, readings, marker_offset)
+
+
+def sag_blocks_between(
+    model: ElasticModel, readings: Readings, marker_offset: ArrayLike | None = None
+) -> FloatArray:
+    """Return the part of `displacement_blocks` that is sag; arguments and shape as there."""
+    q, q_0 = model.at(readings.joint_position), model.at(reference_joints(model.robot, readings))
+
+    def of_point(offset: ArrayLike | None) -> FloatArray:
+        return model.sag_blocks(q, offset) - model.sag_blocks(q_0, offset)
+
+    return _of_points(of_point, readings, marker_offset)
+
+
+def _of_points(
+    of_point: Callable[[ArrayLike | None], FloatArray],
+    readings: Readings,
+    marker_offset: ArrayLike | None,
+) -> FloatArray:
+    """Return the rows of the point whose displacement each reading states."""
     if readings.contacts is None or marker_offset is None:
-        return between.of_point(marker_offset)
+        return of_point(marker_offset)
     # What the tooling holds is the tcp, not the marker.
     held = readings.by_contact[:, None, None]
-    return np.where(held, between.of_point(None), between.of_point(marker_offset))
+    return np.where(held, of_point(None), of_point(marker_offset))
 
 
 @dataclass(frozen=True, eq=False)

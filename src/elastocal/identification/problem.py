@@ -22,7 +22,6 @@ from elastocal.identification._least_squares import RANK_TOLERANCE
 from elastocal.identification.contact import (
     ContactColumns,
     ContactVisibility,
-    TipShift,
     contact_columns,
     is_doubled,
     is_pressed_sideways,
@@ -59,6 +58,21 @@ class ScaledRows:
 
 @brief_repr
 @dataclass(frozen=True, eq=False)
+class OpenNumbers:
+    """Numbers beside the springs of which something is known: what a fit finds with these."""
+
+    columns: FloatArray
+    """What each adds to a deflection, shape (reading, 3, number), in m per unit of the number."""
+    expected: FloatArray
+    """Shape (number,)."""
+    sigma: float
+    """Standard deviation of each, in its unit."""
+    noise: float
+    """Standard deviation of one component of a row, in m."""
+
+
+@brief_repr
+@dataclass(frozen=True, eq=False)
 class Problem:
     """An inspectable, weighted and bounded least-squares problem.
 
@@ -85,8 +99,11 @@ class Problem:
     frames: tuple[str, ...] = ()
     """Sessions whose frames are free; their columns follow those of the springs
     (`elastocal.identification.frames`)."""
+    sag: int = 0
+    """1 where the share of the sag that readings show is open; its column follows those of the
+    frames (`elastocal.identification.sag_share`)."""
     contact: tuple[str, ...] = ()
-    """Compliances of the contact that holds the tool; their columns follow those of the frames
+    """Compliances of the contact that holds the tool; their columns follow that of the sag
     (`elastocal.identification.contact`)."""
     tip: int = 0
     """Directions in which the place of the tip is open; their columns come last
@@ -106,7 +123,7 @@ class Problem:
 
     @property
     def columns(self) -> int:
-        """Number of columns: of the parameters of all springs, of frames, contact, and tip."""
+        """Number of columns: of the parameters of all springs, of frames, sag, contact, and tip."""
         return int(self.O.shape[2])
 
     @property
@@ -117,8 +134,14 @@ class Problem:
     @property
     def frame_columns(self) -> slice:
         """The columns of free frames."""
-        end = self.contact_columns.start
+        end = self.sag_columns.start
         return slice(end - NUMBERS * len(self.frames), end)
+
+    @property
+    def sag_columns(self) -> slice:
+        """The column of the share of the sag that readings show."""
+        end = self.contact_columns.start
+        return slice(end - self.sag, end)
 
     @property
     def contact_columns(self) -> slice:
@@ -208,47 +231,62 @@ class Problem:
         error = self._prior_error_with(contact.prior_error)
         return replace(wider, contact=contact.names, shared=contact.shared, prior_error=error)
 
-    def with_tip(self, columns: FloatArray, scale: float, known: TipShift) -> "Problem":
+    def with_sag(self, share: OpenNumbers, scale: float) -> "Problem":
+        """Return the problem with the column of the sag last, whose share is open.
+
+        Parameters
+        ----------
+        share : OpenNumbers
+            One number, dimensionless.
+        scale : float
+            Sensible size of the first parameter, in its unit.
+        """
+        return replace(self._with_open(share, scale), sag=1)
+
+    def with_tip(self, shift: OpenNumbers, scale: float) -> "Problem":
         """Return the problem with the columns of a tip last, whose place is open.
 
         Parameters
         ----------
-        columns : ndarray, shape (reading, 3, 3)
-            What a shift of the tip along each axis of the tcp adds to a deflection, in m per m.
+        shift : OpenNumbers
+            Along each axis of the tcp, in m.
         scale : float
             Sensible size of the first parameter, in its unit.
-        known : TipShift
-            What is known of the shift.
         """
-        count = columns.shape[2]
-        free, gain = np.full(count, np.inf), known.noise / known.sigma
-        prior = gain * np.column_stack([np.eye(count), known.expected])
-        size = np.full(count, known.sigma / scale)
-        wider = _with_columns_behind(self, columns, (-free, free), size, prior)
-        error = self._prior_error_with(np.full(count, known.noise))
-        return replace(wider, tip=count, prior_error=error)
+        return replace(self._with_open(shift, scale), tip=len(shift.expected))
+
+    def _with_open(self, numbers: OpenNumbers, scale: float) -> "Problem":
+        """Return the problem with the columns of numbers last, and the rows of their prior."""
+        count = len(numbers.expected)
+        free, gain = np.full(count, np.inf), numbers.noise / numbers.sigma
+        prior = gain * np.column_stack([np.eye(count), numbers.expected])
+        size = np.full(count, numbers.sigma / scale)
+        wider = _with_columns_behind(self, numbers.columns, (-free, free), size, prior)
+        return replace(wider, prior_error=self._prior_error_with(np.full(count, numbers.noise)))
 
     def _prior_error_with(self, more: FloatArray) -> FloatArray:
         """Return the errors of the rows of the prior with those of further rows."""
-        own = np.zeros(len(self.prior_rows)) if self.prior_error is None else self.prior_error
-        return np.concatenate([own, more])
+        error = np.zeros(len(self.prior_rows))
+        if self.prior_error is not None:
+            error[: len(self.prior_error)] = self.prior_error
+        return np.concatenate([error, more])
 
     def of_springs(self) -> "Problem":
         """Return the problem of the springs in what neither a frame nor the contact can explain.
 
         Weighted rows are projected on the complement of the frames' columns, and of those of a
         contact of which nothing is known: what the springs' fit and their observability rest on. A
-        compliance of the contact that is stated, and the place of a tip, take from them what their
-        priors leave open.
+        compliance of the contact that is stated, the share of the sag, and the place of a tip take
+        from them what their priors leave open.
         """
-        if not (self.frames or self.contact or self.tip):
+        if self.springs.stop == self.columns:
             return self
         n, size = self.springs.stop, np.broadcast_to(self.size, self.lower.shape)
         rows = self.weighted().reshape(-1, self.columns + 1)
         U, s, _ = np.linalg.svd(rows[:, self.frame_columns], full_matrices=False)
         Q = U[:, s > RANK_TOLERANCE * s[0]] if s.size else U
         rows = rows - Q @ (Q.T @ rows)
-        behind = slice(self.contact_columns.start, self.columns)
+        behind = slice(self.sag_columns.start, self.columns)
         rows = _without_known(rows, behind, self.prior_rows)
         seen = rows[:, [*range(n), -1]].reshape(len(self), -1, n + 1)
         return Problem(

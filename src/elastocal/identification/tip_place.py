@@ -21,12 +21,12 @@ from elastocal.arrays import FloatArray, triple
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError, present
-from elastocal.identification.contact import Contact, TipPlace, TipShift
+from elastocal.identification.contact import Contact, TipPlace
 from elastocal.identification.displacement import displacement_blocks, slopes_by_shift
 from elastocal.identification.knowledge import DriveCompliances, weigh_contact, with_knowledge
 from elastocal.identification.ladder import usable_for_choice
 from elastocal.identification.options import FitOptions
-from elastocal.identification.problem import Problem, build
+from elastocal.identification.problem import OpenNumbers, Problem, build
 from elastocal.identification.rungs import bearing_gears, gears
 from elastocal.identification.solve import solve
 from elastocal.identification.suspicious import screen
@@ -158,8 +158,8 @@ def with_tip_open(
         return np.asarray(displacement_blocks(moved, readings) @ compliance)
 
     columns = slopes_by_shift(displacement)
-    known = TipShift(-np.array(found.place), found.stated, contact.row_noise)
-    return problem.with_tip(columns, model.parameters[0].scale, known)
+    shift = OpenNumbers(columns, -np.array(found.place), found.stated, contact.row_noise)
+    return problem.with_tip(shift, model.parameters[0].scale)
 
 
 def tip_with_interval(contact: Contact, draws: FloatArray) -> Contact:
