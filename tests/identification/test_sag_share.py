@@ -50,7 +50,7 @@ def test_springs_are_found_whatever_share_of_the_sag_readings_show(share):
     low, high = found.interval()
     assert ((low < PLANTED) & (high > PLANTED)).all()
     # The last joint turns the tool, whose tip is nearly on its axis.
-    assert np.abs(found.compliance / PLANTED - 1.0)[:5].max() < 0.003
+    assert np.abs(found.compliance / PLANTED - 1.0)[:5].max() < 0.004
     assert (high - low < 0.02 * PLANTED)[:5].all()
 
 

@@ -9,7 +9,8 @@ the share ``s`` is a number beside the springs,
 
     d = (O(q, f) + s (S(q) - S(q_0))) c,    s = 1 + u,    u = -1/2 with a deviation of 1/2,
 
-where ``u`` has a column in the fit, linear about the compliances that fit all of the sag. See
+where ``u`` has a column in the fit, linear about the compliances that fit all of the sag. The prior
+holds it where springs leave much, since more columns explain more of anything. See
 docs/decisions/0154-share-of-the-sag.md.
 """
 
@@ -27,8 +28,6 @@ from elastocal.identification.solve import solve
 _LESS = 0.5
 """How much less than all of the sag is expected, and its standard deviation: none and all of it are
 as far away."""
-_NOISE = 1e-5
-"""Standard deviation against which this is weighed, in m: a reading of a tracker."""
 
 
 def with_sag_open(
@@ -59,6 +58,11 @@ def with_sag_open(
     sag = sag_blocks_between(model, readings, marker_offset)
     if not sag.any():
         return problem
-    c = solve(problem.take(used), options.loss).compliance[problem.springs]
-    share = OpenNumbers((sag @ c)[..., None], np.array([-_LESS]), _LESS, _NOISE)
+    kept = problem.take(used)
+    c = solve(kept, options.loss).compliance
+    column = sag @ c[problem.springs]
+    # What springs cannot express is alike in all rows of a pose, which then tell no more than one.
+    rows = kept.d.size / len(np.unique(kept.block))
+    noise = float(np.sqrt(rows * np.mean(np.square(kept.residuals(c)))))
+    share = OpenNumbers(column[..., None], np.array([-_LESS]), _LESS, noise)
     return problem.with_sag(share, model.parameters[0].scale)
