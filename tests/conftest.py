@@ -1,6 +1,7 @@
 """Parts of the suite that can be run alone: units, whole commands and pages, the browser."""
 
 import gc
+import os
 from functools import cache
 from pathlib import Path
 
@@ -34,6 +35,7 @@ END_TO_END = (
 )
 """Where tests run whole commands or build whole documents."""
 BROWSER = ("test_in_a_browser.py",)
+WORKER = os.environ.get("PYTEST_XDIST_WORKER", "")
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -51,7 +53,23 @@ def _what_verdicts_make_again():
         yield
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector):
+    """Let each worker collect a part of its own first: what one rewrites, the others read."""
+    report = yield
+    if WORKER and collector.path == TESTS:
+        found, workers = report.result, int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+        number = int(WORKER.removeprefix("gw"))
+        first, end = (len(found) * part // workers for part in (number, number + 1))
+        # The others' parts from their ends, or two would go on side by side.
+        report.result = [*found[first:end], *reversed([*found[end:], *found[:first]])]
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if WORKER:  # all of them in one order again
+        items.sort(key=lambda item: (not item.path.is_relative_to(TESTS), item.path.parts))
     for item in items:
         if not item.path.is_relative_to(TESTS):
             continue
