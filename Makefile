@@ -51,10 +51,11 @@ end-to-end: $(VENV)/installed-dev
 browser: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m 'browser and not slow' tests
 
-# Every page and link; an index for the search says nothing of them, nor do figures.
+# Every page and link; an index for the search says nothing of them, nor do figures, colours of code
+# and folded signatures.
 docs-strict: $(VENV)/installed-dev
-	NO_MKDOCS_2_WARNING=1 SITE_SEARCH=false SITE_FIGURES=false $(BIN)/mkdocs build --strict --quiet \
-		--site-dir .cache/site
+	NO_MKDOCS_2_WARNING=1 SITE_SEARCH=false SITE_FIGURES=false SITE_COLOURS=false SITE_LINE=100000 \
+		$(BIN)/mkdocs build --strict --quiet --site-dir .cache/site
 
 # The site as readers see it: its figures drawn, its notebooks run.
 site: $(VENV)/installed-dev

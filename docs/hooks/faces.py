@@ -101,7 +101,9 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
         )
         return "\n\n".join(f"::: {path}" for path in paths)
 
+    def others(package: str) -> str:
+        in_parts = parted(package)
+        return entries(package, lambda home: home not in in_parts)
+
     markdown = PART.sub(lambda part: entries(part[1], part[2].split().__contains__), markdown)
-    return MARK.sub(
-        lambda mark: entries(mark[1], lambda home: home not in parted(mark[1])), markdown
-    )
+    return MARK.sub(lambda mark: others(mark[1]), markdown)
