@@ -24,6 +24,8 @@ _DAMPING = 1e-3
 _MAX_STEP = 0.5
 """Largest change of a joint in one iteration, in rad or m."""
 _MAX_ITERATIONS = 60
+_UNMOVED = np.eye(4)
+_UNMOVED.setflags(write=False)
 
 
 @brief_repr
@@ -72,7 +74,7 @@ def motions(screws: Screws, positions: FloatArray) -> FloatArray:
     """
     steps = _exponentials(screws, positions)
     total = np.empty((len(steps) + 1, *steps.shape[1:]))
-    total[0] = np.eye(4)
+    total[0] = _UNMOVED
     for index, step in enumerate(steps):
         np.matmul(total[index], step, out=total[index + 1])
     return total
@@ -108,7 +110,7 @@ def _exponentials(screws: Screws, positions: FloatArray) -> FloatArray:
     second = (1.0 - np.cos(positions)).T[..., None, None]
     steps: FloatArray = first * screws.twist[:, None]
     steps += second * screws.twist_squared[:, None]
-    steps += np.eye(4)
+    steps += _UNMOVED
     return steps
 
 
