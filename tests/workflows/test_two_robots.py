@@ -127,7 +127,7 @@ def test_a_meeting_is_left_out_by_name(done, tmp_path):
     )  # fmt: skip
     found = read_json(out / "pair.json", PairResult)
     assert (found.poses, found.readings, found.set_aside) == (24, 143, 0)
-    assert "presses left out by hand: 3:" in " ".join(shown.out.split())
+    assert "presses left out by hand: 3:" in " ".join(shown.err.split())
 
 
 def test_a_known_arm_makes_the_other_better(done, unseen, tmp_path):
