@@ -236,6 +236,7 @@ def _plan_of(path: Path, cell: PairCell) -> PairPlan:
     return plan
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CalibratePairSettings:
     """Settings of ``calibrate-pair``: the cell of two robots, and the readings of each."""
