@@ -108,15 +108,18 @@ def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone
         assert with_it > alone - 1.0 if truth == "kind" else with_it > alone + 2.0
 
 
-def test_no_tracker_is_as_good_as_one_and_encoders_in_production_are_better_in_three_axes(tables):
-    rows = [row.strip("| ").split(" | ") for row in tables.instruments("afp").splitlines()[2:]]
+@pytest.mark.parametrize("kind", ["afp", "machining"])
+def test_no_tracker_is_as_good_as_one_and_encoders_in_production_are_better_in_three_axes(
+    tables, kind
+):
+    rows = [row.strip("| ").split(" | ") for row in tables.instruments(kind).splitlines()[2:]]
     taken = {(row[0], row[1]): [float(cell.partition("%")[0]) for cell in row[3:7]] for row in rows}
     assert len(taken) == 2 * len(tables.INSTRUMENTS)
     assert {row[-1] for row in rows} == {"5"}
     # The same seeds: what there is to correct is the same by every instrument.
     before = {}
     for each in tables.quoted():
-        if each["campaign"] in tables.INSTRUMENTS and each["case"]["kind"] == "afp":
+        if each["campaign"] in tables.INSTRUMENTS and each["case"]["kind"] == kind:
             for own in each["deviations"][:4]:
                 key = (*each["case"].values(), own["name"], own["load"])
                 before.setdefault(key, set()).add(own["mean"][0])

@@ -21,6 +21,7 @@ from elastocal.identification import (
     ladder as ladder_module,
     read_contact,
     rung_of,
+    screen,
     solve,
     weigh_contact,
 )
@@ -48,6 +49,24 @@ def solved(contact: Contact, how: Held = SOFT):
     model = ElasticModel(arm(), actuated(arm()))
     problem = build(model, readings(how), FitOptions(contact=contact))
     return problem, solve(problem).compliance
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_wrong_presses_at_half_of_the_places_spoil_neither_noise_nor_the_others(seed):
+    """What the presses of a place share is spoilt by one, and with it the median of all."""
+    sound = readings(replace(SOFT, noise=5e-6))
+    rng = np.random.default_rng(seed)
+    places = rng.choice(np.unique(sound.pose), 8, replace=False)
+    some = [rng.choice(np.flatnonzero(sound.pose == each)) for each in places]
+    travel = sound.controller_displacement.copy()
+    travel[some] += [0.0, 2e-3, 3e-3]
+    wrong = replace(sound, controller_displacement=travel)
+    options = weigh_contact(arm(), wrong, FitOptions(contact=Contact()))
+    assert options.contact.noise < 6e-6
+    problem = build(ElasticModel(arm(), actuated(arm())), wrong, options)
+    found = screen(problem, most=0.2)
+    assert np.flatnonzero(found.blunder).tolist() == sorted(some)
+    assert np.flatnonzero(found.suspicious).tolist() == sorted(some)
 
 
 @pytest.mark.parametrize("how", [SOFT, Held(tracked=4), Held(doubled=5)])
@@ -254,6 +273,20 @@ def test_a_lost_column_of_stacks_is_seen_by_presses_that_repeat_a_load():
     apart, poses = untold_stacks(arm(), sound_and(contacts=np.ones(len(sound_and()))))
     assert poses == 8
     assert apart == pytest.approx(0.95 * PRESS / SOFT.normal, rel=0.1)
+
+
+def test_friction_that_a_larger_press_left_is_no_other_stack():
+    """At 45 % before and after all others, as examples press: a tenth further after them."""
+    sound = sound_and()
+    normal = np.flatnonzero((sound.load_case == "normal") & (sound.disks == 1))
+    levels = sound.take([*range(len(sound)), *normal, *normal])
+    own = np.repeat([1.0, 0.45, 0.45 * 1.1], [len(sound), len(normal), len(normal)])[:, None]
+    light = levels.reference_force
+    force = light + np.minimum(own, np.where(own < 1.0, 0.45, 1.0)) * (levels.force - light)
+    friction = {"force": force, "controller_displacement": own * levels.controller_displacement}
+    assert untold_stacks(arm(), replace(levels, **friction)) is None
+    lost = replace(levels, **friction, contacts=np.ones(len(levels)))
+    assert untold_stacks(arm(), lost)[1] == 8
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,13 @@ from elastocal.two_robots import (
     load_pair_cell,
     pair_readings,
 )
-from elastocal.two_robots.calibration import LOOKS_WRONG, SET_ASIDE, _screened
+from elastocal.two_robots.calibration import (
+    LEFT_OUT,
+    LOOKS_WRONG,
+    MANY_ASIDE,
+    SET_ASIDE,
+    _screened,
+)
 from elastocal.two_robots.presses import PairModel, build_pair, pair_blocks
 from support import two_arms
 
@@ -202,13 +208,35 @@ def test_every_press_of_a_meeting_after_a_slip_is_set_aside(cell, pair):
     assert len(findings) == 6
 
 
+def one_in_five(pair, kind, rng):
+    """Return presses of which a fifth is wrong: single ones, or all of some meetings."""
+    if kind == "presses":
+        return np.sort(rng.choice(len(pair), len(pair) // 5, replace=False))
+    poses = np.unique(pair.first.pose)
+    slipped = rng.choice(poses, len(poses) // 5, replace=False)
+    return np.flatnonzero(np.isin(pair.first.pose, slipped))
+
+
+@pytest.mark.parametrize("off", [50e-3, 3e-3])
+@pytest.mark.parametrize("kind", ["presses", "meetings"])
+def test_where_one_press_in_five_is_wrong_these_are_set_aside_and_no_other(cell, pair, kind, off):
+    """Single ones lie in most meetings, where all that presses share is spoilt by them."""
+    some = one_in_five(pair, kind, np.random.default_rng(3))
+    kept, (many, *named) = _screened(moved(pair, some, [0.0, 0.6 * off, 0.8 * off]), cell.contact)
+    np.testing.assert_array_equal(kept.first.force, np.delete(pair.first.force, some, axis=0))
+    assert {each.kind for each in named} == {SET_ASIDE.name}
+    assert many == "30 of 150 presses were set aside as blunders: more than single mistakes"
+    assert many.kind == MANY_ASIDE.name
+
+
 def test_where_too_many_presses_are_wrong_none_is_set_aside_and_the_worst_is_named(cell, pair):
-    some = np.arange(0, len(pair), 7)
+    some = np.arange(0, len(pair), 3)
     wrong = moved(moved(pair, some, [0.0, 0.0, 10e-3]), 21, [0.0, 0.0, 2e-3])
     kept, (named,) = _screened(wrong, cell.contact)
     assert len(kept) == len(pair)
     assert named.kind == LOOKS_WRONG.name
     assert named.values["count"] == len(some)
+    assert f"`--exclude {pair.first.pose[21]}:{pair.first.load_case[21]}`" in named.advice
     assert f"the worst at pose {pair.first.pose[21]} {pair.first.load_case[21]} (" in named
 
 
@@ -217,3 +245,39 @@ def test_a_press_too_little_off_to_be_set_aside_is_named_and_kept(cell, pair):
     assert len(kept) == len(pair)
     assert (named.kind, named.values["count"]) == (LOOKS_WRONG.name, 1)
     assert f"pose {pair.first.pose[40]} {pair.first.load_case[40]}" in named
+
+
+def test_presses_are_left_out_of_both_arms_by_name_and_said(cell, own, pair):
+    pose, case = pair.first.pose[40], pair.first.load_case[40]
+    other = pair.first.pose[0]
+    names = f"{pose}:{case}", f"{other}"
+    left = pair_readings(cell.arms, cell.robots, own, cell.T_first_second, names)
+    gone = np.isin(np.arange(len(pair)), 40) | (pair.first.pose == other)
+    for kept, all_of_it in ((left.first, pair.first), (left.second, pair.second)):
+        np.testing.assert_array_equal(kept.force, all_of_it.force[~gone])
+    assert left.unmatched == 0
+    (said,) = _screened(left, cell.contact)[1]
+    assert said.kind == LEFT_OUT.name
+    assert f"{pose}:{case}" in said
+    assert len(left.excluded) == 7
+
+
+def test_a_meeting_where_the_tips_do_not_meet_may_be_left_out(cell, own):
+    first = own[0].pose == own[0].pose[0]
+    q = own[0].joint_position.copy()
+    q[first, 0] += 0.3
+    wrong = replace(own[0], joint_position=q), own[1]
+    with pytest.raises(ConventionError, match=f"at pose {own[0].pose[0]} the tips .* mm apart"):
+        pair_readings(cell.arms, cell.robots, wrong, cell.T_first_second)
+    name = f"{own[0].pose[0]}"
+    left = pair_readings(cell.arms, cell.robots, wrong, cell.T_first_second, name)
+    assert len(left) == np.count_nonzero(~first)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("777", "no usable reading at pose 777"), ("a", "must be POSE or POSE:LOAD_CASE")],
+)
+def test_a_name_that_is_of_no_press_is_refused(cell, own, name, message):
+    with pytest.raises(DatasetError, match=message):
+        pair_readings(cell.arms, cell.robots, own, cell.T_first_second, (name,))

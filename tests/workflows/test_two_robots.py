@@ -118,6 +118,18 @@ def test_the_deviation_at_the_presses_is_that_before_and_after_a_correction(resu
     assert [each for each in shown if isinstance(each, Facts)] == [Facts(found.facts())]
 
 
+def test_a_meeting_is_left_out_by_name(done, tmp_path):
+    run, out = done / "run", tmp_path / "models"
+    given = "--springs", "bearing", "--draws", "40", "--exclude", "3", "--exclude", "5:normal"
+    shown = elastocal(
+        "calibrate-pair", done / "cell.yaml", run / "left.nc", run / "right.nc", "--out", out,
+        *given,
+    )  # fmt: skip
+    found = read_json(out / "pair.json", PairResult)
+    assert (found.poses, found.readings, found.set_aside) == (24, 143, 0)
+    assert "presses left out by hand: 3:" in " ".join(shown.err.split())
+
+
 def test_a_known_arm_makes_the_other_better(done, unseen, tmp_path):
     """A model of the truth's own deflections, exact but for its springs, known for one arm."""
     run = done / "run"

@@ -37,5 +37,6 @@ from .path_table import (
 )
 from .readings import (
     Readings as Readings,
+    excluded_rows as excluded_rows,
     without as without,
 )

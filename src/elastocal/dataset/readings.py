@@ -250,17 +250,33 @@ def without(readings: Readings, excluded: str | Sequence[str]) -> Readings:
     DatasetError
         If a name matches no reading, or none is left.
     """
+    return readings.set_aside(excluded_rows(readings, excluded))
+
+
+def excluded_rows(readings: Readings, excluded: str | Sequence[str]) -> BoolArray:
+    """Return which readings are named ``POSE`` or ``POSE:LOAD_CASE``, shape (reading,).
+
+    Parameters
+    ----------
+    readings, excluded
+        As for `without`.
+
+    Raises
+    ------
+    DatasetError
+        If a name matches no reading, or none is left.
+    """
     # A text is a sequence too: "12" would be the poses 1 and 2.
     names = (excluded,) if isinstance(excluded, str) else tuple(excluded)
-    keep = np.ones(len(readings), dtype=bool)
+    rows = np.zeros(len(readings), dtype=bool)
     for name in names:
-        keep &= ~_named(readings, name)
-    if not np.any(keep):
+        rows |= _named(readings, name)
+    if np.all(rows):
         raise DatasetError(f"to exclude {', '.join(names)} leaves no reading")
-    return readings.set_aside(~keep)
+    return rows
 
 
-def _named(readings: Readings, name: str) -> np.ndarray:
+def _named(readings: Readings, name: str) -> BoolArray:
     pose, _, load_case = name.partition(":")
     try:
         mask = readings.pose == int(pose)

@@ -172,6 +172,7 @@ from .spring_sums import (
 from .suspicious import (
     BLUNDER_SCORE as BLUNDER_SCORE,
     BLUNDER_SIZE as BLUNDER_SIZE,
+    MOST_BLUNDERS as MOST_BLUNDERS,
     screen as screen,
 )
 from .tip_place import with_tip_found as with_tip_found

@@ -62,6 +62,8 @@ _REPEATED = 0.03
 _OTHER_STACK, _OTHER_STACK_SIGMAS, _OTHER_STACK_POSES = 0.05, 4.0, 3
 """Part of its travel by which a repeated press of another stack travels further, that difference
 over its standard error, and poses where it is seen."""
+_FULL = 0.9
+"""Part of the largest load of its pose above which a press overcomes what friction held before."""
 CUT = 0.1
 """Part of its standard deviation by which a compliance that is cut is weighed."""
 _LEAST_PLACES = 4
@@ -402,8 +404,9 @@ def require_pressed(robot: Robot, readings: Readings) -> None:
 def untold_stacks(robot: Robot, readings: Readings) -> tuple[float, int] | None:
     """Return what shows that presses were made on other stacks than the readings say.
 
-    A press that repeats the load of another at its pose, on as many disks, travels as far. One on
-    another disk travels further by what that disk gives way, at every pose.
+    A press that repeats one of the largest loads of its pose, on as many disks, travels as far. One
+    on another disk travels further by what that disk gives way, at every pose. Smaller loads show
+    nothing: after a larger press friction holds a part of its travel.
 
     Returns
     -------
@@ -420,6 +423,7 @@ def untold_stacks(robot: Robot, readings: Readings) -> tuple[float, int] | None:
         first, second = rows[np.array(np.triu_indices(len(rows), 1))]
         change = np.linalg.norm(readings.force[second] - readings.force[first], axis=1)
         repeated = (disks[first] == disks[second]) & (change <= _REPEATED * load[first])
+        repeated &= load[first] >= _FULL * load[rows].max(initial=0.0)
         if repeated.any():
             apart.append(float(np.median((travel[second] - travel[first])[repeated])))
             whole.append(float(np.abs(travel[first[repeated]]).mean()))

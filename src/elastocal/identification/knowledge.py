@@ -203,9 +203,10 @@ def robust_fit(problem: Problem, least: float = _LEAST_NOISE) -> tuple[FloatArra
     noise : float
         Robust standard deviation of the residuals, in m.
     """
-    found = solve(problem, "huber").compliance
-    residual = np.linalg.norm(problem.own_errors(problem.residuals(found)), axis=1)
-    return found, max(float(np.median(residual)) / MEDIAN_NORM, least)
+    found = solve(problem, "huber")
+    residual = problem.residuals(found.compliance)
+    own = np.linalg.norm(problem.own_errors(residual, factor=found.reading_weight), axis=1)
+    return found.compliance, max(float(np.median(own)) / MEDIAN_NORM, least)
 
 
 def expected_sizes(

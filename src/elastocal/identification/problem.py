@@ -188,8 +188,17 @@ class Problem:
         """Return ``O c - d``, unweighted, shape (reading, 3), in m."""
         return np.asarray(self.O @ compliance - self.d)
 
-    def own_errors(self, error: FloatArray, weight: FloatArray | None = None) -> FloatArray:
+    def own_errors(
+        self,
+        error: FloatArray,
+        weight: FloatArray | None = None,
+        factor: FloatArray | None = None,
+    ) -> FloatArray:
         """Return errors of the readings but for what those of a block share.
+
+        What is shared is taken out as a fit with the same factors does. With equal ones a wrong
+        reading spoils the errors of its whole block: where one block in two has one, most errors
+        are spoilt and no reading stands out from their median.
 
         Parameters
         ----------
@@ -197,10 +206,15 @@ class Problem:
             In m.
         weight : ndarray, shape (reading, 3), optional
             Weight of each component; 1 by default.
+        factor : ndarray, shape (reading,), optional
+            Weight that a loss gave each reading, above 0; 1 by default.
         """
         if weight is None:
             weight = np.ones_like(self.weight)
-        return self._whitened((error * weight)[..., None], weight)[..., 0]
+        if factor is None:
+            return self._whitened((error * weight)[..., None], weight)[..., 0]
+        root = np.sqrt(factor)[:, None]
+        return self.own_errors(error, weight * root) / root
 
     def reweighted(self, factor: FloatArray) -> "Problem":
         """Return the problem with each reading's squared residual multiplied by a factor."""

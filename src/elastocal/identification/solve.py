@@ -92,7 +92,7 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
     weight, settled = np.ones(len(problem)), False
     for _ in range(_ITERATIONS):
         solution = _solve_linear(problem, weight)
-        updated = weigh(normalised_residuals(problem, solution.compliance))
+        updated = weigh(normalised_residuals(problem, solution))
         settled = float(np.abs(updated - weight).max()) < _SETTLED
         weight = updated
         if settled:
@@ -106,7 +106,7 @@ def solve(problem: Problem, loss: str = "linear") -> Solution:
 
 
 def normalised_residuals(
-    problem: Problem, compliance: FloatArray, shrinkage: FloatArray | float = 1.0
+    problem: Problem, solution: Solution, shrinkage: FloatArray | float = 1.0
 ) -> FloatArray:
     """Return the norm of each reading's weighted residual in robust standard deviations.
 
@@ -115,12 +115,15 @@ def normalised_residuals(
 
     Parameters
     ----------
-    compliance : ndarray, shape (spring,)
-        Where residuals are taken.
+    problem : Problem
+        What was fitted.
+    solution : Solution
+        Where residuals are taken, with the weights of its loss.
     shrinkage : ndarray, shape (reading,), or float
         By how much the fit has shrunk each residual, at most 1; divided out.
     """
-    error = problem.own_errors(problem.residuals(compliance), problem.weight)
+    residual = problem.residuals(solution.compliance)
+    error = problem.own_errors(residual, problem.weight, solution.reading_weight)
     norms = np.linalg.norm(error, axis=1) / shrinkage
     sigma = np.median(norms) / MEDIAN_NORM
     # Exact data have a median residual of zero, and no deflection is none to divide by.

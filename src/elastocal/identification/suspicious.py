@@ -25,7 +25,7 @@ BLUNDER_SCORE = 25.0
 BLUNDER_SIZE = 0.25
 """... if its residual is also above this part of the median deflection. Both together are
 beyond any model error: a broken beam, a marker knocked off, a reading of another pose."""
-_MOST_BLUNDERS = 0.1
+MOST_BLUNDERS = 0.1
 """Largest part of the readings that may be set aside; more is a bad campaign, not blunders."""
 
 _REDUNDANCY = 1.5
@@ -55,19 +55,27 @@ class Screening:
         return np.asarray(self.score > self.threshold)
 
 
-def screen(problem: Problem) -> Screening:
-    """Return the assessment of the readings of a problem by a robust fit."""
+def screen(problem: Problem, most: float = MOST_BLUNDERS) -> Screening:
+    """Return the assessment of the readings of a problem by a robust fit.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is fitted.
+    most : float
+        Largest part of the readings that may be blunders; where there are more, none is.
+    """
     robust = solve(problem, "cauchy")
     weighted = problem.reweighted(robust.reading_weight)
     h = leverage(weighted, robust)
     if problem.d.size < _REDUNDANCY * rank(robust.factored.s):
         nothing = np.zeros(len(problem))
         return Screening(nothing, nothing, h, np.inf, nothing > 0.0)
-    score = normalised_residuals(problem, robust.compliance, np.sqrt(1.0 - h))
+    score = normalised_residuals(problem, robust, np.sqrt(1.0 - h))
     residual = np.linalg.norm(problem.residuals(robust.compliance), axis=1)
     typical = float(np.median(np.linalg.norm(problem.d, axis=1)))
     blunder = (score > BLUNDER_SCORE) & (residual > BLUNDER_SIZE * typical)
-    if blunder.mean() > _MOST_BLUNDERS:
+    if blunder.mean() > most:
         blunder = np.zeros_like(blunder)
     # The scale is a median itself, with about twice the variance of an estimate from all residuals.
     freedom = 0.5 * max(problem.d.size - rank(robust.factored.s), 2)

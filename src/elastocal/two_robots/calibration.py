@@ -23,6 +23,7 @@ from elastocal.identification import (
     BLUNDER_SCORE,
     BLUNDER_SIZE,
     CUT,
+    MOST_BLUNDERS,
     MOST_UNEXPLAINED,
     RANK_TOLERANCE,
     CalibratedModel,
@@ -68,6 +69,9 @@ of the drive of the joint."""
 _DRAWN_APART = 2.0
 """How many times as far apart the draws let them be: the fit errs less with a tenth, and arms of
 one type differ by a fifth (docs/decisions/0146-draws-move-the-tip.md)."""
+_MOST_ASIDE = 0.25
+"""Largest part of the presses that may be set aside. It is more than for one arm, since a tool
+that slips spoils every press of its meeting."""
 _LEAST_SPREAD = 1e-3
 """Least standard deviation of a known direction, over the largest of its arm."""
 
@@ -89,11 +93,23 @@ SET_ASIDE = Kind(
     grade=Grade.NOTE,
     shown={"error": mm},
 )
+MANY_ASIDE = Kind(
+    "two-robots.many-presses-set-aside",
+    "{count} of {all} presses were set aside as blunders: more than single mistakes",
+    advice="Find out what went wrong at them (a tool that slips, rows mixed up) before the models"
+    " are used.",
+)
 LOOKS_WRONG = Kind(
     "two-robots.presses-look-wrong",
     "presses beyond any noise were kept in the fit: {count}, the worst at {name} ({error} off)",
-    advice="Look at {name}, and leave its rows out of the datasets if they are wrong.",
+    advice="Look at {name}, and leave it out with `--exclude {key}` if it is wrong.",
     shown={"error": mm},
+)
+LEFT_OUT = Kind(
+    "two-robots.left-out-by-hand",
+    "presses left out by hand: {names}",
+    advice="Measure again what was left out, so that nothing has to be.",
+    grade=Grade.NOTE,
 )
 
 
@@ -192,19 +208,26 @@ def _screened(
     stated = None if contact is None else as_fitted(contact)
     typical = float(np.median(np.linalg.norm(pair.relative, axis=1)))
     findings: list[Finding] = []
+    whole = len(pair)
     for name in ("bearing", "gears"):
-        seen, found = pair, screen(build_pair(_model(pair, name, {}), pair, stated))
+        problem = build_pair(_model(pair, name, {}), pair, stated)
+        seen, found = pair, screen(problem, _MOST_ASIDE)
         order = np.argsort(-found.residual, kind="stable")
         findings += [
             SET_ASIDE(name=_press(pair, row), error=float(found.residual[row]))
             for row in order[found.blunder[order]].tolist()
         ]
         pair = pair.set_aside(found.blunder)
+    if len(findings) > MOST_BLUNDERS * whole:
+        findings.insert(0, MANY_ASIDE(count=len(findings), all=whole))
     marked = (found.score > BLUNDER_SCORE) | (found.residual > BLUNDER_SIZE * typical)
     kept = order[(found.suspicious & marked & ~found.blunder)[order]].tolist()
     if kept:
-        error = float(found.residual[kept[0]])
-        findings.append(LOOKS_WRONG(count=len(kept), name=_press(seen, kept[0]), error=error))
+        row, count = kept[0], len(kept)
+        error, named = float(found.residual[row]), (_press(seen, row), seen.name(row))
+        findings.append(LOOKS_WRONG(count=count, name=named[0], key=named[1], error=error))
+    if pair.excluded:
+        findings.append(LEFT_OUT(names=pair.excluded))
     return pair, tuple(findings)
 
 

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.arrays import BoolArray, FloatArray
-from elastocal.dataset import Readings
+from elastocal.dataset import Readings, excluded_rows
 from elastocal.elastic import ElasticModel, Parameter, Spring
 from elastocal.errors import ConventionError, DatasetError, IdentificationError
 from elastocal.identification import (
@@ -71,6 +71,8 @@ class PairReadings:
     """Base of the second robot in that of the first, shape (4, 4)."""
     unmatched: int = 0
     """Readings of either arm whose press the other did not record."""
+    excluded: tuple[str, ...] = ()
+    """Presses that were left out by name, each ``POSE:LOAD_CASE``."""
 
     def __len__(self) -> int:
         """Return the number of presses."""
@@ -108,12 +110,23 @@ class PairReadings:
         first, second = self.first.set_aside(index), self.second.set_aside(index)
         return replace(self, first=first, second=second)
 
+    def without(self, excluded: str | Sequence[str]) -> "PairReadings":
+        """Return the presses without those named (`elastocal.dataset.without`), of both arms."""
+        rows = excluded_rows(self.first, excluded)
+        names = (*self.excluded, *map(self.name, np.flatnonzero(rows).tolist()))
+        return replace(self.set_aside(rows), excluded=names)
+
+    def name(self, row: int) -> str:
+        """Return the name by which a press is left out, ``POSE:LOAD_CASE``."""
+        return f"{self.first.pose[row]}:{self.first.load_case[row]}"
+
 
 def pair_readings(
     names: tuple[str, str],
     robots: tuple[Robot, Robot],
     readings: tuple[Readings, Readings],
     T_first_second: FloatArray,
+    exclude: str | Sequence[str] = (),
 ) -> PairReadings:
     """Return the presses that both arms recorded, if they belong together.
 
@@ -127,11 +140,14 @@ def pair_readings(
         Of each arm in its own base; pose and load case name the press.
     T_first_second : ndarray, shape (4, 4)
         Base of the second robot in that of the first.
+    exclude : str or sequence of str
+        Presses to leave out, each ``POSE`` or ``POSE:LOAD_CASE``.
 
     Raises
     ------
     DatasetError
-        If no press is in both, or one arm was tracked and the other was not.
+        If no press is in both, a name to exclude is of none, or one arm was tracked and the other
+        was not.
     ConventionError
         If the frame is mirrored, the tools do not meet or face each other, or the forces are not
         opposite.
@@ -157,10 +173,10 @@ def pair_readings(
             " both tools, or neither"
         )
     unmatched = sum(map(len, keys)) - 2 * len(common)
-    found = PairReadings(names, robots, first, second, T_first_second, unmatched)
+    found = PairReadings(names, robots, first, second, T_first_second, unmatched).without(exclude)
     _require_meeting(found)
-    labels = [f"pose {pose}" for pose in first.pose.tolist()]
-    require_opposed(names, first.force, second.force @ found.R.T, labels)
+    labels = [f"pose {pose}" for pose in found.first.pose.tolist()]
+    require_opposed(names, found.first.force, found.second.force @ found.R.T, labels)
     return found
 
 

@@ -10,13 +10,19 @@ from elastocal.findings import Finding, Grade
 from elastocal.identification import MOST_TERMS, Term, describe_briefly
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
-from elastocal.two_robots.calibration import LOOKS_WRONG, SET_ASIDE, PairCalibration
+from elastocal.two_robots.calibration import (
+    LEFT_OUT,
+    LOOKS_WRONG,
+    MANY_ASIDE,
+    SET_ASIDE,
+    PairCalibration,
+)
 from elastocal.two_robots.cooperation import CooperationSummary
 from elastocal.wording import counted, mm, phrase, phrases
 
 _LEAST_WEIGHT = 0.05
 """Weight of a spring in a combination, of 1 at most, below which a line leaves it out."""
-_WRONG = (SET_ASIDE.name, LOOKS_WRONG.name)
+_WRONG = (MANY_ASIDE.name, SET_ASIDE.name, LOOKS_WRONG.name, LEFT_OUT.name)
 """Kinds of findings on single presses."""
 
 
@@ -174,7 +180,7 @@ class PairResult(Result):
     def _findings(self) -> Iterable[Block]:
         wrong = [each for each in self.findings if each.kind in _WRONG]
         if wrong:
-            yield Heading(phrase("Presses that look wrong"))
+            yield Heading(phrase("Presses that look wrong or were left out"))
         for each in wrong:
             yield Bullets((each,), "warnings")
             yield Paragraph(each.advice, "advice")

@@ -20,7 +20,7 @@ from elastocal.dataset import (
 from elastocal.errors import CompensationError, DatasetError, PathError, SchemaError
 from elastocal.files import filling, require_place
 from elastocal.identification import CalibratedModel, CalibrateResult, read_model, write_model
-from elastocal.options import Option
+from elastocal.options import Exclude, Option
 from elastocal.progress import Progress
 from elastocal.records import read_json, schema_of, write_json
 from elastocal.report import language_of, write_pair_plan_page
@@ -236,6 +236,7 @@ def _plan_of(path: Path, cell: PairCell) -> PairPlan:
     return plan
 
 
+@brief_repr
 @dataclass(frozen=True)
 class CalibratePairSettings:
     """Settings of ``calibrate-pair``: the cell of two robots, and the readings of each."""
@@ -250,6 +251,8 @@ class CalibratePairSettings:
     """Folder for the model of each arm, ``ARM.json``, ``pair.json`` and ``pair.html``."""
     springs: Annotated[str, Option(choices="springs", file=True)] = "auto"
     """Springs of both arms: ``auto``, a layout, or ``gears``."""
+    exclude: Exclude = ()
+    """Presses left out of both datasets by name, ``POSE`` or ``POSE:LOAD_CASE``."""
     draws: Annotated[int, Option(least=40, most=100_000)] = 200
     """Bootstrap draws."""
     seed: Annotated[int, Option(least=0)] = 0
@@ -269,7 +272,7 @@ def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairR
     SchemaError
         If the cell is not one of two robots.
     DatasetError
-        If the datasets have no press in common.
+        If the datasets have no press in common, or a name to exclude is of none.
     ConventionError
         If the tools do not meet and face each other, or the forces are not opposite.
     IdentificationError
@@ -300,7 +303,9 @@ def calibrate_pair(settings: CalibratePairSettings, progress: Progress) -> PairR
         _readings(path, robot)
         for path, robot in zip((settings.first, settings.second), cell.robots, strict=True)
     )
-    pair = pair_readings(cell.arms, cell.robots, (own[0], own[1]), cell.T_first_second)
+    pair = pair_readings(
+        cell.arms, cell.robots, (own[0], own[1]), cell.T_first_second, settings.exclude
+    )
     known = {name: read_model(path) for name, path in cell.models().items()}
     rng = np.random.default_rng(settings.seed)
     found = identify_pair(pair, rng, cell.contact, settings.springs, known, settings.draws)
