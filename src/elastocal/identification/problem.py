@@ -62,7 +62,7 @@ class OpenNumbers:
     """Numbers beside the springs of which something is known: what a fit finds with these."""
 
     columns: FloatArray
-    """What each adds to a deflection, shape (reading, 3, number), in m per unit of the number."""
+    """Change of a deflection with each number, shape (reading, 3, number), in m per its unit."""
     expected: FloatArray
     """Shape (number,)."""
     sigma: float

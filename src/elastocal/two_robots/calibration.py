@@ -223,9 +223,9 @@ def _screened(
     marked = (found.score > BLUNDER_SCORE) | (found.residual > BLUNDER_SIZE * typical)
     kept = order[(found.suspicious & marked & ~found.blunder)[order]].tolist()
     if kept:
-        row, count = kept[0], len(kept)
-        error, named = float(found.residual[row]), (_press(seen, row), seen.name(row))
-        findings.append(LOOKS_WRONG(count=count, name=named[0], key=named[1], error=error))
+        worst = kept[0]
+        name, error = _press(seen, worst), float(found.residual[worst])
+        findings.append(LOOKS_WRONG(count=len(kept), name=name, key=seen.name(worst), error=error))
     if pair.excluded:
         findings.append(LEFT_OUT(names=pair.excluded))
     return pair, tuple(findings)

@@ -38,7 +38,7 @@ AT_ONCE = 16
 PARTS = (0.33, 0.5, 0.67)
 """Parts of a campaign after which it may have been mistaken, or no longer."""
 _TRACKER = FitOptions(encoders=False)
-"""What a force or a frame read otherwise changes is the tracker's: encoders would hide it."""
+"""Secondary encoders are left out: they would hide a force or a frame that was read otherwise."""
 _TRIMMED = 0.9
 """Part of the readings, those with the smallest residuals, that rank readings of the data."""
 
@@ -61,7 +61,7 @@ class OtherReading:
     estimated: bool = False
     """Whether numbers were estimated for it, which explain part of what the springs miss."""
     cause: str = ""
-    """What it shares with another interpretation that adds nothing beside it."""
+    """Same text in all interpretations of one cause, of which the plainest is told; empty: none."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,8 +26,9 @@ from elastocal.identification.mistakes._rows import (
 from elastocal.identification.solve import fit_each
 
 _IN_POSE, _GROWN = 0.75, 0.2
-"""The same by what grows in each pose, and its least part of the median force or deflection:
-correct arms creep, which leaves 0.7 of the error but is a drift of less than a tenth."""
+"""Part of the error that may be left by what grows in each pose, and its least part of the median
+force or deflection: correct arms creep, which leaves 0.7 of the error but is a drift of less than a
+tenth."""
 _TILTED, _CROSS_TALK = np.radians(8.0), 0.15
 """Tilt of a sensor, and part of one axis in another, from which they are reported; where the
 springs miss much, correct arms seem to have 6 deg and 9 %."""
@@ -90,7 +91,7 @@ class _Unknown:
     """Numbers on which rows of springs depend, estimated with the springs."""
 
     none: FloatArray
-    """What they are where the readings are as stated, shape (number,)."""
+    """Their values for readings that are as stated, shape (number,)."""
     blocks: Callable[[FloatArray], FloatArray]
     """Returns the rows of the springs with numbers, shape (reading, 3, spring)."""
     columns: Callable[[FloatArray, FloatArray], FloatArray]
