@@ -275,6 +275,21 @@ def test_a_lost_column_of_stacks_is_seen_by_presses_that_repeat_a_load():
     assert apart == pytest.approx(0.95 * PRESS / SOFT.normal, rel=0.1)
 
 
+def test_a_press_without_weight_has_an_error_and_spoils_no_other():
+    """Redescending losses give a blunder no weight at all."""
+    sound = readings(replace(SOFT, noise=5e-6))
+    options = FitOptions(contact=Contact())
+    problem = build(ElasticModel(arm(), actuated(arm())), sound, options)
+    error = 1e-5 * np.random.default_rng(0).standard_normal(problem.d.shape)
+    error[7, 2] = 2e-3
+    factor = np.ones(len(problem))
+    factor[7] = 0.0
+    own = problem.own_errors(error, factor=factor)
+    assert np.isfinite(own).all()
+    assert np.linalg.norm(own[7]) > 1e-3
+    assert np.linalg.norm(np.delete(own, 7, axis=0), axis=1).max() < 1e-4
+
+
 def test_friction_that_a_larger_press_left_is_no_other_stack():
     """At 45 % before and after all others, as examples press: a tenth further after them."""
     sound = sound_and()

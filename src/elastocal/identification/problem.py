@@ -207,13 +207,14 @@ class Problem:
         weight : ndarray, shape (reading, 3), optional
             Weight of each component; 1 by default.
         factor : ndarray, shape (reading,), optional
-            Weight that a loss gave each reading, above 0; 1 by default.
+            Weight that a loss gave each reading, at least 0; 1 by default.
         """
         if weight is None:
             weight = np.ones_like(self.weight)
-        if factor is None:
+        if factor is None or self.shared is None:
             return self._whitened((error * weight)[..., None], weight)[..., 0]
-        root = np.sqrt(factor)[:, None]
+        # A reading without weight has errors all the same: their limit is that of a small weight.
+        root = np.sqrt(np.maximum(factor, np.finfo(float).eps))[:, None]
         return self.own_errors(error, weight * root) / root
 
     def reweighted(self, factor: FloatArray) -> "Problem":
