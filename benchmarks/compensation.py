@@ -68,7 +68,7 @@ def c_seconds(numbers: Design, data: np.ndarray) -> tuple[float, float]:
         folder = Path(name) / "c"
         write_c(folder, numbers)
         program = folder / "timing"
-        sources = [folder / "elastocal_model.c", HARNESS, f"-I{folder}"]
+        sources = [str(folder / "elastocal_model.c"), str(HARNESS), f"-I{folder}"]
         subprocess.run(["gcc", "-std=c99", "-O2", *sources, "-o", program, "-lm"], check=True)
         runs = [
             subprocess.run(
@@ -89,11 +89,10 @@ def pinocchio_seconds(model: ElasticModel, data: np.ndarray) -> tuple[float, flo
     """
     robot, joints = model.robot, len(model.robot.joint_names)
     names = robot.joint_names
+    places = [(s.name, names.index(s.joint), s.axes[0]) for s in model.springs[joints:]]
     inserted = [
-        InsertedJoint(
-            s.name, names.index(s.joint), np.array(s.axis), s.revolute, s.distal, np.array(s.offset)
-        )
-        for s in model.springs[joints:]
+        InsertedJoint(name, at, np.array(s.axis), s.revolute, s.distal, np.array(s.offset))
+        for name, at, s in places
     ]
     whole = jacobian_seconds(build_model(robot.chain, inserted), data[:, :joints])
     single = replace(robot.chain, joints=robot.chain.joints[:1])

@@ -32,7 +32,7 @@ POSES = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
 
 def residuals(problem: GeometryProblem, at: State) -> np.ndarray:
     """Return how far markers were measured from where they are expected, shape (3 point,), in m."""
-    T = frames(problem.robot, problem.data.q, problem.torque, at.errors).T_base_tcp[problem.row]
+    T = frames(problem.robot, problem.data.q, problem.loads, at.errors).T_base_tcp[problem.row]
     points = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], at.markers[problem.marker])
     S = at.T_station_base[problem.station]
     predicted = S[:, :3, 3] + np.einsum("nij,nj->ni", S[:, :3, :3], points)

@@ -23,7 +23,7 @@ from elastocal.compensation.online import Design
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.identification import RUNGS, Calibration, FitOptions, calibrate, choose_model
-from elastocal.identification.mistakes import find_undone
+from elastocal.identification.mistakes.undoing import find_undone
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.arm import (
     LOAD_CASES,
@@ -70,7 +70,7 @@ def instructions(numbers: Design, data: np.ndarray) -> list[int]:
         folder = Path(name) / "c"
         write_c(folder, numbers)
         program, counts = folder / "count", folder / "callgrind.out"
-        sources = [folder / "elastocal_model.c", HARNESS, f"-I{folder}", "-DCOUNT"]
+        sources = [str(folder / "elastocal_model.c"), str(HARNESS), f"-I{folder}", "-DCOUNT"]
         subprocess.run(["gcc", "-std=c99", "-O2", *sources, "-o", program, "-lm"], check=True)
         tool = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={counts}"]
         subprocess.run(
