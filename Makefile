@@ -18,7 +18,7 @@ tests units end-to-end browser slow: export OMP_NUM_THREADS := 1
 # start as they do for users.
 tests units end-to-end browser: export LOKY_MAX_CPU_COUNT := 1
 
-.PHONY: demo test style types lint tests units end-to-end browser docs-strict site fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench house fuzz clean
+.PHONY: demo test style types lint tests units end-to-end browser docs-strict site fuzz-lines nightly slow process-figures coverage lowest package lock mutation notebooks docs docs-version bench paired house fuzz clean
 
 demo: $(VENV)/installed
 	$(BIN)/elastocal demo afp --out demo --force
@@ -66,7 +66,7 @@ UNTIL ?= -max_total_time=6
 fuzz-lines: $(VENV)/installed-fuzz
 	cd tests && ../$(BIN)/python -m fuzz.lines $(UNTIL) -max_len=4096 -verbosity=0 -print_final_stats=1
 
-nightly: slow site notebooks process-figures stopping coverage lowest package mutation
+nightly: slow site notebooks process-figures stopping coverage lowest package paired mutation
 
 slow: $(VENV)/installed-dev
 	$(BIN)/pytest $(SHARED_OUT) -m slow -rA
@@ -145,6 +145,11 @@ docs-version: $(VENV)/installed-dev
 		"$$($(BIN)/python -c 'import elastocal; print(".".join(elastocal.__version__.split(".")[:2]))')" latest
 	$(BIN)/mike set-default -F mkdocs-versions.yml latest
 
+# Processor time of the commands that users wait for, in turns with the last commit of an earlier day;
+# `make paired BASE=COMMIT` names another one.
+paired: $(VENV)/installed-dev
+	$(BIN)/python benchmarks/paired.py $(BASE)
+
 bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/run.py
 	$(BIN)/python benchmarks/search.py
@@ -154,6 +159,7 @@ bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/ladder.py
 	$(BIN)/python benchmarks/geometry.py 16811
 	$(BIN)/python benchmarks/codec.py
+	$(BIN)/python benchmarks/live.py 20
 	$(BIN)/python benchmarks/demo.py
 	$(BIN)/python benchmarks/record.py
 

@@ -9,12 +9,12 @@ import importlib.util
 import warnings
 
 import numpy as np
-from timing import figure, seconds
+from timing import figure, inside, seconds
 
-from elastocal.codec import CodecData, Variant, cross_validate
+from elastocal.codec import CodecData, Variant, cross_validate, cross_validation, splits
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, layout
-from elastocal.identification import build
+from elastocal.identification import _least_squares, build
 from elastocal.parallel import core_count
 from elastocal.robot import Robot, catalogue, with_tool
 from elastocal.sim.arm import (
@@ -30,6 +30,12 @@ TOOL = np.array([[1.0, 0, 0, 0.15], [0, 1.0, 0, 0], [0, 0, 1.0, 0.35], [0, 0, 0,
 POSES = 31
 PAPER = Variant(springs="bearing")
 """The paper's 18 springs, whatever is chosen by default."""
+PARTS = (
+    ("the search for mistakes, once", splits, "find_mistakes"),
+    ("the ladder of springs, once", cross_validation, "climbed_ladder"),
+    ("`scipy.optimize.nnls` of all fits", _least_squares, "nnls"),
+)
+"""What it spends its time in: a name, and the function that does it."""
 
 
 def measured() -> tuple[Robot, Readings]:
@@ -83,11 +89,22 @@ def main() -> None:
         print("scikit-learn's learning_curve: left out, scikit-learn is not installed")
     reference = None if usual is None else ("scikit-learn's learning_curve", usual)
     figure(f"codec of {fits} fits: COVER, 18 springs, one process", taken, reference, aim=0.06)
+    whole = ("the codec with COVER", taken)
+    for part, owner, function in PARTS:
+        spent = inside(lambda: cross_validate(robot, readings, [PAPER]), owner, function)
+        figure(f"codec of {fits} fits: {part}", spent, whole)
     ioops = [Variant(search="ioops", springs="bearing")]
     for jobs in (1, core_count()):
         each = seconds(lambda jobs=jobs: cross_validate(robot, readings, ioops, jobs=jobs), 3)
         name, aim = f"the same with IOOPS, processes: {jobs}", 0.6 if jobs == 1 else None
-        figure(name, each, ("the codec with COVER", taken), aim=aim)
+        figure(name, each, whole, aim=aim)
+        if jobs == 1:
+            spent = inside(
+                lambda: cross_validate(robot, readings, ioops, jobs=1),
+                cross_validation,
+                "growing_choices",
+            )
+            figure("the same with IOOPS: its searches", spent, ("the codec with IOOPS", each))
 
 
 if __name__ == "__main__":

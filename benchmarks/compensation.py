@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from timing import figure
+from timing import figure, inside
 
 from elastocal.compensation import CompensatorSettings
 from elastocal.compensation.export import write_c
@@ -116,15 +116,32 @@ def jacobian_seconds(chain: ChainModel, joints: np.ndarray) -> float:
 
 def python_seconds(numbers: Design, data: np.ndarray) -> np.ndarray:
     """Return seconds of each Python step."""
-    compensator, taken = Compensator(numbers), []
-    state = compensator.start()
-    n = numbers.joints
+    return stepped(Compensator(numbers), data)
+
+
+def stepped(compensator: Compensator, data: np.ndarray) -> np.ndarray:
+    """Return seconds of each step of a compensator."""
+    taken, state = [], compensator.start()
+    n = data.shape[1] - 6
     for k, row in enumerate(data.tolist()):
         reading = Reading(0.004 * k, row[:n], row[n : n + 3], row[n + 3 :])
         start = time.perf_counter()
         state, _ = compensator.step(state, reading)
         taken.append(time.perf_counter() - start)
     return np.array(taken)
+
+
+def part_seconds(numbers: Design, data: np.ndarray) -> dict[str, float]:
+    """Return what a Python step spends in its parts, in s."""
+    compensator = Compensator(numbers)
+    owners = {
+        "the generated function of the model": (compensator, "_block"),
+        "filters and weight, in Python": (compensator._conditioner, "step"),
+    }
+    return {
+        part: inside(lambda: stepped(compensator, data), *owner) / len(data)
+        for part, owner in owners.items()
+    }
 
 
 def side_by_side(
@@ -154,6 +171,10 @@ def main() -> None:
     jacobian = ("Pinocchio's Jacobian of the same springs, from Python", 1e-6 * called)
     figure("Python step, 18 springs, filters and interval", 1e-6 * plain, jacobian, aim=20e-6)
     figure("Python step, gears, weight, friction", 1e-6 * geared, step, aim=35e-6)
+    names = "18 springs, filters and interval", "gears, weight, friction"
+    for name, numbers, each in zip(names, designs, (plain, geared), strict=True):
+        for part, spent in part_seconds(numbers, data).items():
+            figure(f"Python step, {name}: {part}", spent, ("the whole step", 1e-6 * each))
     timed = c_microseconds(designs, data)
     if timed is None:
         return

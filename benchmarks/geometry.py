@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 
 from elastocal.geometry import GeometryProblem
 from elastocal.geometry.arm import frames
+from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.determined import told_apart
 from elastocal.geometry.ladder import climb
 from elastocal.geometry.problem import State
@@ -23,7 +24,7 @@ from elastocal.progress import silent
 from elastocal.robot import catalogue
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from timing import figure
+from timing import figure, inside
 
 from support.measured_arms import measure
 
@@ -70,11 +71,20 @@ def main() -> None:
     scipy = ("scipy.optimize.least_squares, one fit", by_scipy)
     figure(f"geometry: one fit of {POSES} poses of 3 markers", fitted, scipy)
     print(f"same minimum: distances {1e9 * apart:.2f} nm apart (rms)")
+
+    def ladder() -> None:
+        climb(problem, 200, np.random.default_rng(0), silent)
+
     begin = perf_counter()
-    climb(problem, 200, np.random.default_rng(0), silent)
+    ladder()
     whole = perf_counter() - begin
     name = f"geometry: the whole ladder, {POSES} poses, 200 draws"
     figure(name, whole, scipy, aim=1.5 if POSES >= 16_000 else None)
+    for part, owner, function in (
+        ("derivatives", GeometryProblem, "linearise"),
+        ("normal equations", Derivatives, "normal"),
+    ):
+        figure(f"{name}: {part}", inside(ladder, owner, function, 1), ("the whole ladder", whole))
 
 
 if __name__ == "__main__":

@@ -15,18 +15,20 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from timing import figure
+from timing import figure, inside
 
 from elastocal.cell import Cell, load_cell
 from elastocal.cell.examples import write_example
 from elastocal.parallel import core_count
-from elastocal.planning import cell_surface, sample_pool
+from elastocal.planning import cell_surface, pool, sample_pool
 from elastocal.planning.pool import SampledPool
+from elastocal.planning.scene import CollisionScene
 from elastocal.robot.inverse import inverse_for
 
 SIZES = (1000, 3000, 10_000)
 LARGE = (*SIZES, 30_000, 100_000)
 ROUNDS = 3
+ASKED = (3000, "afp")
 
 _Result = TypeVar("_Result")
 
@@ -55,6 +57,17 @@ def solved(cell: Cell, q: np.ndarray) -> None:
     inverse_for(cell.robot).solve_many(cell.robot.forward(q), q[:, : cell.robot.external_axes])
 
 
+def parts(cell: Cell, size: int, like: str, alone: float) -> None:
+    """Print what a pool's checks take, and those by Coal, of the time of one process."""
+    own = ("one process", alone)
+    for part, owner, function in (
+        ("the checks alone", pool, "check_margins"),
+        ("collisions by Coal alone", CollisionScene, "keeps"),
+    ):
+        spent = inside(lambda: made(cell, 1), owner, function, 3)
+        figure(f"{size} candidates with all checks, {like}: {part}", spent, own)
+
+
 def report(like: str, sizes: tuple[int, ...], cores: int) -> None:
     """Print one example cell."""
     print(f"{like}: valid candidates with all checks")
@@ -73,8 +86,10 @@ def report(like: str, sizes: tuple[int, ...], cores: int) -> None:
                 f"{size} candidates with all checks, {like}, one process",
                 alone,
                 ("inverse kinematics of as many poses", bare),
-                aim=1.2 if (size, like) == (3000, "afp") else None,
+                aim=1.2 if (size, like) == ASKED else None,
             )
+            if (size, like) == ASKED:
+                parts(cell, size, like, alone)
             figure(
                 f"{size} candidates with all checks, {like}, {cores} processes",
                 helped,

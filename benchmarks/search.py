@@ -8,7 +8,7 @@ Run with ``python benchmarks/search.py``.
 import time
 
 import numpy as np
-from timing import figure, seconds
+from timing import figure, inside, seconds
 
 from elastocal.elastic import ElasticModel, layout
 from elastocal.planning.search import (
@@ -18,6 +18,7 @@ from elastocal.planning.search import (
     ExchangeSearch,
     Information,
     build_information,
+    cover,
     covering_radius,
     nearest_neighbour,
     o1,
@@ -146,6 +147,8 @@ def report_cover_large() -> None:
     plain = seconds(lambda: plain_field(bare.contact, 500), 1)
     same = selection.order.tolist() == order == by_distance.order.tolist()
     figure("COVER 10⁶ → 500", taken, ("the usual NumPy loop", usual), aim=0.15)
+    tree = inside(lambda: Cover().search(bare, 500), cover, "cKDTree", 3)
+    figure("COVER 10⁶ → 500: SciPy's k-d tree alone", tree, ("the whole search", taken))
     print(f"  until d_max = {d_max:.4f} m: {taken_d_max:.2f} s; same picks: {same}")
     print(f"  our loop without cells: {plain:.2f} s; ratio {plain / taken:.1f}")
 
@@ -160,6 +163,10 @@ def report_techniques(pool: Candidates) -> None:
         ioops = taken if name == "ioops" else ioops
         if name in AIMS:
             figure(f"{name} {POOL} → {POSES}", taken, ("IOOPS", ioops), aim=AIMS[name])
+            inverses = inside(lambda search=search: search.search(pool, POSES), np.linalg, "inv")
+            if inverses:
+                own = f"{name} {POOL} → {POSES}: LAPACK's inverses alone"
+                figure(own, inverses, ("the whole search", taken))
         variance = -float(prediction_value(information, order))
         print(
             f"{name:>11}: {1e3 * taken:7.1f} ms, O1 {o1(information, order):.3f}, prediction sigma"
