@@ -78,14 +78,13 @@ def weight_misfit(log: LogStreams, reference: LogStreams, shift: float) -> float
     after = np.searchsorted(wrench.time, own)
     # Across a gap the next sample belongs to another posture.
     near = wrench.time[after] - own <= LONGEST_GAP
+    near &= np.isfinite(wrench.force[after]).all(axis=1)
     own, after = own[near], after[near]
     if len(own) < _LEAST_SAMPLES:
         return np.inf
     force = wrench.force[after]
     down = arm.T_base_tcp[np.searchsorted(time, own + shift).clip(0, len(time) - 1), 2, :3]
-    columns = np.column_stack([down, np.ones(len(down))])
-    known = np.isfinite(force).all(axis=1)
-    return _residual(columns[known], force[known])
+    return _residual(np.column_stack([down, np.ones(len(down))]), force)
 
 
 def _rigid_misfit(log: LogStreams, reference: LogStreams, shift: float, lever: FloatArray) -> float:
