@@ -22,7 +22,8 @@ from independent.mujoco_truth import Laws, MujocoArm, true_deflection
 pytestmark = pytest.mark.slow
 
 HARD = Laws(softening=0.6, bending=True)
-ARMS = ("kuka", "ur", "seven")
+ARMS, SEEDS = ("kuka", "ur", "seven"), (1, 2, 3)
+"""Of a single campaign the share inside may be anything from 83 to 100 %."""
 POSES, UNSEEN = 31, 50
 KNOWN = Contact(normal=1.25 * STEEL.normal, lateral=0.8 * STEEL.lateral)
 """Stiffnesses of a gauge that was off, within the 30 % that are stated."""
@@ -50,7 +51,7 @@ def unseen(arm: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def judged(
-    arm: str, data: Plate | Dataset, contact: Contact, springs: str = "auto"
+    arm: str, data: Plate | Dataset, contact: Contact | None, springs: str = "auto"
 ) -> tuple[float, float]:
     """Return the mean error over the mean deflection, and the share inside the interval."""
     if isinstance(data, Plate):
@@ -78,7 +79,8 @@ def with_tip_off(data: Dataset) -> Dataset:
 
 
 def test_steel_that_is_known_to_30_percent_leaves_less_than_one_percent():
-    errors, inside = zip(*(judged(arm, STEEL, KNOWN) for arm in ARMS), strict=True)
+    data = [(arm, dataset(arm, STEEL, seed)) for arm in ARMS for seed in SEEDS]
+    errors, inside = zip(*(judged(*each, KNOWN) for each in data), strict=True)
     assert np.mean(errors) < 0.008
     assert 0.85 <= np.mean(inside) <= 0.99
 
@@ -93,7 +95,7 @@ def test_soft_disks_are_found_by_presses_on_one_and_on_two():
 def test_a_free_steel_contact_costs_little_beside_a_tracker_with_the_same_springs():
     free, _ = judged("kuka", STEEL, Contact(), "bearing")
     tracked = replace(STEEL, tracked=POSES)
-    assert free < 1.2 * judged("kuka", tracked, Contact(), "bearing")[0]
+    assert free < 1.2 * judged("kuka", tracked, None, "bearing")[0]
 
 
 def test_a_free_steel_contact_leaves_gears_that_stiffen_and_takes_the_links_out():
@@ -111,8 +113,8 @@ def test_gears_with_a_free_normal_and_presses_along_the_normal_alone_are_refused
 
 
 def test_a_tip_9_mm_off_is_found_beside_the_springs():
-    data = [with_tip_off(dataset(arm, STEEL)) for arm in ARMS]
-    found = [judged(arm, each, TIP_OPEN) for arm, each in zip(ARMS, data, strict=True)]
+    data = [(arm, with_tip_off(dataset(arm, STEEL, seed))) for arm in ARMS for seed in SEEDS]
+    found = [judged(*each, TIP_OPEN) for each in data]
     errors, inside = zip(*found, strict=True)
     assert np.mean(errors) < 0.011
     assert 0.85 <= np.mean(inside) <= 0.99
