@@ -204,7 +204,7 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
 
 
 def test_the_faults_that_drivers_are_held_against_have_their_messages_and_their_tests():
-    page = (ROOT / "docs/how-to/when-devices-go-wrong.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/decisions/0080-drivers.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", page, flags=re.MULTILINE)
     assert len(rows) > 10
     known = messages()
