@@ -199,12 +199,12 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     text = "\n".join(page.read_text(encoding="utf-8") for page in (first, *pages))
     quoted = re.findall(r"^\| `([^`]+)`", text, flags=re.MULTILINE)
     known = [*messages(), *(f"unknown {kind} …" for kind in KINDS)]  # of every registry
-    assert len(quoted) > 100
+    assert len(quoted) > 60
     assert not [text for text in quoted if not any(text in message for message in known)]
 
 
 def test_the_faults_that_drivers_are_held_against_have_their_messages_and_their_tests():
-    page = (ROOT / "docs/how-to/when-devices-go-wrong.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/decisions/0080-drivers.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", page, flags=re.MULTILINE)
     assert len(rows) > 10
     known = messages()
