@@ -155,7 +155,7 @@ def test_there_are_hundreds_of_phrases():
 
 def test_a_phrase_within_a_phrase_is_said_too():
     said = phrase("The tolerance is {tolerance} ({source}).", tolerance=mm(3e-4), source="x")
-    assert language_of("de").say(said) == "Die Toleranz ist 0,300 mm (x)."
+    assert language_of("de").say(said) == "Die Toleranz ist 0,300\N{NO-BREAK SPACE}mm (x)."
     both = sentences([said, counted(3, "pose")])
     assert language_of("fr").say(both).endswith(" 3 poses")
     assert str(both) == "The tolerance is 0.300 mm (x). 3 poses"
@@ -164,7 +164,7 @@ def test_a_phrase_within_a_phrase_is_said_too():
 def test_what_is_no_phrase_stays_but_for_its_decimal_sign():
     german = language_of("de")
     assert german.say("joint_a1.axial") == "joint_a1.axial"
-    assert german.say("1.5, -2.0, 3.0 mm") == "1,5; -2,0; 3,0 mm"
+    assert german.say("1.5, -2.0, 3.0 mm") == "1,5; -2,0; 3,0\N{NO-BREAK SPACE}mm"
     assert german.say("1.2.3") == "1.2.3"
     assert language_of("en").say("1.5, 2.0") == "1.5, 2.0"
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from elastocal import plugins
 from elastocal.errors import ReportError
 from elastocal.records import parse_json
+from elastocal.units import with_fixed_units
 from elastocal.wording import Phrase
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ LANGUAGES = {"en": "English", "de": "Deutsch", "fr": "Français"}
 """Languages that a page can be written in, by their code."""
 _BETWEEN_NUMBERS = re.compile(r"(?<=\d), (?=[-+−]?\d)")
 _DECIMAL = re.compile(r"(?<![\w.])([-+−]?\d*)\.(\d+)(?![\w.])")
-_PERCENT = re.compile(r"(?<=\d)%")
 _BEFORE_SIGN = re.compile(" (?=[:;?!%»])")
 _PLACE, _LETTER = re.compile(r"\{\w+\}"), re.compile("[A-Za-z]")
 _SENTENCE = re.compile(
@@ -42,14 +42,15 @@ class Language:
     """Its templates, by the English ones."""
 
     def say(self, text: object) -> str:
-        """Return a text in this language."""
-        if not isinstance(text, str):
-            return str(text)
+        """Return a text in this language, every number on one line with its unit."""
+        return with_fixed_units(self._said(text)) if isinstance(text, str) else str(text)
+
+    def _said(self, text: str) -> str:
         if not self.catalogue:
-            return _with_spaced_percent(text)
+            return text
         known = self._template(text)
         if not known:
-            return _with_decimal_comma(_with_spaced_percent(text))
+            return _with_decimal_comma(text)
         template = self.catalogue.get(known, known)
         values = {name: self.say(value) for name, value in _parts(text).items()}
         return template.format(**values) if values else template
@@ -64,10 +65,11 @@ class Language:
         if not known:
             shown = escape(self.say(text))
             is_english = _SENTENCE.search(text)
-            return Markup('<span lang="en">{}</span>').format(text) if is_english else shown
+            english = Markup('<span lang="en">{}</span>').format(with_fixed_units(text))
+            return english if is_english else shown
         template = escape(self.catalogue.get(known, known))
         values = {name: self.markup(value) for name, value in _parts(text).items()}
-        said = template.format(**values) if values else template
+        said = Markup(with_fixed_units(template.format(**values) if values else template))
         # A phrase of a plug-in that offers no words for it in this language.
         stays = known not in self.catalogue and _LETTER.search(_PLACE.sub("", known))
         return Markup('<span lang="en">{}</span>').format(said) if stays else said
@@ -79,15 +81,6 @@ class Language:
 
 def _parts(text: str) -> Mapping[str, object]:
     return text.parts if isinstance(text, Phrase) else {}
-
-
-def _with_spaced_percent(text: str) -> str:
-    """Return figures in percent as the sentences of the pages write them (ISO 80000-1).
-
-    >>> _with_spaced_percent("±39%").replace(chr(160), "_")
-    '±39_%'
-    """
-    return _PERCENT.sub("\N{NO-BREAK SPACE}%", text)
 
 
 def _with_decimal_comma(text: str) -> str:

@@ -1,0 +1,53 @@
+"""Say where lines of a page may end: before no unit, in a name of code only between its words.
+
+Pages are written with plain spaces. Code keeps its characters, so that it can be copied.
+"""
+
+import re
+from collections.abc import Iterator
+
+from elastocal.units import with_fixed_units
+
+_TAG = re.compile(r"(?s)<(pre|script|style)\b.*?</\1>|<[^>]*>")
+"""A tag, or a whole block whose lines are its own."""
+_NAME = re.compile(r"<(/?)(\w*)")
+_SHORT, _LONG = 12, 30
+"""Characters of code that stay on one line, and that are divided outside tables, too."""
+_OPTION = re.compile(r"(?<![\w-])--[a-z]+")
+_WORD_END = re.compile(r"(?<=\w[_|/+=])(?=\w)|(?<=\w\.)(?=\w{5})|(?<=\()(?=\w)")
+"""Where a name may be divided, but before no ending of a file."""
+
+
+def on_page_content(html: str, **_: object) -> str:
+    r"""Return the page with the places where lines may and may not end.
+
+    >>> on_page_content("0.3 mm <td><code>base_transform --no-fit</code></td>").replace("\xa0", "~")
+    '0.3~mm <td><code>base_<wbr>transform <span class="whole">--no</span>-fit</code></td>'
+    """
+    return "".join(_pieces(html))
+
+
+def _pieces(html: str) -> Iterator[str]:
+    end, within = 0, {"code": False, "td": False}
+    for tag in _TAG.finditer(html):
+        text = html[end : tag.start()]
+        yield _code(text, within["td"]) if within["code"] else with_fixed_units(text)
+        yield tag[0]
+        end = tag.end()
+        slash, name = _NAME.match(tag[0]).groups()
+        if name in within:
+            within[name] = not slash
+    yield with_fixed_units(html[end:])
+
+
+def _code(text: str, in_cell: bool) -> str:
+    if not text.strip():
+        return text
+    if len(text) <= _SHORT:
+        return _whole(text)
+    divided = _WORD_END.sub("<wbr>", text) if in_cell or len(text) > _LONG else text
+    return _OPTION.sub(lambda option: _whole(option[0]), divided)
+
+
+def _whole(text: str) -> str:
+    return f'<span class="whole">{text}</span>'
