@@ -1,4 +1,4 @@
-"""Say where lines of a page may end: before no unit, in a name of code only between its words.
+"""Say where lines of a page may end: before no unit or arrow, in code only between words.
 
 Pages are written with plain spaces. Code keeps its characters, so that it can be copied.
 """
@@ -11,9 +11,10 @@ from elastocal.units import with_fixed_units
 _TAG = re.compile(r"(?s)<(pre|script|style)\b.*?</\1>|<[^>]*>")
 """A tag, or a whole block whose lines are its own."""
 _NAME = re.compile(r"<(/?)(\w*)")
-_SHORT, _LONG = 12, 30
+_SHORT, _LONG = 16, 30
 """Characters of code that stay on one line, and that are divided outside tables, too."""
 _OPTION = re.compile(r"(?<![\w-])--[a-z]+")
+_QUANTITY = re.compile(r"[\d.]+\xa0[^\s\"]+")
 _WORD_END = re.compile(r"(?<=\w[_|/+=])(?=\w)|(?<=\w\.)(?=\w{5})|(?<=\()(?=\w)")
 """Where a name may be divided, but before no ending of a file."""
 
@@ -31,13 +32,17 @@ def _pieces(html: str) -> Iterator[str]:
     end, within = 0, {"code": False, "td": False}
     for tag in _TAG.finditer(html):
         text = html[end : tag.start()]
-        yield _code(text, within["td"]) if within["code"] else with_fixed_units(text)
+        yield _code(text, within["td"]) if within["code"] else _prose(text)
         yield tag[0]
         end = tag.end()
         slash, name = _NAME.match(tag[0]).groups()
         if name in within:
             within[name] = not slash
-    yield with_fixed_units(html[end:])
+    yield _prose(html[end:])
+
+
+def _prose(text: str) -> str:
+    return with_fixed_units(text.replace(" →", "\N{NO-BREAK SPACE}→"))
 
 
 def _code(text: str, in_cell: bool) -> str:
@@ -46,7 +51,11 @@ def _code(text: str, in_cell: bool) -> str:
     if len(text) <= _SHORT:
         return _whole(text)
     divided = _WORD_END.sub("<wbr>", text) if in_cell or len(text) > _LONG else text
-    return _OPTION.sub(lambda option: _whole(option[0]), divided)
+    with_options = _OPTION.sub(lambda option: _whole(option[0]), divided)
+    fixed = with_fixed_units(with_options)
+    if fixed.replace("\xa0", " ") != with_options:  # it writes 5 % as 5%
+        return with_options
+    return _QUANTITY.sub(lambda found: _whole(found[0].replace("\xa0", " ")), fixed)
 
 
 def _whole(text: str) -> str:

@@ -147,6 +147,7 @@ from .rungs import (
     rung_of as rung_of,
 )
 from .show import (
+    condition_text as condition_text,
     show_budget as show_budget,
     show_contact as show_contact,
     show_encoders as show_encoders,

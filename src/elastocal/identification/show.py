@@ -255,6 +255,15 @@ def _hidden_note() -> Phrase:
     )
 
 
+def condition_text(condition: float) -> str:
+    """Return a condition number for people; its last digits mean nothing.
+
+    >>> condition_text(883826.4)
+    '884000'
+    """
+    return f"{float(f'{condition:.3g}'):.0f}"
+
+
 def show_unseen(
     springs: Sequence[SpringSummary],
     open_: tuple[Sequence[Sequence[Term]], Sequence[Sequence[Term]]],
@@ -272,14 +281,14 @@ def show_unseen(
     ranks : tuple of int
         The rank, the rank that any number of poses would reach, and the number of parameters.
     condition : float
-        Condition number of the column-scaled system; its last digits mean nothing.
+        Condition number of the column-scaled system.
     """
     (rank, _, total), (groups, hidden) = ranks, open_
     text = phrase(
         "Rank {rank} of {total}, condition number {condition}.",
         rank=rank,
         total=total,
-        condition=f"{float(f'{condition:.3g}'):.0f}",
+        condition=condition_text(condition),
     )
     yield Paragraph(phrase("{rank} {meaning}", rank=text, meaning=_meaning(springs, open_, ranks)))
     if hidden and (groups or rank < total):

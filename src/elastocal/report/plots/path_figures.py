@@ -261,9 +261,11 @@ def course_figure(trace: CourseDeviation, tolerance: float | None) -> Figure:
     if tolerance is not None:
         for sign in (-1.0, 1.0):
             axes.axhline(sign * _MM * tolerance, color=style.INK, lw=0.8, ls=":")
-        axes.text(
-            float(trace.time[0]), _MM * tolerance, phrase("tolerance"), va="bottom", fontsize=7.5
-        )
+        middle = 0.5 * float(trace.time[0] + trace.time[-1])  # at the ends the curve crosses it
+        axes.annotate(
+            phrase("tolerance"), (middle, _MM * tolerance), (0, 3), ha="center", fontsize=7.5,
+            textcoords="offset points",
+        )  # fmt: skip
     axes.axhline(0.0, color=style.FAINT, lw=0.6, zorder=0)
     axes.set(xlabel=phrase("time in s"), ylabel=phrase("deviation in mm"))
     axes.set_title(

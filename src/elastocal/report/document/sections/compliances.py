@@ -6,6 +6,7 @@ from functools import partial
 from elastocal import blocks
 from elastocal.identification import (
     CalibrationSummary,
+    condition_text,
     show_budget,
     show_contact,
     show_encoders,
@@ -76,7 +77,7 @@ def _head(found: ModelEvidence, observable: int, values: int) -> blocks.Block:
             ),
             (
                 phrase("Condition number (large: single springs are hardly told apart)"),
-                f"{seen.condition:.0f}",
+                condition_text(seen.condition),
             ),
             (phrase("Bootstrap draws"), len(found.model.draws)),
             (phrase("Residual at the poses fitted, mean"), residual),

@@ -215,7 +215,7 @@ _ALWAYS = phrases(
 
 def _not_verified(evidence: Evidence) -> Iterator[blocks.Block]:
     yield blocks.Paragraph(phrase("Whatever the light says, this was not verified:"))
-    yield blocks.Bullets(tuple(_always(evidence)))
+    yield blocks.Bullets(tuple(_always(evidence)), code=True)
     yield blocks.Heading(phrase("Missing in this report"))
     missing = tuple(
         phrase(
