@@ -33,6 +33,8 @@ ROOT = Path(__file__).parents[1]
 FANUC = ROOT / "examples" / "fanuc_r2000ic"
 OPTIONS = runpy.run_path(str(ROOT / "docs" / "hooks" / "command_options.py"))
 """What fills the reference with the options of commands."""
+BREAKS = runpy.run_path(str(ROOT / "docs" / "hooks" / "line_breaks.py"))["on_page_content"]
+"""What says where lines of a page may end."""
 FACE = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
 """What docs/hooks/faces.py fills with the names that a package exports."""
 TOUR = (ROOT / "README.md").read_text(encoding="utf-8").split("## Five-minute tour")[1]
@@ -401,3 +403,21 @@ def test_the_commands_that_the_tutorial_explains_are_those_of_the_demo():
     page = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")
     typed = set(re.findall(r"^elastocal (\w[\w-]*)", page, flags=re.MULTILINE))
     assert typed == {"demo", *(each.words[0] for each in chapters("afp", Path("demo"), 0))}
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_code_in_a_table_of_options_is_not_within_code(name):
+    for row in OPTIONS["options_table"](name).splitlines():
+        assert "`" not in re.sub(r"`[^`\s](?:[^`]*[^`\s])?`(?!\w)", "", row), row
+
+
+def test_lines_of_a_page_end_before_no_unit_and_code_keeps_its_characters():
+    code = '<code>elastocal calibrate data.nc --free-frame none --limit "0.3 mm" 5%</code>'
+    block = "<pre><code>--limit 3 mm</code></pre>"
+    path = '<path d="M0 5 m 3 4"/>'
+    broken = BREAKS(f"<td>0.3 mm {code}{block}{path} and 95% of <b>4\nkN</b></td>")
+    assert "<td>0.3\xa0mm " in broken
+    assert broken.endswith(f"{block}{path} and 95\xa0% of <b>4\xa0kN</b></td>")
+    assert '<span class="whole">--free</span>-frame' in broken
+    read = re.sub(r"<[^>]*>", "", broken[: broken.index("<pre>")])
+    assert read == "0.3\xa0mm " + code[6:-7]
