@@ -11,11 +11,14 @@ from elastocal.units import with_fixed_units
 _TAG = re.compile(r"(?s)<(pre|script|style)\b.*?</\1>|<[^>]*>")
 """A tag, or a whole block whose lines are its own."""
 _NAME = re.compile(r"<(/?)(\w*)")
-_SHORT, _LONG = 16, 30
-"""Characters of code that stay on one line, and that are divided outside tables, too."""
+_SHORT, _MIDDLE, _LONG = 12, 16, 30
+"""Characters of code that stay on one line, of code that does so on wide screens, and of code that
+is divided outside tables, too."""
 _OPTION = re.compile(r"(?<![\w-])--[a-z]+")
 _QUANTITY = re.compile(r"[\d.]+\xa0[^\s\"]+")
-_WORD_END = re.compile(r"(?<=\w[_|/+=])(?=\w)|(?<=\w\.)(?=\w{5})|(?<=\()(?=\w)")
+_JOINED = re.compile(r" (?=→)|(?<=\d) (?=\d{3}\b)")
+"""Before an arrow, and in a number with groups of digits."""
+_WORD_END = re.compile(r"(?<=\w[_|/+=])(?=\w\w)|(?<=\w\.)(?=\w{5})|(?<=\()(?=\w)")
 """Where a name may be divided, but before no ending of a file."""
 
 
@@ -42,7 +45,7 @@ def _pieces(html: str) -> Iterator[str]:
 
 
 def _prose(text: str) -> str:
-    return with_fixed_units(text.replace(" →", "\N{NO-BREAK SPACE}→"))
+    return with_fixed_units(_JOINED.sub("\N{NO-BREAK SPACE}", text))
 
 
 def _code(text: str, in_cell: bool) -> str:
@@ -51,12 +54,12 @@ def _code(text: str, in_cell: bool) -> str:
     if len(text) <= _SHORT:
         return _whole(text)
     divided = _WORD_END.sub("<wbr>", text) if in_cell or len(text) > _LONG else text
-    with_options = _OPTION.sub(lambda option: _whole(option[0]), divided)
-    fixed = with_fixed_units(with_options)
-    if fixed.replace("\xa0", " ") != with_options:  # it writes 5 % as 5%
-        return with_options
-    return _QUANTITY.sub(lambda found: _whole(found[0].replace("\xa0", " ")), fixed)
+    marked = _OPTION.sub(lambda option: _whole(option[0]), divided)
+    fixed = with_fixed_units(marked)
+    if fixed.replace("\xa0", " ") == marked:  # it writes 5% as 5 %
+        marked = _QUANTITY.sub(lambda found: _whole(found[0].replace("\xa0", " ")), fixed)
+    return _whole(marked, "whole wide") if len(text) <= _MIDDLE else marked
 
 
-def _whole(text: str) -> str:
-    return f'<span class="whole">{text}</span>'
+def _whole(text: str, kind: str = "whole") -> str:
+    return f'<span class="{kind}">{text}</span>'
