@@ -57,6 +57,6 @@ def _errors(each: ConditionResult) -> tuple[float, float, float]:
     return each.error_mean, each.error_max, each.deflection_mean
 
 
-def batch(number):
-    """Return a batch of one sample; processes find it here, not in a module of tests."""
-    return [simulate(Sample(3, number))]
+def batch(numbers):
+    """Return a batch of samples; processes find it here, not in a module of tests."""
+    return [simulate(Sample(3, number)) for number in numbers]

@@ -3,7 +3,6 @@
 import contextlib
 import socket
 import threading
-from functools import partial
 
 import pytest
 
@@ -35,11 +34,11 @@ def listening(answer=b""):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_processes_that_got_ready_early_do_every_batch(jobs):
+    parts = [[0, 1], [2, 3], [4]]
     with batch_executor(jobs, None) as spread:
-        found = list(spread([partial(batch, number) for number in range(5)]))
-    assert sorted(numbers(each)[0] for each in found) == [
-        numbers(batch(number))[0] for number in range(5)
-    ]
+        assert spread.workers == jobs
+        found = list(spread.map(batch, parts))
+    assert sorted(map(numbers, found)) == [numbers(batch(part)) for part in parts]
 
 
 def test_processes_that_find_nothing_to_do_end_without_a_word(recwarn):
