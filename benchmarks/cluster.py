@@ -22,7 +22,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from timing import commit, figure
+from timing import commit
 
 from elastocal.cell.examples import write_example
 from elastocal.codec.study import DESIGN, PARTS, StudyStore, read_design
@@ -148,7 +148,6 @@ class Study:
                     self.memory.setdefault(role, []).append(row)
             time.sleep(0.5)
 
-
     def counts(self) -> Counter[str]:
         """Return what was kept and carried, and the processor time that was taken, by now."""
         kept = self.kept()
@@ -195,7 +194,7 @@ def measured(folder: Path, samples: int) -> dict[str, object]:
     begun = Counter(study.log.read_text("ascii").split())
     design = read_design(study.out / DESIGN)
     alone = folder / "alone"
-    words = study.words[:-1] + (str(_COMPARED), "--out", alone, "--jobs", "1")
+    words = (*study.words[:-1], str(_COMPARED), "--out", alone, "--jobs", "1")
     subprocess.run([sys.executable, *map(str, words)], check=True, stdout=subprocess.DEVNULL,
                    stderr=subprocess.DEVNULL)  # fmt: skip
     same = bits(study.out, _COMPARED) == bits(alone, _COMPARED)

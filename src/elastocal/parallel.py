@@ -217,7 +217,8 @@ def map_on_cluster(
     shared = client.submit(pickle.loads, pickle.dumps(function), pure=False)
     # Results are forgotten by the cluster as soon as nothing here names them.
     futures = client.map(_apply, [shared] * len(tasks), tasks, pure=False)
-    completed = as_completed(futures, loop=client.loop)
+    following: Callable[..., Any] = as_completed
+    completed = following(futures, loop=client.loop)
     del futures
     for future in completed:
         yield future.result()

@@ -1,0 +1,74 @@
+"""Fill the page on studies with what a campaign costs: ``<!-- cluster: table -->``, ``… plan``.
+
+The figures stand in ``benchmarks/cluster.json``, which ``python benchmarks/cluster.py`` measures.
+"""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+FIGURES = Path(__file__).parents[2] / "benchmarks" / "cluster.json"
+_MARK = re.compile(r"<!-- cluster: (table|plan) -->")
+_MANY, _WORKERS = 10**6, 200
+"""Campaigns and workers of the example."""
+_BAND, _MINUTE, _KILO, _MEGA, _GIGA = 0.8, 60.0, 1e3, 1e6, 1e9
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Fill the marks in."""
+    made: dict[str, Callable[[dict[str, Any]], str]] = {"table": table, "plan": plan}
+    return _MARK.sub(lambda mark: made[mark[1]](json.loads(FIGURES.read_text("utf-8"))), markdown)
+
+
+def table(figures: dict[str, Any]) -> str:
+    """Return the figures as a table."""
+    memory = ((role, _memory(rows["mb"])) for role, rows in figures["memory_mb"].items())
+    tables = figures["tables_bytes"]
+    rows = (
+        ("processor time of a worker, a campaign", _milliseconds(figures["worker_s_a_campaign"])),
+        ("network, a campaign, all directions", f"{figures['bytes_a_campaign'] / _KILO:.1f} kB"),
+        ("arms a task, at most", f"{figures['largest_task_samples']}"),
+        ("processor time of the scheduler, a task", _milliseconds(figures["scheduler_s_a_task"])),
+        ("processor time of the command, a task", _milliseconds(figures["command_s_a_task"])),
+        *((f"memory of the {role.rstrip(' 12')}{', its nanny with it' * ('worker' in role)}", said)
+          for role, said in memory if role != "worker 2"),
+        ("finished arms on the disk", f"{figures['store_bytes'] / _MEGA:.1f} MB"),
+        *((f"`{name}`", f"{size / _MEGA:.1f} MB") for name, size in tables.items()),
+    )  # fmt: skip
+    lines = (("what", "measured"), ("---", "---"), *rows)
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def plan(figures: dict[str, Any]) -> str:
+    """Return how the figures were measured, and what follows for many workers."""
+    samples, campaigns = figures["samples"], figures["campaigns"]
+    task = figures["largest_task_samples"] * campaigns / samples * figures["worker_s_a_campaign"]
+    busiest = max(figures["scheduler_s_a_task"], figures["command_s_a_task"])
+    minutes = _MANY * figures["worker_s_a_campaign"] / _WORKERS / _MINUTE
+    carried = _MANY * figures["bytes_a_campaign"] / _GIGA
+    tables = _MANY / campaigns * sum(figures["tables_bytes"].values()) / _GIGA
+    same = "equal bit for bit" if figures["same_as_one_process"] else "NOT equal"
+    return (
+        f"Measured {figures['date']}: {campaigns} campaigns ({samples} arms), a scheduler and two"
+        " workers on one machine of two cores that other work shared. One worker was killed at a"
+        " third and replaced, the command at two thirds and given again:"
+        f" {figures['begun_twice']} arms were begun twice, those under way at a kill. The numbers"
+        f" of the first arms were {same} to those of one process.\n\n"
+        f"A full task takes {task:.1f} s of a worker, and {_milliseconds(busiest)} of the busier of"
+        f" scheduler and command: one of each carries about {_BAND * task / busiest:.0f} workers at"
+        f" {_BAND:.0%} of a core. 10⁶ campaigns on {_WORKERS} workers would take {minutes:.0f}"
+        f" minutes beside the start, with {carried:.1f} GB on the network and {tables:.1f} GB of"
+        " tables; that many were not tried."
+    )
+
+
+def _milliseconds(duration: float) -> str:
+    return f"{_KILO * duration:.0f} ms"
+
+
+def _memory(mb: list[float]) -> str:
+    """Return the memory after a tenth of the looks and at the last one."""
+    early = mb[max(1, len(mb) // 10)]
+    return f"{early:.0f} MB early, {mb[-1]:.0f} MB at the end"
