@@ -255,9 +255,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         found = measured(Path(folder), samples)
     text = json.dumps(found, indent=1) + "\n"
-    print(text)
-    if len(sys.argv) > 2:
-        Path(sys.argv[2]).write_text(text, "utf-8")
+    print(text, end="")
+    FIGURES.write_text(text, "utf-8")
 
 
 if __name__ == "__main__":
