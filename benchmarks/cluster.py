@@ -4,8 +4,8 @@ A scheduler, two workers of one thread and ``elastocal study`` run in a network 
 that every byte on it is theirs. At a third of the samples one worker is killed (SIGKILL) and a new
 one started; at two thirds the command, which is then given again. At the end the first samples are
 compared bit for bit with those of one process, and the samples that were simulated twice counted.
-A campaign is one arm under one condition. ``cluster.json`` keeps the figures, from which
-``docs/hooks/cluster.py`` fills the page on studies.
+A campaign is one arm under one condition. ``cluster.json`` keeps the figures of every run,
+from which ``docs/hooks/cluster.py`` fills the page on studies.
 
 Linux only. Run with ``python benchmarks/cluster.py [SAMPLES]``.
 """
@@ -254,9 +254,9 @@ def main() -> None:
     samples = int(sys.argv[1]) if len(sys.argv) > 1 else SAMPLES
     with tempfile.TemporaryDirectory() as folder:
         found = measured(Path(folder), samples)
-    text = json.dumps(found, indent=1) + "\n"
-    print(text, end="")
-    FIGURES.write_text(text, "utf-8")
+    print(json.dumps(found, indent=1))
+    runs = json.loads(FIGURES.read_text("utf-8")) if FIGURES.exists() else []
+    FIGURES.write_text(json.dumps([*runs, found], indent=1) + "\n", "utf-8")
 
 
 if __name__ == "__main__":

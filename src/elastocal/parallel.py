@@ -214,7 +214,9 @@ def map_on_cluster(
     """
     from distributed import as_completed
 
-    shared = client.submit(pickle.loads, pickle.dumps(function), pure=False)
+    # Older protocols lay arrays out anew, and sums over them are then rounded otherwise.
+    sent = pickle.dumps(function, protocol=pickle.HIGHEST_PROTOCOL)
+    shared = client.submit(pickle.loads, sent, pure=False)
     # Results are forgotten by the cluster as soon as nothing here names them.
     futures = client.map(_apply, [shared] * len(tasks), tasks, pure=False)
     following: Callable[..., Any] = as_completed

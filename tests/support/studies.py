@@ -71,3 +71,8 @@ def refuse(_):
 def lack(_):
     """Fail as on a worker where a package is missing."""
     raise ModuleNotFoundError("No module named 'pinocchio'", name="pinocchio")
+
+
+def strides(array, _):
+    """Return how an array lies in the memory of a worker: sums over it are rounded by that."""
+    return array.strides

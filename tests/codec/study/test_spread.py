@@ -3,7 +3,9 @@
 import contextlib
 import socket
 import threading
+from functools import partial
 
+import numpy as np
 import pytest
 
 from elastocal.codec.study import sampling
@@ -11,7 +13,7 @@ from elastocal.codec.study.sampling import batch_executor
 from elastocal.errors import CodecError, ProcedureError
 from support.cli import elastocal
 from support.simulated import example_cell
-from support.studies import batch, lack, numbers, refuse
+from support.studies import batch, lack, numbers, refuse, strides
 
 
 @contextlib.contextmanager
