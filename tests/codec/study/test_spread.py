@@ -98,6 +98,9 @@ def test_workers_of_a_cluster_do_every_batch_and_an_error_of_a_batch_comes_back(
         parts = [[0, 1, 2], [3, 4], [5], [6]]
         found = list(spread.map(batch, parts))
         assert sorted(map(numbers, found)) == [numbers(batch(part)) for part in parts]
+        turned = np.ones((3, 6, 6)).transpose(1, 2, 0)
+        found = spread.map(partial(strides, turned), parts)
+        assert set(found) == {turned.strides}
         with pytest.raises(ProcedureError, match="enough"):
             list(spread.map(refuse, parts))
         with pytest.raises(CodecError, match="its workers have no pinocchio: install"):
