@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 FIGURES = Path(__file__).parents[2] / "benchmarks" / "cluster.json"
+Run = dict[str, Any]
 _MARK = re.compile(r"<!-- cluster: (table|plan) -->")
 _MANY, _WORKERS = 10**6, 200
 """Campaigns and workers of the example."""
@@ -18,12 +19,18 @@ _BAND, _MINUTE, _KILO, _MEGA, _GIGA = 0.8, 60.0, 1e3, 1e6, 1e9
 
 def on_page_markdown(markdown: str, **_: object) -> str:
     """Fill the marks in."""
-    made: dict[str, Callable[[dict[str, Any]], str]] = {"table": table, "plan": plan}
+    made: dict[str, Callable[[list[Run]], str]] = {"table": table, "plan": plan}
     return _MARK.sub(lambda mark: made[mark[1]](json.loads(FIGURES.read_text("utf-8"))), markdown)
 
 
-def table(figures: dict[str, Any]) -> str:
-    """Return the figures as a table."""
+def largest(runs: list[Run]) -> Run:
+    """Return the run of most campaigns, the newest of them: what is quoted."""
+    return max(reversed(runs), key=lambda run: run["campaigns"])
+
+
+def table(runs: list[Run]) -> str:
+    """Return the figures of the largest run as a table."""
+    figures = largest(runs)
     memory = ((role, _memory(rows["mb"])) for role, rows in figures["memory_mb"].items())
     tables = figures["tables_bytes"]
     rows = (
@@ -41,21 +48,26 @@ def table(figures: dict[str, Any]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def plan(figures: dict[str, Any]) -> str:
+def plan(runs: list[Run]) -> str:
     """Return how the figures were measured, and what follows for many workers."""
+    figures = largest(runs)
     samples, campaigns = figures["samples"], figures["campaigns"]
     task = figures["largest_task_samples"] * campaigns / samples * figures["worker_s_a_campaign"]
     busiest = max(figures["scheduler_s_a_task"], figures["command_s_a_task"])
     minutes = _MANY * figures["worker_s_a_campaign"] / _WORKERS / _MINUTE
     carried = _MANY * figures["bytes_a_campaign"] / _GIGA
     tables = _MANY / campaigns * sum(figures["tables_bytes"].values()) / _GIGA
-    same = "equal bit for bit" if figures["same_as_one_process"] else "NOT equal"
+    compared = "; ".join(
+        f"{run['date']}, {run['campaigns']} campaigns of commit {run['commit']}:"
+        f" {'equal bit for bit' if run['same_as_one_process'] else 'not equal'}"
+        for run in runs
+    )
     return (
         f"Measured {figures['date']}: {campaigns} campaigns ({samples} arms), a scheduler and two"
         " workers on one machine of two cores that other work shared. One worker was killed at a"
         " third and replaced, the command at two thirds and given again:"
-        f" {figures['begun_twice']} arms were begun twice, those under way at a kill. The numbers"
-        f" of the first arms were {same} to those of one process.\n\n"
+        f" {figures['begun_twice']} arms were begun twice, those under way at a kill. The first"
+        f" arms of each run beside those of one process: {compared}.\n\n"
         f"A full task takes {task:.1f} s of a worker, and {_milliseconds(busiest)} of the busier of"
         f" scheduler and command: one of each carries about {_BAND * task / busiest:.0f} workers at"
         f" {_BAND:.0%} of a core. 10⁶ campaigns on {_WORKERS} workers would take {minutes:.0f}"

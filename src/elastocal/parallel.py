@@ -407,7 +407,7 @@ def _work_guarded(
             resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
         )
         with os.fdopen(writing, "wb") as pipe:
-            pickle.dump(work(), pipe, protocol=4)
+            pickle.dump(work(), pipe, protocol=pickle.HIGHEST_PROTOCOL)
     finally:
         # No handler of the parent, no buffer of its output: they are the parent's.
         os._exit(0)
