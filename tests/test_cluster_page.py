@@ -21,5 +21,5 @@ def test_the_plan_for_many_workers_is_computed_from_the_figures_that_the_benchma
     slower = {**hook.largest(runs), "scheduler_s_a_task": 2.0, "command_s_a_task": 0.5}
     said = hook.plan([{**slower, "campaigns": 10**5, "samples": 20_000}, *runs])
     seconds = 16 * 5 * slower["worker_s_a_campaign"]
-    assert f"carries about {0.8 * seconds / 2.0:.0f} workers" in said
+    assert f"carries at least {0.8 * seconds / 2.0:.0f} workers" in said
     assert f"{slower['commit']}: not equal" in said

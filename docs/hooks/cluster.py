@@ -68,11 +68,12 @@ def plan(runs: list[Run]) -> str:
         " third and replaced, the command at two thirds and given again:"
         f" {figures['begun_twice']} arms were begun twice, those under way at a kill. The first"
         f" arms of each run beside those of one process: {compared}.\n\n"
-        f"A full task takes {task:.1f} s of a worker, and {_milliseconds(busiest)} of the busier of"
-        f" scheduler and command: one of each carries about {_BAND * task / busiest:.0f} workers at"
-        f" {_BAND:.0%} of a core. 10⁶ campaigns on {_WORKERS} workers would take {minutes:.0f}"
-        f" minutes beside the start, with {carried:.1f} GB on the network and {tables:.1f} GB of"
-        " tables; that many were not tried."
+        f"A full task takes {task:.1f} s of a worker. Per task the busier of scheduler and command"
+        f" took {_milliseconds(busiest)}, all that it did while it waited counted: one of each"
+        f" carries at least {_BAND * task / busiest:.0f} workers at {_BAND:.0%} of a core. On"
+        f" {_WORKERS} workers 10⁶ campaigns would take {minutes:.0f} minutes beside the start, with"
+        f" {carried:.1f} GB on the network and {tables:.1f} GB of tables, if one scheduler carries"
+        " so many; that was not tried."
     )
 
 
