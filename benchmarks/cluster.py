@@ -256,7 +256,8 @@ def main() -> None:
         found = measured(Path(folder), samples)
     print(json.dumps(found, indent=1))
     runs = json.loads(FIGURES.read_text("utf-8")) if FIGURES.exists() else []
-    FIGURES.write_text(json.dumps([*runs, found], indent=1) + "\n", "utf-8")
+    lines = ",\n".join(json.dumps(run) for run in (*runs, found))
+    FIGURES.write_text(f"[\n{lines}\n]\n", "utf-8")
 
 
 if __name__ == "__main__":
