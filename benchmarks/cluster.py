@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -108,7 +108,7 @@ class Study:
         self.folder = folder
         self.start = time.perf_counter()
         self.memory: dict[str, list[tuple[float, float]]] = {}
-        self.spent: Counter[str] = Counter()
+        self.spent: defaultdict[str, float] = defaultdict(float)
         self.parts: dict[str, int] = {}
         dask = ("-m", "dask", "scheduler", "--host", "127.0.0.1", "--no-dashboard")
         self.roles = {"scheduler": Session(*dask)}
@@ -148,11 +148,11 @@ class Study:
                     self.memory.setdefault(role, []).append(row)
             time.sleep(0.5)
 
-    def counts(self) -> Counter[str]:
+    def counts(self) -> dict[str, float]:
         """Return what was kept and carried, and the processor time that was taken, by now."""
         kept = self.kept()
         roles = {role: session.seconds() for role, session in self.roles.items()}
-        return Counter(roles | {"samples": kept, "tasks": len(self.parts), "bytes": bytes_sent()})
+        return roles | {"samples": kept, "tasks": len(self.parts), "bytes": bytes_sent()}
 
 
 def measured(folder: Path, samples: int) -> dict[str, object]:
@@ -165,8 +165,7 @@ def measured(folder: Path, samples: int) -> dict[str, object]:
     study.until(lambda: study.kept() > 0 or command.poll() is not None)
     first = study.counts()
     study.until(lambda: study.kept() >= samples // 3 or command.poll() is not None)
-    found = study.counts()
-    found.subtract(first)
+    found = {key: value - first[key] for key, value in study.counts().items()}
     study.kill("worker 2")
     time.sleep(_INTERVAL)
     study.roles["worker 2"] = study.worker()
@@ -209,7 +208,7 @@ def measured(folder: Path, samples: int) -> dict[str, object]:
         "wall_s": wall,
         "spent_s": dict(study.spent),
         "bytes": carried,
-        "counted": dict(found),
+        "counted": found,
         "worker_s_a_campaign": (found["worker 1"] + found["worker 2"]) / counted,
         "scheduler_s_a_task": found["scheduler"] / found["tasks"],
         "command_s_a_task": found["command"] / found["tasks"],
