@@ -16,6 +16,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from timing import figure
+
 from elastocal.cell.examples import write_example
 from elastocal.parallel import core_count
 
@@ -96,10 +98,12 @@ def main() -> None:
                 f"  {samples:4d} samples: {use.wall:6.1f} s, {use.own:6.1f} s CPU;"
                 f" user / (wall x {CORES}) {use.user / everything:.0%}, others took"
                 f" {max(use.busy - use.own, 0.0) / everything:.0%}; ready for"
-                f" {use.ready:.0%} of the cores; one process {alone.wall:.1f} s, ratio"
-                f" {alone.wall / use.wall:.2f}, of the CPU time {use.own / alone.own:.2f}",
+                f" {use.ready:.0%} of the cores; CPU time {use.own / alone.own:.2f} x that of one"
+                " process",
                 flush=True,
             )
+            name = f"`study`, {samples} arms under 5 conditions, processes: {CORES}"
+            figure(name, use.wall, ("one process", alone.wall))
 
 
 if __name__ == "__main__":

@@ -99,7 +99,7 @@ def figure(
         parts.append(f"asked: {shown(aim)}{'' if taken <= aim else ', short'}")
     print("; ".join(parts), flush=True)
     what, other = reference or ("", None)
-    row = (datetime.now(tz=UTC).date(), _commit(), name, _digits(taken), what, _digits(other))
+    row = (datetime.now(tz=UTC).date(), commit(), name, _digits(taken), what, _digits(other))
     new = not HISTORY.exists()
     with HISTORY.open("a", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
@@ -113,7 +113,7 @@ def _digits(value: float | None) -> str:
 
 
 @cache
-def _commit() -> str:
+def commit() -> str:
     """Return the commit that is measured, with a plus where files differ from it."""
     said = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty=+"]
     return subprocess.run(said, capture_output=True, text=True, check=True).stdout.strip()

@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -195,26 +195,35 @@ def process_pool(processes: int, prepare: Callable[[], object]) -> Iterator[Proc
 
 
 def map_on_cluster(
-    function: Callable[[_Task], _Result], tasks: Iterable[_Task], client: object, patience: float
+    function: Callable[[_Task], _Result], tasks: Sequence[_Task], client: Any
 ) -> Iterator[_Result]:
     """Yield the results of tasks as they are known, done by the workers of a Dask scheduler.
+
+    The function goes over the wire once. Reading it is a task of its own, which the scheduler has
+    done again if the workers that hold the result die; workers that join later get a copy from
+    those that have one. Tasks of a worker that dies go to another.
 
     Parameters
     ----------
     function : callable
         Can be pickled, as can tasks and results.
-    tasks : iterable
-        What it is called with.
+    tasks : sequence
+        What it is called with; all are given to the scheduler at once.
     client : distributed.Client
         Connection to the scheduler.
-    patience : float
-        How long to wait for a worker, in s.
     """
-    from joblib import Parallel, delayed, parallel_config
+    from distributed import as_completed
 
-    with parallel_config("dask", client=client, wait_for_workers_timeout=patience):
-        parallel = Parallel(batch_size=1, pre_dispatch="3*n_jobs", return_as="generator_unordered")
-    yield from _to_the_end(parallel(delayed(function)(task) for task in tasks))
+    # Older protocols lay arrays out anew, and sums over them are then rounded otherwise.
+    sent = pickle.dumps(function, protocol=pickle.HIGHEST_PROTOCOL)
+    shared = client.submit(pickle.loads, sent, pure=False)
+    # Results are forgotten by the cluster as soon as nothing here names them.
+    futures = client.map(_apply, [shared] * len(tasks), tasks, pure=False)
+    following: Callable[..., Any] = as_completed
+    completed = following(futures, loop=client.loop)
+    del futures
+    for future in completed:
+        yield future.result()
 
 
 @contextmanager
@@ -262,6 +271,10 @@ def _end_with(parent: int) -> None:
 
 def _call(task: Callable[[], object]) -> object:
     return task()
+
+
+def _apply(function: Callable[[_Task], _Result], task: _Task) -> _Result:
+    return function(task)
 
 
 def _one_thread_each(processes: int) -> Any:

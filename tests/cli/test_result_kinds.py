@@ -6,7 +6,7 @@ import re
 import pytest
 
 from elastocal.codec.study import StudyStore, run_study, study_summary, write_study
-from elastocal.codec.study.sampling import one_after_the_other
+from elastocal.codec.study.sampling import ONE_AFTER_THE_OTHER
 from elastocal.errors import SchemaError
 from elastocal.records import write_json
 from elastocal.workflows.check import _UNITS, describe_file
@@ -19,7 +19,7 @@ from support.studies import settings, simulate
 @pytest.fixture
 def study(tmp_path):
     folder = tmp_path / "study"
-    found = run_study(StudyStore(folder), settings(), 3, simulate, one_after_the_other)
+    found = run_study(StudyStore(folder), settings(), 3, simulate, ONE_AFTER_THE_OTHER)
     write_study(folder, settings(), found, study_summary(settings(), found, 5e-5))
     return folder
 
@@ -37,12 +37,12 @@ def test_every_file_of_a_study_is_known_and_says_what_it_holds(study):
 
 
 def test_an_edited_part_is_refused_in_its_folder_and_by_itself(study):
-    part = study / "samples" / "000000-000001.json"
+    part = study / "samples" / "000000-000000.json"
     contents = json.loads(part.read_text())
-    contents["samples"][1]["number"] = 7
+    contents["samples"][0]["number"] = 7
     part.write_text(json.dumps(contents))
     for path in (study, part):
-        with pytest.raises(SchemaError, match=r"000000-000001\.json was edited"):
+        with pytest.raises(SchemaError, match=r"000000-000000\.json was edited"):
             describe_file(path)
 
 

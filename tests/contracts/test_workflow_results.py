@@ -71,7 +71,7 @@ def results(tmp_path_factory) -> dict[str, Result]:
     arm = measured_arms.measure(catalogue.load("KR 210 R2700-2"), 60)
     positions = measured_arms.write_positions(out / "positions.csv", arm)
     log_map = foreign_logs.write_map(out, cell)
-    samples = tuple(studies.batch(number)[0] for number in (0, 1, 2))
+    samples = tuple(studies.batch(range(3)))
     figures = workflows.RunFigures(
         str(run), "done", "at HOME", "", 7, 7, (), {"ok": 14}, 0, 60.0, "dataset.nc", (), None
     )

@@ -19,7 +19,7 @@ from elastocal.cell import (
     load_cell,
 )
 from elastocal.codec.study import StudyStore, run_study, study_summary, write_study
-from elastocal.codec.study.sampling import one_after_the_other
+from elastocal.codec.study.sampling import ONE_AFTER_THE_OTHER
 from elastocal.geometry import plan_positions
 from elastocal.identification import read_model, write_model
 from elastocal.planning import read_plan
@@ -589,7 +589,7 @@ def _write_geometry(folder: Path) -> None:
 
 def _write_study(folder: Path) -> None:
     design = studies.settings()
-    results = run_study(StudyStore(folder), design, 3, studies.simulate, one_after_the_other)
+    results = run_study(StudyStore(folder), design, 3, studies.simulate, ONE_AFTER_THE_OTHER)
     write_study(folder, design, results, study_summary(design, results, 5e-5))
 
 

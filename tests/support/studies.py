@@ -11,6 +11,7 @@ from elastocal.codec.study import (
     SpringLabel,
     StudyDesign,
 )
+from elastocal.errors import ProcedureError
 
 SPRINGS = (SpringLabel(name="joint_1.axial", unit="rad/(N*m)"),)
 
@@ -57,6 +58,21 @@ def _errors(each: ConditionResult) -> tuple[float, float, float]:
     return each.error_mean, each.error_max, each.deflection_mean
 
 
-def batch(number):
-    """Return a batch of one sample; processes find it here, not in a module of tests."""
-    return [simulate(Sample(3, number))]
+def batch(numbers):
+    """Return a batch of samples; processes find it here, not in a module of tests."""
+    return [simulate(Sample(3, number)) for number in numbers]
+
+
+def refuse(_):
+    """Refuse a batch, as a cell that cannot be simulated does."""
+    raise ProcedureError("enough")
+
+
+def lack(_):
+    """Fail as on a worker where a package is missing."""
+    raise ModuleNotFoundError("No module named 'pinocchio'", name="pinocchio")
+
+
+def strides(array, _):
+    """Return how an array lies in the memory of a worker: sums over it are rounded by that."""
+    return array.strides

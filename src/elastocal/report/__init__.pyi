@@ -14,9 +14,7 @@ from .plots import (
     error_maps as error_maps,
     plot_result as plot_result,
     stiffness_figure as stiffness_figure,
-    study_figure as study_figure,
     write_plan_figure as write_plan_figure,
     write_recertification_figure as write_recertification_figure,
     write_stiffness_figure as write_stiffness_figure,
-    write_study_figure as write_study_figure,
 )

@@ -5,8 +5,9 @@ Its samples have the simulator's truth on one side, the estimator on the other.
 
 import importlib
 import json
+import threading
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from os import PathLike
@@ -15,44 +16,34 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from elastocal.arrays import FloatArray, IndexArray
 from elastocal.blocks import Block, Picture
-from elastocal.cell import CONDITIONING, DEFAULT_POSES, LIGHT_CONTACT, Cell, fingerprint, load_cell
-from elastocal.codec import ALL_LOADS, study as studies, training_cases
+from elastocal.cell import DEFAULT_POSES, Cell, fingerprint, load_cell
+from elastocal.codec import ALL_LOADS, study as studies
 from elastocal.codec.study import (
     Condition,
-    ConditionResult,
-    Sample,
     SampleResult,
     StudyDesign,
     StudySummary,
     micrometres,
     show_study,
 )
-from elastocal.dataset import Readings
 from elastocal.elastic import LAYOUTS, ElasticModel, layout
 from elastocal.errors import CodecError, DeviceError, nearest
 from elastocal.files import sha256
-from elastocal.identification import AUTO, RUNGS, FitOptions, choose_model, with_knowledge
+from elastocal.identification import AUTO, RUNGS
 from elastocal.options import Option
 from elastocal.progress import Progress
 from elastocal.records import to_data
-from elastocal.report import drawn, study_figure, write_study_figure
-from elastocal.report.document import write_page
+from elastocal.report import document, plots
 from elastocal.results import Result, brief_repr
-from elastocal.robot import Robot
-from elastocal.sim.workcell import (
-    CampaignErrors,
-    CampaignSimulator,
-    ContactPoses,
-    ErrorDraws,
-    ErrorScales,
-)
+from elastocal.sim.workcell import CampaignErrors, CampaignSimulator
+from elastocal.workflows._study_simulation import StudySimulation
 from elastocal.workflows._workflow import workflow
 
 DEFAULT_VARIATION = "poses=6,10,15,20,31"
 """Variation of a study that names none."""
-_SIMULATION = "elastocal.workflows.study"
+_SIMULATION = "elastocal.workflows._study_simulation"
+_DRAWING = "elastocal.report.plots.codec_chart"
 _PAGE = "study.html"
 
 
@@ -119,7 +110,7 @@ class StudyResult(Result):
 
     def plot(self) -> Any:
         """Return the box plots of all conditions, as a Matplotlib figure."""
-        return drawn(study_figure, self.design, self.samples, self.summary)
+        return plots.drawn(plots.study_figure, self.design, self.samples, self.summary)
 
 
 @workflow(StudySettings)
@@ -144,12 +135,14 @@ def study(settings: StudySettings, progress: Progress) -> StudyResult:
             cell, conditions, settings.seed, settings.verification, settings.jobs
         )
         store, design = studies.StudyStore(settings.out), prepared.design
+        # While the samples are simulated: afterwards the other cores would wait for it.
+        threading.Thread(target=importlib.import_module, args=(_DRAWING,)).start()
         results = studies.run_study(
             store, design, settings.samples, prepared.simulate, execute, progress
         )
     summary = studies.study_summary(design, results, settings.target)
     names = studies.write_study(settings.out, design, results, summary)
-    names += [write_study_figure(settings.out, design, results, summary), _PAGE]
+    names += [plots.write_study_figure(settings.out, design, results, summary), _PAGE]
     result = StudyResult(summary, design, results, tuple(names))
     _write_page(settings.out / _PAGE, result)
     return result
@@ -159,7 +152,7 @@ def _write_page(path: Path, result: StudyResult) -> None:
     """Write the page of a study: its figures for each condition, and their box plots."""
     summary = result.summary
     chart = Picture(
-        partial(study_figure, result.design, result.samples, summary),
+        partial(plots.study_figure, result.design, result.samples, summary),
         summary.sentence,
         "One value for each arm: its mean and its largest error at the unseen poses.",
     )
@@ -167,7 +160,7 @@ def _write_page(path: Path, result: StudyResult) -> None:
         ("result", "What the arms reach", result.show()),
         ("chart", "How much they differ", (chart,)),
     )
-    write_page(path, f"Study: {summary.cell}", sections, maker="elastocal study")
+    document.write_page(path, f"Study: {summary.cell}", sections, maker="elastocal study")
 
 
 def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]:
@@ -187,128 +180,11 @@ _PACKAGES = ("elastocal", "numpy", "scipy", "pin")
 
 
 @dataclass(frozen=True, eq=False)
-class _StudySimulation:
-    """Simulates samples of one study; made by `_prepare_study`, sent to processes as it is."""
-
-    conditions: tuple[Condition, ...]
-    chosen: tuple[studies.PoseChoice, ...]
-    """Calibration poses of each condition."""
-    robot: Robot
-    models: dict[str, ElasticModel]
-    """Models by spring layout; a choice by readings is made again in each sample."""
-    truth: CampaignSimulator
-    errors: CampaignErrors
-    pool: studies.StudyPool
-    load_cases: tuple[str, ...]
-    """The full cases: what a condition may name, and what all are verified under."""
-    force_tcp: FloatArray
-    """Their force in the tcp frame, shape (load_case, 3), in N."""
-    presses: dict[str, FloatArray]
-    """All that is pressed at a pose, in order in time; see `CellFile.presses`."""
-    check: str | None
-    """The load case that is kept out of every fit."""
-    marker: FloatArray
-    """In the tcp frame, shape (3,), in m."""
-
-    def __call__(self, sample: Sample) -> SampleResult:
-        """Return the sample's arm, calibrated under every condition."""
-        rng = sample.generator(studies.Purpose.TRUTH)
-        stiffness, balancer = rng.standard_normal(self.truth.springs), rng.standard_normal()
-        draws = ErrorDraws.of(
-            len(self.pool), len(self.measured), sample.generator(studies.Purpose.ERRORS)
-        )
-        found: dict[int, ConditionResult] = {}
-        for spread in dict.fromkeys(each.truth for each in self.conditions):
-            arm = self.truth.stiffened(np.exp(spread * stiffness), float(np.exp(spread * balancer)))
-            verification = self._verification(arm, 2 * sample.number + 1)
-            for cases in dict.fromkeys(each.load_cases for each in self.conditions):
-                numbers = [
-                    number
-                    for number, each in enumerate(self.conditions)
-                    if each.truth == spread and each.load_cases == cases
-                ]
-                found |= self._calibrated(sample, arm, draws, numbers, verification)
-        return SampleResult(sample.number, tuple(found[i] for i in range(len(self.conditions))))
-
-    @property
-    def measured(self) -> tuple[str, ...]:
-        """Presses that become readings, in order in time: all but that of the reference."""
-        return tuple(name for name in self.presses if name != LIGHT_CONTACT)
-
-    def places(self, poses: IndexArray) -> ContactPoses:
-        """Return some poses of the pool as the simulator wants them."""
-        return ContactPoses(self.pool.q[poses], self.pool.normal[poses])
-
-    def _calibrated(
-        self,
-        sample: Sample,
-        arm: CampaignSimulator,
-        draws: ErrorDraws,
-        numbers: Sequence[int],
-        verification: studies.Verification,
-    ) -> dict[int, ConditionResult]:
-        """Calibrate one arm under conditions with the same load cases, measuring each pose once."""
-        chosen = [self.chosen[i].of(sample.generator(studies.Purpose.CHOICE)) for i in numbers]
-        poses = np.unique(np.concatenate(chosen))
-        pressed = self._pressed(self.conditions[numbers[0]].load_cases)
-        cases = tuple(name for name in pressed if name != LIGHT_CONTACT)
-        settled = arm.settle(
-            self.places(poses),
-            np.array([self.presses[name] for name in pressed]),
-            seed=2 * sample.number,
-            reference=pressed.index(LIGHT_CONTACT) if LIGHT_CONTACT in pressed else None,
-        )
-        own = draws.take(poses, np.array([self.measured.index(case) for case in cases]))
-        found = {}
-        for number, order in zip(numbers, chosen, strict=True):
-            condition = self.conditions[number]
-            scales = ErrorScales(condition.tracker_noise, condition.force_noise)
-            station = self.pool.station[poses]
-            readings = self.errors.readings(
-                settled, own, scales, station, cases, conditioned=CONDITIONING in cases
-            )
-            mine = readings.take(np.isin(readings.pose, np.searchsorted(poses, order)))
-            mine = mine.set_aside(mine.load_case == self.check)
-            found[number] = self._fitted(condition.springs, mine, verification)
-        return found
-
-    def _pressed(self, spec: str) -> tuple[str, ...]:
-        """Return the load cases under a condition: all of them, or some at the reference.
-
-        The load case that checks the fit is pressed too: friction feels it.
-        """
-        if spec == ALL_LOADS:
-            return tuple(self.presses)
-        before = (name for name in (CONDITIONING, LIGHT_CONTACT) if name in self.presses)
-        return (*before, *training_cases(spec, self.load_cases))
-
-    def _fitted(
-        self, springs: str, readings: Readings, verification: studies.Verification
-    ) -> ConditionResult:
-        """Calibrate as a user would with these springs."""
-        model = self.models.get(springs)
-        if model is not None:
-            return studies.calibrated(model, readings, self.marker, verification)
-        options = FitOptions(set_blunders_aside=False)
-        choice = choose_model(self.robot, readings, springs, options, self.marker)
-        model = choice.model
-        told = with_knowledge(options, choice.known, model, readings, self.marker)
-        found = studies.calibrated(model, readings, self.marker, verification, told)
-        # Each sample may have other springs, so there is no table of their compliances.
-        return replace(found, compliance=np.zeros(0))
-
-    def _verification(self, arm: CampaignSimulator, seed: int) -> studies.Verification:
-        settled = arm.settle(self.places(self.pool.verification), self.force_tcp, seed=seed)
-        flat = (settled.q, settled.force, settled.deflection)
-        return studies.Verification(*(array.reshape(-1, array.shape[-1]) for array in flat))
-
-
-@dataclass(frozen=True, eq=False)
 class _PreparedStudy:
     """A study that may begin."""
 
     design: StudyDesign
-    simulate: _StudySimulation
+    simulate: StudySimulation
 
 
 def _prepare_study(
@@ -349,7 +225,7 @@ def _prepare_study(
     poses = studies.study_poses(cell, verification, jobs)
     chosen = studies.choose_poses(cell, poses, conditions)
     design = _design(cell, conditions, models, poses.pool, seed)
-    simulate = _StudySimulation(
+    simulate = StudySimulation(
         conditions=tuple(conditions),
         chosen=chosen,
         robot=cell.robot,

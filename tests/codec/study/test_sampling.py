@@ -4,31 +4,35 @@ from pathlib import Path
 import pytest
 
 from elastocal.codec.study import DESIGN, PARTS, StudyStore, run_study
-from elastocal.codec.study.sampling import _BATCH, one_after_the_other
+from elastocal.codec.study.sampling import ONE_AFTER_THE_OTHER, BatchExecutor, batches
 from elastocal.errors import CodecError, FileAccessError, SchemaError
 from support.studies import numbers, settings, simulate
 
 
-def run(folder: Path, samples: int, spread=one_after_the_other, **changes):
+def run(folder: Path, samples: int, spread=ONE_AFTER_THE_OTHER, **changes):
     return run_study(StudyStore(folder), settings(**changes), samples, simulate, spread)
 
 
-def backwards(batches):
-    return (work() for work in reversed(list(batches)))
+def executor(do):
+    return BatchExecutor(1, do)
 
 
-def killed_after(count):
-    def spread(batches):
-        for done, work in enumerate(batches):
-            if done == count:
-                raise KeyboardInterrupt
-            yield work()
-
-    return spread
+@executor
+def backwards(work, parts):
+    return map(work, reversed(parts))
 
 
-def refusing(batches):
-    raise AssertionError("nothing is left to do")
+def killed_after(count, workers=1):
+    def do(work, parts):
+        yield from map(work, parts[:count])
+        raise KeyboardInterrupt
+
+    return BatchExecutor(workers, do)
+
+
+@executor
+def refusing(work, parts):
+    raise AssertionError(f"nothing is left to do with {work}, not {parts}")
 
 
 def test_results_come_in_the_order_of_their_numbers_whatever_was_done_first(tmp_path):
@@ -40,17 +44,27 @@ def test_results_come_in_the_order_of_their_numbers_whatever_was_done_first(tmp_
 def test_a_killed_study_goes_on_and_ends_with_the_same_numbers(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, 9, killed_after(3))
-    kept = StudyStore(tmp_path).finished(settings())
-    assert len(kept) == 3 * _BATCH
+    kept = set(StudyStore(tmp_path).finished(settings()))
+    assert kept == {0, 1, 2, 3, 4, 5}
     asked = []
 
-    def noting(batches):
-        asked.extend(batches)
-        return (work() for work in asked)
+    def noting(work, parts):
+        asked.extend(number for part in parts for number in part)
+        return map(work, parts)
 
-    again = run(tmp_path, 9, noting)
-    assert len(asked) == -(-(9 - 3 * _BATCH) // _BATCH)
+    again = run(tmp_path, 9, BatchExecutor(3, noting))
+    assert asked == [6, 7, 8]
     assert numbers(again) == numbers(run(tmp_path / "whole", 9))
+
+
+@pytest.mark.parametrize("workers", [1, 2, 300])
+def test_every_number_is_in_one_batch_and_the_last_batches_are_single(workers):
+    parts = batches(range(1000), workers, 16)
+    assert [number for part in parts for number in part] == list(range(1000))
+    sizes = [len(part) for part in parts]
+    assert sizes == sorted(sizes, reverse=True)
+    assert (max(sizes) == 16) == (workers < 300)
+    assert set(sizes[-4:]) == {1}
 
 
 def test_a_finished_study_is_not_done_again(tmp_path):
@@ -69,10 +83,10 @@ def test_progress_counts_what_was_there_before(tmp_path):
     run(tmp_path, 4)
     told = []
     run_study(
-        StudyStore(tmp_path), settings(), 6, simulate, one_after_the_other,
+        StudyStore(tmp_path), settings(), 6, simulate, ONE_AFTER_THE_OTHER,
         lambda _, done, total: told.append((done, total)),
     )  # fmt: skip
-    assert told == [(4, 6), (6, 6)]
+    assert told == [(4, 6), (5, 6), (6, 6)]
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,15 @@ import socket
 import threading
 from functools import partial
 
+import numpy as np
 import pytest
 
 from elastocal.codec.study import sampling
 from elastocal.codec.study.sampling import batch_executor
-from elastocal.errors import CodecError
+from elastocal.errors import CodecError, ProcedureError
 from support.cli import elastocal
 from support.simulated import example_cell
-from support.studies import batch, numbers
+from support.studies import batch, lack, numbers, refuse, strides
 
 
 @contextlib.contextmanager
@@ -35,11 +36,11 @@ def listening(answer=b""):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_processes_that_got_ready_early_do_every_batch(jobs):
+    parts = [[0, 1], [2, 3], [4]]
     with batch_executor(jobs, None) as spread:
-        found = list(spread([partial(batch, number) for number in range(5)]))
-    assert sorted(numbers(each)[0] for each in found) == [
-        numbers(batch(number))[0] for number in range(5)
-    ]
+        assert spread.workers == jobs
+        found = list(spread.map(batch, parts))
+    assert sorted(map(numbers, found)) == [numbers(batch(part)) for part in parts]
 
 
 def test_processes_that_find_nothing_to_do_end_without_a_word(recwarn):
@@ -83,3 +84,35 @@ def test_a_missing_extra_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(CodecError, match=r"pip install 'elastocal\[dask\]'"):
         sampling._check_scheduler("tcp://127.0.0.1:9")
+
+
+def test_workers_of_a_cluster_do_every_batch_and_an_error_of_a_batch_comes_back():
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        batch_executor(None, cluster.scheduler_address) as spread,
+    ):
+        assert spread.workers == 2
+        parts = [[0, 1, 2], [3, 4], [5], [6]]
+        found = list(spread.map(batch, parts))
+        assert sorted(map(numbers, found)) == [numbers(batch(part)) for part in parts]
+        turned = np.ones((3, 6, 6)).transpose(1, 2, 0)
+        found = spread.map(partial(strides, turned), parts)
+        assert set(found) == {turned.strides}
+        with pytest.raises(ProcedureError, match="enough"):
+            list(spread.map(refuse, parts))
+        with pytest.raises(CodecError, match="its workers have no pinocchio: install"):
+            list(spread.map(lack, parts))
+
+
+def test_a_cluster_without_workers_is_refused_before_the_long_work(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(sampling, "_PATIENCE", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as cluster,
+        pytest.raises(CodecError, match="the cluster was lost or has no worker"),
+        batch_executor(None, cluster.scheduler_address),
+    ):
+        pass

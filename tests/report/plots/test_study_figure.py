@@ -1,8 +1,7 @@
 import numpy as np
 
 from elastocal.codec.study import Condition, Sample, study_summary
-from elastocal.report import write_study_figure
-from elastocal.report.plots import study_figure, themed_svg
+from elastocal.report.plots import study_figure, themed_svg, write_study_figure
 from elastocal.report.plots.style import BLUE, tint
 from support.studies import settings, simulate
 

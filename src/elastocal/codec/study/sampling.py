@@ -10,27 +10,40 @@ is queried first, by one message with one deadline.
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from functools import partial
-from operator import call
 from typing import Any
 
 from elastocal.codec.study.samples import Sample, SampleResult, Simulate, StudyDesign, StudyStore
 from elastocal.errors import CodecError
-from elastocal.parallel import ProcessPool, map_on_cluster, process_count, process_pool
+from elastocal.parallel import map_on_cluster, process_count, process_pool
 from elastocal.progress import Progress, silent
 
 _STAGE = "samples"
-_BATCH = 2
-"""Samples that are done and kept together: some seconds of work are lost when a study is killed."""
+_LARGEST = 80
+"""Campaigns that are done and kept together, at most: some seconds of work are lost when a study is
+killed. A campaign is one sample under one condition."""
+_ENDING = 4
+"""A batch is at most this part of what a worker still has to do: all end at nearly one time."""
 
-Work = Callable[[], list[SampleResult]]
-"""One batch."""
-BatchExecutor = Callable[[Iterable[Work]], Iterator[list[SampleResult]]]
-"""Has the batches done, somewhere and in any order, and yields each result when it is there."""
+Work = Callable[[Sequence[int]], list[SampleResult]]
+"""Simulates the samples of these numbers."""
+
+
+@dataclass(frozen=True)
+class BatchExecutor:
+    """Has batches done, somewhere and in any order."""
+
+    workers: int
+    """Batches that are done side by side."""
+    map: Callable[[Work, Sequence[Sequence[int]]], Iterator[list[SampleResult]]]
+    """Yields the results of each batch when they are there."""
+
+
 _PATIENCE = 10.0
 """Longest time that a scheduler or its first worker may take to answer, in s."""
 _SCHEDULER = "Scheduler"
@@ -58,8 +71,8 @@ def run_study(
         Number of samples; a finished study goes on with a larger one.
     simulate : callable
         See `Simulate`.
-    execute : callable
-        Has batches done: see `one_after_the_other`, `batch_executor`.
+    execute : BatchExecutor
+        Has batches done: see `ONE_AFTER_THE_OTHER`, `batch_executor`.
     progress : Progress
         Called with stage, done and total.
 
@@ -77,9 +90,9 @@ def run_study(
     done = samples - len(missing)
     progress(_STAGE, done, samples)
     if missing:
-        parts = [missing[start : start + _BATCH] for start in range(0, len(missing), _BATCH)]
-        work = [partial(_simulate_batch, simulate, design.seed, part) for part in parts]
-        for results in execute(work):
+        largest = max(1, _LARGEST // len(design.conditions))
+        work = partial(_simulate_batch, simulate, design.seed)
+        for results in execute.map(work, batches(missing, execute.workers, largest)):
             store.keep(design, results)
             done += len(results)
             progress(_STAGE, done, samples)
@@ -99,9 +112,34 @@ def check_samples(samples: int) -> None:
         raise CodecError(f"{samples} samples: must be at least 1")
 
 
-def one_after_the_other(batches: Iterable[Work]) -> Iterator[list[SampleResult]]:
-    """Run the batches one after another in this process."""
-    return (work() for work in batches)
+def batches(numbers: Sequence[int], workers: int, largest: int) -> list[Sequence[int]]:
+    """Return numbers in batches that become smaller towards the end.
+
+    Source: guided self-scheduling (C. D. Polychronopoulos, D. J. Kuck, IEEE Trans. Comput. C-36,
+    1987), with a bound.
+
+    >>> [len(each) for each in batches(range(30), 2, 3)]
+    [3, 3, 3, 3, 3, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1]
+
+    Parameters
+    ----------
+    numbers : sequence of int
+        Numbers of samples.
+    workers : int
+        Batches that are done side by side.
+    largest : int
+        Samples of a batch, at most.
+    """
+    found, start = [], 0
+    while start < len(numbers):
+        count = min(largest, -(-(len(numbers) - start) // (_ENDING * workers)))
+        found.append(numbers[start : start + count])
+        start += count
+    return found
+
+
+ONE_AFTER_THE_OTHER = BatchExecutor(1, map)
+"""Runs the batches in this process."""
 
 
 @contextmanager
@@ -125,30 +163,40 @@ def batch_executor(
         If Dask is not installed, the scheduler does not answer or is lost, or a process dies.
     """
     if address is not None:
-        _check_scheduler(address)  # refused before the long work
-        yield partial(_over_cluster, address=address)
+        with closing(_connected(address)) as client:
+            with _lost_cluster_named(address):
+                client.wait_for_workers(1, timeout=_PATIENCE)
+                workers = sum(client.ncores().values())
+            yield BatchExecutor(workers, partial(_over_cluster, client=client, address=address))
         return
-    with _dead_process_named(), process_pool(process_count(jobs), prepare) as pool:
-        yield partial(_over_cores, pool=pool)
+    processes = process_count(jobs)
+    with _dead_process_named(), process_pool(processes, prepare) as pool:
+        yield BatchExecutor(processes, partial(pool.map, ordered=False))
 
 
-def _over_cores(batches: Iterable[Work], pool: ProcessPool) -> Iterator[list[SampleResult]]:
-    return pool.map(call, batches, ordered=False)
+def _over_cluster(
+    work: Work, parts: Sequence[Sequence[int]], client: Any, address: str
+) -> Iterator[list[SampleResult]]:
+    with _lost_cluster_named(address):
+        yield from map_on_cluster(work, parts, client)
 
 
-def _over_cluster(batches: Iterable[Work], address: str) -> Iterator[list[SampleResult]]:
-    client = _connected(address)
-    with closing(client):
-        from distributed import KilledWorker
-        from distributed.comm.core import CommClosedError
+@contextmanager
+def _lost_cluster_named(address: str) -> Iterator[None]:
+    from distributed import KilledWorker
+    from distributed.comm.core import CommClosedError
 
-        try:
-            yield from map_on_cluster(call, batches, client, _PATIENCE)
-        except (CancelledError, CommClosedError, KilledWorker, TimeoutError) as error:
-            raise CodecError(
-                f"--dask {address}: the cluster was lost or has no worker"
-                f" ({type(error).__name__}); finished samples are kept: give the same command again"
-            ) from error
+    try:
+        yield
+    except (CancelledError, CommClosedError, KilledWorker, TimeoutError) as error:
+        raise CodecError(
+            f"--dask {address}: the cluster was lost or has no worker ({type(error).__name__});"
+            " finished samples are kept: give the same command again"
+        ) from error
+    except ModuleNotFoundError as error:
+        raise CodecError(
+            f"--dask {address}: its workers have no {error.name}: install elastocal where they run"
+        ) from error
 
 
 @contextmanager
