@@ -50,12 +50,21 @@ def test_every_command_reads_the_files_as_they_are(seeds):
     assert [v for v in run_cases(cases, seeds) if v.word != "ok" or v.code] == []
 
 
+QUICK = [each for each in CORPUS if not each["command"].startswith(REPORTS)]
+WHOLE_REPORTS = [each for each in CORPUS if each["command"].startswith(REPORTS)]
+
+
 @pytest.mark.parametrize(
-    "report", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["quick", "reports"]
+    "entries",
+    [
+        QUICK[::3],
+        pytest.param(QUICK[1::3] + QUICK[2::3], marks=pytest.mark.slow),
+        # These take as long as all others; reports are among the new cases, too.
+        pytest.param(WHOLE_REPORTS, marks=pytest.mark.slow),
+    ],
+    ids=["by day", "by night", "reports"],
 )
-def test_what_fell_once_does_not_fall_again(seeds, report):
-    # Those of whole reports take as long as all others; reports are among the new cases, too.
-    entries = [each for each in CORPUS if each["command"].startswith(REPORTS) == report]
+def test_what_fell_once_does_not_fall_again(seeds, entries):
     assert entries
     assert fallen(run_cases([Case(**entry) for entry in entries], seeds)) == []
 
