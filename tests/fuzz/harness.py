@@ -264,7 +264,10 @@ def _in_child(batch: list[Case], seeds: Path) -> Iterator[Verdict]:
         child = os.fork()
         if not child:
             os.close(reading)
-            _work(batch, seeds, Path(place), writing)
+            try:
+                _work(batch, seeds, Path(place), writing)
+            finally:  # whatever happens, a copy of this process does not go on with its work
+                os._exit(1)
         os.close(writing)
         done = 0
         try:

@@ -91,7 +91,7 @@ _REPORT = (
 _LOGS = ("map.yaml", "controller.csv", "force.csv", "tracker.txt", "cell.yaml", "dome.stl")
 _GUESS = "import {f} --map {o}.yaml --guess"
 _IMPORT = "import controller.csv force.csv tracker.txt --map map.yaml --out {o}.nc"
-_STUDY = ("study/settings.json", "study/study.json", "study/samples/000000-000001.json")
+_STUDY = ("study/settings.json", "study/study.json", "study/samples/000000-000000.json")
 _BASE = "--base 0m,0m,0m,0deg,0deg,0deg --out {o}.src"
 
 KINDS: dict[str, Kind] = {
@@ -294,7 +294,7 @@ KINDS: dict[str, Kind] = {
         "study/settings.json", "json", ("check {f}", "check study"), _STUDY, 0.3, 0.3
     ),
     "study samples": Kind(
-        "study/samples/000000-000001.json", "json", ("check {f}", "check study"), _STUDY, 0.3, 0.3
+        "study/samples/000000-000000.json", "json", ("check {f}", "check study"), _STUDY, 0.3, 0.3
     ),
     "study": Kind("study/study.json", "json", ("check {f}",), _STUDY, 0.3, 0.3),
     "signature": Kind("run/signature.json", "json", ("check {f}", "verify run"), _RUN, 0.03, 0.5),
