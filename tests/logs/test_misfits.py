@@ -15,7 +15,7 @@ def swinging(force):
     T[:, 1, 1] = T[:, 2, 2] = np.cos(angle)
     T[:, 2, 1], T[:, 1, 2] = np.sin(angle), -np.sin(angle)
     T[:, 0, 3] = time
-    arm = SimpleNamespace(time=time, T_base_tcp=T, q=np.column_stack([angle] * 6))
+    arm = SimpleNamespace(time=time, T_base_tcp=T)
     wrench = SimpleNamespace(time=time, force=force)
     return SimpleNamespace(wrench=wrench), SimpleNamespace(arm=arm), T
 
