@@ -98,7 +98,8 @@ def main() -> None:
         figure(name, taken, alone)
     plain, rich = (single(robot, readings, s).calibrated for s in ("bearing", "gears+friction"))
     data = rows(rich.model)
-    pair, steps = side_by_side((plain, rich), data)
+    pair, usual = side_by_side((plain, rich), data)
+    steps = [median for median, _ in usual]
     last = f"{len(rich.model.parameters)} parameters of the last rung"
     figure(f"Python step, {last}", 1e-6 * steps[1], ("18 springs", 1e-6 * steps[0]))
     timed = c_microseconds(pair, data)

@@ -3,10 +3,13 @@
 Beside each pool stands a reference of the same run: the bare inverse kinematics of as many poses.
 One process, all cores and the reference take turns, so that what else the machine does meets all
 three; times are medians over the rounds, and the ratios are what counts. Run with ``python
-benchmarks/pool.py``; ``--large`` goes on to 100 000 candidates, some minutes.
+benchmarks/pool.py``; ``--large`` makes pools of up to a million candidates instead, once each, and
+prints time and memory a candidate: up to an hour.
 """
 
 import argparse
+import math
+import os
 import statistics
 import tempfile
 import time
@@ -26,7 +29,7 @@ from elastocal.planning.scene import CollisionScene
 from elastocal.robot.inverse import inverse_for
 
 SIZES = (1000, 3000, 10_000)
-LARGE = (*SIZES, 30_000, 100_000)
+LARGE = (10_000, 100_000, 1_000_000)
 ROUNDS = 3
 ASKED = (3000, "afp")
 
@@ -68,11 +71,11 @@ def parts(cell: Cell, size: int, like: str, alone: float) -> None:
         figure(f"{size} candidates with all checks, {like}: {part}", spent, own)
 
 
-def report(like: str, sizes: tuple[int, ...], cores: int) -> None:
+def report(like: str, cores: int) -> None:
     """Print one example cell."""
     print(f"{like}: valid candidates with all checks")
     with tempfile.TemporaryDirectory() as name:
-        for size in sizes:
+        for size in SIZES:
             cell, rounds = example(Path(name), like, size), []
             for _ in range(ROUNDS):
                 alone, found = timed(made, cell, 1)
@@ -98,14 +101,46 @@ def report(like: str, sizes: tuple[int, ...], cores: int) -> None:
             print(f"  same pool: {same}", flush=True)
 
 
+def peak_memory() -> float:
+    """Return the most memory that this process and its workers have had, together, in bytes."""
+    own = Path(f"/proc/self/task/{os.getpid()}")
+    processes = [own, *(Path(f"/proc/{pid}") for pid in (own / "children").read_text().split())]
+    peaks = (line for each in processes for line in (each / "status").read_text().splitlines())
+    return sum(1024.0 * int(line.split()[1]) for line in peaks if line.startswith("VmHWM"))
+
+
+def growth(like: str, cores: int) -> None:
+    """Print time and memory a candidate of ever larger pools of one example cell."""
+    print(f"{like}: valid candidates with all checks, {cores} processes")
+    least = math.nan
+    with tempfile.TemporaryDirectory() as name:
+        for size in LARGE:
+            cell = example(Path(name), like, size)
+            taken, found = timed(made, cell, cores)
+            each = taken / len(found.pool.postures)
+            least = each if math.isnan(least) else least
+            figure(
+                f"one candidate of {size}, {like}, {cores} processes",
+                each,
+                (f"of {LARGE[0]}", least),
+            )
+            print(
+                f"  {len(found.pool.postures)} candidates of {found.pool.sampled} points;"
+                f" most memory so far {peak_memory() / 1e6:.0f} MB",
+                flush=True,
+            )
+
+
 def main() -> None:
     """Print the report."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--large", action="store_true", help="go on to 100 000 candidates")
-    sizes = LARGE if parser.parse_args().large else SIZES
-    cores = core_count()
+    parser.add_argument("--large", action="store_true", help="up to a million candidates")
+    large, cores = parser.parse_args().large, core_count()
     for like in ("afp", "machining"):
-        report(like, sizes, cores)
+        if large:
+            growth(like, cores)
+        else:
+            report(like, cores)
 
 
 if __name__ == "__main__":

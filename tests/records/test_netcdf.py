@@ -73,6 +73,24 @@ def test_labelled_arrays_come_back_bit_for_bit(tmp_path):
             assert found[name].values.tobytes() == array.values.tobytes()
 
 
+@pytest.mark.parametrize("size", [3, 200_000], ids=["remembered", "read each time"])
+def test_a_file_is_what_it_is_now_whatever_was_read_before(tmp_path, size):
+    path = tmp_path / "a.nc"
+    for value in (1.0, 2.0):
+        write_arrays(path, LabelledArrays({"x": LabelledArray(("n",), np.full(size, value))}))
+        read_arrays(path)["x"].values[:] = 3.0
+        assert read_arrays(path)["x"].values.tolist() == [value] * size
+
+
+def test_what_was_read_before_is_held_against_the_limit_of_now(tmp_path, monkeypatch):
+    zeros = LabelledArray(("n",), np.zeros(300_000), packed=True)
+    write_arrays(tmp_path / "a.nc", LabelledArrays({"x": zeros}))
+    read_arrays(tmp_path / "a.nc")
+    monkeypatch.setenv("ELASTOCAL_MAX_ARRAYS_MB", "1")
+    with pytest.raises(SchemaError, match="ELASTOCAL_MAX_ARRAYS_MB"):
+        read_arrays(tmp_path / "a.nc")
+
+
 def test_others_find_the_same_in_the_file_and_what_they_write_is_read(tmp_path):
     write_arrays(tmp_path / "a.nc", ARRAYS)
     with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as data:

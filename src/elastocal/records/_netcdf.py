@@ -4,11 +4,12 @@ What is written here is what ``xarray.open_dataset`` and any other reader of Net
 data model is theirs, the conventions are CF (https://cfconventions.org).
 """
 
+import copy
 import hashlib
 import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ _CHECKED = {"fletcher32": True}
 """A checksum for each chunk: a byte that a disk has changed is an error, not another number."""
 _MOST_ARRAYS = Limit("ELASTOCAL_MAX_ARRAYS_MB", 256, "MB of numbers")
 _MOST_SECONDS = Limit("ELASTOCAL_MAX_SECONDS", 8, "s of reading")
+_SMALL = 1_000_000
+"""Files of fewer bytes are read once, however often they are asked for, in bytes."""
 _MEMORY_PER_ARRAYS = 4
 """Memory that reading takes, in terms of the numbers that are read."""
 _MEGABYTE = 1_000_000
@@ -125,13 +128,10 @@ def read_arrays(path: Path, schema: str = "", older: Sequence[str] = ()) -> Labe
     FileAccessError
         If the file is missing, unreadable or empty.
     """
-    _check_signature(path)
-    # Imported here, so that no child repeats it.
-    import h5netcdf  # noqa: F401
-
+    source = _source(path)
+    reader = _read_guarded if isinstance(source, Path) else _remembered
     try:
-        memory = _MEMORY_PER_ARRAYS * _MOST_ARRAYS.most
-        found = guarded(partial(_read, Path(path)), _MOST_SECONDS.most, memory)
+        found = reader(source, _MOST_SECONDS.most, _MOST_ARRAYS.most)
     except GuardedError as error:
         raise SchemaError(f"{path}: not a readable NetCDF4 file: {error}") from error
     if isinstance(found, str):
@@ -143,7 +143,8 @@ def read_arrays(path: Path, schema: str = "", older: Sequence[str] = ()) -> Labe
         check_schema(found.attributes.get("schema"), schema, str(path), older)
     if SEAL in found.attributes:
         require_seal(found.attributes[SEAL], arrays_sha256(found), str(path))
-    return found
+    # What is remembered stays as it is.
+    return found if isinstance(source, Path) else copy.deepcopy(found)
 
 
 def arrays_sha256(arrays: LabelledArrays, without: Collection[str] = (SEAL,)) -> str:
@@ -197,22 +198,37 @@ def netcdf_image(arrays: LabelledArrays) -> memoryview:
     return image.getbuffer()
 
 
-def _check_signature(path: Path) -> None:
+def _source(path: Path) -> Path | bytes:
+    """Return the bytes of a small file, the path of a large one."""
     with readable(path), Path(path).open("rb") as file:
-        start = file.read(len(_SIGNATURE))
-    if not start:
+        image = file.read(_SMALL)
+    if not image:
         raise FileAccessError(f"cannot read {path}: the file is empty")
-    if start != _SIGNATURE:
+    if not image.startswith(_SIGNATURE):
         raise SchemaError(f"{path}: not a NetCDF4 file: it does not begin with the HDF5 signature")
+    return image if len(image) < _SMALL else Path(path)
 
 
-def _read(path: Path) -> LabelledArrays | str:
+def _read_guarded(source: Path | bytes, seconds: int, megabytes: int) -> LabelledArrays | str:
+    """Read in a child process with bounded time and memory."""
+    # Imported here, so that no child repeats it.
+    import h5netcdf  # noqa: F401
+
+    return guarded(partial(_read, source), seconds, _MEMORY_PER_ARRAYS * megabytes)
+
+
+_remembered = lru_cache(maxsize=16)(_read_guarded)
+"""The same for bytes: a report needs a file's hash and its numbers, and several parts need both."""
+
+
+def _read(source: Path | bytes) -> LabelledArrays | str:
     """Return the contents of a file, or why it cannot be read."""
     import h5netcdf
     import h5py
 
     try:
-        with h5py.File(path, "r") as image:
+        opened = h5py.File.in_memory if isinstance(source, bytes) else h5py.File
+        with opened(source) as image:
             _require_readable(image)
             # HDF5 without dimension scales gets made-up ones; the validation names what lacks.
             with h5netcdf.File(image, "r", decode_vlen_strings=True, phony_dims="sort") as file:

@@ -4,11 +4,12 @@ Unknown keys are refused with the nearest known one; a problem is reported by it
 file, for example ``springs.2.axis``.
 """
 
+import copy
 import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin
@@ -142,14 +143,20 @@ def parse_yaml(text: str, path: Path) -> Any:
     """Return the data of a YAML text; the path is for messages. See `read_yaml_data`."""
     _MOST_YAML.require(len(text) / _KILOBYTE, f"{path} has {len(text) / _KILOBYTE:.0f} kB, which")
     try:
-        # The loader is PyYAML's safe one with duplicate keys refused.
-        data = yaml.load(text, _UniqueKeyLoader)
-        require_shallow(data, "it")
-        require_whole_letters(text, data, "it")
+        return copy.deepcopy(_loaded(text))
     except SchemaError as error:
         raise SchemaError(f"{path}: {error}") from error
     except (*_PARSER_ERRORS, yaml.YAMLError) as error:
         raise SchemaError(f"{path} is not valid YAML: {parser_reason(error)}") from error
+
+
+@lru_cache(maxsize=8)
+def _loaded(text: str) -> Any:
+    """Return the data of a text: a command reads the same cell more than once."""
+    # The loader is PyYAML's safe one with duplicate keys refused.
+    data = yaml.load(text, _UniqueKeyLoader)
+    require_shallow(data, "it")
+    require_whole_letters(text, data, "it")
     return data
 
 
