@@ -1,8 +1,8 @@
 """What reports and ``verify`` make again is made once in a process of the suite, per content.
 
 A hundred tests damage one file each of the same run, and every one derives the run, fits its
-readings and draws its figures again: seconds of work from the same bytes. Keys are the bytes, so
-that whatever a test has changed is made anew.
+readings, searches them for mistakes and draws its figures again: seconds from the same bytes.
+Keys are the bytes, so that whatever a test has changed is made anew.
 """
 
 from collections.abc import Callable
@@ -12,6 +12,8 @@ from typing import Any
 import joblib
 import pytest
 
+from elastocal.codec import splits
+from elastocal.identification import calibration
 from elastocal.procedure import RunFolder
 from elastocal.report.pages import templating
 from elastocal.verdict import chain, gather
@@ -19,11 +21,13 @@ from support.kept import content_hash
 
 
 def remember(patch: pytest.MonkeyPatch) -> None:
-    """Let derivations, fits and figures of reports be remembered until the patch is undone."""
+    """Let derivations, fits, mistakes and figures be remembered until the patch is undone."""
     patch.setattr(chain, "derive_run", _remembered(chain.derive_run, _run_key))
     patch.setattr(
         gather, "reproduce_calibration", _remembered(gather.reproduce_calibration, joblib.hash)
     )
+    for module in (calibration, splits):
+        patch.setattr(module, "find_mistakes", _remembered(module.find_mistakes, joblib.hash))
     patch.setattr(templating, "themed_svg", _remembered(templating.themed_svg, _figure_key))
 
 

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from elastocal.cell.examples import block_mesh
 from elastocal.cell.hardware import RegionEntry
-from elastocal.planning.surface import SurfaceError, sample_blue_noise, sample_uniform
+from elastocal.planning.surface import SurfaceError, sample_blue_noise, sample_uniform, sampling
 from elastocal.planning.surface.mesh import weld
 from elastocal.planning.surface.sampling import _eliminate, _pair_weights, region_share
 from elastocal.planning.surface.surface import build_surface
@@ -45,6 +45,25 @@ def test_blue_noise_keeps_its_points_apart():
     assert nearest.min() > 0.6 * largest
     loose = sample_uniform(surface, 500, np.random.default_rng(6))
     assert cKDTree(loose.position).query(loose.position, k=2)[0][:, 1].min() < 0.2 * largest
+
+
+def test_tiles_keep_the_points_apart_but_for_some_at_their_seams(monkeypatch):
+    surface = cap(n=31)
+    largest = 2 * np.sqrt(surface.area / (2 * np.sqrt(3) * 3001))
+
+    def near(points):
+        nearest = cKDTree(points.position).query(points.position, k=2)[0][:, 1]
+        return np.mean(nearest < 0.6 * largest)
+
+    whole = sample_blue_noise(surface, 3001, np.random.default_rng(6))
+    monkeypatch.setattr(sampling, "_LARGEST", 4000)
+    points = sample_blue_noise(surface, 3001, np.random.default_rng(6))
+    assert len(np.unique(points.position, axis=0)) == 3001
+    assert near(whole) == 0.0
+    assert 0.0 < near(points) < 0.05 < near(sample_uniform(surface, 3001, np.random.default_rng(6)))
+    # No part of the surface has more of them than its area's share.
+    side = np.mean(points.position[:, 0] > np.median(whole.position[:, 0]))
+    assert side == pytest.approx(0.5, abs=0.01)
 
 
 def test_elimination_in_rounds_removes_what_the_heap_removes():

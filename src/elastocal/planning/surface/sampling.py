@@ -1,6 +1,7 @@
 """Points spread over a surface: area-uniform, or as blue noise."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.random import Generator
@@ -15,6 +16,8 @@ _PROBE = 20_000
 """Points that are thrown at the surface to find out how much of it the region holds."""
 _OVERSAMPLING = 5
 """Points to eliminate from, per point kept: Yuksel's recommendation."""
+_LARGEST = 250_000
+"""Most points that are eliminated from at once: some 400 MB. More are cut into tiles."""
 _ALPHA, _BETA, _GAMMA = 8.0, 0.65, 1.5
 """Yuksel's constants: steepness of the weight, and the floor that keeps it from clustering."""
 
@@ -56,12 +59,33 @@ def sample_uniform(surface: Surface, count: int, rng: Generator) -> SurfacePoint
 def sample_blue_noise(surface: Surface, count: int, rng: Generator) -> SurfacePoints:
     """Return random points that keep a distance from one another.
 
-    Weighted sample elimination over five times as many uniform points; see
-    `_eliminate`. Parameters and errors: see `sample_uniform`.
+    Weighted sample elimination over five times as many uniform points; see `_eliminate`. Beyond
+    50 000 points in tiles, so that memory is bounded: points on either side of a seam may be
+    nearer to each other. Parameters and errors: see `sample_uniform`.
     """
     pool = sample_uniform(surface, _OVERSAMPLING * count, rng)
     area = surface.area if surface.region is None else surface.area * region_share(surface, rng)
-    return pool.take(_eliminate(pool.position, pool.normal, count, area))
+    position, normal, kept = pool.position, pool.normal, []
+    for tile, share in _tiles(position, np.arange(len(position)), count):
+        part = area * len(tile) / len(position)
+        kept.append(tile[_eliminate(position[tile], normal[tile], share, part)])
+    return pool.take(np.sort(np.concatenate(kept)))
+
+
+def _tiles(position: FloatArray, index: IndexArray, count: int) -> Iterator[tuple[IndexArray, int]]:
+    """Yield the points of each tile, ascending, and how many of them are to be kept.
+
+    What has too many points is halved across its longest side.
+    """
+    if len(index) <= _LARGEST:
+        yield index, count
+        return
+    inside = position[index]
+    order = np.argsort(inside[:, np.ptp(inside, axis=0).argmax()], kind="stable")
+    half = len(index) // 2
+    kept = count * half // len(index)
+    for part, share in ((order[:half], kept), (order[half:], count - kept)):
+        yield from _tiles(position, np.sort(index[part]), share)
 
 
 def region_share(surface: Surface, rng: Generator) -> float:
