@@ -8,7 +8,6 @@ prints time and memory a candidate: up to an hour.
 """
 
 import argparse
-import math
 import os
 import statistics
 import tempfile
@@ -112,18 +111,14 @@ def peak_memory() -> float:
 def growth(like: str, cores: int) -> None:
     """Print time and memory a candidate of ever larger pools of one example cell."""
     print(f"{like}: valid candidates with all checks, {cores} processes")
-    least = math.nan
+    each: list[float] = []
     with tempfile.TemporaryDirectory() as name:
         for size in LARGE:
             cell = example(Path(name), like, size)
             taken, found = timed(made, cell, cores)
-            each = taken / len(found.pool.postures)
-            least = each if math.isnan(least) else least
-            figure(
-                f"one candidate of {size}, {like}, {cores} processes",
-                each,
-                (f"of {LARGE[0]}", least),
-            )
+            each.append(taken / len(found.pool.postures))
+            which = f"one candidate of {size}, {like}, {cores} processes"
+            figure(which, each[-1], (f"of {LARGE[0]}", each[0]))
             print(
                 f"  {len(found.pool.postures)} candidates of {found.pool.sampled} points;"
                 f" most memory so far {peak_memory() / 1e6:.0f} MB",

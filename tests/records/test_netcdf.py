@@ -16,6 +16,7 @@ from elastocal.records import (
     LabelledArray,
     LabelledArrays,
     Variable,
+    _netcdf,
     read_arrays,
     read_netcdf,
     record,
@@ -80,6 +81,16 @@ def test_a_file_is_what_it_is_now_whatever_was_read_before(tmp_path, size):
         write_arrays(path, LabelledArrays({"x": LabelledArray(("n",), np.full(size, value))}))
         read_arrays(path)["x"].values[:] = 3.0
         assert read_arrays(path)["x"].values.tolist() == [value] * size
+
+
+def test_a_small_file_that_holds_many_numbers_is_not_kept_in_memory(tmp_path):
+    _netcdf._remembered.cache_clear()
+    for name, size in (("small", 10), ("large", 2_000_000)):
+        zeros = LabelledArray(("n",), np.zeros(size), packed=True)
+        write_arrays(tmp_path / name, LabelledArrays({"x": zeros}))
+        assert (tmp_path / name).stat().st_size < 100_000
+        assert len(read_arrays(tmp_path / name)["x"].values) == size
+        assert _netcdf._remembered.cache_info().currsize == (1 if name == "small" else 0)
 
 
 def test_what_was_read_before_is_held_against_the_limit_of_now(tmp_path, monkeypatch):

@@ -26,8 +26,9 @@ def remember(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(
         gather, "reproduce_calibration", _remembered(gather.reproduce_calibration, joblib.hash)
     )
+    find_mistakes = _remembered(calibration.find_mistakes, joblib.hash)
     for module in (calibration, splits):
-        patch.setattr(module, "find_mistakes", _remembered(module.find_mistakes, joblib.hash))
+        patch.setattr(module, "find_mistakes", find_mistakes)
     patch.setattr(templating, "themed_svg", _remembered(templating.themed_svg, _figure_key))
 
 

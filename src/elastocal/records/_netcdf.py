@@ -30,6 +30,8 @@ _MOST_ARRAYS = Limit("ELASTOCAL_MAX_ARRAYS_MB", 256, "MB of numbers")
 _MOST_SECONDS = Limit("ELASTOCAL_MAX_SECONDS", 8, "s of reading")
 _SMALL = 1_000_000
 """Files of fewer bytes are read once, however often they are asked for, in bytes."""
+_MOST_REMEMBERED = 10_000_000
+"""Numbers that a remembered file may hold, in bytes: a small file may be a packed large one."""
 _MEMORY_PER_ARRAYS = 4
 """Memory that reading takes, in terms of the numbers that are read."""
 _MEGABYTE = 1_000_000
@@ -143,8 +145,13 @@ def read_arrays(path: Path, schema: str = "", older: Sequence[str] = ()) -> Labe
         check_schema(found.attributes.get("schema"), schema, str(path), older)
     if SEAL in found.attributes:
         require_seal(found.attributes[SEAL], arrays_sha256(found), str(path))
+    if isinstance(source, Path):
+        return found
+    if sum(array.values.nbytes for array in found.variables.values()) > _MOST_REMEMBERED:
+        _remembered.cache_clear()
+        return found
     # What is remembered stays as it is.
-    return found if isinstance(source, Path) else copy.deepcopy(found)
+    return copy.deepcopy(found)
 
 
 def arrays_sha256(arrays: LabelledArrays, without: Collection[str] = (SEAL,)) -> str:
