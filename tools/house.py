@@ -48,6 +48,11 @@ class Module:
         """The file's syntax."""
         return ast.parse(self.text)
 
+    @cached_property
+    def nodes(self) -> tuple[ast.AST, ...]:
+        """All of the tree: walking it takes longer than any search in it."""
+        return tuple(ast.walk(self.tree))
+
     @property
     def package(self) -> str:
         """The package that the module lives in; a face lives in its own."""
@@ -61,11 +66,11 @@ class Module:
     @cached_property
     def code(self) -> frozenset[int]:
         """Numbers of the lines of code."""
-        return code_lines(self.path, self.tree)
+        return code_lines(self.path, self.nodes)
 
     def imports(self, faces: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
         """Yield what is imported: the name as written, in full, and the module it comes from."""
-        for node in ast.walk(self.tree):
+        for node in self.nodes:
             if isinstance(node, ast.Import):
                 for alias in node.names:
                     yield alias.name, alias.name
@@ -85,14 +90,14 @@ class House:
     bypasses: list[str] = field(default_factory=list)
 
 
-def code_lines(path: Path, tree: ast.Module) -> frozenset[int]:
+def code_lines(path: Path, nodes: Iterable[ast.AST]) -> frozenset[int]:
     """Return the numbers of the lines that hold code: no blank, no comment, no docstring."""
     held: set[int] = set()
     with path.open("rb") as file:
         for token in tokenize.tokenize(file.readline):
             if token.type not in _NO_CODE:
                 held.update(range(token.start[0], token.end[0] + 1))
-    for node in ast.walk(tree):
+    for node in nodes:
         body = getattr(node, "body", ())
         for inner in body if isinstance(body, list) else ():
             value = getattr(inner, "value", None)
@@ -239,7 +244,7 @@ def names_used(module: Module, faces: dict[str, dict[str, str]]) -> Iterator[tup
         for named, alias in _taken(module)
         if f"{named}.{alias.name}".removeprefix(".") in faces
     }
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         # An annotation in quotes names what it needs, too.
         written = node.value if isinstance(node, ast.Constant) else None
         if isinstance(node, ast.Attribute):
@@ -251,7 +256,7 @@ def names_used(module: Module, faces: dict[str, dict[str, str]]) -> Iterator[tup
 
 def _taken(module: Module) -> Iterator[tuple[str, ast.alias]]:
     """Yield each name that a module imports, with what it is imported from, if anything."""
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, ast.Import | ast.ImportFrom):
             named = _absolute(node, module.package) if isinstance(node, ast.ImportFrom) else ""
             yield from ((named, alias) for alias in node.names)
@@ -334,7 +339,7 @@ def own_names(module: Module, modules: dict[str, Module]) -> int:
     return len(
         {
             (_absolute(node, module.package), alias.name)
-            for node in ast.walk(module.tree)
+            for node in module.nodes
             if isinstance(node, ast.ImportFrom)
             and _absolute(node, module.package).partition(".")[0] in modules
             for alias in node.names
@@ -353,7 +358,7 @@ def twins(modules: Iterable[Module]) -> list[str]:
     fields = [
         (f"{module.name}.{node.name}", {b.id for b in node.bases if isinstance(b, ast.Name)}, names)
         for module in modules
-        for node in ast.walk(module.tree)
+        for node in module.nodes
         if isinstance(node, ast.ClassDef) and len(names := _fields(node)) >= _FEW
     ]
     return [
@@ -387,7 +392,7 @@ def functions(module: Module, beyond: int = 0) -> Iterator[tuple[str, int]]:
 
     Those whose bodies have ``beyond`` lines at most, of whatever kind, are left out uncounted.
     """
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first = node.body[0].lineno
             lines = range(first, (node.end_lineno or first) + 1)
@@ -457,7 +462,7 @@ def main() -> None:
     loose = [
         f"{module.path}:{node.lineno}"
         for module in modules
-        for node in ast.walk(module.tree)
+        for node in module.nodes
         if _is_dict_of_any(node)
     ]
     long_functions = [f"{name} ({length})" for name, length in every if length > LONG_FUNCTION]
@@ -465,7 +470,7 @@ def main() -> None:
     comments = sum(
         line.lstrip().startswith("#") for module in modules for line in module.text.splitlines()
     )
-    classes = sum(isinstance(n, ast.ClassDef) for m in modules for n in ast.walk(m.tree))
+    classes = sum(isinstance(n, ast.ClassDef) for m in modules for n in m.nodes)
     rows: list[tuple[str, object]] = [
         ("files", len(modules)),
         ("of them faces", len(modules) - len(rooms)),
