@@ -224,8 +224,9 @@ def test_a_million_rows_stream_in_bounded_memory(folder):
         assert sum(1 for _ in file) == 1_000_001
 
 
-def test_a_program_that_cannot_be_read_is_refused_with_the_way_to_a_corrected_one(folder):
-    (folder / "weld.as").write_text(".PROGRAM weld()\n.END\n")
-    done = elastocal("compensate", folder / "model.json", folder / "weld.as", "--out", "out.as")
+@pytest.mark.parametrize("name", ["weld.as", "weld.pg", "WELD.PG"])
+def test_a_program_that_cannot_be_read_is_refused_with_the_way_to_a_corrected_one(folder, name):
+    (folder / name).write_text(".PROGRAM weld()\n.END\n")
+    done = elastocal("compensate", folder / "model.json", folder / name, "--out", "out.as")
     assert "programs in AS are written, not read (read are .src)" in done.reason
     assert "--program NAME" in done.reason

@@ -156,6 +156,7 @@ def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
         "UR20",
         *rail[1:],
         "none.stl",
+        "",
         str(dome),
         *[""] * 6,
         "80 kg",
@@ -169,6 +170,7 @@ def test_questions_are_asked_again_until_they_are_answered(tmp_path, dome):
     for complaint in (
         "no robot 'UR 2'",
         "none.stl",
+        "nothing is offered here: an answer is needed",
         "unit 'kg' is not a force",
         "must be x, y or z of base",
         "the first end of the travel must be the smaller",

@@ -116,6 +116,7 @@ def test_a_signal_leaves_the_surface_and_can_be_resumed(planned, tmp_path, numbe
     said = process.communicate()[1]
     assert process.returncode == 130, said
     assert "interrupted: " in said
+    assert "the same command with --resume goes on" in said
     assert read_journal(journal)[-1].text.startswith("interrupted, ")
     assert run(planned, out, "--resume", "--yes").code == 0
 
@@ -138,6 +139,7 @@ def test_a_dry_run_lists_the_steps_and_writes_nothing(planned, tmp_path):
     assert not (tmp_path / "dry").exists()
     rehearsed = run(planned, tmp_path / "dry", "--dry-run")
     assert "Nothing was moved." in rehearsed.err
+    assert "written to" not in rehearsed.err
     plan, robot = read_plan(planned.plan), load_cell(planned.cell).robot
     lines = [dict(word.split("=") for word in line.split()) for line in rehearsed.out.splitlines()]
     assert [int(line["pose"]) for line in lines] == [0, 1, 2, 3]

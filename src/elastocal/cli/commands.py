@@ -79,7 +79,7 @@ def _show(given: Given, data: object, shown: "Iterable[Block]", *lines: str) -> 
     screen = output.console()
     output.print_blocks(screen, shown)
     for path in (given.settings.get(name) for name in ("out", "figure")):
-        if path is not None and not given.settings.get("dry_run"):
+        if path is not None and not {**given.settings, **given.here}.get("dry_run"):
             screen.print(f"written to {output.bold(path)}", soft_wrap=True)
     for line in lines:
         screen.print(line, soft_wrap=True)

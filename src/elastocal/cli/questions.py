@@ -78,9 +78,11 @@ def _answer(settings: "NewSettings", name: str) -> str:
     from elastocal.errors import ProcedureError
 
     said = getattr(settings, name)
-    offered = None if name in ("robot", "mesh") else settings.offered(name)
+    offered = said or ("" if name in ("robot", "mesh") else settings.offered(name))
     try:
-        text: str = typer.prompt(_QUESTIONS[name], default=said or offered, err=True)
+        text: str = typer.prompt(
+            _QUESTIONS[name], default=offered, show_default=bool(offered), err=True
+        )
     except (typer.Abort, OSError) as end:
         output.console().print()  # the question has no end of its line
         if isinstance(end, typer.Abort) and not isinstance(end.__context__, EOFError):

@@ -239,7 +239,8 @@ def _require_readable(path: Path) -> None:
     """
     suffix = path.suffix.lower()
     for writer in PROGRAM_WRITERS.values():
-        if suffix in writer.suffixes and not PROGRAM_READERS.keys() & set(writer.suffixes):
+        known = (*writer.suffixes, *writer.other_suffixes)
+        if suffix in known and not PROGRAM_READERS.keys() & set(known):
             raise FileAccessError(
                 f"{path}: programs in {writer.title} are written, not read (read are"
                 f" {', '.join(PROGRAM_READERS)}): give its points as a path (.csv), and"

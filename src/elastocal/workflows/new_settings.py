@@ -191,6 +191,8 @@ class NewSettings:
         ElastocalError
             Which says what is allowed.
         """
+        if not text:
+            raise SchemaError("nothing is offered here: an answer is needed")
         if text == NONE and name in ("force_range", "tracker", "process", "accepted", "rail"):
             return
         if name in ("robot", "flange"):

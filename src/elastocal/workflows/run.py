@@ -204,6 +204,8 @@ class RunResult(Result):
         )
         if found.message:
             yield Paragraph(found.message)
+        if self.end is RunEnd.INTERRUPTED and not self.touches:
+            yield Paragraph("the same command with --resume goes on, when a person has looked")
         yield Facts(
             (
                 *(("line", each.sentence()) for each in found.lines),

@@ -40,6 +40,7 @@ class AsWriter(ProgramWriter):
     language: ClassVar = "as"
     title: ClassVar = "AS"
     suffixes: ClassVar = (".as",)
+    other_suffixes: ClassVar = (".pg",)
     longest_name: ClassVar = 15
     reserved: ClassVar = frozenset(_AS_WORDS.split())
     most_external: ClassVar = 2

@@ -149,6 +149,8 @@ class ProgramWriter(ABC):
     """Name for people."""
     suffixes: ClassVar[tuple[str, ...]]
     """Suffixes of the files of a program, the main one first."""
+    other_suffixes: ClassVar[tuple[str, ...]] = ()
+    """Suffixes that programs in the language have elsewhere."""
     longest_name: ClassVar[int]
     reserved: ClassVar[frozenset[str]]
     """Words in capitals that cannot name a program."""
