@@ -62,6 +62,21 @@ def test_the_days_of_logs_are_those_of_their_dates(tmp_path, unit, times, days):
     assert days_of(LogMap(robot={"model": "UR20"}, logs=(entry,)), [path]) == days
 
 
+def test_without_dates_of_the_joints_those_of_another_log_count(tmp_path):
+    arm, tracker = tmp_path / "arm.csv", tmp_path / "tracker.csv"
+    arm.write_text("t;A1\n0.0;1.0\n0.1;1.0\n")
+    tracker.write_text("t;X;Y;Z\n2026-05-18T09:12:14.320+02:00;1;2;3\n")
+    joints = [{"columns": ["A1"], "unit": "deg"}]
+    markers = [{"columns": ["X", "Y", "Z"], "unit": "mm"}]
+    entries = (
+        {"log": "tracker.csv", "time": {"column": "t"}, "markers": markers},
+        {"log": "arm.csv", "time": {"column": "t", "unit": "s"}, "joints": joints},
+    )
+    logs = tuple(LogEntry.model_validate(each) for each in entries)
+    found = days_of(LogMap(robot={"model": "UR20"}, logs=logs), [arm, tracker])
+    assert found == "2026-05-18"
+
+
 ENTRIES = {
     "arm.csv": {"joints": [{"columns": ["A1"], "unit": "deg"}]},
     "force.csv": {"force": {"columns": ["Fx", "Fy", "Fz"], "unit": "N"}},
