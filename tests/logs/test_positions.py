@@ -76,6 +76,16 @@ def test_every_pose_is_found_without_a_force(campaign, tmp_path):
     assert read.stations == ("tracker",)
 
 
+def test_a_tool_that_the_table_does_not_hold_is_told(campaign, tmp_path):
+    folder, _ = campaign
+    path = folder / "with_tool.yaml"
+    tool = 'tool: {mass: "8 kg", centre_of_mass: ["0 mm", "0 mm", "120 mm"]}\nmarker'
+    path.write_text(MAP.replace("marker", tool, 1), encoding="utf-8")
+    (told,) = ec.import_positions(logs(folder), map=path).figures.warnings
+    assert "does not hold the tool of the map (8 kg)" in told
+    assert "payload[kg]" in told
+
+
 def test_motion_is_no_noise_where_most_of_a_log_is_motion():
     # Twenty stops of 1.6 s, moves of 4.4 s between them that begin and end gently.
     time = np.arange(0.0, 120.0, 0.02)
