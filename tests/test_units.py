@@ -151,3 +151,9 @@ def test_a_number_may_stand_between_spaces_of_any_kind():
 )
 def test_kilograms_force_are_read_as_newtons(unit, dimension, si):
     assert parse_quantity(f"1 {unit}", dimension) == pytest.approx(si)
+
+
+@pytest.mark.parametrize("unit", ["Grad", "grad", "°"])
+def test_degrees_in_german_are_no_radians(unit):
+    with pytest.raises(UnitError, match="did you mean 'deg'"):
+        factor(unit, "angle")

@@ -55,6 +55,8 @@ _FACTORS: dict[str, dict[str, float]] = {
     "acceleration": {"m/s2": 1.0, "m/s^2": 1.0, "m/s²": 1.0},
 }
 
+_MEANT = {"grad": "deg", "°": "deg", "degrés": "deg"}
+"""Other languages' words whose nearest unit is another one."""
 SHOWN = {
     "mm": 1e3, "µm": 1e6, "mm/s": 1e3, "ms": 1e3, "mrad": 1e3, "N/mm": 1e-3, "N/µm": 1e-6,
     "deg": 180.0 / math.pi, "°": 180.0 / math.pi,
@@ -116,7 +118,7 @@ def factor(unit: str, dimension: str) -> float:
     if unit not in table:
         raise UnitError(
             f"unit {unit!r} is not {_a(dimension)}: allowed are {', '.join(table)}"
-            f"{nearest(unit, table)}"
+            f"{nearest(_MEANT.get(unit.lower(), unit), table)}"
         )
     return table[unit]
 

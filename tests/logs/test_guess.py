@@ -25,6 +25,8 @@ MAKERS = {
     "hyundai": ("S(deg);H(deg);V(deg);R2(deg);B(deg);R1(deg)", "deg"),
     "abb": ("rax_1;rax_2;rax_3;rax_4;rax_5;rax_6", "deg"),
     "fanuc": ("J1 (deg);J2 (deg);J3 (deg);J4 (deg);J5 (deg);J6 (deg)", "deg"),
+    "in German": (";".join(f"J{n} [Grad]" for n in range(1, 7)), "deg"),
+    "in French": (";".join(f"J{n} [degrés]" for n in range(1, 7)), "deg"),
     "kawasaki": ("JT1;JT2;JT3;JT4;JT5;JT6", "deg"),
     "staubli": ("jnt1[rad];jnt2[rad];jnt3[rad];jnt4[rad];jnt5[rad];jnt6[rad]", "rad"),
     "denso": ("J1 position;J2 position;J3 position;J4 position;J5 position;J6 position", "deg"),

@@ -237,6 +237,8 @@ def _write_with_words(rows, windows, folder):
         ("unit: kN", "unit: '?'", "the unit is still to be written"),
         ("log: force.csv", "log: forces.csv", "'forces.csv' of the map is none of the files"),
         ("[A1, A2,", "[A2, A1,", "the logged tool frame lies|far outside its limits"),
+        ("A4, A5, A6]", "A4, A6, A5]", "with joint_a5 and joint_a6 exchanged they agree"),
+        ("A6], unit: deg", "A6], unit: deg, signs: [1, 1, 1, -1, 1, 1]", "with joint_a4 reversed"),
     ],
 )
 def test_a_map_that_is_wrong_is_refused_by_name(rows, tmp_path, wrong, right, message):

@@ -1,6 +1,7 @@
 """Logs of arm and tracker become positions for `geometry`, with a force in them or without."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import elastocal as ec
 from elastocal.errors import FileAccessError, LogError
 from elastocal.geometry import read_positions
+from elastocal.logs.plateaus import averaged_part, standing_spans
 from support import reported
 from support.cli import elastocal
 from support.foreign_logs import rows_of, write_logs, write_map
@@ -72,6 +74,37 @@ def test_every_pose_is_found_without_a_force(campaign, tmp_path):
     read = read_positions(out, measured.robot)
     assert np.allclose(read.markers, found.found.markers, rtol=0.0, atol=1e-8)
     assert read.stations == ("tracker",)
+
+
+def test_a_tool_that_the_table_does_not_hold_is_told(campaign, tmp_path):
+    folder, _ = campaign
+    path = folder / "with_tool.yaml"
+    tool = 'tool: {mass: "8 kg", centre_of_mass: ["0 mm", "0 mm", "120 mm"]}\nmarker'
+    path.write_text(MAP.replace("marker", tool, 1), encoding="utf-8")
+    (told,) = ec.import_positions(logs(folder), map=path).figures.warnings
+    assert "does not hold the tool of the map (8 kg)" in told
+    assert "payload[kg]" in told
+
+
+def test_motion_is_no_noise_where_most_of_a_log_is_motion():
+    # Twenty stops of 1.6 s, moves of 4.4 s between them that begin and end gently.
+    time = np.arange(0.0, 120.0, 0.02)
+    stop, since = np.divmod(time, 6.0)
+    part = np.clip((since - 1.6) / 4.4, 0.0, 1.0)
+    T = np.tile(np.eye(4), (len(time), 1, 1))
+    T[:, 0, 3] = 0.5 * (stop + part**3 * (10.0 - 15.0 * part + 6.0 * part**2))
+    position = T[:, :3, 3] + np.random.default_rng(2).normal(0.0, 1e-5, (len(time), 3))
+    streams = SimpleNamespace(
+        arm=SimpleNamespace(time=time, T_base_tcp=T),
+        wrench=SimpleNamespace(time=np.empty(0), ok=np.empty(0, bool), force=np.empty((0, 3))),
+        points=SimpleNamespace(time=time, position=position),
+    )
+    spans = [averaged_part(*span) for span in standing_spans(streams, np.zeros(3))]
+    assert len(spans) == 20
+    ends = np.array(spans)
+    assert (np.abs(ends[:, 0] - np.arange(20) * 6.0 - 0.8) < 0.8).all()
+    moved = [np.ptp(T[(time >= a) & (time <= b), 0, 3]) for a, b in spans]
+    assert max(moved) < 5e-5
 
 
 def test_geometry_is_calibrated_from_them(campaign, tmp_path):

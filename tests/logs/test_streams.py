@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.errors import LogError
 from elastocal.logs import ClockFit, days_of
 from elastocal.logs.map import LogEntry, LogMap
+from elastocal.logs.merge import _set_clocks
 from elastocal.logs.streams import body_centre
 
 SHAPE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.15, 0.0], [0.02, 0.03, 0.12]])
@@ -60,6 +61,32 @@ def test_the_days_of_logs_are_those_of_their_dates(tmp_path, unit, times, days):
     }
     entry = LogEntry.model_validate(entry)
     assert days_of(LogMap(robot={"model": "UR20"}, logs=(entry,)), [path]) == days
+
+
+def test_without_dates_of_the_joints_those_of_another_log_count(tmp_path):
+    arm, tracker = tmp_path / "arm.csv", tmp_path / "tracker.csv"
+    arm.write_text("t;A1\n0.0;1.0\n0.1;1.0\n")
+    tracker.write_text("t;X;Y;Z\n2026-05-18T09:12:14.320+02:00;1;2;3\n")
+    joints = [{"columns": ["A1"], "unit": "deg"}]
+    markers = [{"columns": ["X", "Y", "Z"], "unit": "mm"}]
+    entries = (
+        {"log": "tracker.csv", "time": {"column": "t"}, "markers": markers},
+        {"log": "arm.csv", "time": {"column": "t", "unit": "s"}, "joints": joints},
+    )
+    logs = tuple(LogEntry.model_validate(each) for each in entries)
+    found = days_of(LogMap(robot={"model": "UR20"}, logs=logs), [arm, tracker])
+    assert found == "2026-05-18"
+
+
+@pytest.mark.parametrize(
+    ("drift", "sigma", "told"),
+    [(-938e-6, 142e-6, 1), (-40e-6, 3e-6, 0), (2e-3, 4e-6, 0), (600e-6, 500e-6, 0)],
+)
+def test_a_clock_that_was_set_during_the_work_is_told(drift, sigma, told):
+    fit = ClockFit("force.txt", "arm.csv", -3.7, 0.05, drift, sigma, 0.72, 3.7)
+    doubts = list(_set_clocks([fit]))
+    assert len(doubts) == told
+    assert all("force.txt drifts by -938 ppm, and not evenly" in each for each in doubts)
 
 
 ENTRIES = {

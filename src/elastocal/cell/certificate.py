@@ -75,8 +75,9 @@ class CertificateEntry(StrictModel):
 
 
 ASKED = (
-    "number", "operator", "place", "temperature", "robot.serial", "controller.serial",
-    "tool.serial", "sensor.serial", "sensor.certificate", "tracker.serial", "tracker.certificate",
+    "number", "operator", "place", "temperature", "robot.serial", "controller.type",
+    "controller.serial", "tool.type", "tool.serial", "sensor.type", "sensor.serial",
+    "sensor.certificate", "tracker.type", "tracker.serial", "tracker.certificate",
 )  # fmt: skip
 """Entries that are asked for before a run if neither cell file nor options state them."""
 

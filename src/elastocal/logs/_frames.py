@@ -5,6 +5,9 @@ weight in the sensor changes with the arm's orientation, which shows the sensor'
 flange.
 """
 
+from collections.abc import Callable
+from itertools import combinations
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -15,12 +18,15 @@ from elastocal.logs.map import LogEntry, MarkerColumns, Site, ToolPose, Vector
 from elastocal.logs.table import LogTable
 from elastocal.robot import Robot, nearest_rotation, xyzabc_from_T
 from elastocal.units import factor, largest
+from elastocal.wording import listed
 
 _LARGEST_GAP = (20e-3, np.radians(2.0))
 """Distance in m and angle in rad of the logged tool frame from that of the logged joints: an arm
 that is not calibrated is off by some millimetres, another frame by more."""
 _PARTS = 10
 """Parts of a log, each of which must agree, since a column may freeze midway."""
+_ROWS_TRIED = 200
+"""Rows by which joints are tried that are reversed or exchanged."""
 ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
 _WRONG_UNIT = 1e3
 """Factor by which a number may exceed the sizes in a cell; up to it, the unit is questioned by the
@@ -93,11 +99,54 @@ def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) 
         relative = np.swapaxes(R_joints, 1, 2) @ T[whole, :3, :3]
         turn[whole] = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
     both = known & np.isfinite(gap) & np.isfinite(turn)
-    _require_near(table, gap[both], turn[both])
+    turned = stated.shape[1] > 0
+    some = np.flatnonzero(both)[:: max(int(both.sum()) // _ROWS_TRIED, 1)]
+    _require_near(
+        table, gap[both], turn[both], lambda: _joints_that_agree(robot, q[some], T[some], turned)
+    )
     return T
 
 
-def _require_near(table: LogTable, gap: FloatArray, turn: FloatArray) -> None:
+def _joints_that_agree(robot: Robot, q: FloatArray, T: FloatArray, turned: bool) -> str:
+    """Return with which joints reversed or exchanged tool frames agree; else an empty string.
+
+    Parameters
+    ----------
+    robot : Robot
+        With the tcp that the frames are of.
+    q : ndarray, shape (row, joint)
+        Logged joints, in rad or m.
+    T : ndarray, shape (row, 4, 4)
+        Logged tool frames, in base.
+    turned : bool
+        Whether the log states their orientation.
+    """
+    names, joints = robot.joint_names, np.flatnonzero(robot.revolute).tolist()
+    for some in (each for n in range(1, len(joints) + 1) for each in combinations(joints, n)):
+        reversed_q = q.copy()
+        reversed_q[:, some] *= -1.0
+        if _agree(robot.forward(reversed_q), T, turned):
+            return f"with {listed([names[j] for j in some])} reversed (signs: -1) they agree"
+    for first, second in combinations(joints, 2):
+        exchanged = q.copy()
+        exchanged[:, [first, second]] = q[:, [second, first]]
+        if _agree(robot.forward(exchanged), T, turned):
+            return f"with {names[first]} and {names[second]} exchanged they agree"
+    return ""
+
+
+def _agree(here: FloatArray, there: FloatArray, turned: bool) -> bool:
+    """Return whether tool frames are as near as those of an arm that is not calibrated."""
+    if not np.median(np.linalg.norm(here[:, :3, 3] - there[:, :3, 3], axis=1)) <= _LARGEST_GAP[0]:
+        return False
+    relative = np.swapaxes(here[:, :3, :3], 1, 2) @ there[:, :3, :3]
+    turn = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
+    return not turned or bool(np.median(turn) <= _LARGEST_GAP[1])
+
+
+def _require_near(
+    table: LogTable, gap: FloatArray, turn: FloatArray, remedy: Callable[[], str]
+) -> None:
     """Refuse tool frames that are too far from those of the joints in any part of a log.
 
     Raises
@@ -117,11 +166,14 @@ def _require_near(table: LogTable, gap: FloatArray, turn: FloatArray) -> None:
         return
     worst = 0 if max(far[0]) > 1.0 else int(np.argmax([max(each) for each in far]))
     where = "median" if worst == 0 else f"median from row {parts[worst - 1][0] + 1} on"
+    why = (
+        "its tool, its base, or a joint's sign is another; without `pose` in the map the joints"
+        " alone count"
+    )
     raise LogError(
         f"{table.name}: the logged tool frame lies {1e3 * far[worst][0] * _LARGEST_GAP[0]:.4g} mm"
         f" and {np.degrees(far[worst][1] * _LARGEST_GAP[1]):.3g} deg ({where}) from the tcp of the"
-        " logged joints: its tool, its base, or a joint's sign is another; without `pose` in the"
-        " map the joints alone count"
+        f" logged joints: {remedy() or why}"
     )
 
 

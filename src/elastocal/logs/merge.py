@@ -68,6 +68,10 @@ from elastocal.robot import Robot
 from elastocal.wording import counted, listed
 
 _T = TypeVar("_T")
+_MOST_DRIFT = 400e-6
+"""Drift of a clock that no quartz has: a PC's is off by a tenth of it."""
+_EVEN, _KNOWN = 0.05, 1.0 / 3.0
+"""Sigma of a drift over the drift: up to the first it is even, up to the second it is there."""
 _STILL = 0.25
 """Part of a log in which a column must be constant to be named."""
 _MOVES = np.radians(2.0)
@@ -103,12 +107,25 @@ def stream_doubts(
         Robot, sensor and marker.
     """
     reference = next(log for log in logs if log.arm is not None)
+    yield from _set_clocks(clocks)
     for log in logs:
         if log.arm is None and log.entry.time is not None:
             yield from _interruption(log, reference)
             yield from _other_run(log, reference, clocks)
         if log.wrench is not None and log is not reference and log.clock == reference.clock:
             yield from _other_clock(log, reference, site)
+
+
+def _set_clocks(clocks: Sequence[ClockFit]) -> Iterator[str]:
+    """Yield clocks that drift as no clock does, and are not known to do so evenly."""
+    for clock in clocks:
+        sigma, drift = clock.drift_sigma or 0.0, abs(clock.drift)
+        if drift > _MOST_DRIFT and _EVEN * drift < sigma < _KNOWN * drift:
+            yield (
+                f"the clock of {clock.clock} drifts by {1e6 * clock.drift:+.0f} ppm, and not evenly"
+                f" (± {2e6 * sigma:.0f} ppm): was it set during the work? Readings may be averaged"
+                f" {2e3 * (clock.offset_sigma or 0.0):.0f} ms off"
+            )
 
 
 def still_columns(logs: Sequence[LogStreams], robot: Robot) -> Iterator[str]:

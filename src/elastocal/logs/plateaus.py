@@ -36,6 +36,9 @@ _STILL_FORCE = 0.01
 """The same of the force, as a share of the largest change in the log."""
 _SIGMAS = 4.0
 """Noise of the averages that is no change."""
+_CALM = 0.25
+"""Share of the times, those with the least change, at which noise is looked for: most of a log may
+be motion, whose steps are no noise."""
 _ONE_PLACE = 15e-3
 """Largest distance of the tool between two plateaus of one pose, in m."""
 _ONE_TURN = np.radians(2.0)
@@ -144,11 +147,23 @@ def _still(grid: FloatArray, time: FloatArray, values: FloatArray, tolerance: fl
         first = (total[inside[1]] - total[inside[0]]) / before[:, None]
         second = (total[inside[2]] - total[inside[1]]) / after[:, None]
         change = np.linalg.norm(second - first, axis=1)
-        noise = np.median(np.abs(np.diff(values, axis=0)), axis=0) / 0.954
+        noise = np.median(_calm_steps(grid, time, values, change), axis=0) / 0.954
         sigma = np.linalg.norm(noise) * np.sqrt(1.0 / before + 1.0 / after)
         return np.asarray(
             (before > 0) & (after > 0) & (change <= np.maximum(tolerance, _SIGMAS * sigma))
         )
+
+
+def _calm_steps(
+    grid: FloatArray, time: FloatArray, values: FloatArray, change: FloatArray
+) -> FloatArray:
+    """Return the steps from sample to sample at the calmest times, shape (step, axis)."""
+    least = np.nanquantile(change, _CALM) if np.isfinite(change).any() else np.inf
+    calm = change <= least
+    steps = np.abs(np.diff(values, axis=0))
+    nearest = np.clip(np.searchsorted(grid, time[1:]), 0, len(grid) - 1)
+    chosen: FloatArray = steps[calm[nearest]]
+    return chosen if len(chosen) else steps
 
 
 def name_loads(

@@ -147,8 +147,19 @@ def import_positions(
         pose=np.array(pose),
         clocks=clocks,
         plateaus=len(at_rest.bare),
-        warnings=(*still, *astray, *stream_doubts(logs, clocks, site)),
+        warnings=(*still, *astray, *stream_doubts(logs, clocks, site), *_left_out(log_map)),
     )
+
+
+def _left_out(log_map: LogMap) -> Iterator[str]:
+    """Yield what the map says and the table does not: a tool that the URDF may lack."""
+    mass = 0.0 if log_map.tool is None else log_map.tool.mass
+    if mass > 0.0:
+        yield (
+            f"the table does not hold the tool of the map ({mass:.4g} kg): if the URDF for"
+            " `geometry` lacks it, add payload[kg], payload_x[mm], payload_y[mm] and payload_z[mm]"
+            " (its centre in the tcp), or compliances come out too large"
+        )
 
 
 def _rows(

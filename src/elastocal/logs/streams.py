@@ -193,19 +193,26 @@ def _time(entry: LogEntry, table: LogTable) -> FloatArray:
 
 
 def days_of(log_map: LogMap, files: Sequence[Path]) -> str | None:
-    """Return the day on which the joints were logged, of several the first and the last.
+    """Return the day on which logs were taken, of several the first and the last.
 
-    As ISO 8601 has it, ``2026-11-27`` or ``2026-11-27/2026-11-28``, by the clock of the log. None
-    where its times are no dates.
+    As ISO 8601 has it, ``2026-11-27`` or ``2026-11-27/2026-11-28``, by the clock of the joints if
+    it has dates, else by that of the first log that has. None where none has.
 
     Raises
     ------
     LogError
-        If the log of the joints cannot be read as the map says.
+        If a log cannot be read as the map says.
     FileAccessError
         If a file cannot be read.
     """
-    entry = next(each for each in log_map.logs if each.joints)
+    entries = sorted(log_map.logs, key=lambda each: not each.joints)
+    return next((days for each in entries if (days := _days(each, files)) is not None), None)
+
+
+def _days(entry: LogEntry, files: Sequence[Path]) -> str | None:
+    """Return the days of one log, as `days_of` has them."""
+    if entry.time is None:
+        return None
     own = [path for path in files if _is_named(path, entry.log)]
     times = [_time(entry, read_table(path, entry.topic)) for path in own]
     seconds = [float(each) for time in times if len(time) for each in (time.min(), time.max())]

@@ -1,7 +1,9 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.recertification.comparison import _load_note, _notes_on
 from support.recertified import made_up
 
@@ -24,6 +26,24 @@ def test_without_one_plan_the_poses_may_differ(old):
 
 def test_two_calibrations_of_one_dataset_are_not_independent():
     assert "are not independent" in notes("a.nc", "a.nc")
+
+
+def test_two_campaigns_whose_files_have_equal_names_are_independent():
+    old, new = (replace(made_up(seed), provenance="data.nc; import") for seed in (0, 1))
+    domain = CalibrationDomain(
+        joint_position=np.zeros((1, 6)),
+        force=np.array([[1.25, 2.5, -900.125]]),
+        moment=None,
+        torque_low=np.zeros(6),
+        torque_high=np.ones(6),
+        reading_pose=np.zeros(1, int),
+    )
+    again = replace(domain, force=domain.force + 0.0625)
+    old, part = replace(old, domain=domain), replace(new, domain=domain)
+    assert "are not independent" in "; ".join(_notes_on(old, part, True, 0))
+    assert "are not independent" not in "; ".join(
+        _notes_on(old, replace(new, domain=again), True, 0)
+    )
 
 
 def test_other_springs_and_rows_beyond_the_limits_are_told():

@@ -467,6 +467,13 @@ def _what_decides(deflection: RowComparison, limit: float) -> str:
     )
 
 
+def _other_readings(old: CalibratedModel, new: CalibratedModel) -> bool:
+    """Return whether no force is of both: two campaigns whose files have equal names."""
+    if old.domain is None or new.domain is None:
+        return False
+    return not np.isin(new.domain.force, old.domain.force).any()
+
+
 def _notes_on(
     old: CalibratedModel,
     new: CalibratedModel,
@@ -494,7 +501,7 @@ def _notes_on(
             " model, so the springs do not tell whether the robot changed; predictions do, as far"
             " as both models can express the arm"
         )
-    if old.provenance and old.provenance == new.provenance:
+    if old.provenance and old.provenance == new.provenance and not _other_readings(old, new):
         notes.append(
             f"both models state the same origin ({old.provenance}): calibrations of one set of"
             " readings are not independent, and the intervals do not hold for them"
