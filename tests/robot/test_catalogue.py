@@ -321,3 +321,11 @@ class TestTable:
         with pytest.raises(SchemaError, match=message) as refusal:
             read(data)
         assert str(refusal.value).startswith("t.yaml: ")
+
+
+def test_a_robot_is_read_from_a_file_that_is_named_by_a_text(tmp_path):
+    from elastocal.robot import Robot, catalogue
+
+    file = tmp_path / "robot.urdf"
+    file.write_text(catalogue.urdf("KR 120 R2700 extra HA"), encoding="utf-8")
+    assert Robot.from_file(str(file), "flange").tip == "flange"

@@ -139,8 +139,9 @@ class Robot:
         return cls(robot_name(root), text, chain, assumptions(root, chain), meshes)
 
     @classmethod
-    def from_file(cls, path: Path, tip: str, base: str | None = None) -> "Robot":
+    def from_file(cls, path: Path | str, tip: str, base: str | None = None) -> "Robot":
         """Return the robot that a URDF file describes; see `from_urdf`."""
+        path = Path(path)
         text = read_urdf(path)
         with refusals_naming(path):
             return cls.from_urdf(text, tip, base)
