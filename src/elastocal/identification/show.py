@@ -185,10 +185,20 @@ def spring_table(springs: Sequence[SpringSummary]) -> Table:
     for spring in springs:
         # The total of a gear at its torque follows its first row, without repeating the name.
         further = bool(above) and spring.name.startswith(f"{above} ")
-        name = f" {spring.name.removeprefix(above)}" if further else spring.name
+        name = phrase("  {name}", name=_further(spring.name, above)) if further else spring.name
         above = above if further else spring.name
         rows.append((name, *_spring_cells(spring)))
     return Table(phrase("Compliances"), heads, tuple(rows))
+
+
+def _further(name: str, above: str) -> str:
+    """Return the name of a further row of a gear without that of the gear."""
+    made = name.template if isinstance(name, Phrase) else ""
+    if made == "{spring} lost motion":
+        return phrase("lost motion")
+    if made == "{spring} at {torque} N·m":
+        return phrase("at {torque} N·m", torque=name.parts["torque"])
+    return name.removeprefix(f"{above} ")
 
 
 def _spring_cells(spring: SpringSummary) -> tuple[Cell, ...]:
