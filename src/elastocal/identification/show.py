@@ -193,10 +193,9 @@ def spring_table(springs: Sequence[SpringSummary]) -> Table:
 
 def _further(name: str, above: str) -> str:
     """Return the name of a further row of a gear without that of the gear."""
-    made = name.template if isinstance(name, Phrase) else ""
-    if made == "{spring} lost motion":
+    if isinstance(name, Phrase) and name.template == "{spring} lost motion":
         return phrase("lost motion")
-    if made == "{spring} at {torque} N·m":
+    if isinstance(name, Phrase) and name.template == "{spring} at {torque} N·m":
         return phrase("at {torque} N·m", torque=name.parts["torque"])
     return name.removeprefix(f"{above} ")
 
