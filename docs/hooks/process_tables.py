@@ -251,7 +251,7 @@ def short(preset: str) -> str:
             if taken < paper
         ]
         if seeds:
-            found.append(f"* {name}, `{preset}`: {', '.join(below) or 'none'}")
+            found.append(f"* {name}, `{preset}`: {'; '.join(below) or 'none'}")
     return "\n".join(found)
 
 
