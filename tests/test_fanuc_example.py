@@ -15,7 +15,7 @@ PAGE = (ROOT / "docs/how-to/fanuc-example.md").read_text(encoding="utf-8")
 LINES = [
     line
     for block in re.findall(r"^```sh\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
-    for line in block.splitlines()
+    for line in block.replace("\\\n", "").splitlines()
 ]
 QUICK = [line for line in LINES if "codec" not in line and "YOUR_PART" not in line]
 

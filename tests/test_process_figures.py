@@ -88,7 +88,7 @@ def test_touches_before_production_are_held_against_springs_alone_on_the_same_se
     typical = [row for row in rows if row[0] == "typical"]
     assert [row[1] for row in typical] == ["springs alone", "touched"]
     assert [row[-1] for row in typical] == ["5", "5"]
-    alone, touched = (float(row[3].partition("%")[0]) for row in typical)
+    alone, touched = (float(row[3].partition(" ")[0]) for row in typical)
     assert touched > alone
     assert float(typical[1][2]) < 5.0
 
@@ -103,7 +103,7 @@ def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone
     offset = {row[0]: row for row in rows if "offset" in row[1]}
     assert kind != "afp" or "typical" in offset
     for truth, row in offset.items():
-        alone, with_it = (float(cell.partition("%")[0]) for cell in row[5:7])
+        alone, with_it = (float(cell.partition(" ")[0]) for cell in row[5:7])
         # On `kind` there is next to nothing to learn, and a hundredth at most may be spoilt.
         assert with_it > alone - 1.0 if truth == "kind" else with_it > alone + 2.0
 
@@ -113,7 +113,7 @@ def test_no_tracker_is_as_good_as_one_and_encoders_in_production_are_better_in_t
     tables, kind
 ):
     rows = [row.strip("| ").split(" | ") for row in tables.instruments(kind).splitlines()[2:]]
-    taken = {(row[0], row[1]): [float(cell.partition("%")[0]) for cell in row[3:7]] for row in rows}
+    taken = {(row[0], row[1]): [float(cell.partition(" ")[0]) for cell in row[3:7]] for row in rows}
     assert len(taken) == 2 * len(tables.INSTRUMENTS)
     assert {row[-1] for row in rows} == {"5"}
     # The same seeds: what there is to correct is the same by every instrument.

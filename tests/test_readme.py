@@ -411,6 +411,11 @@ def test_code_in_a_table_of_options_is_not_within_code(name):
         assert "`" not in re.sub(r"`[^`\s](?:[^`]*[^`\s])?`(?!\w)", "", row), row
 
 
+def test_a_header_of_a_table_may_be_divided_behind_its_separators():
+    broken = BREAKS("<td><code>Time;S(deg);L(deg);U(deg)</code></td>")
+    assert broken.count(";<wbr>") == 3
+
+
 def test_lines_of_a_page_end_before_no_unit_and_code_keeps_its_characters():
     code = '<code>elastocal calibrate data.nc --free-frame none --limit "0.3 mm" 5%</code>'
     block = "<pre><code>--limit 3 mm</code></pre>"

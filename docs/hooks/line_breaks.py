@@ -18,7 +18,7 @@ _OPTION = re.compile(r"(?<![\w-])--[a-z]+")
 _QUANTITY = re.compile(r"[\d.]+\xa0[^\s\"]+")
 _JOINED = re.compile(r" (?=→)|(?<=\d) (?=\d{3}\b)")
 """Before an arrow, and in a number with groups of digits."""
-_WORD_END = re.compile(r"(?<=\w[_|/+=])(?=\w\w)|(?<=\w\.)(?=\w{5})|(?<=\()(?=\w)")
+_WORD_END = re.compile(r"(?<=\w[_|/+=])(?=\w\w)|(?<=\w\.)(?=\w{5})|(?<=[(;,])(?=\w)")
 """Where a name may be divided, but before no ending of a file."""
 
 

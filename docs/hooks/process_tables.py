@@ -27,16 +27,16 @@ _MARK = re.compile(
     r"<!-- process (table|campaigns|touched|procedures|instruments|summary|short|demos): (\S+) -->"
 )
 _HEAD = ("truth", "springs (taken)", "left-out error, µm", "deviation",
-         "mean, mm", "reduction", "max, mm", "reduction", "seeds")  # fmt: skip
+         "mean, mm", "reduction, %", "max, mm", "reduction, %", "seeds")  # fmt: skip
 _CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out error, µm",
-              "left of the mean, µm", "reduction", "seeds")  # fmt: skip
-_TOUCHED = ("truth", "correction", "minutes before production", "reduction of the mean",
-            "3-D", "at half load", "seeds")  # fmt: skip
+              "left of the mean, µm", "reduction, %", "seeds")  # fmt: skip
+_TOUCHED = ("truth", "correction", "minutes before production", "reduction of the mean, %",
+            "3-D, %", "at half load, %", "seeds")  # fmt: skip
 _PROCEDURES = ("truth", "procedure", "time in the cell, beside springs alone",
-               "mean: springs alone", "with it", "3-D: springs alone", "with it",
-               "half load: springs alone", "with it", "seeds")  # fmt: skip
-_INSTRUMENTS = ("measured by", "springs", "minutes in the cell", "reduction of the mean", "3-D",
-                "at half load", "3-D, at half load", "seeds")  # fmt: skip
+               "mean, %: springs alone", "with it", "3-D, %: springs alone", "with it",
+               "half load, %: springs alone", "with it", "seeds")  # fmt: skip
+_INSTRUMENTS = ("measured by", "springs", "minutes in the cell", "reduction of the mean, %",
+                "3-D, %", "at half load, %", "3-D, at half load, %", "seeds")  # fmt: skip
 INSTRUMENTS = {
     "template": "tracker",
     "no tracker": "no tracker, disk doubled",
@@ -56,7 +56,7 @@ MORE = {
 _README = Path(__file__).parents[2] / "README.md"
 _NAMES = {"afp": "fibre placement", "machining": "roughing"}
 TRUTHS = ("kind", "typical", "harsh")
-_DEMO_HEAD = ("cell", "truth", "mean, mm", "reduction", "max, mm", "reduction", "seeds")
+_DEMO_HEAD = ("cell", "truth", "mean, mm", "reduction, %", "max, mm", "reduction, %", "seeds")
 Figures = dict[str, Any]
 
 
@@ -127,7 +127,7 @@ def campaigns(kind: str) -> str:
             f"`{springs}`", _span(poses, "d"), _span(minutes, ".1f"),
             _mean([1e6 * each["left_out"] for each in seeds], ".0f"),
             _mean([1e6 * each["mean"][1] for each in lateral], ".0f"),
-            _mean([_reduction(each["mean"]) for each in lateral], ".1%"), str(len(seeds)),
+            _percent([_reduction(each["mean"]) for each in lateral]), str(len(seeds)),
         ))  # fmt: skip
     return _markdown(_CAMPAIGNS, rows)
 
@@ -147,7 +147,7 @@ def touched(kind: str) -> str:
             some = [found[seed] for seed in seeds]
             minutes = {each.get("touch_minutes") or 0.0 for each in some}
             cells = [
-                _mean([_reduction(_measure(each, which, load)["mean"]) for each in some], ".1%")
+                _percent([_reduction(_measure(each, which, load)["mean"]) for each in some])
                 for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
             ]
             rows.append((truth, name, _span(minutes, ".1f"), *cells, str(len(some))))
@@ -164,7 +164,7 @@ def procedures(kind: str) -> str:
             pairs = [(alone[seed], found[seed]) for seed in sorted(alone.keys() & found.keys())]
             if pairs:
                 cells = [
-                    _mean([_reduction(_measure(each, which, load)["mean"]) for each in side], ".1%")
+                    _percent([_reduction(_measure(each, which, load)["mean"]) for each in side])
                     for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
                     for side in zip(*pairs, strict=True)
                 ]
@@ -185,7 +185,7 @@ def instruments(kind: str) -> str:
         some = [by_seed[seed] for seed in seeds]
         if some:
             cells = [
-                _mean([_reduction(_measure(each, which, load)["mean"]) for each in some], ".1%")
+                _percent([_reduction(_measure(each, which, load)["mean"]) for each in some])
                 for load in (1.0, 0.5)
                 for which in (0, 1)
             ]
@@ -238,7 +238,7 @@ def summary(preset: str = "typical") -> str:
 
 
 def short(preset: str) -> str:
-    """Return where the correction on a truth takes less of the mean than the paper's does."""
+    """Return a list of where a correction takes less of the mean than the paper's does."""
     found = []
     for kind, name in _NAMES.items():
         seeds = _of(quoted(), kind, preset, campaign="template", springs="auto")
@@ -251,8 +251,8 @@ def short(preset: str) -> str:
             if taken < paper
         ]
         if seeds:
-            found.append(f"{name}: {', '.join(below) or 'none'}")
-    return f"Measures below the paper's reduction of the mean on {preset}: {'; '.join(found)}."
+            found.append(f"* {name}, `{preset}`: {'; '.join(below) or 'none'}")
+    return "\n".join(found)
 
 
 def renew_readme() -> None:
@@ -326,7 +326,7 @@ def _rows(seeds: list[Figures]) -> list[tuple[str, ...]]:
 def _before_and_after(deviations: list[Figures], key: str) -> tuple[str, str]:
     """Return means over seeds before and after correction in mm, and the reduction."""
     before, after = (sum(each[key][k] for each in deviations) / len(deviations) for k in (0, 1))
-    reduction = _mean([_reduction(each[key]) for each in deviations], ".1%")
+    reduction = _percent([_reduction(each[key]) for each in deviations])
     return f"{1e3 * before:.3f} → {1e3 * after:.3f}", reduction
 
 
@@ -337,7 +337,7 @@ def _published(paper: PublishedCase) -> tuple[str, ...]:
         for number in (0, 1)
         for cell in (
             f"{paper.before[number]:.3f} → {paper.after[number]:.3f}",
-            f"{paper.reduction[number]:.2%}",
+            f"{100.0 * paper.reduction[number]:.2f}",
         )
     )
 
@@ -355,6 +355,11 @@ def _deviation(figures: Figures, load: float) -> Figures:
 
 def _reduction(pair: list[float]) -> float:
     return 1.0 - pair[1] / pair[0]
+
+
+def _percent(shares: list[float]) -> str:
+    """Return a mean in per cent, whose sign the heading has."""
+    return _mean([100.0 * share for share in shares], ".1f")
 
 
 def _mean(values: list[float], form: str) -> str:

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 from elastocal.identification import show_unseen, spring_table
 from elastocal.identification.figures import SpringSummary
+from elastocal.report import language_of
+from elastocal.wording import phrase
 
 KNOWN = SpringSummary("joint_1.axial", "hinge", "rad/(N*m)", 4e-7, 3.9e-7, 4.1e-7, True)
 AT_BOUND = SpringSummary(
@@ -24,3 +26,17 @@ def test_a_spring_that_a_bound_decides_is_not_said_to_be_observable():
 def test_a_spring_at_its_bound_is_not_rigid_where_its_interval_says_how_soft_it_may_be():
     rows = spring_table([KNOWN, AT_BOUND, replace(AT_BOUND, high=0.0)]).rows
     assert [row[3] for row in rows] == ["2.500", "above 0.505", "rigid"]
+
+
+def test_further_rows_of_a_gear_are_said_in_other_languages_without_its_name():
+    names = (
+        phrase("joint_a2.axial"),
+        phrase("{spring} at {torque} N·m", spring="joint_a2.axial", torque="340"),
+        phrase("{spring} lost motion", spring="joint_a2.axial"),
+        "joint_a2.axial of a plug-in",
+    )
+    rows = spring_table([replace(KNOWN, name=name) for name in names]).rows
+    english = ["joint_a2.axial", "at 340 N·m", "lost motion", "of a plug-in"]
+    assert [row[0].strip() for row in rows] == english
+    german = [language_of("de").say(row[0]).strip() for row in rows[1:3]]
+    assert german == ["bei 340\xa0N·m", "Umkehrspiel"]

@@ -185,10 +185,19 @@ def spring_table(springs: Sequence[SpringSummary]) -> Table:
     for spring in springs:
         # The total of a gear at its torque follows its first row, without repeating the name.
         further = bool(above) and spring.name.startswith(f"{above} ")
-        name = f" {spring.name.removeprefix(above)}" if further else spring.name
+        name = phrase("  {name}", name=_further(spring.name, above)) if further else spring.name
         above = above if further else spring.name
         rows.append((name, *_spring_cells(spring)))
     return Table(phrase("Compliances"), heads, tuple(rows))
+
+
+def _further(name: str, above: str) -> str:
+    """Return the name of a further row of a gear without that of the gear."""
+    if isinstance(name, Phrase) and name.template == "{spring} lost motion":
+        return phrase("lost motion")
+    if isinstance(name, Phrase) and name.template == "{spring} at {torque} N·m":
+        return phrase("at {torque} N·m", torque=name.parts["torque"])
+    return name.removeprefix(f"{above} ")
 
 
 def _spring_cells(spring: SpringSummary) -> tuple[Cell, ...]:

@@ -24,7 +24,7 @@ from elastocal.planning import PLAN
 from elastocal.procedure import JOURNAL
 from elastocal.progress import Progress
 from elastocal.records import read_arrays, read_json, read_json_data, read_yaml_data
-from elastocal.results import Result, brief
+from elastocal.results import Result
 from elastocal.robot import (
     Robot,
     catalogue,
@@ -223,8 +223,7 @@ class CheckResult(Result):
 
     def facts(self) -> tuple[tuple[str, str], ...]:
         """Return the main facts, a label and a text each."""
-        held = ((name, brief(text)) for name, text in self.lines())
-        return (("file", self.file), ("kind", self.kind), *held)
+        return (("file", self.file), ("kind", self.kind), *self.lines())
 
     def show(self) -> Iterator[Block]:
         """Yield all that the file holds."""

@@ -122,5 +122,5 @@ def test_a_correction_is_drawn_in_decades_from_mean_to_largest():
     assert [text.get_text() for text in axes.texts][:3] == [
         "1 / 2",
         "0.001 / 0.002",
-        "1e-06 / 2e-06",
+        "<0.001 / <0.001",
     ]

@@ -139,7 +139,7 @@ def _rows(what: Phrase, name: str, line: DeviationComparison) -> tuple[Row, ...]
     title = phrase(
         "{what}, {name} ({points} points), without correction in mm",
         what=what,
-        name=name,
+        name=_run_name(name),
         points=line.points,
     )
     return (
@@ -147,6 +147,12 @@ def _rows(what: Phrase, name: str, line: DeviationComparison) -> tuple[Row, ...]
         (phrase("With correction in mm"), *_mm(line.after)),
         (phrase("Reduction"), *(f"{share:.2%}" for share in _three(line.reduction))),
     )
+
+
+def _run_name(name: str) -> str:
+    """Return the name of a line of the file as a phrase, where it is the seed of a run."""
+    word, _, number = name.partition(" ")
+    return phrase("seed {seed}", seed=number) if word == "seed" and number.isdecimal() else name
 
 
 def _title(paper: PublishedCase | None) -> Phrase:

@@ -365,6 +365,11 @@ def _process(found: SimulateProcessResult) -> Figure:
     )
 
 
+def _digits(length: float) -> str:
+    """Return a length in mm with three digits; those that no tracker resolves are not told."""
+    return "<0.001" if 0.0 < length < 1e-3 else f"{length:.3g}"
+
+
 _Bar = tuple[str, float, float, str]
 """Name, mean and largest in mm, colour."""
 
@@ -381,7 +386,7 @@ def _mean_to_largest(bars: list[_Bar], title: str, decades: bool, about: str = "
         axes.plot([mean], [number], "o", color=colour, ms=6)
         axes.plot([largest], [number], "D", color=colour, ms=5, mfc=style.PAPER)
         axes.annotate(
-            f"{mean:.3g} / {largest:.3g}", (1.03, number), va="center", fontsize=8,
+            f"{_digits(mean)} / {_digits(largest)}", (1.03, number), va="center", fontsize=8,
             xycoords=("axes fraction", "data"),
         )  # fmt: skip
     axes.annotate(

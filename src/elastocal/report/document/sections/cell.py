@@ -127,11 +127,15 @@ def _surroundings(cell: Cell) -> Iterator[tuple[str, str]]:
         phrase("Devices"),
         phrase(
             "arm {arm}, sensor {sensor}, metrology {metrology}",
-            arm=str(devices.arm),
-            sensor=str(devices.sensor),
-            metrology=str(devices.metrology),
+            arm=_device(devices.arm),
+            sensor=_device(devices.sensor),
+            metrology=_device(devices.metrology),
         ),
     )
+
+
+def _device(stated: object) -> str:
+    return phrase("simulated") if str(stated) == "simulated" else str(stated)
 
 
 def _degrees(angle: float) -> str:
