@@ -162,6 +162,7 @@ def alike(shown: str, printed: str) -> bool:
     return numbers[0] == pytest.approx(numbers[1], rel=0.02, abs=0.002)
 
 
+@pytest.mark.slow
 def test_the_python_of_the_tour_runs_and_prints_its_figures(toured):
     printed = io.StringIO()
     with contextlib.chdir(toured.folder), contextlib.redirect_stdout(printed):

@@ -89,6 +89,7 @@ def test_the_copies_in_the_folder_are_the_cell_and_the_plan(planned, whole):
     assert (folder.plan / "plan.json").read_bytes() == (planned.plan / "plan.json").read_bytes()
 
 
+@pytest.mark.slow
 def test_killed_for_real_it_goes_on_to_the_same_dataset(planned, whole, tmp_path):
     out = tmp_path / "killed"
     journal = RunFolder(out).journal

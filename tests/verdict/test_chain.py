@@ -213,6 +213,7 @@ def test_a_run_of_before_keeps_its_light_and_is_called_not_verifiable(copied):
     assert judged(gathered(folder)).light is not Light.GREEN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", ["de", "fr"])
 def test_every_link_is_said_in_other_languages(finished, code):
     chain = gathered(finished).chain

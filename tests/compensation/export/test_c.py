@@ -532,6 +532,7 @@ def test_instructions_do_not_depend_on_the_input(tmp_path, springs):
     assert np.ptp(steps[-20:]) < 0.01 * steps.max()
 
 
+@pytest.mark.slow
 def test_cmake_builds_it_and_runs_the_self_test(tmp_path):
     cmake = shutil.which("cmake")
     if cmake is None:

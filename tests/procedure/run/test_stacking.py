@@ -160,6 +160,7 @@ def test_the_arm_waits_at_home_disarmed_until_somebody_says_that_it_is_done(tmp_
     assert [log.pose for log in read_commits(run.journal)] == [0, 1]
 
 
+@pytest.mark.slow
 def test_a_person_who_takes_long_is_nothing_that_a_watchdog_minds(tmp_path):
     run, person = begun(tmp_path / "run")
     late = person._looked

@@ -209,9 +209,11 @@ class TestPlanAndGeometry:
         assert reached["deaf"] == 0
         assert reached["skipped"] == "result"
 
+    @pytest.mark.slow
     def test_the_camera_stays_above_the_floor(self, reached):
         assert reached["low"] > reached["floor"]
 
+    @pytest.mark.slow
     def test_both_print_on_a_few_sheets(self, reached):
         assert 1 <= reached["plan"] <= 4
         assert 3 <= reached["geometry"] <= 14
@@ -238,18 +240,22 @@ def test_the_keyboard_opens_sections_by_the_contents_and_by_themselves(keys):
     assert keys["unfolded"]
 
 
+@pytest.mark.slow
 def test_the_contents_stay_in_sight(keys):
     assert keys["stays"] >= 0
 
 
+@pytest.mark.slow
 def test_the_camera_never_goes_below_the_floor(keys):
     assert keys["low"] > keys["floor"]
 
 
+@pytest.mark.slow
 def test_the_keyboard_moves_the_robot_from_pose_to_pose(keys):
     assert keys["posture"].startswith("Pose 1:")
 
 
+@pytest.mark.slow
 def test_the_first_picture_waits_for_no_view(keys):
     """How soon it is there is measured by benchmarks/report.py."""
     assert keys["shown"] > 300
