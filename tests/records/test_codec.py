@@ -67,7 +67,7 @@ def test_a_file_gives_the_same_class_back(tmp_path):
         ({"schema": "elastocal.whole/9"}, "'elastocal.whole/9'; this version reads"),
         ({"inner": {"schema": "elastocal.inner/4", "values": []}}, "f.json: inner has schema"),
         ({"titel": "b"}, "unknown key 'titel'; did you mean 'title'?"),
-        ({"parts": [{"name": "p", "weigth": 1.0}]}, "parts.0.weight"),
+        ({"parts": [{"name": "p", "weigth": 1.0}]}, "'parts.0.weigth'; did you mean 'weight'"),
         ({"parts": [{"name": "p", "weight": True}]}, "parts.0.weight: Input should be a valid num"),
         ({"parts": [{"name": "p", "weight": "1"}]}, "parts.0.weight: Input should be a valid num"),
         ({"parts": [{"name": "p", "weight": float("nan")}]}, "parts.0.weight"),

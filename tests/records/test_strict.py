@@ -167,6 +167,11 @@ def test_the_first_problem_of_several_is_named():
         validate({"kind": 3}, Cell, "what")
 
 
+def test_a_misspelt_key_is_named_rather_than_the_one_that_is_missing_for_it():
+    with pytest.raises(SchemaError, match="unknown key 'robott'; did you mean 'robot'"):
+        validate({"kind": 3, "robott": "a"}, Cell, "what")
+
+
 def test_the_known_schema_passes():
     check_schema(SCHEMA, SCHEMA, "a file")
 

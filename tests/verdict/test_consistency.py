@@ -84,7 +84,10 @@ def test_a_process_of_another_cell_is_no_part_of_the_run(copied):
     folder = copied("run", "process")
     path = folder / "process" / "table.json"
     sealed.edit_text(path, '"cell": "afp"', '"cell": "other"')
-    assert "of cell 'other'" in absent(gather_evidence(EvidenceOptions(folder), MADE))["process"]
+    assert (
+        "of cell 'other'"
+        in absent(gather_evidence(EvidenceOptions(folder), MADE))["simulated process"]
+    )
 
 
 def test_a_process_with_another_model_is_doubted(copied):

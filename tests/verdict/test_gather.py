@@ -80,7 +80,7 @@ MADE_BY = {
     "calibrated model": ("model.json", "calibrate"),
     "tool file": ("tool.json", "tool"),
     "codec": ("codec", "codec"),
-    "process": ("process", "simulate-process"),
+    "simulated process": ("process", "simulate-process"),
 }
 
 
@@ -100,9 +100,9 @@ def test_what_is_not_there_is_missing_with_the_command_that_makes_it(copied):
             "model.json": "calibrated model",
             "tool.json": "tool file",
             "codec/codec.nc": "codec",
-            "process/table.json": "process",
+            "process/table.json": "simulated process",
         },
-        {"run/journal.jsonl": "journal", "process/deviations.csv": "process"},
+        {"run/journal.jsonl": "journal", "process/deviations.csv": "simulated process"},
         {"run/cell/cell.yaml": "cell", "run/plan/plan.json": "plan", "run/dataset.nc": "dataset"},
     ],
 )
@@ -175,7 +175,7 @@ def test_a_model_alone_is_enough(finished, tmp_path):
     parts = gather_evidence(EvidenceOptions(tmp_path / "mine.json"), MADE)
     assert parts.calibrated is not None
     assert parts.name == parts.robot == "KR 120 R2700 extra HA"
-    assert {"run", "codec", "tool file", "process"} <= set(absent(parts))
+    assert {"run", "codec", "tool file", "simulated process"} <= set(absent(parts))
 
 
 def test_every_codec_of_a_folder_of_codecs_is_read(copied):

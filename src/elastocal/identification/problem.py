@@ -412,6 +412,9 @@ def build(
 ) -> Problem:
     """Return the observation system of a set of readings.
 
+    Its rows are observation blocks (paper Eq. 15). Where links have masses, they also hold the
+    change of the arm's sag between reference and load; see `elastocal.identification.displacement`.
+
     Parameters
     ----------
     model : ElasticModel

@@ -18,6 +18,8 @@ T = TypeVar("T")
 
 _LONGEST_SHOWN = 60
 """Longer values are left out of messages."""
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""How a validator calls a key that it does not know."""
 _MOST_PROBLEMS = 10_000
 """Each takes a kilobyte as soon as one of them is looked at."""
 
@@ -81,13 +83,13 @@ def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
     """Return the first problem in the words of the file."""
     if error.error_count() > _MOST_PROBLEMS:
         return f"it does not fit its schema at {error.error_count()} places"
-    first = error.errors(include_url=False)[0]
+    first = _misspelt(error.errors(include_url=False))
     # An item of an array is known by its place in it; see `elastocal.arrays`.
     item = first.get("ctx", {})
     # A part in angle brackets is the tag of a class among several; the file has no such key.
     parts = [str(part) for part in (*first["loc"], *item.get("at", ()))]
     path = ".".join(part for part in parts if not part.startswith("<"))
-    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+    if first["type"] in _UNKNOWN:
         key, known = str(first["loc"][-1]), _known_keys(cls, first["loc"][:-1])
         allowed = f" (known: {', '.join(known)})" if known else ""
         return f"unknown key {path!r}{nearest(key, known)}{allowed}"
@@ -107,6 +109,21 @@ def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
     shown = first["input"] if in_its_unit is None else text
     given = _shown(item.get("given", shown))
     return message if given in reason or len(given) > _LONGEST_SHOWN else f"{message}, got {given}"
+
+
+def _misspelt(problems: Sequence[Any]) -> Any:
+    """Return the first problem; of a key that is missing the unknown one that was meant for it."""
+    first = problems[0]
+    if first["type"] not in ("missing", "missing_argument"):
+        return first
+    *section, wanted = first["loc"]
+    beside = (
+        each
+        for each in problems[1:]
+        if each["type"] in _UNKNOWN and list(each["loc"][:-1]) == section
+        if nearest(str(each["loc"][-1]), [str(wanted)])
+    )
+    return next(beside, first)
 
 
 def _bound(context: Mapping[str, Any]) -> float | None:

@@ -17,7 +17,7 @@ from elastocal.verdict.history import history_findings
 from elastocal.wording import Phrase, mm, phrase, sentences, spans
 
 _ESSENTIAL = ("run", "journal", "cell", "plan", "summary of the run", "dataset",
-              "calibrated model", "calibration made again", "process")  # fmt: skip
+              "calibrated model", "calibration made again", "simulated process")  # fmt: skip
 """Parts without which no light is green: whatever could hold it back must not do so less by being
 taken away. The codec has a finding of its own."""
 _TOLD_ELSEWHERE = ("codec", "earlier calibration")

@@ -366,7 +366,7 @@ def _with_rest(evidence: Evidence, reader: PartReader, options: EvidenceOptions)
         tool_sha256=file_sha256(place) if found is not None and place is not None else None,
         codecs=_codecs(evidence, reader, options.codec),
         process=reader.find(
-            "process", options.process, PROCESS, process,
+            phrase("simulated process"), options.process, PROCESS, process,
             phrase("`elastocal simulate-process` makes one for a simulated cell"),
             optional=bool(evidence.logs),
         ),

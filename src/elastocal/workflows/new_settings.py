@@ -24,6 +24,8 @@ from elastocal.workflows._inputs import ROBOT_SUFFIXES, parse_frame
 
 NONE = "none"
 """Value that leaves out sensor, tracker, process or tolerance."""
+_LIKELY_SIZES = (1.0 / 200.0, 100.0)
+"""Least and largest extent of a mesh, in reaches of the arm."""
 _MOST_METRES = 25.0
 """Largest extent that a mesh is taken for metres up to; beyond, for millimetres."""
 _INCH_SIZES = (0.1, 3.0)
@@ -209,6 +211,7 @@ class NewSettings:
             _require_three(text, "force" if name == "force_range" else "moment")
         elif name == "unit":
             parse_quantity(f"1 {text}", "length")
+            self._require_size()
         else:
             parse_quantity(text, {"tool_mass": "mass", "press": "force"}.get(name, "length"))
 
@@ -292,6 +295,18 @@ class NewSettings:
         return (
             f"{size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} mm, its numbers taken for {self.unit}"
         )
+
+    def _require_size(self) -> None:
+        """Refuse a unit in which no arm of this reach works on the mesh.
+
+        Raises
+        ------
+        SchemaError
+            With the size that the mesh would have.
+        """
+        low, high = (each * self.reach for each in _LIKELY_SIZES)
+        if not low <= self._metres * float(np.ptp(self.bounds, axis=0).max()) <= high:
+            raise SchemaError(f"the surface would be {self.extent}: another unit is meant")
 
     def place_before(self, ahead: float, above: float) -> str:
         """Return a frame of the mesh: its middle ahead of the base, its lowest point at a height.

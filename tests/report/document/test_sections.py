@@ -380,7 +380,7 @@ def test_what_was_not_verified_is_never_empty(parts):
         (MissingPart("dataset", "gone"), True),
         (MissingPart("calibrated model", "gone"), True),
         (MissingPart("tool file", "gone"), False),
-        (MissingPart("process", "gone"), True),
+        (MissingPart("simulated process", "gone"), True),
         (MissingPart("codec", "torn", damaged=True), True),
     ],
 )

@@ -24,6 +24,7 @@ from .measurement import (
     SHOP_FLOOR as SHOP_FLOOR,
     Blunder as Blunder,
     Noise as Noise,
+    SphericalCap as SphericalCap,
     measure as measure,
     press_forces as press_forces,
     press_poses as press_poses,
