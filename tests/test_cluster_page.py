@@ -18,8 +18,15 @@ def test_the_plan_for_many_workers_is_computed_from_the_figures_that_the_benchma
     filled = hook.on_page_markdown(page.read_text(encoding="utf-8"))
     assert "<!-- cluster" not in filled
     assert f"| {1e3 * hook.largest(runs)['worker_s_a_campaign']:.0f} ms |" in filled
-    slower = {**hook.largest(runs), "scheduler_s_a_task": 2.0, "command_s_a_task": 0.5}
-    said = hook.plan([{**slower, "campaigns": 10**5, "samples": 20_000}, *runs])
+    slower = {
+        **hook.largest(runs),
+        "campaigns": 10**5,
+        "samples": 20_000,
+        "scheduler_s_a_task": 2.0,
+        "command_s_a_task": 0.5,
+        "same_as_one_process": False,
+    }
+    said = hook.plan([slower, *runs])
     seconds = 16 * 5 * slower["worker_s_a_campaign"]
     assert f"carries at least {0.8 * seconds / 2.0:.0f} workers" in said
     assert f"{slower['commit']}: not equal" in said

@@ -58,7 +58,7 @@ def test_a_head_serves_without_its_unit_which_it_then_states_itself(files):
         ("'A3'", "'A2'", "takes column 'A2' twice"),
         ("joint_a3:", "joint_b3:", r"column 'joint_a3\[…\]' is missing"),
         ("unit: deg", "unit: kg", "kg"),
-        ("columns:", "colums:", "key 'columns' is missing"),
+        ("columns:", "colums:", "unknown key 'colums'; did you mean 'columns'"),
         ("position-map/1", "position-map/9", "position-map/9"),
         ("{column: 'A3', unit: deg}", "A3", "joint_a3"),
     ],
