@@ -15,11 +15,11 @@ def _in_an_empty_folder(request, monkeypatch, tmp_path_factory):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Leave to the night what plans for an example cell first: seconds of processor each."""
+    """Leave to the night what plans or cross-validates first: seconds of processor each."""
     for item in items:
         if isinstance(item, pytest.DoctestItem) and any(
             name in example.source
             for example in item.dtest.examples
-            for name in ("ec.plan(", "ec.plan_pair(", "ec.datasets.afp_run(")
+            for name in ("ec.plan(", "ec.plan_pair(", "ec.codec(", "ec.datasets.afp_run(")
         ):
             item.add_marker(pytest.mark.slow)

@@ -19,6 +19,7 @@ for module in pkgutil.walk_packages(elastocal.__path__, "elastocal."):
 """
 
 
+@pytest.mark.slow
 def test_every_module_is_imported_with_the_declared_dependencies_alone():
     paths = {"PYTHONPATH": ":".join(path for path in sys.path if path)}
     command = [sys.executable, "-W", "error", "-c", TRY_ALL]
@@ -26,6 +27,7 @@ def test_every_module_is_imported_with_the_declared_dependencies_alone():
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_what_only_the_documentation_needs_is_not_found_by_the_core():
     pytest.importorskip("charset_normalizer")
     assert "charset-normalizer" not in bare.closure(["numpy", "trimesh", "matplotlib"])

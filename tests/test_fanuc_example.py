@@ -10,6 +10,8 @@ import pytest
 
 from support.cli import elastocal
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/how-to/fanuc-example.md").read_text(encoding="utf-8")
 LINES = [

@@ -230,7 +230,7 @@ def test_guarded_work_comes_back():
 @pytest.mark.parametrize(
     ("work", "reason"),
     [
-        (spin, "more than 1 s"),
+        pytest.param(spin, "more than 1 s", marks=pytest.mark.slow),
         (signal.pause, "more than 1 s"),
         (crash, "crashed"),
         (fill, "more than 100 MB"),

@@ -389,11 +389,14 @@ def passes(folder: str, python: Path | str, path: str) -> None:
     assert " passed" in done.stdout
 
 
+NIGHTLY = ("elastocal-softening", "elastocal-softest")
+
+
 @pytest.mark.parametrize(
     "name",
     [
-        # Its command is tried above by day.
-        pytest.param(name, marks=[pytest.mark.slow] if name == "elastocal-softest" else [])
+        # The command of the one and the spring of the other are tried above by day.
+        pytest.param(name, marks=[pytest.mark.slow] if name in NIGHTLY else [])
         for name in plugged.NAMES
     ],
 )

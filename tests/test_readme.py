@@ -196,6 +196,7 @@ def messages() -> set[str]:
     return found
 
 
+@pytest.mark.slow
 def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     pages = (ROOT / "docs/how-to/when-it-refuses").glob("*.md")
     first = ROOT / "docs/how-to/when-it-refuses.md"
@@ -206,6 +207,7 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     assert not [text for text in quoted if not any(text in message for message in known)]
 
 
+@pytest.mark.slow
 def test_the_faults_that_drivers_are_held_against_have_their_messages_and_their_tests():
     page = (ROOT / "docs/decisions/0080-drivers.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", page, flags=re.MULTILINE)

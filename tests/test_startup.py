@@ -37,6 +37,7 @@ def of_command(*arguments: object) -> set[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_researcher_imports_the_core_without_what_programs_for_people_are_made_of():
     core = ("robot", "elastic", "dataset", "identification", "geometry", "cell", "planning")
     code = "import importlib\n" + "\n".join(
@@ -59,6 +60,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_calibrate_and_predict_import_only_what_they_use(folder):
     calibrate = of_command("calibrate", folder / "data.nc", "--out", folder / "model.json")
     assert not calibrate & UNUSED
@@ -69,6 +71,7 @@ def test_calibrate_and_predict_import_only_what_they_use(folder):
     assert len(predict) <= 1050
 
 
+@pytest.mark.slow
 def test_no_command_imports_the_statistics_and_filters_of_scipy_before_it_needs_them():
     code = (
         "import elastocal.workflows as w, elastocal.cli._operator, elastocal.cell, elastocal.sim\n"

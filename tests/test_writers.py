@@ -130,6 +130,7 @@ for name, write in WRITERS.items():
 """
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_no_crash(tmp_path):
     """A crash of a library would be one of Python: a process of its own."""
     if shutil.which("unshare") is None:

@@ -70,6 +70,7 @@ def test_a_campaign_whose_tracker_moved_is_fitted_with_its_frame(folder):
     assert free["settings"]["free_frame"] == "campaign"
 
 
+@pytest.mark.slow
 def test_people_see_the_frames(folder):
     shown = elastocal(
         "calibrate", folder / "monday.nc", folder / "moved.nc", "--springs", "actuated",

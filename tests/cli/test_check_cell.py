@@ -111,6 +111,7 @@ def test_what_check_refuses_plan_refuses_in_the_same_words(folder, changes, word
     "changes",
     some_by_day(
         [
+            lambda _: {"search__poses": 1, "search__technique": "random"},
             lambda _: {},
             # Limits of the URDF alone are not judged on an arm without masses.
             lambda folder: without_masses(folder) | {"limits__torque": {}},
@@ -118,9 +119,9 @@ def test_what_check_refuses_plan_refuses_in_the_same_words(folder, changes, word
             lambda _: {"trackers": [], "marker": None},
             lambda _: {"load_cases__cases": ["normal"], "search__technique": "i_optimal"},
             lambda _: {"search__metric": "geodesic", "search__technique": "ioops"},
-            lambda _: {"search__poses": 1, "search__technique": "random"},
             lambda _: {"search__d_max": "200 mm", "search__poses": None},
-        ]
+        ],
+        8,
     ),
 )
 def test_what_check_passes_plan_accepts(folder, changes):

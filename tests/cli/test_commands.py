@@ -73,6 +73,7 @@ def test_calibrate_prints_a_table_that_answers_the_first_questions(folder):
         assert text in shown
 
 
+@pytest.mark.slow
 def test_calibrate_json_has_the_ladder_and_the_measured_coverage_of_its_intervals(folder):
     """Spec section 8: ``ladder: [{springs, held_out, chosen}]``, ``coverage``."""
     result = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json", "--json")

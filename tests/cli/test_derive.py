@@ -6,6 +6,7 @@ import pytest
 from elastocal.dataset import read
 from elastocal.procedure import file_sha256
 from elastocal.records import SEAL
+from support.by_day import some_by_day
 from support.cli import elastocal
 from support.recorded_runs import record_run
 
@@ -34,7 +35,9 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
     assert "is no folder of a run: it holds no journal.jsonl" in reason
 
 
-@pytest.mark.parametrize(("torn", "place"), [(0, ""), (9, "line 5 of journal.jsonl, its last,")])
+@pytest.mark.parametrize(
+    ("torn", "place"), some_by_day([(9, "line 5 of journal.jsonl, its last,"), (0, "")])
+)
 def test_a_journal_that_was_cut_shrinks_no_run_silently(tmp_path, torn, place):
     run = record_run(tmp_path / "run")
     journal = run.path / "journal.jsonl"

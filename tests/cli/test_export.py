@@ -46,6 +46,7 @@ def test_it_writes_the_files_and_says_so(tmp_path, model):
     assert facts["springs"] == 18
 
 
+@pytest.mark.slow
 def test_how_sure_the_model_is_on_its_production_is_said(tmp_path, model):
     plain = elastocal("export", model, "--c", tmp_path / "c", "--json")
     assert json.loads(plain.out)["on_production"] is None

@@ -89,6 +89,7 @@ def test_compensate_brings_the_loaded_new_tool_onto_the_path(folder):
     assert figures(plain)["deviation"]["mean"] != figures(found)["deviation"]["mean"]
 
 
+@pytest.mark.slow
 def test_stiffness_is_that_of_the_new_tcp(folder):
     def softest(out: str, *tool: object) -> dict:
         return figures(

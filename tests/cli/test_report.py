@@ -7,6 +7,7 @@ import pytest
 
 from elastocal.report.document import chromium
 from support import reported
+from support.by_day import some_by_day
 from support.cli import elastocal
 
 
@@ -62,7 +63,9 @@ def test_without_a_tolerance_there_is_no_light(copied, tmp_path):
     assert "No tolerance was given" in figures["verdict"]
 
 
-@pytest.mark.parametrize(("tolerance", "light"), [("1 um", "red"), ("10 mm", "yellow")])
+@pytest.mark.parametrize(
+    ("tolerance", "light"), some_by_day([("1 um", "red"), ("10 mm", "yellow")])
+)
 def test_the_tolerance_on_the_command_line_is_the_one_that_counts(
     finished, tmp_path, tolerance, light
 ):

@@ -220,16 +220,24 @@ def test_resume_asks_and_no_terminal_is_no_answer(planned, whole, monkeypatch):
     assert read_journal(RunFolder(whole[0]).journal) == entries
 
 
+REAL = "devices: {arm: cell3, sensor: cell3, metrology: cell3}"
+
+
 def test_on_a_real_machine_a_person_is_asked_before_anything_is_written(
     planned, tmp_path, monkeypatch
 ):
     drivers.install(tmp_path / "site", monkeypatch, "cell3", drivers.REAL)
-    section = "devices: {arm: cell3, sensor: cell3, metrology: cell3}"
-    cell = planned.with_text("real.yaml", section)
+    cell = planned.with_text("real.yaml", REAL)
     monkeypatch.setattr(sys.stdin, "isatty", lambda: False, raising=False)
     result = run(cell, tmp_path / "run")
     assert "a person must confirm that the cell is clear: give --yes" in result.reason
     assert read_journal(RunFolder(tmp_path / "run").journal) == ()
+
+
+@pytest.mark.slow
+def test_on_a_real_machine_a_run_is_done_when_a_person_has_agreed(planned, tmp_path, monkeypatch):
+    drivers.install(tmp_path / "site", monkeypatch, "cell3", drivers.REAL)
+    cell = planned.with_text("real.yaml", REAL)
     assert run(cell, tmp_path / "run", "--yes").code == 0
 
 
@@ -380,15 +388,23 @@ def test_other_settings_on_resume_are_refused(planned, whole):
     assert "procedure.average is 2.0, the run was started with 1.0" in reason
 
 
+FAULT = "faults: [{kind: ft_dropout, pose: 1, step: hold}]"
+
+
 def test_a_fault_ends_the_run_with_one_line_that_says_where_the_arm_is(planned, tmp_path):
-    cell = planned.with_text("fault.yaml", "faults: [{kind: ft_dropout, pose: 1, step: hold}]")
+    cell = planned.with_text("fault.yaml", FAULT)
     result = run(cell, tmp_path / "run")
     assert result.code == 1
     last = result.err.strip().splitlines()[-1]
     assert last.startswith("elastocal: pose 1, attempt 1, load normal: force sensor silent")
     assert last.endswith("The arm is retracted to the approach pose")
     assert "Traceback" not in result.err
-    # The fault is gone, the cell is the same.
+
+
+@pytest.mark.slow
+def test_a_run_goes_on_when_its_fault_is_gone_and_the_cell_is_the_same(planned, tmp_path):
+    cell = planned.with_text("fault.yaml", FAULT)
+    assert run(cell, tmp_path / "run").code == 1
     assert run(planned, tmp_path / "run", "--resume", "--yes").code == 0
 
 

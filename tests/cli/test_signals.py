@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from support.by_day import some_by_day
 from support.cli import PATIENCE, default_signals
 
 LATE = """
@@ -30,6 +31,7 @@ class Sends(importlib.abc.MetaPathFinder):
 
 sys.meta_path.insert(0, Sends())
 from _elastocal_program import run
+from support.by_day import some_by_day
 run()
 """
 
@@ -42,7 +44,7 @@ def _ended(code, *words):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", some_by_day(["SIGINT", "SIGTERM"]))
 @pytest.mark.parametrize(
     ("words", "module"),
     [(["--version"], "importlib.metadata"), (["--help"], "rich.panel"), (["robots"], "rich.table")],

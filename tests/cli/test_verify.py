@@ -153,7 +153,7 @@ def unlink(folder):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (add_a_line, "the run was changed after it was signed"),
+        pytest.param(add_a_line, "the run was changed after it was signed", marks=pytest.mark.slow),
         (forge, "the signature of the run is not valid"),
         (unlink, "the run should be signed, and there is no signature.json"),
     ],

@@ -43,6 +43,7 @@ def test_a_codec_on_drawn_poses_says_so_and_is_prepared_on_the_same(readings):
     assert len(prepared.contact) == 6
 
 
+@pytest.mark.slow
 def test_processes_do_not_change_a_number(readings):
     variants = make_variants({"search": ("random", "ioops")})
     few = CodecOptions(splits=3)
@@ -65,12 +66,14 @@ def test_all_cores_are_used_where_the_first_split_is_slow(readings, monkeypatch,
     assert asked == [processes]
 
 
+@pytest.mark.slow
 def test_variants_are_what_they_are_alone(readings):
     both = cross_validate(robot(), readings, make_variants({"springs": ("actuated", "bearing")}))
     alone = cross_validate(robot(), readings, [SIX])
     np.testing.assert_array_equal(both.errors("actuated"), alone.errors("default"))
 
 
+@pytest.mark.slow
 def test_the_seed_moves_random_choices_and_nothing_else(readings):
     random = [Variant(springs="actuated", search="random")]
     runs = [cross_validate(robot(), readings, random, CodecOptions(seed=s)) for s in (1, 1, 2)]

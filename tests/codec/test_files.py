@@ -71,10 +71,14 @@ def test_arrays_are_labelled_for_any_reader_of_netcdf(tmp_path, data):
     [
         (lambda d: d.drop_vars("chosen"), "'chosen' is missing"),
         (lambda d: d.drop_vars("compliance_1"), "compliance_1"),
-        (lambda d: d.assign_attrs(schema="elastocal.codec/3"), "elastocal.codec/3"),
         (lambda d: d.assign(seed_pose=d["seed_pose"] + 50), "seed_pose names a pose"),
-        (lambda d: d.transpose("n_train", ...), "dimensions"),
         (lambda d: d.assign_attrs(options="{"), "codec.nc"),
+        pytest.param(
+            lambda d: d.assign_attrs(schema="elastocal.codec/3"),
+            "elastocal.codec/3",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(lambda d: d.transpose("n_train", ...), "dimensions", marks=pytest.mark.slow),
     ],
 )
 def test_a_damaged_file_is_refused_by_name(tmp_path, data, change, words):

@@ -103,6 +103,7 @@ def test_covering_radius_is_that_over_all_poses_in_metres(known):
     assert known.insight.indices[0].goodness("covering_radius")[cv, n - 1] == -found
 
 
+@pytest.mark.slow
 def test_training_load_cases_decide_the_indices():
     readings = Cell(rich_truth(), poses=POSES, seed=4).readings()
     variants = [Variant("one", load_cases="normal"), Variant("five")]

@@ -68,6 +68,7 @@ def test_of_a_large_dataset_as_many_poses_are_drawn_as_asked_for_the_same_for_a_
     assert drawn_poses(readings, CodecOptions(poses=31)) is readings
 
 
+@pytest.mark.slow
 def test_a_mistake_in_readings_is_named_as_calibrate_names_it():
     """Poses were counted on a dead axis and on forces in another frame, without a word."""
     sound, springs = campaign(12), [elastic()]

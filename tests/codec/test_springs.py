@@ -65,7 +65,11 @@ def test_what_more_than_the_springs_differ_in_is_judged_on_the_splits(readings):
 
 
 @pytest.mark.parametrize(
-    "springs", ["actuated", "bearing", "bearing-joint", "bearing-ends", "tensor", "gears", "auto"]
+    "springs",
+    [
+        *("actuated", "bearing", "bearing-joint", "bearing-ends"),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("tensor", "gears", "auto")),
+    ],
 )
 def test_every_word_of_calibrate_is_taken(readings, springs):
     data = cross_validate(robot(), readings, [Variant(springs=springs)], FEW)
@@ -104,6 +108,7 @@ def test_verification_poses_have_no_part_in_the_choice_of_springs(readings):
     assert after.error_mean[0, 0].mean() > before.error_mean[0, 0].mean()
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_springs_that_each_split_chose(readings):
     auto = cross_validate(robot(), readings, [Variant()])
     names = sorted({name for split in auto.split_layouts[0] for name in split})
@@ -134,6 +139,7 @@ def test_springs_of_a_small_training_set_are_what_calibrate_takes_on_it(readings
             assert set(sizes[n - 1 : to - 1]) == {taken}
 
 
+@pytest.mark.slow
 def test_files_and_words_say_which_springs_were_taken(readings, tmp_path):
     data = cross_validate(robot(), readings, [Variant()], FEW)
     write_codec(tmp_path, data)

@@ -120,6 +120,7 @@ LINES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.lists(LINES, max_size=12))
 def test_no_bytes_make_anything_but_events_or_our_refusal(lines):

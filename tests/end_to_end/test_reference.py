@@ -129,6 +129,7 @@ def test_the_check_shows_what_is_wrong_with_its_level(fits):
     assert off.mean == pytest.approx(np.sqrt(3.0) * 0.5e-3, abs=2.0 * plain.max)
 
 
+@pytest.mark.slow
 def test_the_check_enters_no_codec(dataset):
     variants, options = make_variants({"springs": ["actuated"]}), CodecOptions(splits=2)
     robot = ec.Robot.from_urdf(dataset.robot_urdf, dataset.tcp_frame)

@@ -10,6 +10,7 @@ from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import RobotError
 from elastocal.identification import FitOptions, attainable_rank, calibrate
 from elastocal.robot import Robot
+from support.by_day import some_by_day
 from support.cells import TRACKED, Cell, linear_truth, robot, urdf
 from support.cli import elastocal
 
@@ -43,6 +44,7 @@ def test_missing_poses_are_told_from_what_no_pose_would_show():
     assert not any("constant" in text for text in calibration.warnings)
 
 
+@pytest.mark.slow
 def test_all_load_cases_at_twelve_poses_reach_what_can_be_reached(data):
     result = elastocal("calibrate", data, "--out", data.with_suffix(".json"), "--json")
     figures = json.loads(result.out)
@@ -51,7 +53,7 @@ def test_all_load_cases_at_twelve_poses_reach_what_can_be_reached(data):
     assert [text for text in figures["warnings"] if "has a mass" not in text] == []
 
 
-@pytest.mark.parametrize("bounds", ["0,0", "1e-9,2e-9", "1,2"])
+@pytest.mark.parametrize("bounds", some_by_day(["0,0", "1e-9,2e-9", "1,2"]))
 def test_bounds_that_leave_the_data_no_part_are_refused(data, bounds):
     out = data.with_suffix(".json")
     assert "bound" in elastocal("calibrate", data, "--out", out, "--bounds", bounds).reason

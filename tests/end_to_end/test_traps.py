@@ -88,6 +88,7 @@ def in_tcp_frame(force: np.ndarray) -> np.ndarray:
     return np.einsum("plji,plj->pli", R, force)
 
 
+@pytest.mark.slow
 def test_good_data_pass(tmp_path):
     result = calibrate(tmp_path, good())
     assert result.code == 0, result.err
@@ -98,14 +99,23 @@ def test_good_data_pass(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        pytest.param(lambda: {"force": -arrays()["force"]}, "sign turned", id="sign of the force"),
         pytest.param(
-            lambda: {"force": in_tcp_frame(arrays()["force"])}, "tcp frame", id="force in tcp frame"
+            lambda: {"force": -arrays()["force"]},
+            "sign turned",
+            id="sign of the force",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            lambda: {"force": in_tcp_frame(arrays()["force"])},
+            "tcp frame",
+            id="force in tcp frame",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             lambda: {"force": in_tcp_frame(-arrays()["force"])},
             "tcp frame with their sign turned",
             id="sensor convention",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             lambda: {"joint_position": turned(arrays()["joint_position"])},
@@ -151,6 +161,7 @@ def test_a_wrong_unit_is_refused_by_name(tmp_path, columns, by, message):
     assert message in calibrate_text(tmp_path, scaled(as_csv(tmp_path), columns, by)).reason
 
 
+@pytest.mark.slow
 def test_a_tool_weight_left_in_the_forces_is_named(tmp_path):
     result = calibrate(tmp_path, changed(force=arrays()["force"] + [0.0, 0.0, -600.0]))
     assert result.code == 0, result.err
@@ -165,6 +176,7 @@ def test_forces_zeroed_at_the_wrong_moment_are_named(tmp_path):
     assert any("zeroed at the wrong" in warning for warning in json.loads(result.out)["warnings"])
 
 
+@pytest.mark.slow
 def test_a_blunder_of_500_mm_is_set_aside_and_named(tmp_path):
     cell = Cell(linear_truth(), poses=POSES, blunders=(Blunder(3, "west", (0.0, 0.5, 0.0)),))
     figures = json.loads(calibrate(tmp_path, cell.measure()).out)
@@ -186,6 +198,7 @@ def test_readings_that_slipped_and_a_missing_load_case_are_left_out(tmp_path):
     assert not figures["suspicious"]
 
 
+@pytest.mark.slow
 def test_a_pose_measured_under_two_labels_is_one_pose(tmp_path):
     values = {name: np.concatenate([array, array[:1]]) for name, array in arrays().items()}
     figures = json.loads(calibrate(tmp_path, changed(**values)).out)

@@ -26,6 +26,7 @@ def relative_error(calibration: Calibration, arm) -> float:
     return float(error / np.linalg.norm(truth.deflection, axis=1).mean())
 
 
+@pytest.mark.slow
 def test_without_noise_eighteen_springs_miss_by_the_large_deflections_only():
     eighteen = relative_error(fitted(Cell(linear_truth(), noise=QUIET)), linear_truth())
     six = relative_error(fitted(Cell(linear_truth(), noise=QUIET), "actuated"), linear_truth())
@@ -41,6 +42,7 @@ def test_bending_links_stiffening_gears_and_noise_leave_two_percent():
     assert six > 4.0 * eighteen
 
 
+@pytest.mark.slow
 def test_links_that_bend_need_springs_in_their_middle():
     joints = robot().joint_names
     arm = with_link_bending(linear_truth(), dict.fromkeys(joints[1:3], LINK_BENDING))

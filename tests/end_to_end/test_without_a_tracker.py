@@ -239,6 +239,7 @@ def test_what_a_tracker_judges_is_refused_without_one(story, tmp_path, option, v
         )
 
 
+@pytest.mark.slow
 def test_tools_are_turned_by_up_to_a_radian(story, tmp_path):
     cell = story / "cell" / "cell.yaml"
     ec.plan(cell, out=tmp_path / "plan", poses=6, compare="none")

@@ -103,6 +103,7 @@ def filled(*_: object) -> None:
     assert len(bytearray(3 << 30)) < 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "word"), [(crash, "traceback"), (busy, "hang"), (filled, "memory")]
 )

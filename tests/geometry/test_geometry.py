@@ -345,6 +345,7 @@ def test_positions_in_netcdf_are_those_of_the_table(tmp_path):
             )
 
 
+@pytest.mark.slow
 def test_a_fit_of_nonsense_is_refused():
     measured = measure(kuka(), 60)
     rng = np.random.default_rng(5)

@@ -46,6 +46,7 @@ def test_eight_hundred_random_poses_neither_over_nor_underfit(seed):
     assert left_out_error(measured, fitted(measured, train), ~train) < 1.1 * FLOOR
 
 
+@pytest.mark.slow
 def test_payloads_of_a_small_arm_are_one_model_and_no_moved_station():
     """Under 0, 1.25 and 2.5 kg, one after the other, as a campaign goes."""
     payloads = tuple(np.repeat([0.0, 1.25, 2.5], 300).tolist())

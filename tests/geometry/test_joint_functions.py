@@ -27,6 +27,7 @@ from elastocal.geometry.solve import register
 from elastocal.progress import silent
 from elastocal.records import write_json
 from elastocal.robot import Robot
+from support.by_day import some_by_day
 from support.measured_arms import (
     Measured,
     kuka,
@@ -210,7 +211,7 @@ def test_a_urdf_does_without_them(model):
     assert model.chain.held_out.mean < model.held_out.registration.mean
 
 
-@pytest.mark.parametrize("arm", [kuka, seven_axes])
+@pytest.mark.parametrize("arm", some_by_day([kuka, seven_axes]))
 def test_no_functions_are_found_where_there_are_none(arm):
     chosen = [rung(fitted(measure(arm(), 150, seed=seed, **PLANTED))) for seed in range(2)]
     assert "joint-functions" not in chosen

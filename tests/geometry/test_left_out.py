@@ -72,6 +72,7 @@ def test_figures_stand_with_and_without_blunders():
     assert model.with_blunders.chosen.mean > 10 * model.held_out.chosen.mean
 
 
+@pytest.mark.slow
 def test_blunders_all_over_are_no_cluster():
     for seed in range(5):
         model = fitted(measure(universal(), 120, stations=1, noise=NOISE, blunders=12, seed=seed))

@@ -230,6 +230,7 @@ def test_a_mistake_is_refused_by_its_name(mistake):
     assert "\n" not in said
 
 
+@pytest.mark.slow
 def test_the_command_refuses_a_mirrored_tracker_and_writes_nothing(tmp_path):
     measured = campaign("universal", 30, markers=1, stations=1)
     data = replace(measured.data, markers=measured.data.markers * [1.0, -1.0, 1.0])

@@ -41,6 +41,7 @@ def test_a_station_sees_each_pose_and_nothing_collides(cell):
     assert plan.moves[-1].end is None
 
 
+@pytest.mark.slow
 def test_chosen_poses_predict_better_than_drawn_ones(cell):
     best, drawn = (planned(cell, name).expected[-1] for name in ("i_optimal", "random"))
     assert best.poses == drawn.poses == 24
@@ -95,6 +96,7 @@ def test_what_presses_alone_know_is_refused(tmp_path, cell):
     assert bare in elastocal("plan", cell.path, "--out", tmp_path / "p", "--search", "cover").reason
 
 
+@pytest.mark.slow
 def test_too_few_poses_are_said_to_be_few(cell):
     (found,) = plan_positions(cell, 6, seed=1).findings
     assert "plan" in found
@@ -134,6 +136,7 @@ def test_options_of_one_campaign_that_contradict_are_refused(tmp_path, cell, opt
     assert not (tmp_path / "plan").exists()
 
 
+@pytest.mark.slow
 def test_it_says_how_many_poses_functions_of_each_joint_need(cell):
     """With 24 poses every joint's function is mostly a guess, with 48 it is less of one."""
     few = planned(cell, "random").functions

@@ -64,6 +64,7 @@ def test_the_corrected_tool_stands_where_it_is_programmed():
     assert np.linalg.norm(found.uncorrected, axis=1).mean() > 1e-4
 
 
+@pytest.mark.slow
 def test_a_tool_behind_the_measured_tcp_is_the_same_arm():
     measured = measure(kuka(), 60, noise=0.0)
     model, X = fitted(measured, MARKERS), np.eye(4)

@@ -8,6 +8,7 @@ import pytest
 from elastocal.elastic import ElasticModel, actuated
 from elastocal.identification import FitOptions, build, calibrate, leave_poses_out, solve
 from elastocal.robot import Robot, with_tool
+from support.by_day import some_by_day
 from support.cells import robot, urdf
 from support.geared import heavy_robot
 from support.problems import campaign, elastic, linear_readings
@@ -24,7 +25,7 @@ def doubtful():
     return replace(readings, marker_displacement=marker)
 
 
-@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("loss", some_by_day(["huber", "cauchy"]))
 def test_refits_keep_the_weights_that_the_loss_gave(loss):
     readings = doubtful()
     found = made(readings, FitOptions(loss=loss))
@@ -71,6 +72,7 @@ def test_one_configuration_under_two_labels_is_worth_a_warning():
     assert found.warnings[0].startswith("poses 3, 100 are one configuration")
 
 
+@pytest.mark.slow
 def test_a_fit_that_explains_little_is_worth_a_warning():
     noise = np.random.default_rng(0).normal(0.0, 2e-3, (155, 3))
     readings, _ = linear_readings("actuated")

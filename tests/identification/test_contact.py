@@ -107,6 +107,7 @@ def climbed_free():
     return climb(arm(), readings(FREE), rungs, ("bearing-gears",), options), options
 
 
+@pytest.mark.slow
 def test_gears_that_a_free_contact_leaves_out_count_as_doubt():
     choice, options = climbed_free()
     assert [each.name for each in choice.ladder] == ["bearing-gears"]
@@ -142,6 +143,7 @@ def test_a_doubt_that_cannot_be_fitted_is_said_and_refuses_nothing(monkeypatch):
     assert "stopped short" in choice.refused[1]
 
 
+@pytest.mark.slow
 def test_presses_on_one_and_on_two_disks_leave_it_free_with_gears():
     how = Held(doubled=8, noise=5e-6)
     options = weigh_contact(arm(), readings(how), FitOptions(contact=Contact(spread=0.02)))
@@ -307,7 +309,7 @@ def test_friction_that_a_larger_press_left_is_no_other_stack():
 @pytest.mark.parametrize(
     ("lost", "kinds"),
     [
-        ([], set()),
+        pytest.param([], set(), marks=pytest.mark.slow),
         (
             ["contacts", "reference_force"],
             {"calibration.untold-stacks", "calibration.no-light-force"},
@@ -338,6 +340,7 @@ def test_a_surface_that_pulls_is_refused(name):
         ec.calibrate(ec.Dataset.from_xarray(turned), contact=Contact(5e6, 3e6), springs="actuated")
 
 
+@pytest.mark.slow
 def test_a_marker_of_zeros_ends_in_a_sentence_and_not_in_a_traceback():
     blank = held_by_contact(Held(noise=5e-6, doubled=8)).to_xarray()
     blank["marker_displacement"] = 0.0 * blank["controller_displacement"]

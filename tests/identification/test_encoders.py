@@ -158,6 +158,7 @@ def test_sound_encoders_are_not_warned_of():
     assert not [each for each in found.warnings if "encoders" in str(each)]
 
 
+@pytest.mark.slow
 def test_the_command_uses_and_leaves_them(tmp_path):
     path = tmp_path / "data.nc"
     write(data(), path)
@@ -174,6 +175,7 @@ def test_the_command_uses_and_leaves_them(tmp_path):
     np.testing.assert_array_equal(told.calibrated.compliance, plain.calibrated.compliance)
 
 
+@pytest.mark.slow
 def test_a_codec_trains_with_them():
     readings = data(2e-6, 9).readings(arm().joint_names)
     made = cross_validate(arm(), readings, options=CodecOptions(splits=3), jobs=1)

@@ -86,6 +86,7 @@ def joint_2(found: Calibration) -> float:
     return float(found.calibrated.compliance[1] * STIFFNESS[1])
 
 
+@pytest.mark.slow
 def test_joint_2_comes_out_right_though_the_tracker_moved_between_the_payloads():
     clean = [payload_readings(seed) for seed in range(5)]
     shifted = [moved(each, each.load_case, seed)[0] for seed, each in enumerate(clean)]
@@ -108,6 +109,7 @@ def test_the_interval_of_joint_2_counts_the_frames_and_holds_the_truth():
     assert high - low > 1.3 * (clean[1] - clean[0])[1] * STIFFNESS[1]
 
 
+@pytest.mark.slow
 def test_held_out_errors_are_those_of_frames_of_the_training_poses():
     readings, _ = moved(payload_readings(), payload_readings().load_case)
     free, tied = fitted(readings, "load_case"), fitted(readings)
@@ -196,6 +198,7 @@ def test_a_fit_with_frames_is_the_fit_of_what_no_frame_explains():
     np.testing.assert_allclose(rows, 0.0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_springs_that_a_free_frame_could_be_are_not_counted_as_seen():
     """With one orientation and one force, a shift of the tracker deflects all poses alike."""
     readings = payload_readings()

@@ -115,6 +115,7 @@ def test_bounds_hold_the_spring_and_no_other():
     assert np.all(held.calibrated.draws[:, 1] >= low)
 
 
+@pytest.mark.slow
 def test_a_certain_prior_wins_and_a_vague_one_does_not():
     truth = fitted()[1]
     certain, _ = fitted(KnownSpring(NAMES[1], None, None, 2.0 * truth[1], 1e-6 * truth[1]))
@@ -124,6 +125,7 @@ def test_a_certain_prior_wins_and_a_vague_one_does_not():
     assert vague.calibrated.compliance[1] == pytest.approx(free.calibrated.compliance[1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_prior_is_no_data_observability_does_not_count_it():
     readings, _ = linear_readings("bearing", 20e-6)
     model = elastic("bearing")
@@ -136,6 +138,7 @@ def test_a_prior_is_no_data_observability_does_not_count_it():
     assert seen.unobservable == without.unobservable
 
 
+@pytest.mark.slow
 def test_the_figures_say_which_springs_had_a_prior_and_are_read_back():
     truth = fitted()[1]
     known = (

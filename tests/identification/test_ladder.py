@@ -165,6 +165,7 @@ def test_the_score_of_a_pose_is_its_mean_error_where_no_load_is_low():
         assert rung.chosen or np.allclose(rung.held_out.error, held_out.error, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_errors_of_the_chosen_rung_are_those_of_its_calibration():
     readings = Cell(rich_truth(), seed=3, poses=8).readings()
     choice = choose_model(robot(), readings, "auto", OPTIONS)
@@ -289,6 +290,7 @@ def test_springs_that_a_ladder_chooses_are_told_what_the_drives_say(springs, tol
         assert [each.name for each in choice.known] == list(choice.model.parameter_names)
 
 
+@pytest.mark.slow
 def test_a_longer_tool_does_not_turn_springs_that_the_calibrated_tool_hardly_did_to_great_errors():
     """Springs at the wrist, which presses beside its axis hardly turn, took all of the noise."""
     arm, longer = rich_truth(), T_from_xyzabc(0.0, 0.0, 0.15, 0.0, np.radians(30.0), 0.0)

@@ -68,7 +68,13 @@ def test_the_largest_component_is_one_in_size():
     np.testing.assert_allclose(found, [[0.6, -1.0, 0, 0], [0, 0, 1.0, 0.5]], atol=1e-9)
 
 
-@pytest.mark.parametrize(("n", "k"), [(6, 2), (12, 4), (18, 5), (18, 9), (18, 13), (30, 15)])
+@pytest.mark.parametrize(
+    ("n", "k"),
+    [
+        *((6, 2), (12, 4), (18, 5), (18, 9), (30, 15)),
+        pytest.param(18, 13, marks=pytest.mark.slow),
+    ],
+)
 def test_a_dense_null_space_is_spanned_whatever_its_size(n, k):
     """Beyond some thousands of coordinate sets (few poses) elimination takes over."""
     null_space = orthonormal(np.random.default_rng(k).normal(size=(k, n)))

@@ -80,6 +80,7 @@ def test_suspicious_readings_come_worst_first_and_say_whether_they_were_set_asid
     assert scores == sorted(scores, reverse=True)
 
 
+@pytest.mark.slow
 def test_blunders_that_are_kept_are_named_but_not_set_aside():
     figures = summary(calibration(keep=True))
     assert figures.readings == 155
@@ -98,6 +99,7 @@ def test_accuracy_is_stated_with_its_split_and_only_of_poses_left_out():
     assert held_out.mean > figures.residual.mean
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_figures():
     made = calibrate(elastic(), calibration().readings, np.random.default_rng(0))
     assert summary(made) == summary(calibration())

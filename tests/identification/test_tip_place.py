@@ -132,6 +132,7 @@ def test_two_campaigns_of_one_arm_have_not_moved_where_each_has_found_its_tip():
     assert not [each for each in found.notes if "another tool" in each]
 
 
+@pytest.mark.slow
 def test_a_report_makes_the_same_fit_again():
     model = calibrated()
     assert reproduce_calibration(model.calibrated, model.calibration, elsewhere()).same

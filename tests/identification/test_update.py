@@ -12,6 +12,7 @@ from elastocal.identification import CalibrateResult, calibrate, update_springs
 from elastocal.records import read_json
 from elastocal.workflows import calibrate as calibrate_files
 from support import problems
+from support.by_day import some_by_day
 from support.cells import Cell, linear_truth, unseen
 from support.cli import elastocal
 
@@ -56,7 +57,7 @@ def worn_unseen(softer):
     return replace(readings, marker_displacement=marker)
 
 
-@pytest.mark.parametrize("poses", [5, 31])
+@pytest.mark.parametrize("poses", some_by_day([5, 31]))
 def test_an_arm_that_got_softer_is_followed_at_poses_that_nothing_has_seen(poses):
     model = problems.elastic("bearing")
     old = calibrate(model, readings_of(poses, 0), np.random.default_rng(0)).calibrated
@@ -190,6 +191,7 @@ def test_an_arm_that_has_worn_or_not_is_no_mistake(few, softer):
         assert worth.refusal is None or worth.refusal.kind == "update.no-gain"
 
 
+@pytest.mark.slow
 def test_noise_alone_moves_nothing_or_next_to_nothing(few):
     readings = production(noise=0.0)
     rng = np.random.default_rng(3)

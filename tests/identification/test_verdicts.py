@@ -81,6 +81,7 @@ def test_with_a_longer_lever_or_without_noise_the_same_spring_is_seen(noise, lev
     assert faint(noise, lever).calibrated.observability.faint == ()
 
 
+@pytest.mark.slow
 def test_a_spring_that_is_too_weak_to_see_is_not_compared():
     old, new = (replace(faint(seed=n).calibrated, provenance=f"campaign {n}") for n in (0, 1))
     found = recertify(old, new).summary

@@ -207,6 +207,7 @@ def test_a_soft_arm_with_its_wrist_near_axis_1_stands_where_its_joints_say():
     assert np.abs(between).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_an_arm_that_yields_so_far_that_its_levers_change_is_warned_of():
     """A UR10e pressed with 165 N yields 5 mm: its last tilt was held in 22 of 27 campaigns."""
     soft = campaign("parallel axes", POSES["few"], 0, press=165.0, springs="bearing")

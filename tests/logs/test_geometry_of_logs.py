@@ -12,6 +12,7 @@ from elastocal.geometry.ladder import climb
 from elastocal.progress import silent
 from elastocal.records import write_json
 from elastocal.robot import Robot
+from support.by_day import some_by_day
 from support.loaded_arms import SPRINGS, jacobian, tooled
 from support.measured_arms import MARKERS, Measured, measure
 
@@ -133,7 +134,9 @@ OFFSET = -3.0
 """Of the clock of the sensor's log, in s."""
 
 
-@pytest.mark.parametrize(("presses", "decided"), [((1.0, 1.0), False), ((0.5, 1.0), True)])
+@pytest.mark.parametrize(
+    ("presses", "decided"), some_by_day([((1.0, 1.0), False), ((0.5, 1.0), True)])
+)
 def test_of_equally_long_moves_the_deflection_or_the_map_says_which_is_which(
     tmp_path, presses, decided
 ):

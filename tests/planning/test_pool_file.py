@@ -128,6 +128,7 @@ def test_contradictions_are_refused_by_name(changes, said):
         replace(plans.pool(), **changes)
 
 
+@pytest.mark.slow
 def test_an_unknown_schema_is_refused_by_name(tmp_path):
     said = damaged(tmp_path, lambda data: data.assign_attrs(schema="elastocal.pool/2"))
     assert "'elastocal.pool/2'; this version reads 'elastocal.pool/1'" in said

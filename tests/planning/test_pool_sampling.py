@@ -12,6 +12,7 @@ from elastocal.planning import (
     sample_pool,
 )
 from elastocal.planning.surface import SurfaceError
+from support.by_day import some_by_day
 
 
 def example(folder, like="afp", **changes):
@@ -31,7 +32,7 @@ def gathered(cell, jobs=1, seed=0, progress=lambda *_: None):
 FEW = ("pool: 3000", "pool: 120")
 
 
-@pytest.mark.parametrize("sampling", ["blue_noise", "uniform"])
+@pytest.mark.parametrize("sampling", some_by_day(["uniform", "blue_noise"]))
 def test_there_are_as_many_candidates_as_wanted(tmp_path, sampling):
     cell = example(tmp_path, pool=("pool: 3000", f"pool: 150\n  sampling: {sampling}"))
     found = gathered(cell)
@@ -72,6 +73,7 @@ def test_the_seed_decides_the_pool(tmp_path):
     assert not np.array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_progress_counts_up_to_what_is_wanted(tmp_path):
     told = []
     gathered(example(tmp_path, pool=FEW), progress=lambda *count: told.append(count))

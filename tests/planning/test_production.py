@@ -74,6 +74,7 @@ def test_the_best_next_pose_leaves_least_variance_on_production(cell, made):
     assert best_additions(cell, postures, measured, 1, others).share[0] >= found.share[0]
 
 
+@pytest.mark.slow
 def test_a_pose_that_needs_a_neighbour_gets_one_that_does_not_repeat_it(cell, made):
     measured, postures = measured_of(made.plan), postures_of(made.pool)
     found = best_additions(cell, postures, measured, 2, beside=measured[:1])
@@ -108,6 +109,7 @@ def changed(cell: Cell, **search) -> Cell:
     return replace(cell, file=cell.file.model_copy(update={"search": model}))
 
 
+@pytest.mark.slow
 def test_the_process_of_an_example_is_the_one_that_is_simulated(cell, kind):
     courses = process_courses(kind, cell, 0, None)
     assert [name for name, _ in cell.process.courses] == [course.name for course in courses]
@@ -123,6 +125,7 @@ def test_six_poses_chosen_for_production_cover_it(plan):
     assert "100% of" in dict(plan.facts())["production"]
 
 
+@pytest.mark.slow
 def test_a_plan_away_from_production_says_so_by_name(cell, kind, folder):
     """The rail is held where production never runs; the block is pressed on one side face."""
     text = (folder / "cell.yaml").read_text()
@@ -168,6 +171,7 @@ def test_an_accuracy_out_of_reach_is_told_with_what_is_expected(cell):
     assert any("search.accuracy) is not expected from 5 poses" in text for text in found.findings)
 
 
+@pytest.mark.slow
 def test_the_floor_of_the_model_is_no_better_for_more_poses(cell, plan):
     found = make_plan(changed(cell, floor=50e-6), jobs=1).plan.production
     assert all(each.error > 50e-6 for each in found.expected)
@@ -220,6 +224,7 @@ def test_a_plan_of_fewer_poses_than_the_cell_says_is_still_a_plan_of_that_cell(f
     assert workflows.dry_run(cell, plan=tmp_path / "plan", out=tmp_path / "run").poses == 5
 
 
+@pytest.mark.slow
 def test_no_pose_is_left_to_a_station_that_cannot_be_registered(cell):
     """The block's second tilt to weigh the tool by is seen by a station that sees little else."""
     found = make_plan(changed(cell, poses=9), jobs=1).plan

@@ -21,6 +21,9 @@ from support import live_bench
 from support.browser import PROBE, Look, complaints_of, emulate, requests_of
 from support.run_cells import planned_cell
 
+pytestmark = pytest.mark.slow
+"""What the page asks for is tried by day in `test_session.py`, without a browser."""
+
 LEAST_CONTRAST = 4.5
 """Of text, by WCAG 2.2, success criterion 1.4.3."""
 WAIT = """new Promise((done, fail) => {
@@ -312,7 +315,6 @@ def run_it(page, cell, told):
     told["names"] = page.get(NAMES)
 
 
-@pytest.mark.slow
 def test_the_page_complains_of_nothing_and_asks_nobody_else(told):
     # The browser notes each refusal that a page is told, whatever the page makes of it.
     assert [text for text in told["complaints"] if "422" not in text] == []

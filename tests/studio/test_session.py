@@ -8,18 +8,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from elastocal import workflows
 from elastocal.cell import load_cell, write_example
-from elastocal.errors import ProcedureError, RobotError, SchemaError
+from elastocal.errors import FileAccessError, ProcedureError, RobotError, SchemaError
+from elastocal.robot import xyzabc_from_T
 from elastocal.studio import Session, default_springs
 from elastocal.studio.cell_edit import form_of
 from elastocal.studio.posture import CellView
 from elastocal.studio.recorded import RunView, find_runs
 from elastocal.studio.springs import _caveats
-from elastocal.studio.trials import compare_techniques, survey_reach
 from elastocal.studio.worker import Outbox, Worker, WorkState
 from elastocal.wording import in_words
-from elastocal.workflows.check import describe_file
-from elastocal.workflows.studio import _PageOperator
+from elastocal.workflows.studio import _Commands, _PageOperator
+from support import live_bench
 from support.recorded_runs import record_run
 from support.run_cells import planned_cell
 from support.tasks import ask_twice, fail, tick_until_stopped
@@ -30,8 +31,7 @@ class Commands:
 
     real = False
 
-    def check(self, cell):
-        return describe_file(cell)
+    check = _Commands.check
 
     def springs(self, cell):
         return default_springs(cell)
@@ -301,6 +301,17 @@ def test_a_work_that_fails_says_why():
     assert (news.state, news.message) == (WorkState.FAILED, "it cannot be done")
 
 
+def test_work_may_begin_when_other_work_has_ended():
+    news = []
+    worker = Worker(lambda: news.append(worker.news))
+    for kind in ("plan", "survey"):
+        worker.begin(kind, fail)
+        worker._reader.join(60.0)
+    worker.close()
+    ended = [each.kind for each in news if each.state is WorkState.FAILED]
+    assert ended == ["plan", "survey"]
+
+
 def test_a_run_on_disk_is_opened_pose_by_pose(tmp_path):
     run = record_run(tmp_path / "run", poses=2)
     found = RunView.read(run.path)
@@ -331,26 +342,113 @@ def test_runs_are_listed_those_that_cannot_be_read_with_the_reason(tmp_path):
         RunView.read(tmp_path)
 
 
-class Silent:
-    """A line to a studio that nobody listens to."""
+class Listener:
+    """A line to a studio that keeps what it hears, and says stop after so many samples."""
+
+    def __init__(self, most):
+        self.samples, self.told, self._most = [], [], most
 
     def progress(self, *_):
         pass
 
+    def sample(self, live):
+        self.samples.append(live)
 
-@pytest.mark.slow
-def test_a_survey_and_a_comparison_are_made_of_the_pool_of_the_cell(tmp_path):
-    path = planned_cell(tmp_path, poses=3).cell
-    found = survey_reach(path, Silent())
+    def tell(self, live):
+        self.told.append(live)
+
+    def stopped(self):
+        return len(self.samples) >= self._most
+
+
+class Asking:
+    """A page whose works are done at once, in this process."""
+
+    def __init__(self, path, model):
+        self.path, self.session = path, Session(path, _Commands(model))
+        self.session.worker.begin = self._do
+
+    def _do(self, _kind, work):
+        self._result = work(self.heard)
+
+    def ask(self, action, most=1, **message):
+        """Return the result of the work that an action begins, and what was heard of it."""
+        self.heard = Listener(most)
+        self.session.actions[action](message)
+        return self._result, self.heard
+
+    def look(self, action, **message):
+        """Return what an action shows."""
+        return self.session.actions[action](message)
+
+
+@pytest.fixture(scope="module")
+def asking(tmp_path_factory):
+    path = planned_cell(tmp_path_factory.mktemp("asking"), poses=3).cell
+    return Asking(path, live_bench.write_model_of(path, path.with_name("model.json")))
+
+
+def test_a_survey_and_a_comparison_are_made_of_the_pool_of_the_cell(asking):
+    found, _ = asking.ask("survey")
     free = [p for p, name in zip(found["points"], found["refused"], strict=True) if not name]
     assert len(free) == 40
     assert found["summary"].startswith(f"40 of {len(found['points'])} points can be pressed on")
-    compared = compare_techniques(path, Silent())
+    compared, _ = asking.ask("compare")
     rows = {each["technique"]: each for each in compared["rows"]}
     assert {each["poses"] for each in rows.values()} == {"3"}
     radius = {name: float(each["covering_radius"].split()[0]) for name, each in rows.items()}
     assert radius["cover"] == min(radius.values())
     assert float(rows["ioops"]["o1"]) == max(float(each["o1"]) for each in rows.values())
+
+
+def test_the_devices_are_heard_until_somebody_says_stop(asking):
+    _, heard = asking.ask("watch", most=2)
+    shown = heard.samples[-1]
+    kinds = [each["device"].split()[0] for each in shown["devices"]]
+    assert kinds == ["arm", "sensor", "metrology"]
+    assert {len(each["cells"]) for each in shown["devices"]} == {len(shown["columns"])}
+
+
+def test_a_plan_is_made_shown_and_run_and_a_run_that_is_stopped_can_be_gone_on_with(asking):
+    made, _ = asking.ask("plan", folder="planned")
+    shown = asking.look("poses", **made)
+    assert shown["summary"].startswith("3 poses by ")
+    assert [each["id"] for each in shown["poses"]] == [0, 1, 2]
+    with pytest.raises(FileAccessError, match="planned"):
+        asking.ask("plan", folder="planned")
+    stopped, heard = asking.ask("run", most=2, plan="planned", folder="run", rate=20.0)
+    assert stopped["interrupted"]
+    assert heard.samples[-1]["next"]
+    assert asking.look("folders")["plans"] == ["planned"]
+    (run,) = asking.look("folders")["runs"]
+    assert "interrupted" in run["state"]
+    assert "AT THE SURFACE" not in run["state"]
+    assert len(asking.look("record", folder="run")["poses"]) < 3
+    beside = asking.path.parent
+    left = workflows.dry_run(asking.path, plan=beside / "planned", out=beside / "run")
+    assert left.poses == 3
+
+
+def test_a_page_sees_postures_places_and_news(asking):
+    scene = asking.look("scene")
+    q, T = scene["home"], np.reshape(scene["posture"]["tcp"], (4, 4))
+    assert asking.look("posture", q=q)["posture"]["q"] == q
+    abc = xyzabc_from_T(T)[3:].tolist()
+    there = asking.look("place", q=q, position=T[:3, 3].tolist(), orientation=abc)["posture"]
+    assert there["tcp"] == pytest.approx(scene["posture"]["tcp"], abs=1e-9)
+    kept = asking.look("place", q=q, position=T[:3, 3].tolist())["posture"]
+    assert kept["tcp"] == pytest.approx(there["tcp"], abs=1e-9)
+    number, told = asking.session.news(-1, 0.0)
+    assert (told["work"]["state"], told["cell"]) == ("none", scene["number"])
+    assert asking.session.news(number, 0.0) == (number, told)
+
+
+def test_the_springs_of_a_model_have_an_interval_and_say_where_it_holds(asking):
+    scene = asking.look("scene")
+    assert scene["springs"].startswith("calibrated model model.json")
+    (case, *_) = scene["posture"]["cases"]
+    assert case["size"].endswith(" mm")
+    assert case["caveat"].endswith("the interval may not hold here")
 
 
 def test_the_view_opens_on_arm_and_tooling_and_not_on_the_floor(view):

@@ -64,3 +64,13 @@ def test_a_question_and_a_warning_wait_for_a_studio_that_hangs():
     lives = [live for kind, *(live, *_) in told[:-1] if kind == "live"]
     assert [live for live in lives if "number" not in live] == wanted
     assert [live["number"] for live in lives if "number" in live][-1] == 999
+
+
+def test_progress_that_is_none_is_not_told_again():
+    ours, theirs = multiprocessing.Pipe()
+    outbox = Outbox(theirs)
+    outbox.progress("poses measured", 1, 3)
+    assert ours.recv() == ("progress", "poses measured", 1, 3)
+    outbox.progress("poses measured", 1, 3)
+    outbox.close(("done", {}))
+    assert ours.recv() == ("done", {})

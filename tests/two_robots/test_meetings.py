@@ -59,6 +59,7 @@ def test_a_plan_is_the_same_when_it_is_made_again(plan, cell):
         np.testing.assert_allclose(made.second, other.second, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_chosen_meetings_tell_more_than_the_first_of_the_pool(plan, cell):
     pool = meeting_pool(cell, np.random.default_rng(0))
     rows = observation_rows(cell, pool)

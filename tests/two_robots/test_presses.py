@@ -28,6 +28,7 @@ from elastocal.two_robots.calibration import (
 )
 from elastocal.two_robots.presses import PairModel, build_pair, pair_blocks
 from support import two_arms
+from support.by_day import some_by_day
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +183,7 @@ def test_presses_without_blunders_are_all_kept(pair, sound):
     assert not {SET_ASIDE.name, LOOKS_WRONG.name} & {each.kind for each in sound.findings}
 
 
-@pytest.mark.parametrize("off", [50e-3, 3e-3, 1e-3])
+@pytest.mark.parametrize("off", some_by_day([1e-3, 3e-3, 50e-3]))
 def test_a_blunder_is_set_aside_named_and_moves_neither_arm(cell, pair, sound, off):
     wrong = moved(pair, 40, [0.0, 0.6 * off, 0.8 * off])
     found = identify_pair(wrong, np.random.default_rng(0), cell.contact, "gears", draws=40)

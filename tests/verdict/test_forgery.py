@@ -280,7 +280,7 @@ def test_a_forged_page_is_refused(tmp_path, kind):
     assert refusal(folder / PAGE)
 
 
-@pytest.mark.parametrize("kind", some_by_day(OF_THE_RUN))
+@pytest.mark.parametrize("kind", some_by_day(OF_THE_RUN, 6))
 def test_a_forged_run_is_refused(tmp_path, kind):
     folder = forged.copied(tmp_path / "all")
     (folder / "model.json").unlink()

@@ -118,6 +118,7 @@ def test_the_deviation_at_the_presses_is_that_before_and_after_a_correction(resu
     assert [each for each in shown if isinstance(each, Facts)] == [Facts(found.facts())]
 
 
+@pytest.mark.slow
 def test_a_meeting_is_left_out_by_name(done, tmp_path):
     run, out = done / "run", tmp_path / "models"
     given = "--springs", "bearing", "--draws", "40", "--exclude", "3", "--exclude", "5:normal"

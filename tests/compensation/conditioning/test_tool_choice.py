@@ -43,6 +43,7 @@ def test_cross_talk_of_one_percent_is_no_rotation(seed):
     assert abs(found.fit.mass - sensor.mass) <= found.fit.half_width["mass"]
 
 
+@pytest.mark.slow
 def test_the_weight_is_known_to_the_noise_although_the_matrix_is_not():
     postures, sensor = raw(1, count=31, cross_talk=0.01)
     fit = choose_tool(postures).fit
@@ -55,7 +56,7 @@ def test_the_weight_is_known_to_the_noise_although_the_matrix_is_not():
     assert np.abs(left[3:]).max() < 0.1
 
 
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", some_by_day([3, 8]))
 def test_without_a_matrix_intervals_reach_as_far_as_beside_its_prior(seed):
     # Few postures, hardly turned: they cannot show a cross-talk of 1 %, and do not ask for it.
     rng = np.random.default_rng(seed)
@@ -93,6 +94,7 @@ def test_intervals_cover_the_tool_under_a_cross_talk_of_one_percent(count, angle
     assert 0.90 <= np.mean(covered) <= 0.99
 
 
+@pytest.mark.slow
 def test_a_weight_determines_at_most_eighteen_directions_of_the_matrix():
     fit = choose_tool(raw(1, count=31, cross_talk=0.01)[0]).fit
     assert 10 <= fit.matrix_rank <= 18
@@ -105,6 +107,7 @@ def test_a_clean_sensor_gets_no_matrix_and_no_drift():
     assert found.set_aside == ()
 
 
+@pytest.mark.slow
 def test_a_rotation_is_freed_only_where_it_was_asked_for():
     sensor = replace(TOOL, R_flange_sensor=Rotation.from_euler("z", 4.0, degrees=True).as_matrix())
     postures, _ = raw(0, tool=sensor)
@@ -168,8 +171,10 @@ def test_halves_that_disagree_are_within_the_interval():
 
 @pytest.mark.parametrize(
     ("order", "reason"),
-    [([3, 0, 1, 2], "in the order w x y z, their columns are named x y z w"),
-     ([1, 2, 3, 0], "in the order x y z w, their columns are named w x y z")],
+    some_by_day(
+        [([3, 0, 1, 2], "in the order w x y z, their columns are named x y z w"),
+         ([1, 2, 3, 0], "in the order x y z w, their columns are named w x y z")]
+    ),
 )  # fmt: skip
 def test_quaternions_of_the_other_order_are_told(order, reason):
     postures, _ = raw(8)

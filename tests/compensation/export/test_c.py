@@ -163,7 +163,9 @@ def course(rng, joints, count=2000):
     [
         pytest.param("base", 3, "hinges", marks=pytest.mark.slow),
         pytest.param("tcp", 1, "hinges", marks=pytest.mark.slow),
-        ({"abc": ["30 deg", "-20 deg", "170 deg"]}, 5, "hinges"),
+        pytest.param(
+            {"abc": ["30 deg", "-20 deg", "170 deg"]}, 5, "hinges", marks=pytest.mark.slow
+        ),
         ("base", 3, "gears"),
         pytest.param("tcp", 1, "gears", marks=pytest.mark.slow),
     ],
@@ -266,7 +268,8 @@ def beginnings(rng, deflection, limit):
     return rows
 
 
-@pytest.mark.parametrize("name", some_by_day(["gears, grown", "hinges"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["gears, grown", "hinges"])
 def test_offsets_of_courses_are_those_of_python(tmp_path, name):
     model = compensated.arm("on a rail") if name == "hinges" else geared()
     state = None if name == "hinges" else grown_arm(model.model.robot)
@@ -469,6 +472,7 @@ class TestFriction:
         assert "elastocal_rest" not in (folder / "README.md").read_text()
         assert "memory" not in (folder / "elastocal_model.h").read_text()
 
+    @pytest.mark.slow
     def test_angles_of_points_are_good_to_half_a_femtoradian(self, with_friction, tmp_path):
         source = tmp_path / "arcs.c"
         source.write_text(

@@ -12,6 +12,7 @@ from elastocal.compensation.online import Compensator, Reading
 from elastocal.compensation.process.loop import CycleInput
 from elastocal.identification import EncoderZero
 from elastocal.robot import Robot
+from support.by_day import some_by_day
 from support.compensated import calibrated
 from support.compiled import CompiledCorrector
 from support.exported import needs_gcc
@@ -34,7 +35,7 @@ def compensator(remembers: bool, joints: slice = slice(1, 3)) -> Compensator:
 
 
 @needs_gcc
-@pytest.mark.parametrize("remembers", [False, True])
+@pytest.mark.parametrize("remembers", some_by_day([True, False]))
 def test_the_c_follows_encoders_as_python_does(remembers, tmp_path):
     python = compensator(remembers)
     there, state = CompiledCorrector(python, tmp_path), python.start()
@@ -58,7 +59,7 @@ def test_the_c_follows_encoders_as_python_does(remembers, tmp_path):
     assert state.zero
 
 
-@pytest.mark.parametrize("remembers", [False, True])
+@pytest.mark.parametrize("remembers", some_by_day([False, True]))
 def test_without_encoders_nothing_of_them_is_in_the_c(remembers):
     made = compensator(remembers, slice(0, 0))
     assert not [name for name, text in c_files(made.design).items() if "ncoder" in text]

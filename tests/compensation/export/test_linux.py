@@ -111,6 +111,7 @@ def test_over_loopback_it_corrects_holds_fades_and_ends_at_zero(program):
     assert not offset.any()
 
 
+@pytest.mark.slow
 def test_what_is_refused_and_a_bad_status_are_said_when_they_happen(program):
     path, files = program
     telegram = b'<Rob><RIst X="1620,9999"/><IPOC>1</IPOC></Rob>'

@@ -134,6 +134,7 @@ def test_a_sequence_is_that_of_friction_elements_along_their_path(gravity):
         memory = found[3:]
 
 
+@pytest.mark.slow
 def test_an_unknown_start_moves_the_deflection_by_at_most_what_is_said_and_is_forgotten():
     calibrated = geared()
     model, c = calibrated.model, calibrated.compliance

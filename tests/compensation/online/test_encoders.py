@@ -159,6 +159,7 @@ def test_a_zeroed_encoder_that_loses_its_count_is_not_followed(lost):
     np.testing.assert_allclose(answer.deflection, sound[-1].deflection, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_noise_is_smoothed_over_the_stated_time():
     made, q = compensator("100 ms"), posture()
     rng, state, beyond = np.random.default_rng(0), made.start(), []

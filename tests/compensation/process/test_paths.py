@@ -12,6 +12,7 @@ from elastocal.errors import CompensationError
 from elastocal.planning import cell_surface
 from elastocal.robot import Robot, wrist_angle
 from elastocal.robot.inverse import inverse_for
+from support.by_day import some_by_day
 from support.simulated import example_cell
 from support.urdfs import KR_LIKE, opw_arm_urdf
 
@@ -99,7 +100,7 @@ def test_a_force_begins_and_ends_at_nothing():
     assert share[25] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("like", ["afp", "machining"])
+@pytest.mark.parametrize("like", some_by_day(["machining", "afp"]))
 def test_joints_reach_the_courses_but_for_one_turn_of_the_tool(like, courses, rings):
     cell, made = example_cell(like), (courses if like == "afp" else rings)[1][:2]
     with_joints = with_postures(cell, made)

@@ -92,6 +92,7 @@ def test_noise_is_read_or_refused_and_nothing_else(noise):
         read_rob(noise)
 
 
+@pytest.mark.slow
 @given(st.data())
 @settings(max_examples=300, deadline=None)
 def test_damaged_messages_are_read_or_refused_and_nothing_else(data):

@@ -91,6 +91,7 @@ def test_a_robot_that_really_changed_is_told_from_other_poses_and_loads(springs)
     assert found.verdict is Verdict.FAIL
 
 
+@pytest.mark.slow
 def test_gears_of_campaigns_under_other_forces_are_held_against_one_another():
     old, (new, _) = before("gears"), after("gears", 1.0)
     assert old.model.springs != new.model.springs

@@ -45,6 +45,7 @@ def test_intervals_hold_a_planted_change_at_every_level_in_19_of_20_pairs():
     assert np.mean([each.largest.low > 0.0 for each in pairs]) == 1.0
 
 
+@pytest.mark.slow
 def test_an_unchanged_cell_has_a_lower_end_of_zero_although_noise_makes_every_norm_positive():
     """The mean's misses all lie on this side: 5 %, of 120 pairs 6 with a deviation of 2.4."""
     pairs = [compared(made_up(2 * n), made_up(2 * n + 1)) for n in range(120)]

@@ -15,6 +15,7 @@ from elastocal.planning.motion.route import _Roadmap
 from elastocal.planning.pool import PoolBuilder
 from elastocal.planning.postures import Postures
 from elastocal.planning.surface import sample_uniform
+from support.by_day import some_by_day
 from support.moving import BALL, CLEARANCE, HOME, box, chain, dense, mover, pressed
 from support.postures import arm
 
@@ -124,6 +125,7 @@ def test_poses_in_one_place_are_all_visited():
     assert [move.duration for move in route.moves[1:-1]] == [0.0] * 3
 
 
+@pytest.mark.slow
 def test_the_way_does_not_depend_on_how_poses_are_numbered():
     postures, walled = pressed(POINTS), mover(WALL)
     first = plan_route(HOME, postures, walled)
@@ -160,7 +162,7 @@ def example(like, folder, count) -> tuple:
     return cell, surface, pool.postures.take(np.arange(min(count, len(pool.postures))))
 
 
-@pytest.mark.parametrize("like", ["afp", "machining"])
+@pytest.mark.parametrize("like", some_by_day(["afp", "machining"]))
 def test_the_poses_of_an_example_are_visited(like, tmp_path):
     cell, surface, postures = example(like, tmp_path, 6)
     robot = mover_for(cell, collision_scene(cell, surface))

@@ -292,6 +292,7 @@ def _criterion(name: str, information: Information) -> Criterion:
     return CRITERIA[name].of(information)
 
 
+@pytest.mark.slow
 def test_a_single_swap_after_the_end_brings_next_to_nothing():
     """The search ends as the paper's does; docs/explanation/choosing-poses.md says how far off."""
     gains = []

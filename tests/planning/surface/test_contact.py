@@ -38,6 +38,7 @@ def test_a_disk_is_supported_on_a_block_exactly_where_its_rim_is_inside_the_edge
     assert fit.gap[fit.supported].max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_step_under_the_disk_shows_as_a_gap():
     surface = grid(lambda x, _: np.where(x > 0.001, 0.01, 0.0), 201)
     points = surface.points(*_at(surface, (-0.02, 0.0)))

@@ -19,6 +19,7 @@ from elastocal.procedure.derive.derivation import DerivedRun
 from elastocal.procedure.record import ReadingStatus, Window
 from elastocal.records import to_data
 from elastocal.robot import Robot
+from support.by_day import some_by_day
 from support.recorded_runs import Run, Truth, record_run
 from support.sealed import edit_journal
 
@@ -131,6 +132,7 @@ def test_deriving_again_gives_the_same_files(run, derived):
     assert json.loads(folder.summary.read_text())["schema"] == "elastocal.run-summary/2"
 
 
+@pytest.mark.slow
 def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):
     def slip(pose: int, window: Window) -> Window:
         if (pose, window.load_case) == (2, "east"):
@@ -149,8 +151,18 @@ def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("status", [ReadingStatus.UNSTABLE, ReadingStatus.ABORTED])
-@pytest.mark.parametrize("station", ["station_1", "station_2"])
+@pytest.mark.parametrize(
+    ("station", "status"),
+    some_by_day(
+        [
+            ("station_2", ReadingStatus.UNSTABLE),
+            ("station_1", ReadingStatus.UNSTABLE),
+            ("station_2", ReadingStatus.ABORTED),
+            ("station_1", ReadingStatus.ABORTED),
+        ],
+        4,
+    ),
+)
 def test_a_press_that_was_given_up_keeps_its_force_and_its_place_in_time(tmp_path, status, station):
     def give_up(pose: int, window: Window) -> Window:
         if (pose, window.load_case) == (2, "south"):
@@ -171,6 +183,7 @@ def test_a_press_that_was_given_up_keeps_its_force_and_its_place_in_time(tmp_pat
     np.testing.assert_array_equal(pressed.joint_position[0], data.joint_position[2, case])
 
 
+@pytest.mark.slow
 def test_a_press_that_was_given_up_is_not_known_by_what_was_pressed_before_it(tmp_path):
     """Its last second may reach back into the window before."""
 
@@ -216,6 +229,7 @@ def test_a_pose_with_a_bad_reference_is_missing_as_a_whole(tmp_path):
     assert notes == {"the unloaded reference is missing: no beam"}
 
 
+@pytest.mark.slow
 def test_a_load_case_that_was_never_had_is_left_out_with_a_warning(tmp_path):
     def without_north(_: int, window: Window) -> Window:
         if window.load_case == "north":
@@ -238,6 +252,7 @@ def test_a_tool_that_is_heavier_than_the_cell_says_is_told(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_the_wrong_mass_hardly_touches_the_forces(tmp_path):
     """The tare of the same pose takes the weight away; only its turn under load is left."""
     run = record_run(tmp_path / "run", Truth(mass=75.0))

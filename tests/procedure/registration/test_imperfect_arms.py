@@ -80,6 +80,7 @@ def test_a_bump_of_half_a_millimetre_half_way_is_found_and_has_an_interval(prese
     assert abs(move.distance - 0.5e-3) < 4.0 * move.distance_sigma < 0.5e-3
 
 
+@pytest.mark.slow
 def test_a_jump_that_cannot_be_told_is_not_said_and_the_size_that_can_is_stated():
     readings, lever, _ = unloaded("typical", 0)
     few = some(readings, 8, 0)
@@ -89,6 +90,7 @@ def test_a_jump_that_cannot_be_told_is_not_said_and_the_size_that_can_is_stated(
     assert register(readings, lever).detectable < 0.3e-3
 
 
+@pytest.mark.slow
 def test_two_stations_and_a_marker_4_mm_off_are_right_on_a_typical_arm():
     """The tool is 1 mm wrong as well: the lever arm that counts is to where the marker is."""
     readings, lever, marker = unloaded("typical", 0)
@@ -107,6 +109,7 @@ def test_two_stations_and_a_marker_4_mm_off_are_right_on_a_typical_arm():
         assert np.linalg.norm(turn - np.eye(3)) < 4.0 * np.sqrt(2.0) * placed.rotation_sigma
 
 
+@pytest.mark.slow
 def test_a_blunder_of_500_mm_is_found_on_a_typical_arm_and_leaves_no_trace():
     readings, lever, _ = unloaded("typical", 0)
     position = readings.position.copy()

@@ -92,18 +92,22 @@ def frame(request, seen):
     return found
 
 
+@pytest.mark.slow
 def test_the_page_complains_of_nothing(seen):
     assert seen.complaints == []
 
 
+@pytest.mark.slow
 def test_the_network_is_asked_for_nothing(seen):
     assert seen.requests == []
 
 
+@pytest.mark.slow
 def test_the_page_does_not_scroll_sideways(frame):
     assert frame["scrollWidth"] <= frame["innerWidth"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("look", LOOKS, ids=lambda each: f"{each.width}-{each.scheme}")
 @pytest.mark.parametrize("name", ["report", "plan"])
 def test_the_view_in_three_dimensions_is_drawn_in_the_colours_of_the_page(pages, name, look):
@@ -116,6 +120,7 @@ def test_the_view_in_three_dimensions_is_drawn_in_the_colours_of_the_page(pages,
     assert view["ground"] == ([0x1D, 0x20, 0x23] if frame["dark"] else [0xF6, 0xF6, 0xF3])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "least"), [("report", 6), ("geometry", 2)])
 def test_every_picture_shows_something(pages, name, least):
     for frame in pages[name].frames.values():
@@ -126,12 +131,14 @@ def test_every_picture_shows_something(pages, name, least):
             assert len(image["alt"]) > 20
 
 
+@pytest.mark.slow
 def test_every_text_stands_out_from_its_ground(frame):
     text = frame["text"]
     assert text["count"] > 50
     assert text["ratio"] >= LEAST_CONTRAST, text
 
 
+@pytest.mark.slow
 def test_screenshots_show_more_than_one_colour_and_differ(seen):
     pictures = list(seen.screenshots.values())
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)

@@ -136,6 +136,7 @@ def test_a_variant_without_errors_is_refused_by_name(tmp_path, known):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_all_files_are_written_and_the_same_codec_gives_the_same_bytes(tmp_path, known):
     whole, part = tmp_path / "a", tmp_path / "b"
     whole.mkdir()

@@ -203,6 +203,7 @@ class TestProgram:
         desk.repeat(10)
         assert desk.robot.ended
 
+    @pytest.mark.slow
     def test_pressing_shows_in_the_sensor_of_the_cell(self, desk):
         desk.at_place()
         sensor, normal = desk.live.sensor(), places()[1].normal

@@ -56,6 +56,7 @@ def test_another_seed_gives_another_run(session_of):
     assert np.abs(a[:, 2:8] - b[:, 2:8]).min(axis=0).max() > 0.0
 
 
+@pytest.mark.slow
 def test_a_pose_measures_the_same_first_or_last_early_or_late(session_of):
     alone, q_alone = visit(session_of(start=1000.0), places()[2])
     session = session_of()
@@ -68,6 +69,7 @@ def test_a_pose_measures_the_same_first_or_last_early_or_late(session_of):
     np.testing.assert_array_equal(q_after, q_alone)
 
 
+@pytest.mark.slow
 def test_a_pose_that_is_done_again_after_a_stop_measures_the_same(session_of):
     place = places()[1]
     alone, _ = visit(session_of(), place)

@@ -39,6 +39,7 @@ def test_the_undeformed_robot_is_that_of_the_cell(like):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("like", ["afp", "machining"])
 def test_typical_deflections_are_half_to_two_and_a_half_millimetres(like):
     cell = example_cell(like)
