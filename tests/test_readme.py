@@ -103,6 +103,7 @@ def test_the_tour_has_the_lines_that_a_new_user_needs():
     assert len(blocks("text")) == 2
 
 
+@pytest.mark.slow
 def test_every_shell_line_of_the_tour_is_done(toured):
     failed = {line: result.err for line, result in toured.results.items() if result.code != 0}
     assert not failed
@@ -116,6 +117,7 @@ def test_every_shell_line_of_the_tour_is_done(toured):
         assert (toured.folder / name).is_file(), name
 
 
+@pytest.mark.slow
 def test_the_output_in_the_readme_is_what_the_commands_print(toured):
     lines = (
         "elastocal demo --out demo",
@@ -127,6 +129,7 @@ def test_the_output_in_the_readme_is_what_the_commands_print(toured):
             words = words[after(part.split(), words) :]
 
 
+@pytest.mark.slow
 def test_the_page_on_the_table_quotes_what_the_tour_prints(toured):
     """The condition number is of no meaning to its last digits."""
     page = (ROOT / "docs/how-to/read-the-table.md").read_text(encoding="utf-8")

@@ -9,6 +9,8 @@ from elastocal.errors import IdentificationError
 from elastocal.identification import Contact
 from support.held import STIFFNESS, Held, held_by_contact
 
+pytestmark = pytest.mark.slow
+
 STATED = Contact(normal=5e6, lateral=3e6)
 
 
@@ -26,7 +28,6 @@ def found(tmp_path_factory):
     return codec(Held(poses=10), out, springs="actuated,bearing"), out
 
 
-@pytest.mark.slow
 def test_training_sets_find_the_springs_behind_the_contact(found):
     data = found[0].data
     # Seven of ten poses in each split, and the contact is stated.

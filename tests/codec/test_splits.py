@@ -7,8 +7,12 @@ import pytest
 
 from elastocal.codec import CodecOptions
 from elastocal.codec.splits import drawn_poses, make_campaign, make_splits, split_sizes
+from elastocal.elastic import ElasticModel, layout
 from elastocal.errors import CodecError, ConventionError
+from elastocal.identification import Contact
 from elastocal.planning.search import Candidates, Cover
+from elastocal.robot import Robot
+from support.held import Held, held_by_contact
 from support.problems import campaign, elastic
 
 
@@ -82,3 +86,12 @@ def test_a_mistake_in_readings_is_named_as_calibrate_names_it():
     trusted = CodecOptions(trust_conventions=True)
     found = make_campaign(springs, turned, trusted).findings
     assert any(str(each).startswith("fitted in spite of this: ") for each in found)
+
+
+def test_readings_that_no_tracker_took_are_counted():
+    data = held_by_contact(Held(poses=4))
+    arm = Robot.from_urdf(data.robot_urdf, data.tcp_frame)
+    model, held = ElasticModel(arm, layout(arm, "actuated")), data.readings(arm.joint_names)
+    options = CodecOptions(contact=Contact(normal=5e6, lateral=3e6))
+    kinds = [each.kind for each in make_campaign([model], held, options).findings]
+    assert "codec.held-by-contact" in kinds

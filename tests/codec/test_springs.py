@@ -1,6 +1,7 @@
 """Springs of a codec are those of `calibrate`, chosen without a look at what verifies them."""
 
 from dataclasses import replace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from elastocal.codec import (
     read_codec,
     write_codec,
 )
+from elastocal.codec._prepared import taken_springs
 from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import IdentificationError, SpringError
@@ -223,3 +225,12 @@ def test_a_press_that_is_set_aside_is_still_remembered_by_friction():
     np.testing.assert_allclose(remembered, whole, atol=1e-12 * size)
     forgotten = displacement_blocks(model, readings.take(~aside))
     assert np.abs(forgotten - whole).max() > 1e-3 * size
+
+
+def test_springs_that_could_not_be_tried_are_refused_with_the_reason():
+    class Refused(str):
+        values = MappingProxyType({"springs": "gears"})
+
+    why = Refused("gears were not tried: contact.normal is free")
+    with pytest.raises(IdentificationError, match=why):
+        taken_springs(SimpleNamespace(ladder=(), refused=(why,)), "gears")

@@ -257,5 +257,9 @@ def test_a_run_that_was_gone_on_with_at_once_is_one_state():
         except CompensationError:
             refused += 1
     assert refused <= 2
+
+
+def test_a_run_that_paused_for_long_is_one_state_and_says_so():
+    same = np.full(6, 20e-6)
     paused = replace(in_two_sessions(same, same, 5), pause=5400.0)
     assert any("paused for 90 min" in str(each) for each in state_of(paused).findings)

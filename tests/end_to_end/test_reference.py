@@ -18,6 +18,8 @@ from elastocal.procedure.record import read_commits
 from support.cli import elastocal
 from support.run_cells import planned_cell
 
+pytestmark = pytest.mark.slow
+
 ORDER = (
     "conditioning", "light_contact", "normal_45", "normal", "north", "normal_75", "normal_45_back",
 )  # fmt: skip
@@ -54,7 +56,6 @@ def dataset(run) -> Dataset:
     return read(run[0] / "dataset.nc")
 
 
-@pytest.mark.slow
 def test_the_plan_lists_every_press_in_order(run):
     assert tuple(read_plan(run[1]).contact.load_cases) == ORDER
 
@@ -86,7 +87,6 @@ def test_displacements_count_from_the_light_contact(dataset):
     assert np.all(low / full < 0.45)
 
 
-@pytest.mark.slow
 def test_a_plan_without_the_presses_is_refused(run, tmp_path):
     old = planned_cell(tmp_path, POSES)
     with pytest.raises(ProcedureError, match=r"contact\.load_cases are normal, north, those of"):
@@ -111,7 +111,6 @@ def fits(run, dataset, tmp_path_factory):
     return [ec.calibrate(path, springs="actuated") for path in paths]
 
 
-@pytest.mark.slow
 def test_the_check_enters_neither_fit_nor_draws_nor_left_out_errors(fits):
     plain, off = fits
     np.testing.assert_array_equal(plain.calibrated.compliance, off.calibrated.compliance)
@@ -129,7 +128,6 @@ def test_the_check_shows_what_is_wrong_with_its_level(fits):
     assert off.mean == pytest.approx(np.sqrt(3.0) * 0.5e-3, abs=2.0 * plain.max)
 
 
-@pytest.mark.slow
 def test_the_check_enters_no_codec(dataset):
     variants, options = make_variants({"springs": ["actuated"]}), CodecOptions(splits=2)
     robot = ec.Robot.from_urdf(dataset.robot_urdf, dataset.tcp_frame)

@@ -40,11 +40,13 @@ def fallen(verdicts) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 def test_cases_have_a_place_of_their_own(seeds):
     """In the folder of the seeds they made another process make these again, under the first."""
     assert not quick_place(seeds).is_relative_to(seeds.parent)
 
 
+@pytest.mark.slow
 def test_every_command_reads_the_files_as_they_are(seeds):
     cases = [Case(kind, command) for kind, known in KINDS.items() for command in known.commands[:1]]
     assert [v for v in run_cases(cases, seeds) if v.word != "ok" or v.code] == []
@@ -54,16 +56,8 @@ QUICK = [each for each in CORPUS if not each["command"].startswith(REPORTS)]
 WHOLE_REPORTS = [each for each in CORPUS if each["command"].startswith(REPORTS)]
 
 
-@pytest.mark.parametrize(
-    "entries",
-    [
-        QUICK[::3],
-        pytest.param(QUICK[1::3] + QUICK[2::3], marks=pytest.mark.slow),
-        # These take as long as all others; reports are among the new cases, too.
-        pytest.param(WHOLE_REPORTS, marks=pytest.mark.slow),
-    ],
-    ids=["by day", "by night", "reports"],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("entries", [QUICK, WHOLE_REPORTS], ids=["quick", "reports"])
 def test_what_fell_once_does_not_fall_again(seeds, entries):
     assert entries
     assert fallen(run_cases([Case(**entry) for entry in entries], seeds)) == []
@@ -82,6 +76,7 @@ def test_none_of_a_hundred_thousand_new_cases_falls(seeds, part):
     assert fallen(run_cases(cases, seeds, NIGHT)) == []
 
 
+@pytest.mark.slow
 def test_a_number_gives_the_same_case(seeds):
     data = (seeds / "dataset.nc").read_bytes()
     for number in range(20):

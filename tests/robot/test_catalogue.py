@@ -10,7 +10,12 @@ import pytest
 
 from elastocal.errors import RobotError, SchemaError
 from elastocal.robot import catalogue
-from elastocal.robot.catalogue import CatalogueEntry, catalogue as table
+from elastocal.robot.catalogue import (
+    CatalogueEntry,
+    catalogue as table,
+    show_robot,
+    show_robots,
+)
 from elastocal.robot.catalogue.catalogue import LINKS
 from support.urdfs import colliding_links
 
@@ -329,3 +334,15 @@ def test_a_robot_is_read_from_a_file_that_is_named_by_a_text(tmp_path):
     file = tmp_path / "robot.urdf"
     file.write_text(catalogue.urdf("KR 120 R2700 extra HA"), encoding="utf-8")
     assert Robot.from_file(str(file), "flange").tip == "flange"
+
+
+def test_what_is_shown_of_a_robot_has_its_numbers_and_their_sources():
+    name = "UR20"
+    (table, paragraph) = show_robots([name])
+    assert [row[0] for row in table.rows] == [name]
+    assert "not known" in str(paragraph.text)
+    joints, facts = show_robot(name)
+    robot, known = catalogue.load(name), catalogue.entry(name)
+    assert [row[0] for row in joints.rows] == list(robot.joint_names)
+    assert f"{np.degrees(robot.limits.upper[0]):.1f}" in joints.rows[0][2]
+    assert {f"source of {field}" for field in known.sources} <= {fact for fact, _ in facts.pairs}

@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,6 +16,7 @@ from elastocal.records import read_arrays, write_arrays
 from elastocal.report import language_of
 from elastocal.verdict import EvidenceOptions, Light, LinkState, find_everything, gather_evidence
 from elastocal.verdict._files import read_hash
+from elastocal.verdict.chain import changed_text
 from elastocal.verdict.evidence import Seal
 from elastocal.verdict.findings import codec_findings, missing_findings, reading_findings
 from elastocal.verdict.judgement import judge
@@ -282,6 +284,7 @@ def test_a_bad_statement_in_a_dataset_is_refused(finished):
             replace(data, attributes={**data.attributes, "made_from": text})
 
 
+@pytest.mark.slow
 def test_a_difference_below_rounding_is_none(copied):
     folder = copied()
     path = folder / "run" / "dataset.nc"
@@ -306,3 +309,21 @@ def test_a_difference_below_rounding_is_none(copied):
     dataset.write(dataset.Dataset.from_xarray(data), path)
     texts = [link.text for link in gathered(folder).chain]
     assert any("its attribute robot_urdf is another" in text for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("name", "again", "differs"),
+    [
+        ("marker", f"{0.1 * (1.0 + 1e-12)!r} m, 0.2 m, 0.3 m", False),
+        ("marker", "0.1001 m, 0.2 m, 0.3 m", True),
+        ("marker", "0.1 m, 0.2 m", True),
+        ("marker", None, True),
+        # What is not fitted is the same to the letter.
+        ("robot_urdf", "<robot>1.00000000000001</robot>", True),
+    ],
+)
+def test_a_text_differs_but_for_the_rounding_of_what_is_fitted(name, again, differs):
+    known = {"marker": "0.1 m, 0.2 m, 0.3 m", "robot_urdf": "<robot>1.0</robot>"}
+    stated, found = (SimpleNamespace(attributes=each) for each in (known, known | {name: again}))
+    said = changed_text(stated, found)
+    assert said == (f"its attribute {name} is another" if differs else "")

@@ -178,6 +178,7 @@ def test_a_model_alone_is_enough(finished, tmp_path):
     assert {"run", "codec", "tool file", "simulated process"} <= set(absent(parts))
 
 
+@pytest.mark.slow
 def test_every_codec_of_a_folder_of_codecs_is_read(copied):
     folder = copied("run", "codec")
     (folder / "codec").rename(folder / "inner")

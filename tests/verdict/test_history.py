@@ -8,6 +8,7 @@ from elastocal.procedure.record import HISTORY
 from elastocal.verdict import LinkState, begin_record
 from elastocal.verdict.history import history_link
 from elastocal.workflows import verify
+from elastocal.workflows.verify import _expected
 from support import reported
 from support.fake_runs import RECORD
 
@@ -48,6 +49,7 @@ def test_a_history_that_was_cut_is_broken_and_damaged_lines_are_left_out(three, 
     assert "was cut" in link.text
 
 
+@pytest.mark.slow
 def test_another_run_than_the_one_that_is_expected_is_refused():
     run = reported.finished() / "run"
     known = read_journal(run / "journal.jsonl")[0].run.identity
@@ -56,3 +58,21 @@ def test_another_run_than_the_one_that_is_expected_is_refused():
         verify(run, expect="0" * 8).require_whole()
     with pytest.raises(VerificationError, match="--expect"):
         verify(run, expect="newest")
+
+
+@pytest.mark.parametrize(
+    ("expect", "state", "said"),
+    [
+        ("abcd1234", LinkState.WHOLE, "as expected"),
+        ("0" * 8, LinkState.BROKEN, "not of the run 00000000 that is expected"),
+    ],
+)
+def test_a_run_is_held_against_the_expected_one(expect, state, said):
+    (link,) = _expected("abcd1234" * 8, expect)
+    assert link.state is state
+    assert said in link.text
+    (old,) = _expected(None, expect)
+    assert "does not state its run" in old.text
+    assert _expected(None, None) == []
+    with pytest.raises(VerificationError, match="--expect"):
+        _expected(None, "newest")

@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 from datetime import datetime, timedelta
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -173,6 +174,7 @@ def test_nothing_moves_where_the_cold_run_is_of_no_use(touched, tmp_path):
         assert not (tmp_path / "v-run").exists()
 
 
+@pytest.mark.slow
 def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(
     touched, tmp_path, monkeypatch
 ):
@@ -239,3 +241,22 @@ def test_a_tracker_that_moved_during_the_touches_is_refused(touched, monkeypatch
     monkeypatch.setattr(touches_module, "read_run", read)
     with pytest.raises(ProcedureError, match=rf"{moved}: station station_1 moved by"):
         read_touches(folder / "cold", folder / "state-run")
+
+
+@pytest.mark.parametrize(
+    ("began", "resumed", "pause"),
+    [
+        ("2026-11-29T08:00:00+00:00", "2026-11-29T10:00:00+00:00", 7200.0 - 60.0),
+        ("2026-11-29T08:00:00+00:00", "", 0.0),
+        ("", "2026-11-29T10:00:00+00:00", 0.0),
+    ],
+)
+def test_the_longest_pause_of_a_run_is_that_between_its_sessions(began, resumed, pause):
+    entries = [
+        SimpleNamespace(event=event, text=text, time=time)
+        for event, text, time in (
+            (Event.START, "", 5.0), (Event.COMMIT, "", 65.0), (Event.RESUME, resumed, 65.0),
+        )
+    ]  # fmt: skip
+    run = SimpleNamespace(record=SimpleNamespace(started=began), entries=entries)
+    assert touches_module._longest_pause(run) == pytest.approx(pause)

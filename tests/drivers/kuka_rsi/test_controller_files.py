@@ -10,8 +10,10 @@ from elastocal.drivers.kuka_rsi import SHEET, RsiSettings, bounds_of, controller
 from elastocal.drivers.kuka_rsi.controller_files import LONGEST_NAME, PROGRAMS
 from elastocal.drivers.kuka_rsi.ethernet_file import MODES, check_ethernet_file
 from elastocal.errors import DeviceError, ElastocalError, FileAccessError
+from elastocal.records import write_json
+from elastocal.workflows.krc_config import _notes
 from support.cli import elastocal
-from support.kuka_bench import write_cell
+from support.kuka_bench import record, write_cell
 from support.simulated import example_cell
 
 WORDS = re.compile(
@@ -151,3 +153,23 @@ def test_a_cell_without_a_kuka_is_refused(tmp_path):
         workflows.krc_config(example_cell("afp").path, out=tmp_path / "krc")
     with pytest.raises(ElastocalError, match="either a folder to write into, or a file"):
         workflows.krc_config(write_cell(tmp_path))
+
+
+def test_the_sheet_says_where_the_delay_comes_from(tmp_path):
+    cell = example_cell("afp")
+    write_json(cell.path.parent / "commissioning.json", record())
+    for told, said in (
+        ({"commissioning": "commissioning.json"}, "measured, commissioning.json"),
+        ({"delay": "20 ms"}, "as the cell file says"),
+        ({}, "ASSUMED: measure it"),
+    ):
+        sheet = controller_files(cell, RsiSettings(mode="contact", **told))[SHEET].decode("utf-8")
+        assert said in sheet
+
+
+def test_what_is_left_to_do_is_noted():
+    sign, reached, measured = _notes(RsiSettings(mode="contact"))
+    assert "sign SIGN-OFF.md line by line" in sign
+    assert "a controller cannot reach it" in reached
+    assert "elastocal measure-delay" in measured
+    assert len(_notes(RsiSettings(mode="contact", address="192.168.10.5", delay="20 ms"))) == 1

@@ -1,9 +1,10 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from elastocal.procedure.derive.readings import average
+from elastocal.procedure.derive.readings import PoseReadings, average
 from elastocal.procedure.record import (
     ArmStream,
     PointStream,
@@ -149,3 +150,12 @@ def test_the_mean_pose_is_a_rotation():
     found = average(replace(made, arm=replace(made.arm, T_base_tcp=T)), window()).tool
     R = found.T_base_tcp[:3, :3]
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
+
+
+def test_the_press_before_the_reference_is_known_by_its_name():
+    def pressed(*names: str) -> PoseReadings:
+        loads = tuple(SimpleNamespace(tool=n, window=SimpleNamespace(load_case=n)) for n in names)
+        return PoseReadings(None, None, loads, None)
+
+    assert pressed("normal", "conditioning").conditioning == "conditioning"
+    assert pressed("normal").conditioning is None
