@@ -10,7 +10,9 @@ import stat
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
@@ -28,6 +30,7 @@ def cell(tmp_path_factory):
     return write_example(tmp_path_factory.mktemp("studio") / "cell", "machining")[0]
 
 
+@pytest.mark.slow
 def test_the_first_line_is_the_address_and_ctrl_c_ends_it(cell):
     words = [sys.executable, "-m", "elastocal", "studio", str(cell), "--no-browser"]
     with subprocess.Popen(
@@ -46,6 +49,18 @@ def test_the_first_line_is_the_address_and_ctrl_c_ends_it(cell):
             assert process.wait(PATIENCE) == 0
         finally:
             process.kill()
+
+
+def test_ctrl_c_ends_it_after_the_address_was_printed(cell, monkeypatch):
+    def ctrl_c():
+        raise KeyboardInterrupt
+
+    studio = import_module("elastocal.workflows.studio")
+    waiting = SimpleNamespace(Event=lambda: SimpleNamespace(wait=ctrl_c))
+    monkeypatch.setattr(studio, "threading", waiting)
+    done = elastocal("studio", cell, "--no-browser")
+    assert (done.code, done.err.startswith("Ctrl-C ends it")) == (0, True)
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{32,}/\n", done.out)
 
 
 def test_the_page_is_opened_after_the_address_was_printed(cell, monkeypatch):
