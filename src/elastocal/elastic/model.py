@@ -33,14 +33,14 @@ from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
-from elastocal.errors import SpringError
+from elastocal.errors import SpringError, require_type
 from elastocal.results import brief_repr
 from elastocal.robot import (
     ChainModel,
@@ -259,6 +259,7 @@ class CartesianCompliance:
     force."""
 
 
+@runtime_checkable
 class SavedRobot(Protocol):
     """A robot as a file of results holds it."""
 
@@ -303,9 +304,15 @@ class ElasticModel:
     _groups: tuple[AlikeSprings, ...] = field(init=False, repr=False)
 
     def __init__(self, robot: Robot | SavedRobot, springs: Iterable[Spring]) -> None:
+        require_type(robot, (Robot, SavedRobot), "robot", "Robot, or that of a result")
         found = robot if isinstance(robot, Robot) else robot.read()
+        given: object = springs
+        is_one = isinstance(given, str) or not isinstance(given, Iterable)
+        listed = (given,) if is_one else tuple(springs)
+        for spring in listed:
+            require_type(spring, Spring, "springs", "springs, such as those of elastic.layout")
         object.__setattr__(self, "robot", found)
-        object.__setattr__(self, "springs", tuple(springs))
+        object.__setattr__(self, "springs", listed)
         check_springs(self.springs, self.robot.joint_names)
         chain, columns = insert_springs(self.robot, self.springs)
         parameters = tuple(p for spring in self.springs for p in spring.parameters)
@@ -717,7 +724,18 @@ def spring_torques(
     SpringError
         If force or moment has another shape or is not finite.
     """
-    torques = check_vectors("force", force)[..., None, :] @ jacobian.translation
+    loads = {"force": check_vectors("force", force)}
     if moment is not None:
-        torques = torques + check_vectors("moment", moment)[..., None, :] @ jacobian.rotation
+        loads["moment"] = check_vectors("moment", moment)
+    try:
+        torques = loads["force"][..., None, :] @ jacobian.translation
+        if moment is not None:
+            torques = torques + loads["moment"][..., None, :] @ jacobian.rotation
+    except ValueError as error:
+        rows = jacobian.translation.shape[:-2]
+        given = ", ".join(f"{name} of shape {load.shape}" for name, load in loads.items())
+        raise SpringError(
+            f"{given} and joint positions of {rows} rows do not go together: as many rows of each,"
+            " or one, are allowed"
+        ) from error
     return np.asarray(torques[..., 0, :])

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.errors import RobotError
-from elastocal.files import sha256
+from elastocal.errors import RobotError, require_type
+from elastocal.files import as_path, sha256
 from elastocal.results import brief_repr
 from elastocal.robot.chain import ChainJoint, ChainModel, SerialChain, build_model
 from elastocal.robot.urdf import (
@@ -134,6 +134,7 @@ class Robot:
         RobotError
             If the URDF cannot be read or has no such links.
         """
+        require_type(text, str, "text", "text of a URDF; from_file reads a file")
         chain = read_chain(text, tip, base)
         root = parse_urdf(text)
         return cls(robot_name(root), text, chain, assumptions(root, chain), meshes)
@@ -141,7 +142,7 @@ class Robot:
     @classmethod
     def from_file(cls, path: Path | str, tip: str, base: str | None = None) -> "Robot":
         """Return the robot that a URDF file describes; see `from_urdf`."""
-        path = Path(path)
+        path = as_path(path, "path")
         text = read_urdf(path)
         with refusals_naming(path):
             return cls.from_urdf(text, tip, base)
