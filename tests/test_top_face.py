@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import pydoc
 import subprocess
 import sys
 
@@ -71,6 +72,28 @@ def test_packages_are_completed_and_found_without_being_imported():
     assert shown[0] == "calibrate"
     assert {"codec", "datasets", "elastic", "geometry", "identification", "robot"} < set(shown)
     assert not [name for name in shown if name.startswith("_") and name != "__version__"]
+    assert not {"arrays", "blocks", "cli", "files", "locks", "templating", "wording"} & set(shown)
+
+
+@pytest.mark.parametrize("name", ["codec", "geometry", "report", "studio"])
+def test_help_on_a_command_that_is_also_a_package_is_that_of_the_command(name):
+    package = getattr(ec, name)
+    text = pydoc.render_doc(package, renderer=pydoc.plaintext)
+    first, *_ = ec.workflows.__dict__[name].__doc__.splitlines()
+    assert f"elastocal.{name} - {first}" in text
+    assert "Parameters\n    ----------" in text
+    assert len(text) < 6000
+    star: dict[str, object] = {}
+    exec(f"from elastocal.{name} import *", star)
+    assert len(star) > 3
+
+
+def test_signatures_name_their_types():
+    functions = (ec.Robot.forward, ec.ElasticModel.deflection, ec.Dataset.from_arrays)
+    for each in (*functions, ec.identification.CalibratedModel.predict):
+        signature = str(inspect.signature(each))
+        assert "ArrayLike" in signature
+        assert "_SupportsArray" not in signature
 
 
 def test_every_field_of_the_settings_stands_in_help_and_in_the_signature():

@@ -29,6 +29,8 @@ A free motion of the joint clears the memory: after it the state is assumed near
 changes the torque by more than ``2 r`` erases all earlier history.
 """
 
+from __future__ import annotations  # signatures show ArrayLike by its name
+
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -157,7 +159,7 @@ class FrictionElements:
     """Torque at which each slides, shape (element,), in N·m or N."""
 
     @classmethod
-    def of(cls, springs: Sequence[Spring]) -> "FrictionElements":
+    def of(cls, springs: Sequence[Spring]) -> FrictionElements:
         """Return the elements of springs, in their order."""
         first = np.cumsum([0, *(len(spring.axes) for spring in springs)])
         axis = [first[k] for k, spring in enumerate(springs) for _ in spring.friction_limits]
@@ -332,7 +334,7 @@ class ElasticModel:
         """Names of the parameters, in the order of every compliance vector."""
         return tuple(parameter.name for parameter in self.parameters)
 
-    def at(self, q: "ArrayLike | ModelPosture") -> "ModelPosture":
+    def at(self, q: ArrayLike | ModelPosture) -> ModelPosture:
         """Return the model at joint positions ``q``, for several questions about them."""
         return q if isinstance(q, ModelPosture) else ModelPosture(self, q)
 
@@ -357,7 +359,7 @@ class ElasticModel:
         return any(group.law.bears_weight for group in self._groups)
 
     def load_torques(
-        self, q: "ArrayLike | ModelPosture", force: ArrayLike, moment: ArrayLike | None = None
+        self, q: ArrayLike | ModelPosture, force: ArrayLike, moment: ArrayLike | None = None
     ) -> FloatArray:
         """Return the torque of a load about each axis (paper Eq. 9), shape (..., axis), in N·m.
 
@@ -385,7 +387,7 @@ class ElasticModel:
 
     def observation_blocks(
         self,
-        q: "ArrayLike | ModelPosture",
+        q: ArrayLike | ModelPosture,
         force: ArrayLike,
         moment: ArrayLike | None = None,
         marker_offset: ArrayLike | None = None,
@@ -427,7 +429,7 @@ class ElasticModel:
 
     def joint_blocks(
         self,
-        q: "ArrayLike | ModelPosture",
+        q: ArrayLike | ModelPosture,
         force: ArrayLike,
         moment: ArrayLike | None = None,
         friction: FloatArray | None = None,
@@ -451,7 +453,7 @@ class ElasticModel:
 
     def _loaded_blocks(
         self,
-        posture: "ModelPosture",
+        posture: ModelPosture,
         observed: FloatArray,
         force: ArrayLike,
         moment: ArrayLike | None,
@@ -465,7 +467,7 @@ class ElasticModel:
         return self._blocks(observed, torque, weight, friction)
 
     def sag_blocks(
-        self, q: "ArrayLike | ModelPosture", marker_offset: ArrayLike | None = None
+        self, q: ArrayLike | ModelPosture, marker_offset: ArrayLike | None = None
     ) -> FloatArray:
         """Return the rows ``S`` of the sag: ``S c`` is what the arm's own weight deflects.
 
@@ -482,7 +484,7 @@ class ElasticModel:
         posture = self.at(q)
         return self._blocks(posture.observed(marker_offset), posture.weight)
 
-    def joint_sag_blocks(self, q: "ArrayLike | ModelPosture") -> FloatArray:
+    def joint_sag_blocks(self, q: ArrayLike | ModelPosture) -> FloatArray:
         """Return the rows of what the arm's own weight turns each joint by; see `joint_blocks`."""
         posture = self.at(q)
         return self._blocks(posture.own_axes, posture.weight)

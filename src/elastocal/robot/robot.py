@@ -1,5 +1,7 @@
 """The rigid robot: kinematics, limits and gravity torques of a serial chain."""
 
+from __future__ import annotations  # signatures show ArrayLike by its name
+
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -115,7 +117,7 @@ class Robot:
     @classmethod
     def from_urdf(
         cls, text: str, tip: str, base: str | None = None, meshes: tuple[tuple[str, Path], ...] = ()
-    ) -> "Robot":
+    ) -> Robot:
         """Return the robot that a URDF text describes.
 
         Parameters
@@ -140,7 +142,7 @@ class Robot:
         return cls(robot_name(root), text, chain, assumptions(root, chain), meshes)
 
     @classmethod
-    def from_file(cls, path: Path | str, tip: str, base: str | None = None) -> "Robot":
+    def from_file(cls, path: Path | str, tip: str, base: str | None = None) -> Robot:
         """Return the robot that a URDF file describes; see `from_urdf`."""
         path = as_path(path, "path")
         text = read_urdf(path)
