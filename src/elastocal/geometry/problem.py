@@ -28,7 +28,7 @@ from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, ChainJoint, Robot
 from elastocal.wording import phrases
 
-RUNGS = phrases(
+RUNGS: tuple[str, ...] = phrases(
     "registration", "offsets", "geometry", "weight", "bearings", "harmonics", "joint-functions"
 )
 """Rungs from the frames alone to functions of each joint, by names that pages say in other
