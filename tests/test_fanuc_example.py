@@ -46,6 +46,11 @@ def test_what_the_page_quotes_is_printed(printed):
     assert "deviation as programmed: 1.12 mm mean" in printed
 
 
+def test_the_page_explains_the_warning_that_its_commands_print(printed):
+    (warning,) = re.findall(r"`(the marker seems [^`]+)`", PAGE)
+    assert printed.count(f"warning: {warning}") == 2
+
+
 def test_the_compliances_are_those_of_any_least_squares(printed):
     published = (1.16158, 0.367704, 0.510267, 3.69238, 2.35464, 4.85390)
     found = re.findall(r"joint_\d\.axial +(\d\.\d{4}) ", printed)[:6]

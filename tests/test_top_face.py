@@ -1,14 +1,19 @@
 """``import elastocal as ec``: every command, the nouns, the readers; nothing before it is used."""
 
+import dataclasses
 import inspect
+import pydoc
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import elastocal as ec
 from elastocal.cli.commands import COMMANDS
 from elastocal.elastic import Hinge
+from elastocal.robot import parse_urdf
+from elastocal.workflows._inputs import find_robot
 
 OTHERWISE = {"import": "import_logs"}
 """Commands whose name is a word of Python."""
@@ -67,6 +72,28 @@ def test_packages_are_completed_and_found_without_being_imported():
     assert shown[0] == "calibrate"
     assert {"codec", "datasets", "elastic", "geometry", "identification", "robot"} < set(shown)
     assert not [name for name in shown if name.startswith("_") and name != "__version__"]
+    assert not {"arrays", "blocks", "cli", "files", "locks", "templating", "wording"} & set(shown)
+
+
+@pytest.mark.parametrize("name", ["codec", "geometry", "report", "studio"])
+def test_help_on_a_command_that_is_also_a_package_is_that_of_the_command(name):
+    package = getattr(ec, name)
+    text = pydoc.render_doc(package, renderer=pydoc.plaintext)
+    first, *_ = ec.workflows.__dict__[name].__doc__.splitlines()
+    assert f"elastocal.{name} - {first}" in text
+    assert "Parameters\n    ----------" in text
+    assert len(text) < 6000
+    star: dict[str, object] = {}
+    exec(f"from elastocal.{name} import *", star)
+    assert len(star) > 3
+
+
+def test_signatures_name_their_types():
+    functions = (ec.Robot.forward, ec.ElasticModel.deflection, ec.Dataset.from_arrays)
+    for each in (*functions, ec.identification.CalibratedModel.predict):
+        signature = str(inspect.signature(each))
+        assert "ArrayLike" in signature
+        assert "_SupportsArray" not in signature
 
 
 def test_every_field_of_the_settings_stands_in_help_and_in_the_signature():
@@ -105,6 +132,32 @@ def test_calibrate_takes_datasets_and_springs_as_objects(readings, tmp_path):
     named = ec.calibrate([readings, readings], springs="actuated")
     assert [*named.made_from] == ["dataset 1", "dataset 2"]
     assert named.calibration.readings == 2 * len(readings.poses)
+
+
+def test_calibrate_takes_a_robot_and_the_path_of_springs(readings, tmp_path):
+    robot = ec.Robot.from_urdf(readings.robot_urdf, readings.tcp_frame)
+    sideways = dataclasses.replace(robot, gravity=(0.0, 9.80665, 0.0))
+    springs = tmp_path / "springs.yaml"
+    springs.write_text("schema: elastocal.springs/1\ninclude: actuated\n", encoding="utf-8")
+    found = ec.calibrate(readings, robot=sideways, springs=springs, out=tmp_path / "model.json")
+    again = ec.read_model(tmp_path / "model.json").model
+    assert again.robot.urdf_hash == robot.urdf_hash
+    assert (again.robot.tip, again.robot.gravity) == (robot.tip, sideways.gravity)
+    assert found.calibration.settings.springs == str(springs)
+    by_name = ec.calibrate(readings, springs="actuated")
+    np.testing.assert_allclose(found.compliance, by_name.compliance)
+
+
+def test_a_robot_given_keeps_its_base_and_takes_another_tool():
+    robot = ec.robot.catalogue.load("UR20")
+    shifted = find_robot(robot, None, "0 mm, 0 mm, 100 mm, 0 deg, 0 deg, 0 deg")
+    q = np.zeros(len(robot.joint_names))
+    z = robot.forward(q)[:3, 2]
+    np.testing.assert_allclose(shifted.forward(q)[:3, 3], robot.forward(q)[:3, 3] + 0.1 * z)
+    link = robot.chain.joints[0].name
+    links = parse_urdf(robot.urdf).iterfind(f"joint[@name='{link}']/child")
+    from_link = ec.Robot.from_urdf(robot.urdf, robot.tip, next(links).get("link"))
+    assert find_robot(from_link, None, None).base == from_link.base
 
 
 def test_models_are_taken_as_objects(readings, tmp_path):

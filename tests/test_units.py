@@ -157,3 +157,13 @@ def test_kilograms_force_are_read_as_newtons(unit, dimension, si):
 def test_degrees_in_german_are_no_radians(unit):
     with pytest.raises(UnitError, match="did you mean 'deg'"):
         factor(unit, "angle")
+
+
+@pytest.mark.parametrize(
+    ("unit", "dimension", "meant"),
+    [("Grad", "angle", "deg"), ("degrees", "angle", "deg"), ("sec", "time", "s")],
+)
+def test_another_word_for_a_unit_is_refused_with_the_unit_that_is_meant(unit, dimension, meant):
+    with pytest.raises(UnitError) as refused:
+        factor(unit, dimension)
+    assert str(refused.value).endswith(f"did you mean {meant!r}?")

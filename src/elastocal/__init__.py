@@ -37,13 +37,18 @@ _exports = {
 _commands = next(s for s in _statements("workflows/__init__.pyi") if isinstance(s, ast.Assign))
 _exports["workflows"] = ast.literal_eval(_commands.value)
 _attribute, _, __all__ = lazy_loader.attach(__name__, submod_attrs=_exports)
-_PACKAGES = sorted(
-    entry.name.removesuffix(".py")
+_PACKAGES = {
+    entry.name.removesuffix(".py"): entry.is_dir()
     for entry in os.scandir(__path__[0])
     if not entry.name.startswith(("_", "options", "outputs"))
     and (entry.is_dir() or entry.name.endswith(".py"))
-)
-"""Subpackages and modules; ``codec``, ``geometry``, ``report`` and ``studio`` are commands too."""
+}
+"""Subpackages and modules, and which are packages; ``codec``, ``geometry``, ``report`` and
+``studio`` are commands too."""
+_FOR_PEOPLE = ("datasets", "errors")
+"""Modules that are completed beside the packages; the others serve these."""
+_SHELLS = ("cli", "templating", "viewer")
+"""Packages that show results, and have nothing to call."""
 
 
 def __getattr__(name: str) -> object:
@@ -53,11 +58,17 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*__all__, *_PACKAGES})
+    packages = {name for name, is_package in _PACKAGES.items() if is_package}
+    return sorted({*__all__, *_FOR_PEOPLE, *(packages - {*_SHELLS})})
 
 
 class _Command(types.ModuleType):
-    """A package that bears the name of a command, and is called as it."""
+    """A package that bears the name of a command, is called as it, and has its help."""
+
+    @property
+    def __doc__(self) -> str:  # type: ignore[override]
+        """The help of the command, then what the package is."""
+        return f"{self.__wrapped__.__doc__}\n\nThe package of this name: {vars(self)['__doc__']}"
 
     @property
     def __wrapped__(self) -> Callable[..., object]:
@@ -81,6 +92,8 @@ class _Face(types.ModuleType):
         """Set an attribute; a subpackage that bears the name of a command is called as it."""
         if name in __all__ and isinstance(value, types.ModuleType):
             value.__class__ = _Command
+            # With it `help` would print every class of the package after the command.
+            vars(value).pop("__all__", None)
         super().__setattr__(name, value)
 
 

@@ -6,7 +6,9 @@ print it unchanged. Each error is also the builtin that a caller would expect (`
 """
 
 import difflib
+import reprlib
 from collections.abc import Iterable
+from numbers import Number
 from typing import TypeVar
 
 _T = TypeVar("_T")
@@ -130,6 +132,28 @@ def of_kind(value: object, kind: type[_T], name: str) -> _T:
             " which is a mistake in elastocal: please report it"
         )
     return value
+
+
+def require_type(value: object, kinds: type | tuple[type, ...], name: str, allowed: str) -> None:
+    """Refuse an argument of a public function that is of another type.
+
+    Raises
+    ------
+    TypeError
+        It names the argument, what it is, and what is allowed.
+    """
+    if not isinstance(value, kinds):
+        raise TypeError(f"{name} is {described_type(value)} (allowed: {allowed})")
+
+
+def described_type(value: object) -> str:
+    """Return what an argument of a wrong type is, on one line.
+
+    >>> described_type("60 mm"), described_type([60.0])
+    ("'60 mm', of type str", 'of type list')
+    """
+    kind = f"of type {type(value).__name__}"
+    return f"{reprlib.repr(value)}, {kind}" if isinstance(value, str | Number) else kind
 
 
 def nearest(name: str, allowed: Iterable[str]) -> str:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.errors import FileAccessError, SchemaError
+from elastocal.errors import FileAccessError, SchemaError, described_type
 from elastocal.locks import show_life, taken_over
 from elastocal.outputs import current_rule
 
@@ -121,6 +121,27 @@ def replacing(path: Path) -> Iterator[Path]:
         ) from error
     except OSError as error:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def as_path(given: object, name: str, *others: str) -> Path:
+    """Return the path that an argument of a public function is.
+
+    Parameters
+    ----------
+    name : str
+        The argument, for the message.
+    others : str
+        What the function takes beside a path, for the message.
+
+    Raises
+    ------
+    TypeError
+        If it is neither a text nor a path.
+    """
+    if not isinstance(given, str | os.PathLike):
+        allowed = ", ".join(("path", *others))
+        raise TypeError(f"{name} is {described_type(given)} (allowed: {allowed})")
+    return Path(given)
 
 
 def path_from(folder: Path, file: str | os.PathLike[str]) -> str:

@@ -234,6 +234,8 @@ def _option(module: str, annotation: ast.expr) -> tuple[str, Option]:
     """Return the type of a field, and what ``Annotated`` says of its option."""
     if isinstance(annotation, ast.Name) and annotation.id in SHARED:
         return SHARED[annotation.id]
+    if isinstance(annotation, ast.Name):
+        annotation = _meant(module, annotation)
     if isinstance(annotation, ast.Subscript) and ast.unparse(annotation.value) == "Annotated":
         parts = annotation.slice.elts if isinstance(annotation.slice, ast.Tuple) else []
         kind, notes = parts[0], parts[1:]
@@ -241,23 +243,23 @@ def _option(module: str, annotation: ast.expr) -> tuple[str, Option]:
             if isinstance(note, ast.Call) and ast.unparse(note.func) == Option.__name__:
                 places = dict(zip(("name",), map(ast.literal_eval, note.args), strict=False))
                 words = {str(word.arg): ast.literal_eval(word.value) for word in note.keywords}
-                return _meant(module, kind), Option(**places, **words)
-        return _meant(module, kind), Option()
-    return _meant(module, annotation), Option()
+                return ast.unparse(_meant(module, kind)), Option(**places, **words)
+        return ast.unparse(_meant(module, kind)), Option()
+    return ast.unparse(annotation), Option()
 
 
-def _meant(module: str, kind: ast.expr) -> str:
+def _meant(module: str, kind: ast.expr) -> ast.expr:
     """Return a type, written out if it is a name that a module of elastocal gives another."""
     if not isinstance(kind, ast.Name):
-        return ast.unparse(kind)
+        return kind
     for node in _source(module).body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == kind.id:
-            return ast.unparse(node.value)
+            return node.value
         if isinstance(node, ast.ImportFrom) and kind.id in (alias.name for alias in node.names):
             origin = node.module or ""
             if origin.startswith("elastocal."):
                 return _meant(_defining(origin, kind.id), kind)
-    return ast.unparse(kind)
+    return kind
 
 
 def _plain(text: str) -> str:

@@ -55,8 +55,11 @@ _FACTORS: dict[str, dict[str, float]] = {
     "acceleration": {"m/s2": 1.0, "m/s^2": 1.0, "m/s²": 1.0},
 }
 
-_MEANT = {"grad": "deg", "°": "deg", "degrés": "deg"}
-"""Other languages' words whose nearest unit is another one."""
+MEANT = {
+    **dict.fromkeys(("°", "degree", "degrees", "grad", "grd", "degrés"), "deg"),
+    "nm": "N*m", "nmm": "N*mm", "sec": "s",
+}  # fmt: skip
+"""Units by other words for them, in small letters, as logs of three languages have them."""
 SHOWN = {
     "mm": 1e3, "µm": 1e6, "mm/s": 1e3, "ms": 1e3, "mrad": 1e3, "N/mm": 1e-3, "N/µm": 1e-6,
     "deg": 180.0 / math.pi, "°": 180.0 / math.pi,
@@ -116,9 +119,10 @@ def factor(unit: str, dimension: str) -> float:
     """
     table = _FACTORS[dimension]
     if unit not in table:
+        meant = MEANT.get(unit.lower(), unit)
         raise UnitError(
             f"unit {unit!r} is not {_a(dimension)}: allowed are {', '.join(table)}"
-            f"{nearest(_MEANT.get(unit.lower(), unit), table)}"
+            f"{nearest(meant if meant in table else unit, table)}"
         )
     return table[unit]
 

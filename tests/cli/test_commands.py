@@ -65,7 +65,7 @@ def test_calibrate_prints_a_table_that_answers_the_first_questions(folder):
     shown = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json").err
     for text in (
         "left-out poses",
-        "Worse than the best by",
+        "Above the best allowed",
         "interval",
         "not by itself",
         "group 1",

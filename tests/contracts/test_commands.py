@@ -182,6 +182,12 @@ def test_every_option_has_a_sentence():
             assert found.summary.endswith(".")
 
 
+@pytest.mark.parametrize("name", ["calibrate", "codec"])
+def test_an_option_whose_type_bears_a_name_keeps_its_own_words(name):
+    contact = next(p for p in GROUP.get_command(None, name).params if p.name == "contact")
+    assert contact.metavar == "CONTACT.yaml"
+
+
 class TestCompletion:
     def asked(self, *words: str) -> list[str]:
         """Return what bash is offered for the last word."""

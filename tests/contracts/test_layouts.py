@@ -1,13 +1,15 @@
 """What every spring layout keeps, on every kind of arm."""
 
+import re
 from functools import cache, partial
 
 import numpy as np
 import pytest
 
-from elastocal.elastic import LAYOUTS, ElasticModel, Spring
+from elastocal.elastic import LAYOUTS, ElasticModel, Spring, layout
 from elastocal.elastic.layouts import SpringEntry, bearing_joint, custom
 from elastocal.elastic.springs.hinge import axial
+from elastocal.errors import SpringError
 from elastocal.robot import Robot
 from elastocal.sim.arm import (
     Linkage,
@@ -82,3 +84,11 @@ class TestEveryLayout(LayoutSuite):
             translation, rotation = np.moveaxis(columns, 0, -1)
             np.testing.assert_allclose(found.translation, translation, atol=2e-9)
             np.testing.assert_allclose(found.rotation, rotation, atol=2e-9)
+
+
+@pytest.mark.parametrize("name", ["auto", "gears", "gears+friction", "bearing-gears"])
+def test_a_layout_that_is_made_from_readings_is_refused_with_who_takes_it(name):
+    robot = Robot.from_urdf(ARMS["six axes"], "tcp")
+    words = rf"layout '{re.escape(name)}' is made from readings: springs=.* of calibrate takes it"
+    with pytest.raises(SpringError, match=words):
+        layout(robot, name)

@@ -47,7 +47,7 @@ from elastocal.cell.production import ProcessFile, ProductionPath, read_producti
 from elastocal.cell.rig import DeviceChoices
 from elastocal.dataset import require_joint_names
 from elastocal.errors import ElastocalError, FileAccessError, RobotError, SchemaError
-from elastocal.files import read_text, sha256
+from elastocal.files import as_path, read_text, sha256
 from elastocal.records import StrictModel, from_data, parse_yaml
 from elastocal.robot import (
     Rail,
@@ -357,7 +357,7 @@ def load_cell(path: Path, *, production: bool = True) -> Cell:
     >>> ec.load_cell(ec.init("cell").cell).robot.joint_names[:2]
     ('rail', 'joint_a1')
     """
-    path = Path(path)
+    path = as_path(path, "path")
     text = read_text(path)
     data = parse_yaml(text, path)
     if isinstance(data, dict) and "robots" in data:

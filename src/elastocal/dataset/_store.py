@@ -45,7 +45,7 @@ from elastocal.dataset._layout import (
 from elastocal.dataset._structure import assemble
 from elastocal.dataset.dataset import Dataset
 from elastocal.errors import DatasetError, SchemaError, UnitError, nearest
-from elastocal.files import read_text
+from elastocal.files import as_path, read_text
 from elastocal.records import LabelledArrays, arrays_sha256, parse_json, read_arrays, write_arrays
 from elastocal.tables import (
     Column,
@@ -311,7 +311,7 @@ def read(path: Path | str) -> Dataset:
     FileAccessError
         If the file cannot be read.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     arrays = _read_netcdf(path) if _suffix(path) == ".nc" else None
     try:
         dataset = Dataset.from_labelled(arrays or read_table(path))

@@ -9,6 +9,8 @@ judged by their median over the usable readings, which a single blunder cannot m
 the blunder.
 """
 
+from __future__ import annotations  # signatures show ArrayLike by its name
+
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -472,7 +474,7 @@ class Dataset(Result):
         check: Sequence[str] = (),
         stations: Mapping[str, Sequence[int]] | None = None,
         provenance: str = "",
-    ) -> "Dataset":
+    ) -> Dataset:
         """Return the dataset of plain arrays in SI units, if it is plausible.
 
         Parameters
@@ -552,7 +554,7 @@ class Dataset(Result):
         return dataset
 
     @classmethod
-    def from_labelled(cls, arrays: LabelledArrays) -> "Dataset":
+    def from_labelled(cls, arrays: LabelledArrays) -> Dataset:
         """Return the dataset of labelled arrays, such as a NetCDF file holds them.
 
         Dimensions and axes may be in any order; units that are not SI are converted.
@@ -590,7 +592,7 @@ class Dataset(Result):
         return dataset
 
     @classmethod
-    def from_xarray(cls, data: "xr.Dataset") -> "Dataset":
+    def from_xarray(cls, data: xr.Dataset) -> Dataset:
         """Return the dataset of an `xarray.Dataset`, as plausible as one of a file.
 
         Raises
@@ -615,7 +617,7 @@ class Dataset(Result):
             freeze(each.values)
         return arrays
 
-    def to_xarray(self) -> "xr.Dataset":
+    def to_xarray(self) -> xr.Dataset:
         """Return the dataset as an `xarray.Dataset`, which shares the read-only arrays."""
         return xarray_from_labelled(self.to_labelled())
 
@@ -708,7 +710,7 @@ class Dataset(Result):
 
     def select(
         self, poses: Sequence[int] | None = None, load_cases: Sequence[str] | None = None
-    ) -> "Dataset":
+    ) -> Dataset:
         """Return some poses and load cases, in the order asked for.
 
         Load cases that are not asked for by name and have no usable reading at the chosen poses

@@ -32,6 +32,7 @@ axis, changes nothing. Special cases:
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -54,7 +55,9 @@ from elastocal.elastic.springs import (
     coordinate_axis,
     spring_at,
 )
-from elastocal.errors import SpringError
+from elastocal.errors import SpringError, require_type
+from elastocal.files import as_path
+from elastocal.options import CHOICES
 from elastocal.plugins import Registry
 from elastocal.records import StrictModel, read_yaml
 from elastocal.results import brief_repr
@@ -351,12 +354,14 @@ LAYOUTS: Registry[Callable[[Robot], tuple[Spring, ...]]] = Registry(
 """Layouts by name."""
 
 
-def layout(robot: Robot, name: str, beside: Sequence[str] = ()) -> tuple[Spring, ...]:
+def layout(
+    robot: Robot, name: str | PathLike[str], beside: Sequence[str] = ()
+) -> tuple[Spring, ...]:
     """Return the springs of a layout by name, or of a YAML file by its path.
 
     Parameters
     ----------
-    name : str
+    name : str or path-like
         Name or path.
     beside : sequence of str
         Words that the caller takes as well, for the refusal of others.
@@ -366,10 +371,23 @@ def layout(robot: Robot, name: str, beside: Sequence[str] = ()) -> tuple[Spring,
     SpringError
         If the name is neither a layout nor a file.
     """
-    path = Path(name)
+    require_type(robot, Robot, "robot", "Robot")
+    path = as_path(name, "name", "name of a layout")
+    name = str(name)
+    if _of_readings(name) and not beside:
+        raise SpringError(
+            f"spring layout {name!r} is made from readings: springs={name!r} of calibrate takes it,"
+            f" not layout() (allowed: {', '.join(LAYOUTS)}, or a .yaml file)"
+        )
     if name in LAYOUTS or path.suffix not in (".yaml", ".yml"):
         return LAYOUTS.named(name, beside, ", or a .yaml file")(robot)
     return tuple(spring for spring, _ in _springs_of(robot, read_springs(path)))
+
+
+def _of_readings(name: str) -> bool:
+    """Return whether springs of that name depend on readings too."""
+    word = name.partition("+")[0]
+    return word in CHOICES["springs"] and word not in LAYOUTS
 
 
 def known_springs(robot: Robot, name: str) -> tuple[KnownSpring, ...]:

@@ -29,18 +29,20 @@ A free motion of the joint clears the memory: after it the state is assumed near
 changes the torque by more than ``2 r`` erases all earlier history.
 """
 
+from __future__ import annotations  # signatures show ArrayLike by its name
+
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
-from elastocal.errors import SpringError
+from elastocal.errors import SpringError, require_type
 from elastocal.results import brief_repr
 from elastocal.robot import (
     ChainModel,
@@ -157,7 +159,7 @@ class FrictionElements:
     """Torque at which each slides, shape (element,), in N·m or N."""
 
     @classmethod
-    def of(cls, springs: Sequence[Spring]) -> "FrictionElements":
+    def of(cls, springs: Sequence[Spring]) -> FrictionElements:
         """Return the elements of springs, in their order."""
         first = np.cumsum([0, *(len(spring.axes) for spring in springs)])
         axis = [first[k] for k, spring in enumerate(springs) for _ in spring.friction_limits]
@@ -259,6 +261,7 @@ class CartesianCompliance:
     force."""
 
 
+@runtime_checkable
 class SavedRobot(Protocol):
     """A robot as a file of results holds it."""
 
@@ -303,9 +306,15 @@ class ElasticModel:
     _groups: tuple[AlikeSprings, ...] = field(init=False, repr=False)
 
     def __init__(self, robot: Robot | SavedRobot, springs: Iterable[Spring]) -> None:
+        require_type(robot, (Robot, SavedRobot), "robot", "Robot, or that of a result")
         found = robot if isinstance(robot, Robot) else robot.read()
+        given: object = springs
+        is_one = isinstance(given, str) or not isinstance(given, Iterable)
+        listed = (given,) if is_one else tuple(springs)
+        for spring in listed:
+            require_type(spring, Spring, "springs", "springs, such as those of elastic.layout")
         object.__setattr__(self, "robot", found)
-        object.__setattr__(self, "springs", tuple(springs))
+        object.__setattr__(self, "springs", listed)
         check_springs(self.springs, self.robot.joint_names)
         chain, columns = insert_springs(self.robot, self.springs)
         parameters = tuple(p for spring in self.springs for p in spring.parameters)
@@ -325,7 +334,7 @@ class ElasticModel:
         """Names of the parameters, in the order of every compliance vector."""
         return tuple(parameter.name for parameter in self.parameters)
 
-    def at(self, q: "ArrayLike | ModelPosture") -> "ModelPosture":
+    def at(self, q: ArrayLike | ModelPosture) -> ModelPosture:
         """Return the model at joint positions ``q``, for several questions about them."""
         return q if isinstance(q, ModelPosture) else ModelPosture(self, q)
 
@@ -350,7 +359,7 @@ class ElasticModel:
         return any(group.law.bears_weight for group in self._groups)
 
     def load_torques(
-        self, q: "ArrayLike | ModelPosture", force: ArrayLike, moment: ArrayLike | None = None
+        self, q: ArrayLike | ModelPosture, force: ArrayLike, moment: ArrayLike | None = None
     ) -> FloatArray:
         """Return the torque of a load about each axis (paper Eq. 9), shape (..., axis), in N·m.
 
@@ -378,7 +387,7 @@ class ElasticModel:
 
     def observation_blocks(
         self,
-        q: "ArrayLike | ModelPosture",
+        q: ArrayLike | ModelPosture,
         force: ArrayLike,
         moment: ArrayLike | None = None,
         marker_offset: ArrayLike | None = None,
@@ -420,7 +429,7 @@ class ElasticModel:
 
     def joint_blocks(
         self,
-        q: "ArrayLike | ModelPosture",
+        q: ArrayLike | ModelPosture,
         force: ArrayLike,
         moment: ArrayLike | None = None,
         friction: FloatArray | None = None,
@@ -444,7 +453,7 @@ class ElasticModel:
 
     def _loaded_blocks(
         self,
-        posture: "ModelPosture",
+        posture: ModelPosture,
         observed: FloatArray,
         force: ArrayLike,
         moment: ArrayLike | None,
@@ -458,7 +467,7 @@ class ElasticModel:
         return self._blocks(observed, torque, weight, friction)
 
     def sag_blocks(
-        self, q: "ArrayLike | ModelPosture", marker_offset: ArrayLike | None = None
+        self, q: ArrayLike | ModelPosture, marker_offset: ArrayLike | None = None
     ) -> FloatArray:
         """Return the rows ``S`` of the sag: ``S c`` is what the arm's own weight deflects.
 
@@ -475,7 +484,7 @@ class ElasticModel:
         posture = self.at(q)
         return self._blocks(posture.observed(marker_offset), posture.weight)
 
-    def joint_sag_blocks(self, q: "ArrayLike | ModelPosture") -> FloatArray:
+    def joint_sag_blocks(self, q: ArrayLike | ModelPosture) -> FloatArray:
         """Return the rows of what the arm's own weight turns each joint by; see `joint_blocks`."""
         posture = self.at(q)
         return self._blocks(posture.own_axes, posture.weight)
@@ -717,7 +726,18 @@ def spring_torques(
     SpringError
         If force or moment has another shape or is not finite.
     """
-    torques = check_vectors("force", force)[..., None, :] @ jacobian.translation
+    loads = {"force": check_vectors("force", force)}
     if moment is not None:
-        torques = torques + check_vectors("moment", moment)[..., None, :] @ jacobian.rotation
+        loads["moment"] = check_vectors("moment", moment)
+    try:
+        torques = loads["force"][..., None, :] @ jacobian.translation
+        if moment is not None:
+            torques = torques + loads["moment"][..., None, :] @ jacobian.rotation
+    except ValueError as error:
+        rows = jacobian.translation.shape[:-2]
+        given = ", ".join(f"{name} of shape {load.shape}" for name, load in loads.items())
+        raise SpringError(
+            f"{given} and joint positions of {rows} rows do not go together: as many rows of each,"
+            " or one, are allowed"
+        ) from error
     return np.asarray(torques[..., 0, :])

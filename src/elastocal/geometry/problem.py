@@ -26,18 +26,13 @@ from elastocal.geometry.derivatives import Derivatives
 from elastocal.geometry.positions import Positions, joint_loads
 from elastocal.results import brief_repr
 from elastocal.robot import GRAVITY, ChainJoint, Robot
+from elastocal.wording import phrases
 
-RUNGS = (
-    "registration",
-    "offsets",
-    "geometry",
-    "weight",
-    "bearings",
-    "harmonics",
-    "joint-functions",
+RUNGS: tuple[str, ...] = phrases(
+    "registration", "offsets", "geometry", "weight", "bearings", "harmonics", "joint-functions"
 )
-"""Rungs from the frames alone to functions of each joint; each includes all before, but the last no
-scales of joints that turn."""
+"""Rungs from the frames alone to functions of each joint, by names that pages say in other
+languages; each includes all before, but the last no scales of joints that turn."""
 CHAIN_RUNGS = RUNGS[:3]
 """Rungs with only poses and zeros of joints: what a URDF can express."""
 _SIZES = {"shift": 1e-3, "turn": 1e-3, "offset": 1e-3, "scale": 1e-3}

@@ -152,17 +152,6 @@ def axis_table(accuracy: GeometryAccuracy) -> Table:
     return Table(phrase("Errors by axis in mm, of poses left out"), heads, tuple(rows), texts=2)
 
 
-_MODELS = phrases(
-    "registration", "offsets", "geometry", "weight", "bearings", "harmonics", "joint-functions"
-)
-"""Names of the models, which pages say in other languages."""
-
-
-def model_name(rung: str) -> str:
-    """Return the name of a model as a phrase."""
-    return next((each for each in _MODELS if each == rung), rung)
-
-
 def rung_table(model: GeometryModel) -> Table:
     """Return the models that were tried, with their errors at the same left-out poses."""
     taken = {"" if model.chain is None else model.chain.rung: phrase("in URDF and table")}
@@ -174,7 +163,7 @@ def rung_table(model: GeometryModel) -> Table:
         (*heads, *(phrases("Mean, regions left out") if tried else ()), ""),
         tuple(
             (
-                model_name(each.rung),
+                each.rung,
                 each.unknowns,
                 *(f"{1e3 * value:.3f}" for value in vars(each.held_out).values()),
                 *(() if each.regions is None else (f"{1e3 * each.regions.mean:.3f}",)),

@@ -5,6 +5,8 @@ longer cutter changes no compliance; it changes the lever arms of the force and 
 deflection.
 """
 
+from __future__ import annotations  # signatures show ArrayLike by its name
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -300,7 +302,7 @@ class CalibratedModel:
         T_tcp_tool: ArrayLike,
         mass: float | None = None,
         centre: Sequence[float] | None = None,
-    ) -> "CalibratedModel":
+    ) -> CalibratedModel:
         """Return the model of the same springs at another tool's tcp.
 
         Compliances, draws and observability are the arm's. Predictions are of the new tcp, under

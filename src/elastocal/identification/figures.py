@@ -129,8 +129,8 @@ class RungSummary:
     held_out: float
     """Mean error at left-out poses, in m."""
     difference: DifferenceSummary
-    """Difference of the score by which it is judged from the best: its error at left-out poses and
-    left-out low load."""
+    """Difference of the score by which it is judged, its error at left-out poses and left-out low
+    load, from the best of those that may be taken; below 0 it is better and may not be."""
     parameters: int
     chosen: bool
     production_error: float | None = None
@@ -414,9 +414,10 @@ def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
         Ladder of a choice between all rungs.
     """
     taken = next(rung for rung in ladder if rung.chosen)
-    best = min(ladder, key=lambda rung: rung.difference.mean)
+    best = min(ladder, key=lambda rung: abs(rung.difference.mean))
+    better = [rung for rung in ladder if rung.difference.mean < 0.0]
     worse = [rung for rung in ladder if rung.difference.low > 0.0]
-    others = [rung.springs for rung in ladder if rung not in (taken, best, *worse)]
+    others = [rung.springs for rung in ladder if rung not in (taken, best, *better, *worse)]
 
     def by(rung: RungSummary) -> str:
         found = rung.difference
@@ -436,6 +437,8 @@ def ladder_sentence(ladder: Sequence[RungSummary]) -> str:
         )
     if unsure := [each.springs for each in ladder if not each.backed]:
         text += f"; too unsure of production to be taken: {', '.join(unsure)}"
+    if barred := [rung.springs for rung in better if rung.backed]:
+        text += f"; better, but with more numbers than the readings hold: {', '.join(barred)}"
     if worse:
         listed = ", ".join(f"{each.springs} by {by(each)}" for each in worse)
         text += f"; shown to be worse than the best: {listed}"

@@ -12,7 +12,7 @@ from elastocal.arrays import FloatArray
 from elastocal.blocks import Block, Facts
 from elastocal.elastic import KINDS, AnySpring, ElasticModel, require_possible
 from elastocal.errors import SchemaError, nearest
-from elastocal.files import sha256
+from elastocal.files import as_path, sha256
 from elastocal.findings import group_alike
 from elastocal.identification.calibrated import CalibratedModel, ToolChange
 from elastocal.identification.domain import CalibrationDomain
@@ -313,4 +313,5 @@ def read_model(source: ModelSource) -> CalibratedModel:
         return source
     if isinstance(source, CalibrateResult):
         return source.calibrated
-    return read_json(Path(source), CalibrateResult).calibrated
+    path = as_path(source, "source", CalibrateResult.__name__, CalibratedModel.__name__)
+    return read_json(path, CalibrateResult).calibrated

@@ -144,7 +144,7 @@ def show_ladder(ladder: Sequence[RungSummary]) -> Iterator[Block]:
     """Yield the models that were tried at the same left-out poses; nothing of a single one."""
     if len(ladder) < 2:
         return
-    heads = phrases("Springs", "Numbers", "At left-out poses", "Worse than the best by")
+    heads = phrases("Springs", "Numbers", "At left-out poses", "Above the best allowed")
     rows = tuple(
         (
             rung.springs,
@@ -193,11 +193,8 @@ def spring_table(springs: Sequence[SpringSummary]) -> Table:
 
 def _further(name: str, above: str) -> str:
     """Return the name of a further row of a gear without that of the gear."""
-    if isinstance(name, Phrase) and name.template == "{spring} lost motion":
-        return phrase("lost motion")
-    if isinstance(name, Phrase) and name.template == "{spring} at {torque} N·m":
-        return phrase("at {torque} N·m", torque=name.parts["torque"])
-    return name.removeprefix(f"{above} ")
+    figure = name.parts.get("figure") if isinstance(name, Phrase) else None
+    return figure if isinstance(figure, Phrase) else name.removeprefix(f"{above} ")
 
 
 def _spring_cells(spring: SpringSummary) -> tuple[Cell, ...]:

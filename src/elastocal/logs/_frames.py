@@ -87,17 +87,14 @@ def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) 
     if not known.any():
         raise LogError(f"{table.name}: no row states the whole tool frame")
     T: FloatArray = np.full((len(table), 4, 4), np.nan)
-    gap, turn = np.empty(len(table)), np.full(len(table), np.nan)
+    gap, turn = np.full((2, len(table)), np.nan)
     for start in range(0, len(table), ROWS_AT_A_TIME):
         rows = slice(start, start + ROWS_AT_A_TIME)
-        T_joints, whole = robot.forward(q[rows]), np.flatnonzero(known[rows]) + start
-        R_joints = T_joints[known[rows], :3, :3]
+        T_joints, whole = robot.forward(q[rows])[known[rows]], np.flatnonzero(known[rows]) + start
         T[whole, 3] = (0.0, 0.0, 0.0, 1.0)
-        T[whole, :3, :3] = _rotations(pose, stated[whole], R_joints)
+        T[whole, :3, :3] = _rotations(pose, stated[whole], T_joints[:, :3, :3])
         T[rows, :3, 3] = position[rows]
-        gap[rows] = np.linalg.norm(position[rows] - T_joints[:, :3, 3], axis=1)
-        relative = np.swapaxes(R_joints, 1, 2) @ T[whole, :3, :3]
-        turn[whole] = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
+        gap[whole], turn[whole] = _apart(T_joints, T[whole])
     both = known & np.isfinite(gap) & np.isfinite(turn)
     turned = stated.shape[1] > 0
     some = np.flatnonzero(both)[:: max(int(both.sum()) // _ROWS_TRIED, 1)]
@@ -137,11 +134,15 @@ def _joints_that_agree(robot: Robot, q: FloatArray, T: FloatArray, turned: bool)
 
 def _agree(here: FloatArray, there: FloatArray, turned: bool) -> bool:
     """Return whether tool frames are as near as those of an arm that is not calibrated."""
-    if not np.median(np.linalg.norm(here[:, :3, 3] - there[:, :3, 3], axis=1)) <= _LARGEST_GAP[0]:
-        return False
+    gap, turn = map(np.median, _apart(here, there))
+    return bool(gap <= _LARGEST_GAP[0] and (not turned or turn <= _LARGEST_GAP[1]))
+
+
+def _apart(here: FloatArray, there: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return distance in m and angle in rad between frames, each of shape (row,)."""
+    distance = np.linalg.norm(here[:, :3, 3] - there[:, :3, 3], axis=1)
     relative = np.swapaxes(here[:, :3, :3], 1, 2) @ there[:, :3, :3]
-    turn = np.atleast_1d(Rotation.from_matrix(relative).magnitude())
-    return not turned or bool(np.median(turn) <= _LARGEST_GAP[1])
+    return distance, np.atleast_1d(Rotation.from_matrix(relative).magnitude())
 
 
 def _require_near(

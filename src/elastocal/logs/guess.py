@@ -15,6 +15,7 @@ from elastocal.logs.recordings import is_recording, read_recording, read_topics
 from elastocal.logs.streams import read_table
 from elastocal.logs.table import LogTable
 from elastocal.results import brief_repr
+from elastocal.units import MEANT
 from elastocal.wording import listed
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$|_(mm|m|um|deg|rad|N|kN|Nm|s|ms)$")
@@ -62,17 +63,6 @@ _OF_BOXES = {
 }  # fmt: skip
 """Units of the boxes of sensors: SI unit, and its number in one of theirs."""
 _STEP = re.compile(r"(?i)(step|reading|handshake|plateau|messpunkt)")
-_PLAIN_UNITS = {
-    "°": "deg",
-    "degrees": "deg",
-    "degree": "deg",
-    "grad": "deg",
-    "grd": "deg",
-    "degrés": "deg",
-    "nm": "N*m",
-    "nmm": "N*mm",
-    "sec": "s",
-}
 _LEAST_AXES = 5
 """Columns with numbers that are the joints of an arm."""
 _SURELY_DEGREES = 7.0
@@ -462,7 +452,7 @@ def _stated(name: str) -> str | None:
     if match is None:
         return None
     unit = (match[1] or match[2]).strip()
-    return _PLAIN_UNITS.get(unit.lower(), unit)
+    return MEANT.get(unit.lower(), unit)
 
 
 def _triples(pattern: re.Pattern[str], names: dict[str, str]) -> list[tuple[str, ...]]:

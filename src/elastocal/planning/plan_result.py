@@ -19,7 +19,7 @@ from elastocal.arrays import FloatArray
 from elastocal.blocks import Block, Facts
 from elastocal.cell import TRACKER, Cell
 from elastocal.errors import PlanningError, SchemaError
-from elastocal.files import sha256, write_json
+from elastocal.files import as_path, sha256, write_json
 from elastocal.findings import Finding, group_alike
 from elastocal.planning.production import ProductionRecord
 from elastocal.records import read_json, record, to_data
@@ -348,7 +348,7 @@ def read_plan(folder: Path) -> PlanResult:
     FileAccessError
         If it cannot be read.
     """
-    path = Path(folder)
+    path = as_path(folder, "folder")
     path = path / PLAN if path.is_dir() else path
     written = read_json(path, _WrittenPlan)
     plan = PlanResult(**{each.name: getattr(written, each.name) for each in fields(PlanResult)})

@@ -1,5 +1,7 @@
 """The rigid robot: kinematics, limits and gravity torques of a serial chain."""
 
+from __future__ import annotations  # signatures show ArrayLike by its name
+
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -10,8 +12,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray, IndexArray
-from elastocal.errors import RobotError
-from elastocal.files import sha256
+from elastocal.errors import RobotError, require_type
+from elastocal.files import as_path, sha256
 from elastocal.results import brief_repr
 from elastocal.robot.chain import ChainJoint, ChainModel, SerialChain, build_model
 from elastocal.robot.urdf import (
@@ -115,7 +117,7 @@ class Robot:
     @classmethod
     def from_urdf(
         cls, text: str, tip: str, base: str | None = None, meshes: tuple[tuple[str, Path], ...] = ()
-    ) -> "Robot":
+    ) -> Robot:
         """Return the robot that a URDF text describes.
 
         Parameters
@@ -134,14 +136,15 @@ class Robot:
         RobotError
             If the URDF cannot be read or has no such links.
         """
+        require_type(text, str, "text", "text of a URDF; from_file reads a file")
         chain = read_chain(text, tip, base)
         root = parse_urdf(text)
         return cls(robot_name(root), text, chain, assumptions(root, chain), meshes)
 
     @classmethod
-    def from_file(cls, path: Path | str, tip: str, base: str | None = None) -> "Robot":
+    def from_file(cls, path: Path | str, tip: str, base: str | None = None) -> Robot:
         """Return the robot that a URDF file describes; see `from_urdf`."""
-        path = Path(path)
+        path = as_path(path, "path")
         text = read_urdf(path)
         with refusals_naming(path):
             return cls.from_urdf(text, tip, base)

@@ -16,6 +16,7 @@ import codecs
 import contextlib
 import math
 import re
+import reprlib
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -342,6 +343,11 @@ def parse_urdf(text: str, comments: bool = False) -> ElementTree.Element:
     except ElementTree.ParseError as error:
         if "<xacro:" in text:
             raise RobotError(_XACRO) from error
+        if "<" not in text:
+            raise RobotError(
+                f"a URDF is a text with an element <robot>, not {reprlib.repr(text)}"
+                " (Robot.from_file reads a file)"
+            ) from error
         raise RobotError(f"URDF is not valid XML: {error}") from error
     if root.find("link") is None and root.find("group") is not None:
         raise RobotError(

@@ -81,17 +81,17 @@ _TOOL_LOADS = (
 
 
 def find_robot(
-    robot: str | None, tcp: str | None, tool: str | None, dataset: Dataset | None = None
+    robot: str | Robot | None, tcp: str | None, tool: str | None, dataset: Dataset | None = None
 ) -> Robot:
     """Return the robot that a user means.
 
     Parameters
     ----------
-    robot : str or None
-        A URDF file, a catalogue name, or None for the dataset's own.
+    robot : str, Robot or None
+        A URDF file, a catalogue name, the robot itself, or None for the dataset's own.
     tcp : str or None
-        Link at the tool centre point; by default the dataset's, or the robot's only tip
-        (`elastocal.robot.tip_links`).
+        Link at the tool centre point; by default that of the robot itself or of the dataset, or
+        the only tip (`elastocal.robot.tip_links`).
     tool : str or None
         Pose of the tcp behind that link, ``"x, y, z, a, b, c"`` with units (KUKA Z-Y'-X'').
     dataset : Dataset, optional
@@ -102,12 +102,16 @@ def find_robot(
     RobotError
         If there is no robot, or its tool centre point is undetermined.
     """
-    urdf, path = _find_urdf(robot, dataset)
     T_tcp_tool = None if tool is None else parse_frame(tool, "tool", error=RobotError)
-    if robot is None and dataset is not None:
-        tcp = tcp or dataset.tcp_frame
-    with contextlib.nullcontext() if path is None else refusals_naming(path):
-        arm = _robot_at(urdf, tcp, T_tcp_tool)
+    if isinstance(robot, Robot):
+        arm = _robot_at(robot.urdf, tcp or robot.tip, T_tcp_tool, robot.base)
+        arm = replace(arm, meshes=robot.meshes, gravity=robot.gravity)
+    else:
+        urdf, path = _find_urdf(robot, dataset)
+        if robot is None and dataset is not None:
+            tcp = tcp or dataset.tcp_frame
+        with contextlib.nullcontext() if path is None else refusals_naming(path):
+            arm = _robot_at(urdf, tcp, T_tcp_tool)
     if dataset is None or dataset.gravity is None:
         return arm
     return replace(arm, gravity=dataset.gravity)
@@ -480,7 +484,9 @@ def parse_frame(
     return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))
 
 
-def _robot_at(urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None) -> Robot:
+def _robot_at(
+    urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None, base: str | None = None
+) -> Robot:
     """Return the robot of a URDF up to a link, its only tip by default, or to a tool behind it."""
     if not tcp:
         tips = list(tip_links(parse_urdf(urdf)))
@@ -493,7 +499,7 @@ def _robot_at(urdf: str, tcp: str | None, T_tcp_tool: FloatArray | None) -> Robo
         tcp = tips[0]
     if T_tcp_tool is not None:
         urdf, tcp = with_tool(urdf, tcp, _TOOL_LINK, T_tcp_tool), _TOOL_LINK
-    robot = Robot.from_urdf(urdf, tcp)
+    robot = Robot.from_urdf(urdf, tcp, base)
     require_joint_names(robot.joint_names)
     return robot
 

@@ -7,13 +7,16 @@ import dataclasses
 import functools
 import inspect
 import itertools
+import operator
 import types
-from collections.abc import Callable, Collection, Mapping, Sequence
-from os import PathLike
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from numbers import Integral, Real
+from os import PathLike, fspath
 from pathlib import Path
 from typing import (
     Annotated,
     Any,
+    Literal,
     Protocol,
     TypeVar,
     Union,
@@ -24,7 +27,7 @@ from typing import (
     overload,
 )
 
-from elastocal.errors import FileAccessError, nearest
+from elastocal.errors import FileAccessError, described_type, nearest
 from elastocal.files import remove_leftovers, require_place
 from elastocal.options import settings_fields
 from elastocal.outputs import OutputRule, ruled
@@ -84,7 +87,6 @@ def workflow(
         @functools.wraps(function)
         def call(*given: Any, progress: Progress = silent, **options: Any) -> R:
             chosen, hears = _chosen(function.__name__, settings, by_place, given, options)
-            chosen = _as_hinted(chosen)
             files = _places(chosen)
             written = [path for each in (*outputs, record) for path in files.pop(each, ())]
             for path in written:
@@ -121,16 +123,20 @@ def _chosen(
     _require_known(name, options, fields)
     is_settings = bool(given) and isinstance(given[0], settings)
     places = 1 if is_settings else _count_places(given, len(by_place))
-    if len(given) > places + 1:
+    rest = given[places:]
+    if rest[1:] or not all(map(callable, rest)):
         count = f"{len(by_place)} arguments" if by_place[1:] else "one argument"
         raise TypeError(f"{name}() takes {count} without a name")
     if is_settings:
-        return dataclasses.replace(given[0], **options), given[1:]
+        stated = {each: getattr(given[0], each) for each in fields} | options
+        stated = _as_hinted(name, settings, stated)
+        changed = {k: v for k, v in stated.items() if v is not getattr(given[0], k)}
+        return dataclasses.replace(given[0], **changed), rest
     options |= _by_name(name, by_place, given[:places], options)
     for each in by_place:
         if each not in options and fields[each].default is inspect.Parameter.empty:
             raise TypeError(f"{name}() needs {each!r}")
-    return settings(**options), given[places:]
+    return settings(**_as_hinted(name, settings, options)), rest
 
 
 def _signature(
@@ -210,24 +216,120 @@ def _is_file(text: str) -> bool:
         return False
 
 
-def _as_hinted(given: Any) -> Any:
-    """Return settings whose files and lists have the types of their fields."""
-    found = {name: getattr(given, name) for name in inspect.signature(type(given)).parameters}
-    hints = get_type_hints(type(given))
-    wanted = {name: _converted(value, hints[name]) for name, value in found.items()}
-    changed = {name: value for name, value in wanted.items() if value is not found[name]}
-    return dataclasses.replace(given, **changed) if changed else given
+def _as_hinted(function: str, settings: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of fields with the types of their hints; see `_taken`.
+
+    Raises
+    ------
+    TypeError
+        If a value is of no type that its field takes; it names the field and these types.
+    """
+    hints, found = get_type_hints(settings), {}
+    for name, value in given.items():
+        try:
+            found[name] = _taken(value, hints[name])
+        except _NotTakenError as refused:
+            allowed = ", ".join(_words(hints[name]))
+            raise TypeError(f"{function}(): {name} is {refused} (allowed: {allowed})") from None
+    return found
 
 
-def _converted(value: Any, hint: Any) -> Any:
-    """Return a value as its type hint wants it: texts as paths, one item or a list as a tuple."""
-    allowed = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
-    if isinstance(value, str | PathLike) and Path in allowed and str not in allowed:
-        return value if isinstance(value, Path) else Path(value)
-    several = [get_args(each)[0] for each in allowed if get_args(each)[1:] == (Ellipsis,)]
-    if not several or value is None:
+class _NotTakenError(Exception):
+    """A value is of no type that its hint names; its text says of which it is."""
+
+
+def _taken(value: Any, hint: Any) -> Any:
+    """Return a value as its type hint wants it: texts as paths, one item or a list as a tuple.
+
+    Raises
+    ------
+    _NotTakenError
+        If neither the value nor a part of it is of a type that is wanted there.
+    """
+    allowed = _alternatives(hint)
+    if any(_is_one(value, each) for each in allowed):
         return value
-    # A text is a sequence too: "12" would be the items "1" and "2".
-    items = (value,) if isinstance(value, str | PathLike) else tuple(value)
-    converted = tuple(_converted(each, several[0]) for each in items)
-    return value if value == converted else converted
+    if isinstance(value, str | PathLike) and Path in allowed:
+        return Path(value)
+    if isinstance(value, PathLike) and str in allowed:
+        return fspath(value)
+    for each in allowed:
+        if (items := _items(value, each)) is not None:
+            taken = tuple(_taken(*item) for item in items)
+            same = isinstance(value, tuple) and all(map(operator.is_, taken, value))
+            return value if same else taken
+    raise _NotTakenError(described_type(value))
+
+
+def _alternatives(hint: Any) -> tuple[Any, ...]:
+    """Return the types that a hint names."""
+    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+
+
+def _is_one(value: Any, hint: Any) -> bool:
+    """Return whether a value is of one type of a hint that is no list of several."""
+    if get_origin(hint) is Literal:  # the work knows which of its words are allowed
+        return any(isinstance(value, type(word)) for word in get_args(hint))
+    if _is_list(hint):
+        return False
+    kind = get_origin(hint) or hint
+    if kind is bool:  # NumPy's, too
+        return hasattr(type(value), "__bool__")
+    if kind is Mapping:  # data frames are none by class
+        return hasattr(value, "keys") and hasattr(value, "__getitem__")
+    kind = {int: Integral, float: Real}.get(kind, kind)
+    is_open = not isinstance(kind, type) or getattr(kind, "_is_protocol", False)
+    return is_open or isinstance(value, kind)
+
+
+def _is_list(hint: Any) -> bool:
+    return get_origin(hint) in (tuple, Sequence, Iterable)
+
+
+def _items(value: Any, hint: Any) -> list[tuple[Any, Any]] | None:
+    """Return the items of a value with their hints; None where the hint wants other ones.
+
+    A text is a sequence too, but "12" is not the items "1" and "2".
+    """
+    if not _is_list(hint):
+        return None
+    first, *rest = get_args(hint)
+    is_single = isinstance(value, str | PathLike) or not isinstance(value, Iterable)
+    items = [value] if is_single else list(value)
+    if not rest or rest == [Ellipsis]:
+        return None if value is None else [(item, first) for item in items]
+    return list(zip(items, (first, *rest), strict=True)) if len(items) == len(rest) + 1 else None
+
+
+_PLAIN_WORDS = {
+    str: "text",
+    Path: "path",
+    PathLike: "path",
+    types.NoneType: "None",
+    bool: "True or False",
+    int: "whole number",
+    float: "number",
+    Callable: "function",
+    Mapping: "columns or values by name",
+}
+
+
+def _words(hint: Any) -> list[str]:
+    """Return the names of the types that a hint names, each once."""
+    named: dict[str, None] = {}
+    kinds = _alternatives(hint)
+    for each in kinds:
+        if each is str and any((get_origin(other) or other) is PathLike for other in kinds):
+            continue
+        if get_origin(each) is Literal:
+            named |= dict.fromkeys(map(str, get_args(each)))
+        elif _is_list(each) and (get_origin(each) is not tuple or get_args(each)[-1] is Ellipsis):
+            items = _words(get_args(each)[0])
+            named |= dict.fromkeys(items)
+            named["several of them"] = None
+        elif _is_list(each):
+            named[f"{len(get_args(each))} numbers"] = None
+        else:
+            kind = get_origin(each) or each
+            named[_PLAIN_WORDS.get(kind, getattr(kind, "__name__", str(kind)))] = None
+    return list(named)

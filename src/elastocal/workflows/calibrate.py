@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -76,8 +77,8 @@ class CalibrateSettings(FitSettings):
         Path | None, Option(required=True, ends=(".json",), help="Model file (.json) to write.")
     ] = None
     """Model file to write; none: the result is only returned."""
-    robot: Annotated[str | None, Option(choices="robot")] = None
-    """URDF file or catalogue name; by default the dataset's own."""
+    robot: Annotated[str | Robot | None, Option(choices="robot")] = None
+    """URDF file or catalogue name; by default the dataset's own. In Python also a `Robot`."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
     tool_frame: ToolFrame = None
@@ -109,7 +110,7 @@ class CalibrateSettings(FitSettings):
     def __post_init__(self) -> None:
         """Keep the springs that an iterator gives."""
         super().__post_init__()
-        if not isinstance(self.springs, str):
+        if not isinstance(self.springs, str | PathLike):
             object.__setattr__(self, "springs", tuple(self.springs))
 
     @property

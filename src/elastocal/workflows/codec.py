@@ -34,6 +34,7 @@ from elastocal.options import Exclude, Marker, Option, ToolFrame
 from elastocal.parallel import one_blas_thread
 from elastocal.progress import Progress
 from elastocal.results import Result, brief_repr
+from elastocal.robot import Robot
 from elastocal.workflows._inputs import (
     DatasetSource,
     KnownContact,
@@ -64,8 +65,8 @@ class CodecSettings(CodecOptions):
     ] = ()
     """Comparisons, each ``"KEY=A,B"`` with a key of `codec.KEYS`; every combination is a
     variant."""
-    robot: Annotated[str | None, Option(choices="robot")] = None
-    """URDF file or catalogue name; by default the dataset's own."""
+    robot: Annotated[str | Robot | None, Option(choices="robot")] = None
+    """URDF file or catalogue name; by default the dataset's own. In Python also a `Robot`."""
     tcp: str | None = None
     """Link at the tool centre point; by default the dataset's."""
     tool_frame: ToolFrame = None

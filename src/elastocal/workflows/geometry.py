@@ -36,7 +36,7 @@ from elastocal.records import write_json
 from elastocal.report import drawn, error_maps, language_of
 from elastocal.report.document import REPORT_TITLE, GeometryFindings, write_geometry_page
 from elastocal.results import Result, brief_repr
-from elastocal.robot import BUILT_MARK
+from elastocal.robot import BUILT_MARK, Robot
 from elastocal.tables import write_table
 from elastocal.units import in_unit, parse_point
 from elastocal.wording import counted, mm
@@ -55,8 +55,8 @@ class GeometrySettings:
 
     positions: Annotated[str | PathLike[str], Option(argument=True)]
     """CSV of joints and markers."""
-    robot: Annotated[str | None, Option(choices="robot", required=True)] = None
-    """URDF file or catalogue name."""
+    robot: Annotated[str | Robot | None, Option(choices="robot", required=True)] = None
+    """URDF file or catalogue name. In Python also a `Robot`."""
     tcp: str | None = None
     """Link that carries the markers."""
     map: Annotated[Path | None, Option(metavar="MAP.yaml")] = None

@@ -44,8 +44,8 @@ class ToolSettings:
         Path | None, Option(required=True, ends=(".json",), help="Tool file (.json) to write.")
     ] = None
     """Tool file to write; none: the result is only returned."""
-    robot: Annotated[str | None, Option(choices="robot")] = None
-    """URDF file, catalogue name or model file, for a CSV with joints."""
+    robot: Annotated[str | Robot | None, Option(choices="robot")] = None
+    """URDF file, catalogue name or model file, for a CSV with joints. In Python also a `Robot`."""
     flange: str | None = None
     """Link that the sensor sits on, for a CSV; by default ``flange``."""
     sensor: str | None = None
@@ -161,11 +161,10 @@ def _from_table(path: Path, settings: ToolSettings) -> _PostureSource:
     """Return the postures of a CSV file."""
     arm, flange = None, settings.flange or _FLANGE
     if settings.robot is not None:
-        if Path(settings.robot).suffix.lower() == ".json":
-            robot = read_model(Path(settings.robot)).model.robot
-        else:
-            robot = find_robot(settings.robot, flange, None)
-        arm = Robot.from_urdf(robot.urdf, flange, robot.base)
+        robot = settings.robot
+        if isinstance(robot, str) and Path(robot).suffix.lower() == ".json":
+            robot = read_model(robot).model.robot
+        arm = find_robot(robot, flange, None)
     rule = "must be six quantities, e.g. '0 mm, 0 mm, 45 mm, 0 deg, 0 deg, 0 deg'"
     T_flange_sensor = parse_frame(settings.sensor or _AS_FLANGE, "sensor", rule, CompensationError)
     down = np.array(settings.down or _DOWN)

@@ -19,7 +19,7 @@ from elastocal.elastic.springs.spring import (
 from elastocal.errors import SpringError
 from elastocal.records import record
 from elastocal.units import impossible
-from elastocal.wording import phrase
+from elastocal.wording import Phrase, phrase
 
 LOST_MOTION = Unit("rad", "arcmin", 10_800.0 / np.pi)
 """Unit of the angle between a torque and its opposite that friction leaves."""
@@ -100,7 +100,7 @@ class Gear(OneAxisSpring):
             Characteristic(
                 self.name
                 if torque == 0.0
-                else phrase("{spring} at {torque} N·m", spring=self.name, torque=f"{torque:.0f}"),
+                else self._name_of(phrase("at {torque} N·m", torque=f"{torque:.0f}")),
                 (1.0, *(1.0 / (1.0 + (torque / T) ** 2) for T in self.knees), *sliding),
                 TORSIONAL,
             )
@@ -112,12 +112,15 @@ class Gear(OneAxisSpring):
             both_ways = (2.0 * r for r in self.slips)
             found.append(
                 Characteristic(
-                    phrase("{spring} lost motion", spring=self.name),
+                    self._name_of(phrase("lost motion")),
                     (0.0, *soft, *both_ways),
                     LOST_MOTION,
                 )
             )
         return tuple(found)
+
+    def _name_of(self, figure: Phrase) -> Phrase:
+        return phrase("{spring} {figure}", spring=self.name, figure=figure)
 
     @property
     def friction_limits(self) -> tuple[float, ...]:

@@ -83,7 +83,8 @@ class Characteristic:
     """Figure of a spring, as in a data sheet: a sum of its parameters."""
 
     name: str
-    """Begins with the spring's name; equal to it for its compliance without load."""
+    """Begins with the spring's name; equal to it for its compliance without load. A phrase may have
+    the rest as its part ``figure``, which is shown alone below the first row."""
     weights: tuple[float, ...]
     """One a parameter of the spring."""
     unit: Unit
