@@ -103,7 +103,6 @@ def test_the_tour_has_the_lines_that_a_new_user_needs():
     assert len(blocks("text")) == 2
 
 
-@pytest.mark.slow
 def test_every_shell_line_of_the_tour_is_done(toured):
     failed = {line: result.err for line, result in toured.results.items() if result.code != 0}
     assert not failed
@@ -117,7 +116,6 @@ def test_every_shell_line_of_the_tour_is_done(toured):
         assert (toured.folder / name).is_file(), name
 
 
-@pytest.mark.slow
 def test_the_output_in_the_readme_is_what_the_commands_print(toured):
     lines = (
         "elastocal demo --out demo",
@@ -129,7 +127,6 @@ def test_the_output_in_the_readme_is_what_the_commands_print(toured):
             words = words[after(part.split(), words) :]
 
 
-@pytest.mark.slow
 def test_the_page_on_the_table_quotes_what_the_tour_prints(toured):
     """The condition number is of no meaning to its last digits."""
     page = (ROOT / "docs/how-to/read-the-table.md").read_text(encoding="utf-8")
@@ -199,7 +196,6 @@ def messages() -> set[str]:
     return found
 
 
-@pytest.mark.slow
 def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     pages = (ROOT / "docs/how-to/when-it-refuses").glob("*.md")
     first = ROOT / "docs/how-to/when-it-refuses.md"
@@ -210,7 +206,6 @@ def test_the_refusals_that_the_docs_quote_are_those_of_the_code():
     assert not [text for text in quoted if not any(text in message for message in known)]
 
 
-@pytest.mark.slow
 def test_the_faults_that_drivers_are_held_against_have_their_messages_and_their_tests():
     page = (ROOT / "docs/decisions/0080-drivers.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (?!fault|---)(.*?) \| (.*?) \| (.*?) \|$", page, flags=re.MULTILINE)

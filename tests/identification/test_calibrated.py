@@ -100,11 +100,12 @@ def test_the_interval_of_a_compliance_is_that_of_its_draws(calibrated):
     np.testing.assert_array_equal(calibrated.interval(), interval(DRAWS))
 
 
-def test_the_interval_of_a_compliance_lacks_the_doubt_about_the_model(calibrated):
+def test_the_interval_of_a_compliance_is_the_stated_one_and_moves_no_prediction(calibrated):
     """A prediction has a meaning in every model, a spring in its own alone."""
     q, force, _ = rows(7)
-    told = replace(calibrated, spring_draws=C + 0.5 * (DRAWS - C))
-    np.testing.assert_array_equal(told.interval(), interval(C + 0.5 * (DRAWS - C)))
+    ends = np.column_stack([0.5 * C, 2.0 * C])
+    told = replace(calibrated, spring_ends=np.vstack([ends, ends]))
+    np.testing.assert_array_equal(told.interval(), ends.T)
     np.testing.assert_array_equal(told.predict(q, force).low, calibrated.predict(q, force).low)
 
 

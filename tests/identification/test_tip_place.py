@@ -8,7 +8,7 @@ import pytest
 
 import elastocal as ec
 from elastocal.dataset import Dataset
-from elastocal.errors import IdentificationError, SchemaError
+from elastocal.errors import IdentificationError, SchemaError, SpringError
 from elastocal.identification import (
     CalibrateResult,
     Contact,
@@ -114,9 +114,17 @@ def test_a_model_file_keeps_where_the_draws_have_the_tip(tmp_path):
         replace(calibrated(), tip=calibrated().tip[1:])
     with pytest.raises(SchemaError, match="tip is nan m: it must be finite"):
         replace(calibrated(), tip=np.full_like(calibrated().tip, np.nan))
-    for rows in (calibrated().draws[:1], calibrated().draws[:0]):
-        with pytest.raises(SchemaError, match=f"{len(rows)} spring_draws: as many as draws"):
-            replace(calibrated(), spring_draws=rows)
+
+
+def test_a_model_file_refuses_ends_of_intervals_that_are_none():
+    ends = calibrated().spring_ends
+    for rows in (ends[:1], ends[:0], ends[:, :1]):
+        with pytest.raises(SchemaError, match=r"spring_ends \(\d+, \d\) must be \(\d+, 2\)"):
+            replace(calibrated(), spring_ends=rows)
+    with pytest.raises(SchemaError, match="the lower end before the upper one"):
+        replace(calibrated(), spring_ends=ends[:, ::-1])
+    with pytest.raises(SpringError, match="spring_ends"):
+        replace(calibrated(), spring_ends=np.full_like(ends, np.nan))
 
 
 def test_positions_of_the_described_tcp_are_no_sign_of_another_tool():

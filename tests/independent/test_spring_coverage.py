@@ -2,9 +2,11 @@
 
 The truth is an arm of `elastocal.sim.arm` at its exact loaded equilibrium, under its own weight if
 it has masses: a gear and two tilts at each joint, of sizes drawn anew in each campaign, which the
-ladder's `bearing` can express. What `calibrate --springs auto` calls known is held against the
-spring of the same name, in few and in many poses. Light arms are pressed as far as some 2 mm: at
-5 mm their levers are no longer those of the fit (docs/decisions/0135-known-by-name.md).
+ladder's `bearing` can express. In half of the campaigns three tilts of four are rigid: beside a
+spring that a bound holds at zero, draws are too sure of the others
+(docs/decisions/0156-profiles-of-springs.md). What `calibrate --springs auto` calls known is held
+against the spring of the same name, in few and in many poses. Light arms are pressed as far as some
+2 mm: at 5 mm their levers are no longer those of the fit (docs/decisions/0135-known-by-name.md).
 """
 
 from collections.abc import Iterator
@@ -43,6 +45,8 @@ CAMPAIGNS = 25
 POSES = {"few": 7, "many": 31}
 TILT = 0.05, 0.4
 """Compliance of a tilt over that of the gear of its joint."""
+TILTING = 1.0, 0.25
+"""Share of the tilts that are not rigid, in one half of the campaigns and in the other."""
 GEAR = 0.7, 1.4
 """Compliance of a gear over the usual one of the arm."""
 
@@ -92,7 +96,9 @@ def kind(arm: str) -> Kind:
 ARMS = ("parallel axes", "210 kg", "seven axes", "3 kg")
 
 
-def truth(of: Kind, rng: np.random.Generator) -> tuple[ElasticArm, dict[str, float]]:
+def truth(
+    of: Kind, rng: np.random.Generator, tilting: float = 1.0
+) -> tuple[ElasticArm, dict[str, float]]:
     """Return an arm, and the compliance of each of its springs by name, in rad/(N·m)."""
     linkage, planted, springs = Linkage.from_urdf(of.urdf, "tool"), {}, []
     for joint, origin in enumerate(joint_origins(of.robot.chain)):
@@ -100,6 +106,9 @@ def truth(of: Kind, rng: np.random.Generator) -> tuple[ElasticArm, dict[str, flo
         gear = planted[f"{name}.axial"] = 1e-6 * of.gears[joint] * rng.uniform(*GEAR)
         springs.append(axial_spring(linkage, joint, 1.0 / gear))
         for axis, direction in origin.directions.items():
+            planted[f"{name}.{axis}"] = 0.0
+            if tilting < 1.0 and rng.uniform() > tilting:
+                continue
             tilt = planted[f"{name}.{axis}"] = gear * rng.uniform(*TILT)
             springs.append(TruthSpring(name, direction, Linear(1.0 / tilt), at=origin.offset))
     gravity = GRAVITY if of.robot.has_masses else (0.0, 0.0, 0.0)
@@ -127,12 +136,18 @@ class Campaign:
 
 @one_blas_thread()
 def campaign(
-    arm: str, poses: int, seed: int, *, press: float | None = None, springs: str = "auto"
+    arm: str,
+    poses: int,
+    seed: int,
+    *,
+    tilting: float = 1.0,
+    press: float | None = None,
+    springs: str = "auto",
 ) -> Campaign:
     """Press at poses about a posture, by default with its kind's force, and calibrate."""
     of, rng = kind(arm), np.random.default_rng([seed, poses])
     of = of if press is None else replace(of, press=press)
-    real, planted = truth(of, rng)
+    real, planted = truth(of, rng, tilting)
     spread = np.full(len(of.middle), 0.5)
     spread[-1] = 2.5
     q = np.array(of.middle) + spread * rng.uniform(-1.0, 1.0, (poses, len(spread)))
@@ -157,14 +172,14 @@ def campaign(
     return Campaign(choice.taken, summaries, planted, sums, warnings)
 
 
-def held_by_spring(arm: str, poses: int, campaigns: int) -> dict[str, list[bool]]:
+def held_by_spring(arm: str, poses: int, campaigns: int, tilting: float) -> dict[str, list[bool]]:
     """Return whether intervals held what was planted, by spring, in campaigns of as many arms.
 
     Sums of springs that are not known singly count under one name.
     """
     held: dict[str, list[bool]] = {}
     for seed in range(campaigns):
-        found = campaign(arm, poses, seed)
+        found = campaign(arm, poses, seed, tilting=tilting)
         for name, each in found.held():
             held.setdefault(name, []).append(each)
         held.setdefault("sums", []).extend(found.sums)
@@ -172,16 +187,17 @@ def held_by_spring(arm: str, poses: int, campaigns: int) -> dict[str, list[bool]
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("tilting", TILTING)
 @pytest.mark.parametrize("poses", POSES)
 @pytest.mark.parametrize("arm", ARMS)
-def test_the_interval_of_a_known_spring_holds_what_was_planted(arm, poses):
+def test_the_interval_of_a_known_spring_holds_what_was_planted(arm, poses, tilting):
     """One of twenty may miss: of 25, five are more than chance makes of any spring.
 
     Errors of springs of one campaign hang together: of 25 all may be held, too.
     """
-    held = held_by_spring(arm, POSES[poses], CAMPAIGNS)
+    held = held_by_spring(arm, POSES[poses], CAMPAIGNS, tilting)
     for name, each in held.items():
-        print(f"{arm}, {poses}: {name} {sum(each)} of {len(each)}")
+        print(f"{arm}, {poses}, {tilting}: {name} {sum(each)} of {len(each)}")
     every = np.concatenate(list(held.values()))
     assert every.mean() > 0.93
     assert all(np.sum(~np.array(each)) < 5 for name, each in held.items() if name != "sums")
@@ -193,6 +209,21 @@ def test_one_campaign_of_a_small_arm_says_what_it_knows():
     held = dict(found.held())
     assert {"joint_2.axial", "joint_3.axial", "joint_1.x", "joint_1.y"} <= held.keys()
     assert sum(held.values()) >= len(held) - 1
+
+
+def test_a_gear_is_doubted_where_tilts_that_were_left_out_could_be_part_of_it():
+    """Springs of the axes alone predicted as well: joint 3 was 0.627 to 0.638, planted 0.522."""
+    found = campaign("210 kg", POSES["many"], 3, tilting=0.25)
+    assert found.taken == "actuated"
+    held = dict(found.held())
+    assert {"joint_a2.axial", "joint_a3.axial", "joint_a5.axial"} <= held.keys()
+    assert all(held.values())
+
+
+def test_a_gear_may_be_all_that_a_rigid_tilt_beside_it_has_of_the_noise():
+    """The draws gave joint 1 0.000 to 0.289 µrad/(N·m), planted 0.316: the rest was in a tilt."""
+    found = campaign("210 kg", POSES["many"], 11, tilting=0.25)
+    assert dict(found.held())["joint_a1.axial"]
 
 
 def test_a_soft_arm_with_its_wrist_near_axis_1_stands_where_its_joints_say():

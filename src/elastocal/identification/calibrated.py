@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray, triple
-from elastocal.elastic import ElasticModel, ModelPosture, check_vectors
+from elastocal.elastic import ElasticModel, ModelPosture, Spring, check_vectors
 from elastocal.errors import RobotError, SpringError
 from elastocal.identification.displacement import slopes_by_shift
 from elastocal.identification.domain import CalibratedLoads, CalibrationDomain
@@ -24,6 +24,7 @@ from elastocal.identification.extrapolation import CalibratedTorques
 from elastocal.identification.observability import Observability
 from elastocal.identification.prediction_doubt import PredictionDoubt, ProductionRows
 from elastocal.identification.production import CoveredRows, ProductionCoverage, covered_rows
+from elastocal.identification.spring_sums import sum_weights
 from elastocal.identification.uncertainty import UNKNOWN_MISFIT, Misfit, interval
 from elastocal.records import record
 from elastocal.results import Result, brief_repr
@@ -187,6 +188,24 @@ class Prediction(Result):
         )
 
 
+def spring_rows(springs: Sequence[Spring], seen: Observability) -> FloatArray:
+    """Return what of the springs has an interval: weights of sums of their parameters.
+
+    Shape (row, parameter): each parameter, each characteristic of each spring, then each sum that
+    is known though its springs are not (`Observability.seen_beside`).
+    """
+    parameters = [parameter for spring in springs for parameter in spring.parameters]
+    n, first, characteristics = len(parameters), 0, list[FloatArray]()
+    for spring in springs:
+        for each in spring.characteristics:
+            row = np.zeros(n)
+            row[first : first + len(spring.parameters)] = each.weights
+            characteristics.append(row)
+        first += len(spring.parameters)
+    sums = sum_weights(seen.seen_beside(parameters), [each.name for each in parameters])
+    return np.vstack([np.eye(n), *characteristics, sums.reshape(-1, n)])
+
+
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class CalibratedModel:
@@ -213,28 +232,29 @@ class CalibratedModel:
     it belonged to another tool."""
     encoders: tuple[EncoderZero, ...] = ()
     """What secondary encoders read in the air; empty: the calibration had none."""
-    spring_draws: FloatArray | None = None
-    """Draws of which springs have their intervals, shape (draw, spring); None: `draws`. They lack
-    the doubt whether another model is right, since a spring has a value in its own model alone."""
-
+    spring_ends: FloatArray | None = None
+    """Lower and upper ends of the 95 % intervals of springs (`spring_rows`), shape (row, 2); None:
+    those of the draws. Draws serve predictions: they have the doubt whether another model is right,
+    and beside a spring that a bound holds they are too near to one another."""
     tip: FloatArray | None = None
     """Where each draw has the tip, from the tcp of the model in its frame, shape (draw, 3), in m;
     None: its place is known."""
 
     def __post_init__(self) -> None:
-        for name in ("compliance", "draws", "spring_draws", "tip"):
+        for name in ("compliance", "draws", "spring_ends", "tip"):
             if getattr(self, name) is None:
                 continue
             array = np.array(getattr(self, name), dtype=float)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        if self.spring_draws is not None and np.array_equal(self.spring_draws, self.draws):
-            object.__setattr__(self, "spring_draws", None)
 
-    @property
-    def draws_of_springs(self) -> FloatArray:
-        """Draws of which springs and sums of springs have their intervals, shape (draw, spring)."""
-        return self.draws if self.spring_draws is None else self.spring_draws
+    @cached_property
+    def ends(self) -> FloatArray:
+        """Ends of the 95 % interval of each row of `spring_rows`, shape (row, 2)."""
+        if self.spring_ends is not None:
+            return self.spring_ends
+        rows = spring_rows(self.model.springs, self.observability)
+        return np.column_stack(interval(self.draws @ rows.T))
 
     @property
     def stiffness(self) -> FloatArray:
@@ -339,7 +359,8 @@ class CalibratedModel:
 
     def interval(self) -> tuple[FloatArray, FloatArray]:
         """Return the 95 % intervals of the compliances, two arrays of shape (spring,)."""
-        return interval(self.draws_of_springs)
+        low, high = self.ends[: len(self.compliance)].T
+        return low, high
 
     def predict(
         self,

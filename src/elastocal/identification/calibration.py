@@ -6,6 +6,7 @@ and every prediction use the calibrated model.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -16,7 +17,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel, Parameter
 from elastocal.errors import IdentificationError, present
 from elastocal.findings import Finding, Kind, as_number
-from elastocal.identification.calibrated import CalibratedModel
+from elastocal.identification.calibrated import CalibratedModel, spring_rows
 from elastocal.identification.contact import ContactSummary, contact_summary, untold_stacks
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.encoders import (
@@ -59,6 +60,8 @@ from elastocal.identification.uncertainty import (
     interval,
     leave_poses_out,
     measured_coverage,
+    noise_of_a_direction,
+    profile_ends,
     widen_draws,
     widening_factor,
 )
@@ -242,17 +245,19 @@ def calibrate(
     draws = _resampled(weighted, options.draws, rng, model.parameters)
     few, by = _widening(weighted, c, draws, held_out, ladder, unexplained)
     widened = _stretched(weighted, c, draws, by, model.parameters)
+    seen = _seen(model, weighted.of_springs(), c[springs], options)
+    fits = [Fit(model, weighted, c), *_doubting(ladder, options.loss)]
     calibrated = CalibratedModel(
         model,
         c[springs],
         widened[:, springs],
-        _seen(model, weighted.of_springs(), c[springs], options),
+        seen,
         provenance,
         held_out.misfit,
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, fitted, kept.block),
         encoders=encoder_zeros(model, fitted, c[springs]) if options.encoders else (),
-        spring_draws=_stretched(weighted, c, draws, few, model.parameters)[:, springs],
+        spring_ends=_spring_ends(fits, seen, draws, few),
         tip=(widened - c)[:, weighted.tip_columns] if weighted.tip else None,
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
@@ -306,6 +311,61 @@ def _seen(
     return find_hidden(seen, problem, compliance, model.parameters, sizes, held)
 
 
+class Fit(NamedTuple):
+    """A model that was fitted."""
+
+    model: ElasticModel
+    problem: Problem
+    """Weighted as it was solved."""
+    compliance: FloatArray
+    """Shape (column,)."""
+
+
+def _doubting(ladder: Sequence[Climbed], loss: str) -> list[Fit]:
+    """Return fits of rungs that have all springs of the chosen one and more (`Climbed.told`)."""
+    fits = []
+    for each in ladder:
+        if each.told is not None:
+            found = solve(each.told, loss)
+            weighted = each.told.reweighted(found.reading_weight)
+            fits.append(Fit(each.model, weighted, found.compliance))
+    return fits
+
+
+def _spring_ends(
+    fits: Sequence[Fit], seen: Observability, draws: FloatArray, by: float
+) -> FloatArray:
+    """Return the ends of the intervals of springs: of draws, and of the profiles of all fits.
+
+    See `spring_rows`. Draws know which directions scatter more than others; profiles know what a
+    spring may be whose neighbours a bound holds.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        That of the model, then those that have all its springs and more.
+    seen : Observability
+        What the readings tell of its springs.
+    draws : ndarray, shape (draw, column)
+        Draws of its fit.
+    by : float
+        Factor by which few poses stretch them.
+    """
+    model, fitted, compliance = fits[0]
+    rows = spring_rows(model.springs, seen)
+    noise = noise_of_a_direction(fitted, compliance, draws)
+    stretched = widen_draws(fitted, compliance, draws, by)[:, fitted.springs]
+    found = [np.column_stack(interval(stretched @ rows.T))]
+    for other, problem, c in fits:
+        names = list(other.parameter_names)
+        sums = np.zeros((len(rows), problem.columns))
+        sums[:, [names.index(name) for name in model.parameter_names]] = rows
+        found.append(profile_ends(problem, c, sums, noise))
+    ends = np.column_stack([np.fmin.reduce(found)[:, 0], np.fmax.reduce(found)[:, 1]])
+    most = np.abs(rows) @ _largest(model.parameters)
+    return np.asarray(np.clip(ends, -most[:, None], most[:, None]))
+
+
 def _encoders(
     problem: Problem, solution: Solution, held_out: HeldOut, zeros: tuple[EncoderZero, ...]
 ) -> EncoderSummary | None:
@@ -356,13 +416,18 @@ def _contact_warnings(found: ContactSummary | None, options: FitOptions) -> list
     ]
 
 
+def _largest(parameters: Sequence[Parameter]) -> FloatArray:
+    """Return the largest compliance that any arm has of each parameter, in its unit."""
+    dimensions = (present(dimension_of_unit(each.unit.si), "dimension") for each in parameters)
+    return np.array([largest(each)[0] for each in dimensions])
+
+
 def _as_of_arms(problem: Problem, draws: FloatArray, parameters: Sequence[Parameter]) -> FloatArray:
     """Return draws whose springs are no larger than compliances of any arm are.
 
     A spring that some choice of the poses does not turn takes any value in it.
     """
-    dimensions = (present(dimension_of_unit(each.unit.si), "dimension") for each in parameters)
-    most = np.array([largest(each)[0] for each in dimensions])
+    most = _largest(parameters)
     found = draws.copy()
     found[:, problem.springs] = np.clip(draws[:, problem.springs], -most, most)
     return found

@@ -24,7 +24,7 @@ from elastocal.identification.prediction_doubt import PredictionDoubt
 from elastocal.identification.production import ProductionCoverage
 from elastocal.identification.spring_sums import Term, sum_weights
 from elastocal.identification.suspicious import Screening
-from elastocal.identification.uncertainty import Coverage, HeldOut, interval
+from elastocal.identification.uncertainty import Coverage, HeldOut
 from elastocal.records import record
 from elastocal.results import brief_repr
 from elastocal.wording import um
@@ -300,6 +300,7 @@ def spring_summaries(
     room = np.minimum(calibrated.compliance - lower, upper - calibrated.compliance)
     at_bound, at_lower = room <= dust, calibrated.compliance - lower <= dust
     first, rows = 0, list[SpringSummary]()
+    ends = iter(calibrated.ends[len(calibrated.compliance) :].tolist())
     for spring in calibrated.model.springs:
         own = slice(first, first + len(spring.parameters))
         first = own.stop
@@ -309,7 +310,7 @@ def spring_summaries(
             parts = dict(zip(names, each.weights, strict=True))
             group, reach = seen.group_of(parts), seen.faint_reach(parts)
             value = float(calibrated.compliance[own] @ weights)
-            low, high = map(float, interval(calibrated.draws_of_springs[:, own] @ weights))
+            low, high = next(ends)
             # Noise may mix the parts of a gear and leave what they come to.
             whole = np.count_nonzero(weights) > 1 and 0.5 * (high - low) <= abs(value)
             if whole and group is not None and group > len(seen.unobservable):
@@ -347,10 +348,10 @@ def sum_summaries(calibrated: CalibratedModel) -> tuple[SumSummary, ...]:
     sums = calibrated.observability.seen_beside(parameters)
     rows = sum_weights(sums, list(units))
     values = (rows @ calibrated.compliance).tolist()
-    ends = interval(calibrated.draws_of_springs @ rows.T)
+    ends = calibrated.ends[len(calibrated.ends) - len(rows) :].tolist()
     return tuple(
-        SumSummary(terms, units[terms[0].spring], value, float(low), float(high))
-        for terms, value, low, high in zip(sums, values, *ends, strict=True)
+        SumSummary(terms, units[terms[0].spring], value, low, high)
+        for terms, value, (low, high) in zip(sums, values, ends, strict=True)
     )
 
 

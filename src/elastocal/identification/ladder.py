@@ -42,6 +42,7 @@ from elastocal.identification.rungs import (
     low_loads,
     rung_of,
 )
+from elastocal.identification.sag_share import with_sag_open
 from elastocal.identification.solve import PoseGrams
 from elastocal.identification.suspicious import screen
 from elastocal.identification.uncertainty import HeldOut, leave_poses_out
@@ -52,6 +53,8 @@ from elastocal.robot import Robot
 _LEAST_GAIN = 0.05
 """Part of the error that a richer rung must gain where the evidence for it is within one standard
 error; measured in docs/decisions/0066-ladder.md."""
+_AXES, _BEARINGS = "actuated", "bearing"
+"""Names of the rungs with springs of the axes alone, and with those at the bearings besides."""
 _LACKED = "gears"
 """The rung that is fitted beside a free contact as a first fit has it, where its springs imitate
 the contact: bending links are what the rungs that are left lack."""
@@ -104,6 +107,9 @@ class Climbed:
     production_error: float = float("nan")
     """Error that is expected on production, in m; NaN where it is not estimated, as for rungs that
     left-out poses show to be worse."""
+    told: Problem | None = None
+    """Its problem with what the drives say, where springs of the axes alone were chosen and it has
+    those at the bearings too: what the former may be if the arm has the latter."""
 
     @property
     def is_carried(self) -> bool:
@@ -195,7 +201,7 @@ def choose_model(
     if len(allowed) == 1:
         return climb(robot, readings, rungs, allowed, options, marker_offset)
     choice = climb(robot, readings, rungs, allowed, options, marker_offset, production)
-    return choice if choice.known else _told(choice, robot, readings, options, marker_offset)
+    return _told(choice, robot, readings, options, marker_offset)
 
 
 def _told(
@@ -205,16 +211,29 @@ def _told(
     options: FitOptions,
     marker_offset: ArrayLike | None,
 ) -> Choice:
-    """Return a choice with what the drives say of its springs as their prior."""
+    """Return a choice with what the drives say of its springs.
+
+    Where it has those of the axes alone, also with what they say of those at the bearings.
+    """
+    axes_alone = choice.taken == _AXES
+    if choice.known and not axes_alone:
+        return choice
     drives = DriveCompliances.of(robot, readings, options, marker_offset)
-    known = drives.known_springs(choice.model)
-    told = with_knowledge(options, known, choice.model, readings, marker_offset)
-    held_out = leave_poses_out(build(choice.model, readings, told, marker_offset))
-    ladder = tuple(
-        replace(each, known=known, held_out=held_out) if each.chosen else each
-        for each in choice.ladder
-    )
-    return replace(choice, ladder=ladder)
+
+    def told(rung: Climbed) -> Climbed:
+        doubts = axes_alone and rung.name == _BEARINGS and np.isfinite(rung.apart)
+        if not doubts and (rung.known or not rung.chosen):
+            return rung
+        known = drives.known_springs(rung.model)
+        fit = with_knowledge(options, known, rung.model, readings, marker_offset)
+        problem = build(rung.model, readings, fit, marker_offset)
+        if rung.chosen:
+            return replace(rung, known=known, held_out=leave_poses_out(problem))
+        every = np.ones(len(readings), dtype=bool)
+        problem = with_sag_open(problem, rung.model, readings, every, fit, marker_offset)
+        return replace(rung, told=problem)
+
+    return replace(choice, ladder=tuple(map(told, choice.ladder)))
 
 
 def usable_for_choice(

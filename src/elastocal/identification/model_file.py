@@ -14,7 +14,7 @@ from elastocal.elastic import KINDS, AnySpring, ElasticModel, require_possible
 from elastocal.errors import SchemaError, nearest
 from elastocal.files import as_path, sha256
 from elastocal.findings import group_alike
-from elastocal.identification.calibrated import CalibratedModel, ToolChange
+from elastocal.identification.calibrated import CalibratedModel, ToolChange, spring_rows
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.identification.encoders import EncoderZero
 from elastocal.identification.figures import CalibrationSummary
@@ -89,9 +89,9 @@ class CalibrateResult(Result):
     in files before it was written."""
     update: SpringUpdate | None = None
     """Update of the springs by tracked production; None: they are those of the calibration."""
-    spring_draws: FloatArray | None = None
-    """Draws of which springs have their intervals, shape (draw, parameter); none: `draws`. See
-    `CalibratedModel.spring_draws`."""
+    spring_ends: FloatArray | None = None
+    """Ends of the 95 % intervals of springs, shape (row, 2); none: those of the draws. See
+    `CalibratedModel.spring_ends`."""
     tip: FloatArray | None = None
     """Where each draw has the tip (`CalibratedModel.tip`), shape (draw, 3), in m; none where its
     place is known."""
@@ -123,12 +123,6 @@ class CalibrateResult(Result):
         if len(self.draws) < MINIMUM_DRAWS:
             raise SchemaError(f"{len(self.draws)} draws, at least {MINIMUM_DRAWS} are needed")
         numbers = {"compliance": self.compliance[None], "draws": self.draws}
-        numbers |= {} if self.spring_draws is None else {"spring_draws": self.spring_draws}
-        if self.spring_draws is not None and len(self.spring_draws) != len(self.draws):
-            raise SchemaError(
-                f"{len(self.spring_draws)} spring_draws: as many as draws ({len(self.draws)}) are"
-                " needed"
-            )
         for name, rows in numbers.items():
             if rows.ndim != 2 or rows.shape[1] != n:
                 raise SchemaError(f"{name} must have one number for each of {n} parameters")
@@ -144,6 +138,7 @@ class CalibrateResult(Result):
         if seen.parameters != n or not 0 <= seen.rank <= n:
             raise SchemaError(f"observability (rank {seen.rank}) does not fit {n} parameters")
         self._require_known_names()
+        self._require_ends()
 
     def _require_known_names(self) -> None:
         """Refuse combinations of parameters, or a calibrated tcp, that the model does not have."""
@@ -180,9 +175,21 @@ class CalibrateResult(Result):
             calibration=calibration,
             tool=calibrated.tool,
             domain=calibrated.domain,
-            spring_draws=calibrated.spring_draws,
+            spring_ends=calibrated.spring_ends,
             tip=calibrated.tip,
         )
+
+    def _require_ends(self) -> None:
+        """Refuse ends of intervals that are not those of the springs, or no numbers of an arm."""
+        if self.spring_ends is None:
+            return
+        wanted = len(spring_rows(self.springs, self.observability))
+        if self.spring_ends.shape != (wanted, 2):
+            raise SchemaError(f"spring_ends {self.spring_ends.shape} must be {(wanted, 2)}")
+        parameters = [p for s in self.springs for p in s.parameters]
+        require_possible(parameters, self.spring_ends[: len(parameters)].T, "spring_ends")
+        if not np.all(self.spring_ends[:, 0] <= self.spring_ends[:, 1]):
+            raise SchemaError("spring_ends must have the lower end before the upper one")
 
     def _require_tip(self) -> None:
         """Refuse places of the tip that are not those of the draws, or no tool's."""
@@ -221,7 +228,7 @@ class CalibrateResult(Result):
             float("nan") if self.calibration is None else self.calibration.unexplained,
             None if self.calibration is None or self.tool is not None else self.calibration.doubt,
             self._encoders,
-            self.spring_draws,
+            self.spring_ends,
             self.tip,
         )
 

@@ -13,6 +13,13 @@ Nielsen and Webb, "Cluster-robust inference: a guide to empirical practice", Jou
 Econometrics 232, 2023) and its refits exist already for the held-out errors. So the draws are
 stretched about the estimate until their variance is the jackknife's, and by the ratio of Student's
 to the normal quantile. See docs/decisions/0003-bootstrap-widening.md.
+
+Springs: where the true compliance of a neighbour is zero, its bound, the fit gives it a part of the
+noise and takes that from the spring; all draws do the same, and no bootstrap holds near a bound
+(D. W. K. Andrews, "Inconsistency of the bootstrap when a parameter is on the boundary of the
+parameter space", Econometrica 68, 2000). So the interval of a spring also holds its profile: all
+values with which the readings are explained nearly as well. See
+docs/decisions/0156-profiles-of-springs.md.
 """
 
 from dataclasses import dataclass
@@ -23,9 +30,9 @@ from scipy.optimize import nnls
 from scipy.special import ndtri, stdtrit
 
 from elastocal.arrays import BoolArray, FloatArray, IndexArray
-from elastocal.identification._least_squares import minimise
+from elastocal.identification._least_squares import minimise, rank
 from elastocal.identification.problem import Problem
-from elastocal.identification.solve import PoseGrams, factor
+from elastocal.identification.solve import Factored, PoseGrams, factor
 from elastocal.records import record
 from elastocal.results import brief_repr
 
@@ -48,6 +55,12 @@ _REWEIGHTED = 6
 """Rounds of weights, after which a split no longer changes."""
 _LEAST_VARIANCE = 1e-3
 """Least variance relative to the mean square: it limits the weight of a reading."""
+_LEFT_OPEN = 1e-6
+"""Part of a sum of compliances beyond what is determined, from which on it is open."""
+_PUSHES, _AS_FAR = 16, 1e-3
+"""Most steps to an end of a profile, and how near to it they come, relative to its width."""
+_FARTHER, _PART = 4.0, 0.1
+"""Most by which one step goes farther, and the least part of a bracket that one goes into it."""
 
 
 @brief_repr
@@ -379,6 +392,131 @@ def doubt_factor(
     """
     spread = _variance(problem, draws - compliance) / len(draws)
     return float(np.sqrt(1.0 + moved / spread)) if spread > 0.0 else 1.0
+
+
+def noise_of_a_direction(problem: Problem, compliance: FloatArray, draws: FloatArray) -> float:
+    """Return the noise with which independent rows would spread a fit as far as the draws spread.
+
+    Readings at one pose share their errors, so it is larger than that of a row.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    compliance : ndarray, shape (column,)
+        The estimate.
+    draws : ndarray, shape (draw, column)
+        Draws about it.
+
+    Returns
+    -------
+    float
+        In m.
+    """
+    rows = problem.weighted()[..., :-1].reshape(-1, problem.columns)
+    square = float(np.mean(np.sum(np.square((draws - compliance) @ rows.T), axis=1)))
+    free = (compliance > problem.lower) & (compliance < problem.upper)
+    together = np.vstack([rows, problem.prior_rows[:, :-1]])[:, free]
+    size = np.linalg.norm(together, axis=0)
+    U, s, _ = np.linalg.svd(together[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+    told = float(np.sum(np.square(U[: len(rows), : rank(s)]))) if s.size else 0.0
+    return float(np.sqrt(square / told)) if told > 0.0 else 0.0
+
+
+def profile_ends(
+    problem: Problem, compliance: FloatArray, sums: FloatArray, noise: float
+) -> FloatArray:
+    """Return how small and how large sums of compliances may be, shape (sum, 2).
+
+    The ends of the 95 % profile-likelihood interval (D. J. Venzon, S. H. Moolgavkar, "A method for
+    computing profile-likelihood-based confidence intervals", Applied Statistics 37, 1988): of all
+    compliances within the bounds that explain readings and prior only so much worse than the
+    estimate as noise makes the truth explain them, the smallest and the largest value of the sum.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    compliance : ndarray, shape (column,)
+        The estimate.
+    sums : ndarray, shape (sum, column)
+        Weights of each sum.
+    noise : float
+        That of a row, in m; see `noise_of_a_direction`.
+
+    Returns
+    -------
+    ndarray
+        NaN of a sum that readings and prior leave open.
+    """
+    system = factor(problem)
+    known, scale = rank(system.s), system.scale
+    asked = np.stack([-sums, sums], axis=1) / scale
+    size = np.linalg.norm(asked, axis=2)
+    open_ = np.linalg.norm(asked @ system.Vt[known:].T, axis=2) > _LEFT_OPEN * size
+    ends = np.full(size.shape, np.nan)
+    told = np.nonzero(~open_ & (size > 0.0))
+    if len(told[0]) and noise > 0.0:
+        bounds = problem.lower * scale, problem.upper * scale
+        far = _farthest(system, compliance * scale, bounds, asked[told], NORMAL_QUANTILE * noise)
+        ends[told] = far
+    return np.asarray(ends * [-1.0, 1.0])
+
+
+def _farthest(
+    system: Factored,
+    best: FloatArray,
+    bounds: tuple[FloatArray, FloatArray],
+    sums: FloatArray,
+    most: float,
+) -> FloatArray:
+    """Return the largest value of each sum, of a misfit whose square grows by that of ``most``.
+
+    A linear term is added to the squares. Between the bounds the misfit grows in proportion to it;
+    where one is met, the right term is sought between two that are too small and too large.
+    """
+    known = rank(system.s)
+    push = (sums @ system.Vt[:known].T) / system.s[:known]
+    push = np.pad(push, ((0, 0), (0, len(system.s) - known)))
+    by, found = most / np.linalg.norm(push, axis=1), sums @ best
+    below = np.stack([np.zeros(len(by)), np.full(len(by), -most)])
+    above = np.full((2, len(by)), np.inf)
+    todo = np.arange(len(by))
+    least = _squares_left(system, best)
+    for _ in range(_PUSHES):
+        y = system.y + by[todo, None] * push[todo]
+        s, Vt = (np.broadcast_to(each, (len(todo), *each.shape)) for each in (system.s, system.Vt))
+        x = minimise(s, Vt, y, *bounds)
+        found[todo] = np.einsum("fi,fi->f", sums[todo], x)
+        off = np.sqrt(np.maximum(_squares_left(system, x) - least, 0.0)) - most
+        for side, own in ((below, off <= 0.0), (above, off > 0.0)):
+            side[:, todo[own]] = by[todo[own]], off[own]
+        todo = todo[np.abs(off) > _AS_FAR * most]
+        if not len(todo):
+            break
+        by[todo] = _between(below[:, todo], above[:, todo], most)
+    return np.asarray(found)
+
+
+def _between(below: FloatArray, above: FloatArray, most: float) -> FloatArray:
+    """Return where to look next, between places that fall short and those that are beyond.
+
+    Parameters
+    ----------
+    below, above : ndarray, shape (2, place)
+        Each place and how far it is off; infinite where nothing is beyond yet.
+    """
+    (low, short), (high, over) = below, above
+    part = np.clip(-short / (over - short), _PART, 1.0 - _PART)
+    inside = low + part * (np.where(np.isinf(high), 0.0, high) - low)
+    farther = low * np.clip(most / np.maximum(short + most, _PART * most), 1.0, _FARTHER)
+    return np.asarray(np.where(np.isinf(high), farther, inside))
+
+
+def _squares_left(system: Factored, x: FloatArray) -> FloatArray:
+    """Return the squares that a scaled solution, or each of a stack, leaves."""
+    left = system.s * (x @ system.Vt.T) - system.y
+    return np.asarray(np.sum(np.square(left), axis=-1))
 
 
 def distrust_factor(

@@ -282,7 +282,7 @@ def update_springs(
         return calibrated, replace(known, farthest=0.0, refusal=refusal)
     draws = _draws(calibrated, rows, L, weight, rng)
     compliance = _springs(calibrated, c + L @ z)
-    return replace(calibrated, compliance=compliance, draws=draws, spring_draws=None), known
+    return replace(calibrated, compliance=compliance, draws=draws, spring_ends=None), known
 
 
 def _refusal(left: float, ratio: float, gain: float, standard_error: float) -> Finding | None:

@@ -269,7 +269,7 @@ def _updated(settings: CalibrateSettings, file: Path) -> CalibrateResult:
             before,
             compliance=moved.compliance,
             draws=moved.draws,
-            spring_draws=None,
+            spring_ends=None,
             # What was said of production was of the springs as they were.
             calibration=None if figures is None else replace(figures, doubt=None),
             update=replace(
