@@ -10,6 +10,7 @@ import shutil
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import pytest
@@ -37,6 +38,8 @@ BREAKS = runpy.run_path(str(ROOT / "docs" / "hooks" / "line_breaks.py"))["on_pag
 """What says where lines of a page may end."""
 FACE = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
 """What docs/hooks/faces.py fills with the names that a package exports."""
+FACES = runpy.run_path(str(ROOT / "docs" / "hooks" / "faces.py"))
+"""How it does."""
 TOUR = (ROOT / "README.md").read_text(encoding="utf-8").split("## Five-minute tour")[1]
 TOUR = TOUR.split("\n## ")[0]
 NUMBER = re.compile(r"[-+±]?\d+\.\d+")
@@ -226,6 +229,28 @@ def test_every_face_has_its_page_in_the_reference():
     faces = [".".join(stub.parent.relative_to(ROOT / "src").parts) for stub in stubs]
     # What the command line is made of is nobody's interface.
     assert sorted(marked) == sorted(face for face in faces if ".cli" not in face)
+
+
+def reference_entries() -> dict[str, list[str]]:
+    """Return what each page of the reference shows when its faces are filled."""
+    entries = {}
+    for path in sorted(FACES["PAGES"].glob("*.md")):
+        page = SimpleNamespace(file=SimpleNamespace(src_uri=f"reference/api/{path.name}"))
+        filled = FACES["on_page_markdown"](path.read_text(encoding="utf-8"), page)
+        for heading, text in re.findall(r"^##+ (.*)\n([^#]*)", filled, flags=re.MULTILINE):
+            assert text.strip(), f"{path.name}: {heading} has nothing"
+        entries[path.stem] = re.findall(r"^::: (.*)", filled, flags=re.MULTILINE)
+    return entries
+
+
+def test_each_name_stands_once_in_the_reference_on_the_page_that_names_its_module():
+    entries = reference_entries()
+    assert "elastocal.workflows.calibrate_pair" in entries["workflows-pair"]
+    # Pages that show a module whole have the names that its package exports from it.
+    assert "elastocal.compensation.online.Design" not in entries["compensation"]
+    for path in FACES["PAGES"].glob("*.md"):
+        for package, modules in FACES["PART"].findall(path.read_text(encoding="utf-8")):
+            assert set(modules.split()) <= set(FACES["exported"](package).values()), path.name
 
 
 def test_every_command_stands_on_the_page_of_its_group():

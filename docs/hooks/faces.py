@@ -67,6 +67,16 @@ def shown_elsewhere(page: str) -> set[str]:
     }
 
 
+def shown_whole() -> set[str]:
+    """Return the modules that pages of the reference show with all their names."""
+    return {
+        path
+        for page in PAGES.glob("*.md")
+        for path, options in _BLOCK.findall(page.read_text(encoding="utf-8"))
+        if not _MEMBER.search(options)
+    }
+
+
 def parted(package: str) -> set[str]:
     """Return the modules of a package that pages of their own show."""
     return {
@@ -83,6 +93,7 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     if not page.file.src_uri.startswith("reference/api/"):
         return markdown
     known, elsewhere = shown(markdown), shown_elsewhere(Path(page.file.src_uri).name)
+    whole = shown_whole()
 
     def entries(package: str, wanted: Callable[[str], bool]) -> str:
         # What comes from another package's face has its entry there.
@@ -92,6 +103,7 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
             if wanted(home)
             and name not in known
             and f"{package}.{name}" not in elsewhere
+            and f"{package}.{home}" not in whole
             and name in defined(package, home)
         }
         # A function called like its module would show the module.

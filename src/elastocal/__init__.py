@@ -2,7 +2,7 @@
 
 The method is that of Monsarrat et al., "In-situ elastic calibration of robots", Robotics and
 Computer-Integrated Manufacturing (2024), doi:10.1016/j.rcim.2024.102743, called *the paper*
-throughout. Typical use::
+throughout. Typical use:
 
     import elastocal as ec
 

@@ -1,6 +1,6 @@
 """Plug-ins: springs, criteria, commands … of other packages, found by their entry points.
 
-A package that is installed beside elastocal names what it adds in its ``pyproject.toml``::
+A package that is installed beside elastocal names what it adds in its ``pyproject.toml``:
 
     [project.entry-points."elastocal.springs"]
     creep = "elastocal_creep:Creep"

@@ -223,6 +223,7 @@ def test_process_poses_are_read(folder, example):
         ("robot.rail.axis", [False, True, False], "robot.rail.axis: must be a number"),
         ("search.pool", 10_000_001, "search.pool: Input should be less than or equal to 10000000"),
         ("search.seed", 2**64, "search.seed: Input should be less"),
+        ("search.poses", "three", "search.poses: Input should be a valid integer, got 'three'"),
         ("engagement.disk_radius", "1001 m", "engagement.disk_radius: '1001 m' is too large"),
         ("tcp.abc.0", "1e300 deg", "tcp.abc.0: '1e300 deg' is too large"),
         ("motion.home.rail", "1e300 m", "home.rail: '1e300 m' is too large"),

@@ -267,6 +267,7 @@ def plan_it(page, cell, told):
     page.wait("document.documentElement.dataset.work !== 'plan busy'")
     page.wait("document.getElementById('poses').children.length > 0")
     told["planned"] = (page.text("plan-text"), page.text("poses"))
+    told["legend of a plan"] = page.text("survey-legend")
     page.click("#plan-form button")
     page.wait("/there already|in it|holds/.test(document.getElementById('message').textContent)")
     told["planned again"] = (page.text("message"), page.get(BESIDE))
@@ -376,6 +377,8 @@ def test_points_are_tried_and_techniques_compared(told):
 
 def test_a_plan_is_made_and_its_poses_are_shown(told):
     summary, poses = told["planned"]
+    # The points that were tried are no longer shown.
+    assert told["legend of a plan"] == ""
     assert summary.startswith("3 poses by ")
     assert poses == "012"
     assert "on the tooling" in told["at a pose"]

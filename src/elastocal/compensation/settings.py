@@ -1,6 +1,6 @@
 """Settings of the online compensator, as in its file.
 
-Example::
+Example:
 
     schema: elastocal.compensator/1
     cycle: "4 ms"

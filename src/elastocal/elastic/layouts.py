@@ -1,7 +1,7 @@
 """Spring layouts: the springs of a robot, by a name or from a YAML file.
 
 A new named layout is a function ``(robot) -> springs`` here, an entry in `LAYOUTS`, a line in the
-changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file::
+changelog and an entry in ``tests/contracts/test_layouts.py``. A spring file:
 
     schema: elastocal.springs/1
     include: actuated            # optional: start from a named layout

@@ -1,6 +1,6 @@
 """The map: the meaning of the columns of foreign logs, written by a person.
 
-Example::
+Example:
 
     schema: elastocal.log-map/1
     robot: {model: KR 120 R2700 extra HA}     # as in a cell file; or cell: CELL.yaml for all of it

@@ -95,7 +95,8 @@ def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
         return f"unknown key {path!r}{nearest(key, known)}{allowed}"
     if first["type"] in ("missing", "missing_argument"):
         return f"key {path!r} is missing"
-    reason = first["msg"].removeprefix("Value error, ")
+    # How a validator failed to read a text is its own affair.
+    reason = first["msg"].removeprefix("Value error, ").partition(", unable to parse")[0]
     text = _at(data, first["loc"])
     bound = _bound(item)
     in_its_unit = None

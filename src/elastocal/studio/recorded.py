@@ -180,14 +180,12 @@ def _committed(log: PoseLog) -> dict[str, object]:
 
 def _said(entry: Entry) -> str:
     where = "" if entry.pose is None else f"pose {entry.pose}, "
-    what = " ".join(
-        part
-        for part in (
-            entry.step or "",
-            entry.event.value,
-            entry.action.value if entry.action else "",
-            entry.target if isinstance(entry.target, str) else "",
-        )
-        if part
+    parts = (
+        entry.step or "",
+        entry.event.value,
+        entry.action.value if entry.action else "",
+        entry.target if isinstance(entry.target, str) else "",
     )
+    # A step that is called like its action or event is said once.
+    what = " ".join(dict.fromkeys(part for part in parts if part))
     return f"{entry.time:.1f} s: {where}{what}{f' ({entry.text})' if entry.text else ''}"

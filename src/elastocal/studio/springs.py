@@ -164,7 +164,7 @@ def default_springs(cell: Cell) -> StudioSprings:
     )
     stiffness = np.where(robot.revolute, torque / WIND_UP, DRIVE)
     source = (
-        "default springs, not calibrated: one a joint, whose gear winds up"
+        "default springs, not calibrated: one per joint, whose gear winds up"
         f" {quantity(WIND_UP, 'mrad')} under the torque it may use. Sizes may be"
         " wrong by a factor of 3"
     )

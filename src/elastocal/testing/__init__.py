@@ -1,7 +1,7 @@
 """Contract suites for pytest, for variants of elastocal and of other packages.
 
 A suite is a class of tests. Make a subclass whose name begins with ``Test`` and give it the fixture
-that says what is tested::
+that says what is tested:
 
     class TestSoftening(SpringSuite):
         @pytest.fixture(params=[Softening("joint_2.soft", "joint_2", (1.0, 0.0, 0.0))])

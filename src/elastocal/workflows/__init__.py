@@ -1,6 +1,6 @@
 """The work of every command as one function: settings and progress in, a typed result out.
 
-Each takes its settings record, or the first of its fields and the others by name::
+Each takes its settings record, or the first of its fields and the others by name:
 
     result = calibrate(CalibrateSettings(data="dataset.nc", springs="actuated"))
     result = calibrate("dataset.nc", springs="actuated")

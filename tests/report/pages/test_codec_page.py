@@ -93,6 +93,10 @@ def test_numbers_are_told_with_unit_and_count(shown):
     mixed = springs["joint_5.axial (not told apart (bearing))"]["figure"]["data"]
     (said,) = [trace["text"] for trace in mixed if "text" in trace and trace["meta"] == 1]
     assert all(each.endswith("not told apart") for each in said)
+    # The page opens with a spring that some variant determines.
+    unseen = [name for name, each in springs.items() if not each["determined"]]
+    assert all(name.endswith("(not told apart)") for name in unseen)
+    assert all(name in unseen for name in springs if name.endswith("(not told apart)"))
 
 
 def test_verdicts_and_medians_stand_in_words(text, known):

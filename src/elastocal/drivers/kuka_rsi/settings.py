@@ -1,6 +1,6 @@
 """Settings of a KUKA arm in the cell file, and the bounds that follow from them and the cell.
 
-Example::
+Example:
 
     devices:
       arm:

@@ -4,7 +4,7 @@ Verified against the simulator (`elastocal.sim.wire`) and clients of a few lines
 
 The lines of a stream: a header that names columns and units, points, beam, frame, fault.
 
-Example::
+Example:
 
     t[s],x[mm],y[mm],z[mm],sigma[mm]
     frame 2026-11-22T08:00 setup 3

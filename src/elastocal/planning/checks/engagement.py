@@ -35,9 +35,7 @@ class EdgeCheck(PointCheck):
     """Least distance between disk and edge, in m."""
     name: str = "edge"
     unit: str = "m"
-    advice: str = phrase(
-        "use a smaller disk or edge margin: so many points are too near to an edge"
-    )
+    advice: str = phrase("use a smaller disk or edge margin: points near an edge are refused")
     order: ClassVar[int] = 10
 
     @classmethod

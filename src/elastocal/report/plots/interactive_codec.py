@@ -120,7 +120,9 @@ def _compliance_view(each: SpringBoxes, styles: Sequence[VariantStyle], last: in
     mark = never_told_apart(each)
     name = f"{each.spring} ({mark})" if mark else each.spring
     words = f"Box plots of the compliance of {each.spring} over the number of training poses"
-    return _view(name, words, traces, last, [(each.unit, scale)])
+    view = _view(name, words, traces, last, [(each.unit, scale)])
+    # The page opens with a spring that some variant determines.
+    return view | {"determined": len(each.never) < len(each.boxes)}
 
 
 def _view(

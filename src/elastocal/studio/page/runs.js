@@ -103,7 +103,9 @@ async function openPlan(folder) {
   $("plans").value = folder;
   $("plan-text").textContent = plan.summary;
   $("findings").replaceChildren(...plan.findings.map((text) => element("li", text)));
+  // The tried points make way for the poses, and their colours with them.
   view.set("survey");
+  $("survey-legend").replaceChildren();
   view.set("poses", { kind: "tags", poses: true, at: plan.poses.map((pose) => pose.position), texts: plan.poses.map((pose) => String(pose.id)), hints: plan.poses.map((pose) => `pose ${pose.id}, seen by ${pose.station}`), colour: "--region" });
   $("poses").replaceChildren(...plan.poses.map((pose) => {
     const button = element("button", String(pose.id), { type: "button", title: `seen by ${pose.station}`, ariaLabel: `Pose ${pose.id} of the plan` });
@@ -173,7 +175,7 @@ async function openPose(folder, pose, button) {
   for (const each of $("record-poses").children) each.setAttribute("aria-pressed", String(each === button));
   const pairs = ({ time, value }, scale) => time.map((t, k) => [t, scale * value[k]]);
   const shown = (now) => chart(`Pose ${pose} of ${folder}`, "Force against the unloaded reference, in N", pairs(streams.force, 1),
-    "Way of the marker, in mm", pairs(streams.marker, 1e3), streams.windows, now);
+    "Travel of the marker, in mm", pairs(streams.marker, 1e3), streams.windows, now);
   const play = $("play");
   $("play-label").hidden = !streams.time.length;
   play.max = streams.time.length - 1;

@@ -78,6 +78,7 @@
   Object.entries(charts).forEach(([id, views]) => {
     const choice = document.getElementById(`${id}-choice`);
     views.forEach(({ name }, number) => choice.append(new Option(name, number)));
+    choice.value = Math.max(0, views.findIndex(({ determined }) => determined !== false));
     choice.addEventListener("change", () => draw(id));
     document.getElementById(`${id}-size`).addEventListener("input", () => tell(id));
   });
