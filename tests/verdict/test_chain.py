@@ -306,3 +306,34 @@ def test_a_difference_below_rounding_is_none(copied):
     dataset.write(dataset.Dataset.from_xarray(data), path)
     texts = [link.text for link in gathered(folder).chain]
     assert any("its attribute robot_urdf is another" in text for text in texts)
+
+
+def shift_readings(folder, part, kind="sound"):
+    """Move each marker displacement by a part of its noise, and renew every hash."""
+    path = folder / "run" / "dataset.nc"
+    data = dataset.read(path).to_xarray().copy(deep=True)
+    moved, sigma = data["marker_displacement"], data["marker_sigma"]
+    data["marker_displacement"] = moved + part * sigma
+    if kind == "louder":
+        data["marker_sigma"] = 100.0 * sigma
+    dataset.write(dataset.Dataset.from_xarray(data), path)
+    summary = folder / "run" / "summary.json"
+    sealed.edit(summary, lambda record: record.update(dataset_sha256=file_sha256(path)))
+
+
+def test_what_another_version_derived_is_not_called_changed(copied):
+    folder = copied()
+    shift_readings(folder, 0.15)
+    (link,) = [each for each in gathered(folder).chain if each.name == "dataset"]
+    assert link.state is LinkState.UNSTATED
+    assert "by up to 15% of the noise of a reading, 15% in the mean" in link.text
+
+
+@pytest.mark.parametrize(("part", "kind"), [(0.3, "sound"), (0.15, "louder")])
+def test_a_change_of_more_than_a_part_of_the_noise_is_broken_whoever_states_it(copied, part, kind):
+    """Neither the version nor the noise that an edited file states makes room for it."""
+    folder = copied()
+    shift_readings(folder, part, kind)
+    (link,) = [each for each in gathered(folder).chain if each.name == "dataset"]
+    assert link.state is LinkState.BROKEN
+    assert "the dataset is not what the streams give: marker_" in link.text
