@@ -65,7 +65,7 @@ from elastocal.planning.surface import (
 )
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import InverseKinematics, NumericalInverse, inverse_for
 from elastocal.wording import phrase, sentences
 
 _APART = (0.2, float(np.radians(10.0)))
@@ -472,7 +472,11 @@ class PostureSolver:
         for contact in np.moveaxis(contact_frames(points, normals, spins), 1, 0):
             off = contact.copy()
             off[:, :3, 3] += self.approach * normals
-            here, there = (self.inverse.solve_many(T, external).q for T in (contact, off))
+            here = self.inverse.solve_many(contact, external).q
+            if isinstance(self.inverse, NumericalInverse):
+                there = self.inverse.beside(off, here)
+            else:
+                there = self.inverse.solve_many(off, external).q
             # NaN where there is no solution. Half a turn: axes 4 and 6 may be given a turn apart.
             reached = np.abs(there - here).max(axis=2) < np.pi
             point, branch = np.nonzero(reached)

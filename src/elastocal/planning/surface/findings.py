@@ -290,5 +290,5 @@ class ReachableFrom:
         for position in self.external:
             left = np.flatnonzero(~reached)
             if len(left):
-                reached[left] = self.inverse.solve_many(T_base_tcp[left], position).reachable
+                reached[left] = self.inverse.reachable(T_base_tcp[left], position)
         return reached
