@@ -138,6 +138,13 @@ def test_no_file_is_replaced_and_none_is_left_behind_by_a_refusal(tmp_path, dome
     assert elastocal(*known, cell, "--force").code == 0
 
 
+def test_a_number_without_a_unit_is_named_with_its_option(tmp_path, dome):
+    tcp = ("--tcp", "0, 0 mm, 200 mm, 0 deg, 0 deg, 0 deg")
+    found = elastocal("new", "--robot", "UR20", "--mesh", dome, *tcp, "-o", tmp_path / "cell.yaml")
+    assert found.code == 1
+    assert "--tcp '0, 0 mm, 200 mm, 0 deg, 0 deg, 0 deg': " in found.reason
+
+
 def test_what_is_missing_is_named(tmp_path, dome):
     out = tmp_path / "cell.yaml"
     assert "--robot is missing" in elastocal("new", "--mesh", dome, "-o", out).reason

@@ -1,5 +1,7 @@
 """Common mistakes of shop floors are found and named; sound campaigns pass in silence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import ConventionError
 from elastocal.findings import Grade
 from elastocal.identification import FitOptions, calibrate
+from elastocal.identification.mistakes import find_mistakes
 from elastocal.identification.mistakes.plausibility import find_implausible
 from elastocal.identification.mistakes.undoing import find_undone
 from support.by_day import some_by_day
@@ -54,6 +57,24 @@ WARNED = (
     "forces in lbf from half way on",
     "sensor turned by 90 deg from half way on",
 )
+
+
+def test_what_import_suspected_is_said_in_place_of_another_name():
+    """Exchanged axes look to a fit like an axis reversed, or two load cases exchanged."""
+    made = campaign(SMALL)
+    readings, offset = made.readings, made.marker
+    model = ElasticModel(made.robot, bearing(made.robot))
+    wrong = replace(readings, force=readings.force @ np.diag([1.0, 1.0, -1.0]))
+    with pytest.raises(ConventionError, match="looks reversed"):
+        find_mistakes(model, wrong, FitOptions(), offset)
+    doubts = ("force_x and force_y are exchanged", "another one")
+    with pytest.raises(ConventionError) as refused:
+        find_mistakes(model, replace(wrong, doubts=doubts), FitOptions(), offset)
+    assert str(refused.value).startswith("force_x and force_y are exchanged; another one (`import`")
+    sound = find_mistakes(model, readings, FitOptions(), offset)
+    suspected = find_mistakes(model, replace(readings, doubts=doubts), FitOptions(), offset)
+    assert [*map(str, suspected)] == [f"{each} (`import` said so of the logs)" for each in doubts]
+    assert not sound
 
 
 @pytest.mark.parametrize("name", some_by_day(REFUSED))

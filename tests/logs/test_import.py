@@ -442,6 +442,32 @@ def test_a_sensor_that_is_mapped_wrongly_is_told_by_press_and_weight(rows, tmp_p
     )
 
 
+def test_a_certain_mistake_is_refused_with_the_entry_that_undoes_it(rows, tmp_path):
+    """The tool frame in the log is that of the joints: the tracker alone can be mirrored."""
+    cell, out = reported.finished() / "cell" / "cell.yaml", tmp_path / "data.nc"
+    files = write_logs(replace(rows, position=rows.position * [1.0, 1.0, -1.0]), tmp_path)
+    with pytest.raises(LogError) as refused:
+        ec.import_logs(files, map=write_map(tmp_path, cell), out=out)
+    said = str(refused.value)
+    assert said.startswith("the frame of the tracker is left-handed")
+    assert said.endswith("write `signs: [-1, 1, 1]` at markers in the map")
+    assert not out.exists()
+    undone = MAP.replace("[4, 5, 6], unit: mm", "[4, 5, 6], unit: mm, signs: [-1, 1, 1]")
+    found = ec.import_logs(files, map=write_map(tmp_path, cell, undone), out=out)
+    assert found.figures.warnings == found.dataset.doubts == ()
+
+
+@pytest.mark.slow
+def test_what_may_be_mistaken_is_carried_by_the_dataset(rows, tmp_path):
+    """No entry of a map mends a channel of half its gain."""
+    files = write_logs(replace(rows, force=rows.force * [1.0, 0.5, 1.0]), tmp_path)
+    path = write_map(tmp_path, reported.finished() / "cell" / "cell.yaml")
+    found = ec.import_logs(files, map=path, out=tmp_path / "data.nc")
+    (doubt,) = read_dataset(tmp_path / "data.nc").doubts
+    assert doubt in found.figures.warnings
+    assert doubt.startswith("force_y shows")
+
+
 @pytest.mark.slow
 def test_loads_near_none_of_the_map_are_refused_with_what_they_are(rows, tmp_path):
     files = write_logs(replace(rows, force=-rows.force, moment=-rows.moment), tmp_path)

@@ -24,10 +24,8 @@ WARNED = (
     "force in kgf for N",
     "moments in N m for N mm",
     "force_z dead",
-    "force_x reversed",
     "one clock, 2 s apart",
     "marker frozen from half way on",
-    "tracker left-handed",
     "a lost part of the tracker",
 )
 REFUSED = (
@@ -35,6 +33,8 @@ REFUSED = (
     "A1, A2 exchanged",
     "A6 frozen from half way on",
     "force x, y exchanged",
+    "force_x reversed",
+    "tracker left-handed",
     "A4 reversed, no pose",
     "zero of A3 10 deg off, no pose",
 )

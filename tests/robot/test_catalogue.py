@@ -38,6 +38,13 @@ def opw_forward(entry: CatalogueEntry, q: np.ndarray) -> np.ndarray:
 
 
 class TestNames:
+    def test_each_robot_is_shown_with_its_maker(self):
+        listed, *_ = catalogue.show_robots(["UR20", "KR 300 R2700-2"])
+        assert [row[:2] for row in listed.rows] == [
+            ("UR20", "Universal Robots"),
+            ("KR 300 R2700-2", "KUKA"),
+        ]
+
     def test_all_robots_are_there(self):
         assert len(NAMES) == 17
         assert set(ALL) - set(NAMES) == {

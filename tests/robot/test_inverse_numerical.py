@@ -171,3 +171,30 @@ def test_a_straight_wrist_is_reached_by_an_arm_that_is_nearly_opw(bend):
     q = np.random.default_rng(4).uniform(-1.0, 1.0, (50, 6))
     q[:, 4] = bend
     assert inverse_for(tilted).solve_many(tilted.forward(q)).reachable.all()
+
+
+class TestQuicker:
+    """Answers that need not find every solution are those of all solutions."""
+
+    robot = Robot.from_urdf(offset_wrist_urdf(), "tcp")
+    T = robot.forward(np.random.default_rng(3).uniform(-1.0, 1.0, (6, 6)))
+
+    def test_poses_are_reachable_that_have_a_solution(self):
+        some = self.T.copy()
+        some[::3, 0, 3] += 9.0
+        solver = NumericalInverse(self.robot)
+        expected = solver.solve_many(some).reachable
+        assert expected.tolist() == [False, True, True] * 2
+        assert solver.reachable(some).tolist() == expected.tolist()
+        assert solver.quick().solve_many(some).reachable.tolist() == expected.tolist()
+
+    def test_a_pose_beside_is_reached_in_the_slot_of_the_first(self):
+        solver = NumericalInverse(self.robot)
+        here, beside = solver.solve_many(self.T).q, self.T.copy()
+        beside[:, 2, 3] += 1e-4
+        found = solver.beside(beside, here)
+        there = np.isfinite(found[..., 0])
+        assert there.sum() >= 0.9 * np.isfinite(here[..., 0]).sum()
+        pose, _ = np.nonzero(there)
+        np.testing.assert_allclose(self.robot.forward(found[there]), beside[pose], atol=1e-8)
+        assert np.median(np.abs(found[there] - here[there]).max(axis=-1)) < 1e-2

@@ -324,6 +324,42 @@ def test_a_difference_below_rounding_is_none(copied):
 )
 def test_a_text_differs_but_for_the_rounding_of_what_is_fitted(name, again, differs):
     known = {"marker": "0.1 m, 0.2 m, 0.3 m", "robot_urdf": "<robot>1.0</robot>"}
-    stated, found = (SimpleNamespace(attributes=each) for each in (known, known | {name: again}))
+    stated, found = (
+        SimpleNamespace(attributes=each, doubts=()) for each in (known, known | {name: again})
+    )
     said = changed_text(stated, found)
     assert said == (f"its attribute {name} is another" if differs else "")
+
+
+def shift_readings(folder, part, kind="sound"):
+    """Move each marker displacement by a part of its noise, and renew every hash."""
+    path = folder / "run" / "dataset.nc"
+    data = dataset.read(path).to_xarray().copy(deep=True)
+    moved, sigma = data["marker_displacement"], data["marker_sigma"]
+    data["marker_displacement"] = moved + part * sigma
+    if kind == "louder":
+        data["marker_sigma"] = 100.0 * sigma
+    dataset.write(dataset.Dataset.from_xarray(data), path)
+    summary = folder / "run" / "summary.json"
+    sealed.edit(summary, lambda record: record.update(dataset_sha256=file_sha256(path)))
+
+
+def test_what_another_version_derived_is_not_called_changed(copied):
+    folder = copied()
+    shift_readings(folder, 0.15)
+    (link,) = [each for each in gathered(folder).chain if each.name == "dataset"]
+    assert link.state is LinkState.OTHERWISE
+    assert "by up to 15% of the noise of a reading, 15% in the mean" in link.text
+    # It is not proved, either: no light is green by it.
+    held = [each for each in find_everything(gathered(folder)) if each.holds_back]
+    assert any("derived by another version of elastocal: dataset" in str(each) for each in held)
+
+
+@pytest.mark.parametrize(("part", "kind"), [(0.3, "sound"), (0.15, "louder")])
+def test_a_change_of_more_than_a_part_of_the_noise_is_broken_whoever_states_it(copied, part, kind):
+    """Neither the version nor the noise that an edited file states makes room for it."""
+    folder = copied()
+    shift_readings(folder, part, kind)
+    (link,) = [each for each in gathered(folder).chain if each.name == "dataset"]
+    assert link.state is LinkState.BROKEN
+    assert "the dataset is not what the streams give: marker_" in link.text

@@ -1,10 +1,12 @@
 from ._layout import (
+    DOUBTS as DOUBTS,
     MADE_FROM as MADE_FROM,
     SCHEMA as SCHEMA,
     STATUSES as STATUSES,
     read_made_from as read_made_from,
     require_joint_names as require_joint_names,
     require_labels as require_labels,
+    write_doubts as write_doubts,
     write_vector as write_vector,
 )
 from ._store import (

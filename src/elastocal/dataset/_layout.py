@@ -60,6 +60,9 @@ STATIONS = "stations"
 """Attribute with the poses that each station of the tracker measured, as JSON: a station that moved
 counts as another one from there on."""
 
+DOUBTS = "doubts"
+"""Attribute with the mistakes that `import` suspected in the readings, as a JSON list of texts."""
+
 ATTRIBUTES = (
     "schema",
     "robot_name",
@@ -69,6 +72,7 @@ ATTRIBUTES = (
     "gravity",
     "check",
     STATIONS,
+    DOUBTS,
     "provenance",
     MADE_FROM,
 )
@@ -375,6 +379,8 @@ def canonical_attributes(attributes: Mapping[str, object]) -> dict[str, str]:
             read_made_from({name: value})
         if name == STATIONS:
             read_stations({name: value})
+        if name == DOUBTS:
+            read_doubts({name: value})
     texts = {"robot_name": "", "provenance": "", **attributes}
     return {name: str(texts[name]) for name in known if name in texts}
 
@@ -460,6 +466,28 @@ def write_stations(stations: Mapping[str, Sequence[int]]) -> str:
     '{"left": [0, 2]}'
     """
     return json.dumps({name: [int(pose) for pose in poses] for name, poses in stations.items()})
+
+
+def read_doubts(attributes: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the mistakes that `import` suspected; none: not stated.
+
+    Raises
+    ------
+    DatasetError
+        If it is not a JSON list of texts.
+    """
+    text = attributes.get(DOUBTS, "[]")
+    with contextlib.suppress(SchemaError):
+        found = parse_json(text, DOUBTS)
+        if isinstance(found, list) and all(isinstance(each, str) for each in found):
+            return tuple(found)
+    raise DatasetError(f"attribute {DOUBTS!r} is {text!r:.60}: it must be a list of texts as JSON")
+
+
+def write_doubts(doubts: Iterable[str]) -> dict[str, str]:
+    """Return the attribute of some mistakes, each once; none without any."""
+    once = list(dict.fromkeys(doubts))
+    return {DOUBTS: json.dumps(once)} if once else {}
 
 
 def _is_poses(value: object) -> bool:

@@ -10,6 +10,7 @@ from elastocal.dataset._layout import (
     AXES,
     CONDITIONED,
     COORDINATES,
+    DOUBTS,
     INTEGERS,
     JOINT_VARIABLES,
     MADE_FROM,
@@ -177,7 +178,7 @@ def _news(names: Collection[str], attributes: Mapping[str, object]) -> list[str]
     late = [each.name for each in (*VARIABLES, *INTEGERS) if each.schema != SCHEMA]
     news = [f"variable {name!r}" for name in late if name in names]
     news += ["coordinate 'campaign'"] if "campaign" in names else []
-    late_attributes = ("gravity", "check", STATIONS, MADE_FROM)
+    late_attributes = ("gravity", "check", STATIONS, DOUBTS, MADE_FROM)
     news += [f"attribute {name!r}" for name in late_attributes if name in attributes]
     conditioned = attributes.get("history") == CONDITIONED
     return news + ([f"attribute 'history' {CONDITIONED!r}"] if conditioned else [])

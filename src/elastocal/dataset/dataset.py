@@ -60,6 +60,7 @@ from elastocal.dataset._layout import (
     Vector,
     canonical_attributes,
     freeze,
+    read_doubts,
     read_stations,
     read_vector,
     write_stations,
@@ -640,6 +641,11 @@ class Dataset(Result):
     def stations(self) -> dict[str, tuple[int, ...]]:
         """The poses that each station of the tracker measured, by its name; none: not known."""
         return read_stations(self.attributes)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The mistakes that `import` suspected in the readings, as sentences."""
+        return read_doubts(self.attributes)
 
     @property
     def _variables(self) -> dict[str, np.ndarray]:

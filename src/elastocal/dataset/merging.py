@@ -20,6 +20,7 @@ from elastocal.dataset._layout import (
     FloatArray,
     IntArray,
     StatusArray,
+    write_doubts,
 )
 from elastocal.dataset.readings import Presses, Readings
 from elastocal.errors import DatasetError, nearest
@@ -93,7 +94,12 @@ def merge(
         sequence=_sequence(datasets, cases),
         contacts=_contacts(datasets, cases),
         campaigns=_campaigns(datasets, campaigns),
-        attributes={**stated, **_check(datasets), "provenance": provenance},
+        attributes={
+            **stated,
+            **_check(datasets),
+            **write_doubts(doubt for each in datasets for doubt in each.doubts),
+            "provenance": provenance,
+        },
         **joined,
     )
 
@@ -220,6 +226,7 @@ def usable_readings(
         np.array(dataset.load_cases)[case],
         conditioned=dataset.conditioned,
         also_pressed=presses,
+        doubts=dataset.doubts,
         **flat,
     )
     kept_out = np.isin(readings.load_case, dataset.check_cases)

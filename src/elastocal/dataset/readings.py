@@ -20,7 +20,8 @@ from elastocal.results import brief_repr
 _LARGEST = 1e9
 """No SI number of a robot's reading comes near; what does is a damaged file."""
 _NO_NUMBERS = (
-    *("pose", "load_case", "sequence", "contacts", "campaign", "conditioned", "also_pressed"),
+    *("pose", "load_case", "sequence", "contacts", "campaign"),
+    *("conditioned", "also_pressed", "doubts"),
 )
 """Fields that are labels or say how all readings were taken."""
 
@@ -111,6 +112,8 @@ class Readings:
     also_pressed: Presses | None = None
     """Presses without a usable reading, such as one that slipped; None: not recorded. `take` keeps
     those of all poses, since friction remembers them."""
+    doubts: tuple[str, ...] = ()
+    """Mistakes that `import` suspected in them, as sentences."""
 
     def __post_init__(self) -> None:
         self._own("pose", np.array(self.pose, dtype=np.int64), (len(self.pose),))

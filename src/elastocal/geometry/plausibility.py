@@ -64,6 +64,8 @@ class Undone:
     """Mistake and remedy, a sentence without its end."""
     robot: Robot
     data: Positions
+    entry: str = ""
+    """Key and value by which the map of a log undoes it; empty where no key does."""
 
 
 def undone_joints(robot: Robot, data: Positions, score: Score) -> Iterator[Undone]:
@@ -102,12 +104,19 @@ def _readings(robot: Robot, data: Positions) -> Iterator[Undone]:
     for factor in ratios(_ANGLES):
         q = data.q * np.where(robot.revolute, factor, 1.0)
         message = f"every joint {unit_mistake(factor, _ANGLES)}"
-        yield Undone(message, robot, replace(data, q=q))
+        entry = f"`unit: {_unit_of(factor, _ANGLES)}` at joints"
+        yield Undone(message, robot, replace(data, q=q), entry)
     for reading in other_joint_readings(robot):
-        yield Undone(reading.message, robot, replace(data, q=reading.read(robot, data.q)))
+        read = replace(data, q=reading.read(robot, data.q))
+        turned = np.flatnonzero((read.q == -data.q).all(axis=0) & (read.q != data.q).any(axis=0))
+        only = (np.delete(read.q == data.q, turned, axis=1)).all()
+        names = listed([robot.joint_names[joint] for joint in turned])
+        entry = f"`signs: -1` for {names}" if len(turned) and only else ""
+        yield Undone(reading.message, robot, read, entry)
     for joint, name in enumerate(robot.joint_names):
         message = f"{name} turns the other way round than in the URDF: turn its sign"
-        yield Undone(message, robot, _joint(data, joint, -data.q[:, joint]))
+        turned_joint = _joint(data, joint, -data.q[:, joint])
+        yield Undone(message, robot, turned_joint, f"`signs: -1` for {name}")
 
 
 def _swapped_joints(robot: Robot, data: Positions) -> Iterator[Undone]:
@@ -115,7 +124,11 @@ def _swapped_joints(robot: Robot, data: Positions) -> Iterator[Undone]:
         q = data.q.copy()
         q[:, [a, b]] = q[:, [b, a]]
         names = f"{robot.joint_names[a]} and {robot.joint_names[b]}"
-        yield Undone(f"the columns of {names} are swapped", robot, replace(data, q=q))
+        message, entry = (
+            f"the columns of {names} are swapped",
+            f"`columns` with those of {names} swapped",
+        )
+        yield Undone(message, robot, replace(data, q=q), entry)
 
 
 def _scaled_joint(robot: Robot, data: Positions, score: Score) -> Undone:
@@ -154,8 +167,9 @@ def _shifted_zero(robot: Robot, data: Positions, score: Score) -> Undone:
     def shifted(joint: int, by: float) -> Undone:
         degrees = float(np.degrees(by))
         message = f"the zero of {robot.joint_names[joint]} is {-degrees:.3g} deg off: add"
-        q = data.q[:, joint] + by
-        return Undone(f"{message} {degrees:.3g} deg to it", robot, _joint(data, joint, q))
+        shift, q = f"{degrees:.3g} deg", data.q[:, joint] + by
+        entry = f'`offsets: "{shift}"` for {robot.joint_names[joint]}'
+        return Undone(f"{message} {shift} to it", robot, _joint(data, joint, q), entry)
 
     turning = np.flatnonzero(robot.revolute).tolist()
     joint, by = min(
@@ -180,11 +194,16 @@ def ratios(units: dict[str, float]) -> tuple[float, ...]:
 
 
 def unit_mistake(factor: float, units: dict[str, float]) -> str:
-    """Return the true unit of a column that differs by a factor; None if there is none."""
+    """Return which unit a column is in that differs by a factor; empty if it is none."""
     for real, heading in permutations(units, 2):
         if abs(factor * units[heading] / units[real] - 1.0) < 1e-6:
             return f"is in {real}, but its heading says {heading}"
     return ""
+
+
+def _unit_of(factor: float, units: dict[str, float]) -> str:
+    """Return the true unit that `unit_mistake` names."""
+    return unit_mistake(factor, units).split()[2].rstrip(",")
 
 
 def _late_rows(robot: Robot, data: Positions) -> Iterator[Undone]:
@@ -210,7 +229,8 @@ def _trackers(robot: Robot, data: Positions) -> Iterator[Undone]:
         " of marker_x, marker_y, marker_z"
     )
     mirrored = data.markers * [-1.0, 1.0, 1.0]
-    yield Undone(f"the frame of the tracker {left}", robot, replace(data, markers=mirrored))
+    entry = "`signs: [-1, 1, 1]` at markers"
+    yield Undone(f"the frame of the tracker {left}", robot, replace(data, markers=mirrored), entry)
     for station in data.stations if len(data.stations) > 1 else ():
         own = (data.station == station)[:, None, None]
         markers = np.where(own, mirrored, data.markers)
@@ -222,7 +242,8 @@ def _trackers(robot: Robot, data: Positions) -> Iterator[Undone]:
         for factor in ratios(LENGTHS):
             markers = data.markers * np.where(own, factor, 1.0)
             message = f"{name} {unit_mistake(factor, LENGTHS)}"
-            yield Undone(message, robot, replace(data, markers=markers))
+            entry = f"`unit: {_unit_of(factor, LENGTHS)}` at markers" if own.all() else ""
+            yield Undone(message, robot, replace(data, markers=markers), entry)
 
 
 def _late_markers(robot: Robot, data: Positions) -> Iterator[Undone]:
@@ -305,7 +326,8 @@ def _other_robots(robot: Robot, data: Positions) -> Iterator[Undone]:
         except RobotError:
             continue
         if other.revolute == robot.revolute:
-            yield Undone(f"the arm is a {name}: give --robot '{name}'", other, data)
+            message, entry = f"the arm is a {name}: give --robot '{name}'", f"`model: {name}`"
+            yield Undone(message, other, data, entry)
 
 
 MOST_LEFT_OUT = 2e-3
@@ -394,7 +416,19 @@ def plausible_ladder(
     raise GeometryError(_refusal(problem, mistakes, missed if why is None else why))
 
 
-def position_mistake(robot: Robot, data: Positions) -> str | None:
+@dataclass(frozen=True)
+class PositionMistake:
+    """Why a nominal arm does not carry its marker to some positions."""
+
+    message: str
+    """Sentence without its end, with the entry of a map that undoes it."""
+    certain: bool
+    """Whether a single mistake explains it as well as `geometry` asks for, and a map undoes it."""
+
+
+def position_mistake(
+    robot: Robot, data: Positions, joints_agree: bool = False
+) -> PositionMistake | None:
     """Return why a nominal arm does not carry its marker to some positions; None: it does.
 
     For a few positions, none of which can be left out: mistakes are judged by the nominal arm. Each
@@ -407,6 +441,9 @@ def position_mistake(robot: Robot, data: Positions) -> str | None:
         The arm as stated.
     data : Positions
         As stated.
+    joints_agree : bool
+        Whether the controller states the tool frame, too, and it is that of the joints: then
+        neither they nor the arm are mistaken.
     """
 
     def missed(each: Undone) -> float:
@@ -418,14 +455,21 @@ def position_mistake(robot: Robot, data: Positions) -> str | None:
     why = f"the marker is {1e3 * stated:.3g} mm (median) from where the arm carries it"
     unnamed = f"{why}: is the log of another run, of another arm, or its time mistaken?"
     if len(data) < _NAMED_FROM:
-        return unnamed
-    every = [*undone_joints(robot, data, missed), *undone_markers(robot, data)]
-    found = sorted(((missed(each), each.mistake) for each in every), key=lambda pair: pair[0])
-    best = found[0][0]
-    named = [text for left, text in found if left <= _TIE * best][:2]
-    if best <= max(_FAR_BETTER * stated, min(_NOT_DRAWN * arm_length(robot), 0.5 * stated)):
-        return f"{', or '.join(named)}; {why}, with that undone {1e3 * best:.2g} mm"
-    return unnamed
+        return PositionMistake(unnamed, certain=False)
+    if joints_agree:
+        every = [*_trackers(robot, data), *_markers(robot, data)]
+    else:
+        every = [*undone_joints(robot, data, missed), *undone_markers(robot, data)]
+    found = sorted(((missed(each), each) for each in every), key=lambda pair: pair[0])
+    best, likeliest = found[0]
+    named = [each.mistake for left, each in found if left <= _TIE * best][:2]
+    is_arm = best <= _NOT_DRAWN * arm_length(robot)
+    if not (best <= _FAR_BETTER * stated or (is_arm and best <= 0.5 * stated)):
+        return PositionMistake(unnamed, certain=False)
+    certain = len(named) == 1 and is_arm and best <= _FAR_BETTER * stated and likeliest.entry != ""
+    enter = f"; write {likeliest.entry} in the map" if certain else ""
+    text = f"{', or '.join(named)}; {why}, with that undone {1e3 * best:.2g} mm{enter}"
+    return PositionMistake(text, certain)
 
 
 def implausible(problem: GeometryProblem, found: GeometryLadder) -> str | None:

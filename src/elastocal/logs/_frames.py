@@ -59,8 +59,10 @@ def vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> 
     scale = factor(vector.unit, dimension) / getattr(vector, "counts", 1.0)
     most, name = largest(dimension)
     with np.errstate(over="ignore"):
-        found: FloatArray = scale * np.column_stack(
-            [table.numbers(column) for column in vector.columns]
+        found: FloatArray = (
+            scale
+            * np.array(vector.signs)
+            * np.column_stack([table.numbers(column) for column in vector.columns])
         )
     beyond = np.argwhere(np.abs(found) > _WRONG_UNIT * most)
     if len(beyond):

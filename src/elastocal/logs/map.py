@@ -59,6 +59,8 @@ UNKNOWN = "?"
 _ColumnName = Annotated[str, BeforeValidator(lambda name: str(name) if name is not True else name)]
 """A name of the header, or the number of a column from 1."""
 _Three = tuple[_ColumnName, _ColumnName, _ColumnName]
+_Sign = Literal[-1, 1]
+_Signs = tuple[_Sign, _Sign, _Sign]
 
 
 def _check_unit(unit: str, dimension: str) -> None:
@@ -88,6 +90,8 @@ class Vector(StrictModel):
 
     columns: _Three
     unit: str
+    signs: _Signs = (1, 1, 1)
+    """-1 at a column that counts in the opposite direction."""
     counts: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 1.0
     """Counts of the log in one unit, as the box of a sensor states them."""
 
@@ -103,7 +107,7 @@ class Joints(StrictModel):
     unit: str
     names: tuple[str, ...] = ()
     """Joint of each column; by default the robot's next ones of such a unit."""
-    signs: tuple[Literal[-1, 1], ...] = ()
+    signs: tuple[_Sign, ...] = ()
     """-1 where the controller counts in the opposite direction."""
     offsets: tuple[Angle | Length, ...] = ()
     """Offset that is added after the sign, with its unit."""
@@ -143,6 +147,8 @@ class MarkerColumns(StrictModel):
 
     columns: _Three
     unit: str
+    signs: _Signs = (1, 1, 1)
+    """-1 at one column of a tracker whose frame is left-handed."""
     u95: Vector | None = None
     """Uncertainty of each coordinate by the instrument, twice its standard deviation."""
 

@@ -23,16 +23,18 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from elastocal.arrays import FloatArray, longest_run
 from elastocal.compensation.conditioning import (
+    BIAS_JUMPS,
     SENSOR_TURNED,
+    SensorMistake,
     StaticPostures,
     fit_tool,
     other_centre,
     other_mass,
-    refuse_other_readings,
+    sensor_mistake,
     static_postures,
 )
-from elastocal.dataset import Dataset
-from elastocal.errors import CompensationError, LogError, present
+from elastocal.dataset import Dataset, write_doubts
+from elastocal.errors import LogError, present
 from elastocal.files import sha256
 from elastocal.geometry import Payload, Positions, position_mistake
 from elastocal.logs._frames import sensor_doubts
@@ -260,6 +262,11 @@ def sensor_contradictions(postures: StaticPostures, site: Site) -> Iterator[str]
     """Yield contradictions between the weight of the tool and axes, units and zero of the sensor.
 
     Its rotation is reported with its angles where readings can be formed (`sensor_doubts`).
+
+    Raises
+    ------
+    LogError
+        If a mistake is certain: the map undoes it, and the weight then turns as it must.
     """
     fit = fit_tool(postures, site.T_flange_sensor[:3, :3])
     left, change = fit.force_scatter, _change(postures)
@@ -267,12 +274,12 @@ def sensor_contradictions(postures: StaticPostures, site: Site) -> Iterator[str]
     # In another unit the weight may hardly change.
     if not max(change, site.sensor.mass * turning) > _WEIGHS:
         return
-    try:
-        if change > _WEIGHS:
-            refuse_other_readings(postures, site.T_flange_sensor[:3, :3], _LEVER)
-    except CompensationError as error:
-        if not str(error).startswith(SENSOR_TURNED):
-            yield str(error)
+    found = _sensor_mistake(postures, site) if change > _WEIGHS else None
+    if found is not None and found.entry:
+        raise LogError(f"{found.message}; write {found.entry} in the map")
+    if found is not None:
+        if not found.message.startswith(SENSOR_TURNED):
+            yield found.message
         return
     if left < _FITS * change and fit.mass > 0.0 and "mass" not in fit.undetermined:
         yield from other_mass(fit.mass, site.sensor.mass)
@@ -286,10 +293,8 @@ def sensor_misfit(postures: StaticPostures, site: Site) -> str | None:
     left, change = fit.force_scatter, _change(postures)
     if not change > _WEIGHS:
         return None
-    try:
-        refuse_other_readings(postures, site.T_flange_sensor[:3, :3], _LEVER)
-    except CompensationError as error:
-        return str(error)
+    if (found := _sensor_mistake(postures, site)) is not None:
+        return found.message
     if left < _FITS * change and fit.mass < 0.0:
         return (
             "the weight of the tool points upward in the sensor: does it show the force on the"
@@ -304,10 +309,20 @@ def sensor_misfit(postures: StaticPostures, site: Site) -> str | None:
     return None
 
 
+def _sensor_mistake(postures: StaticPostures, site: Site) -> SensorMistake | None:
+    return sensor_mistake(postures, site.T_flange_sensor[:3, :3], _LEVER)
+
+
 def marker_contradictions(
-    streams: Streams, spans: Sequence[tuple[float, float]], site: Site
+    streams: Streams, spans: Sequence[tuple[float, float]], log_map: LogMap, site: Site
 ) -> Iterator[str]:
-    """Yield why the marker does not go where the arm carries it, at the first span of each pose."""
+    """Yield why the marker does not go where the arm carries it, at the first span of each pose.
+
+    Raises
+    ------
+    LogError
+        If a mistake is certain.
+    """
     firsts = _first_of_poses(spans, number_poses(spans, streams))
     seen = [each for span in firsts if (each := _place(streams, span)) is not None]
     if len(seen) < _LEAST_POSES:
@@ -318,9 +333,13 @@ def marker_contradictions(
         markers=np.stack(markers)[:, None],
         station=np.array(stations),
     )
-    mistake = position_mistake(site.robot, data)
+    poses = [each.pose for each in log_map.logs if each.pose is not None]
+    agree = any(each.angles or each.quaternion for each in poses)  # `stated_poses` requires it
+    mistake = position_mistake(site.robot, data, joints_agree=agree)
+    if mistake is not None and mistake.certain:
+        raise LogError(mistake.message)
     if mistake is not None:
-        yield mistake
+        yield mistake.message
 
 
 def _place(
@@ -424,7 +443,7 @@ def import_streams(
     if by_word is None:
         spans = [averaged_part(*each) for each in standing_spans(alone, site.marker)]
     # What is named first explains what comes after: joints that are mistaken turn the weight, too.
-    astray = () if still else tuple(marker_contradictions(streams, spans, site))
+    astray = () if still else tuple(marker_contradictions(streams, spans, log_map, site))
     judged = None if still or astray else postures
     sensor = () if judged is None else tuple(sensor_contradictions(judged, site))
     doubts = (*still, *astray, *sensor, *stream_doubts(logs, clocks, site))
@@ -436,7 +455,14 @@ def import_streams(
         if why is None:
             raise
         raise LogError(f"{why} ({error})") from error
-    return replace(found, clocks=clocks, warnings=(*doubts, *found.warnings))
+    dataset = _doubted(found.dataset, [*astray, *sensor, *found.dataset.doubts])
+    return replace(found, dataset=dataset, clocks=clocks, warnings=(*doubts, *found.warnings))
+
+
+def _doubted(dataset: Dataset, doubts: Sequence[str]) -> Dataset:
+    """Return a dataset that carries the mistakes that its readings may contain."""
+    carried = [each for each in doubts if not each.startswith(BIAS_JUMPS)]
+    return replace(dataset, attributes={**dataset.attributes, **write_doubts(carried)})
 
 
 def _imported(
@@ -463,6 +489,7 @@ def _imported(
     progress("readings", 4, 4)
     loads = np.array([each.force_tcp for each in plateaus if each.pose >= 0 and each.load])
     doubts = sensor_doubts(judged, loads.reshape(-1, 3), site) if judge_sensor else ()
+    dataset = _doubted(dataset, doubts)
     warnings = (*doubts, *_warnings(plateaus, rows, registration, log_map))
     return ImportedLogs(dataset, streams, tuple(plateaus), (), registration, warnings)
 

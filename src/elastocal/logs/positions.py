@@ -129,7 +129,7 @@ def import_positions(
         named = name_loads(named, states, site.sensor, log_map.load_cases)
     free = [each for each in named if each.pose >= 0 and each.load is None]
     spans = [(each.start, each.end) for each in free]
-    astray = () if still else tuple(marker_contradictions(streams, spans, site))
+    astray = () if still else tuple(marker_contradictions(streams, spans, log_map, site))
     seen = [each for plateau in free for each in _rows(plateau, streams, logs, at_rest.least)]
     if len({pose for *_, pose in seen}) < _LEAST:
         poses = counted(len({pose for *_, pose in seen}), "pose")

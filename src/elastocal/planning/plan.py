@@ -54,6 +54,7 @@ from elastocal.planning.postures import Postures
 from elastocal.planning.production import production_findings
 from elastocal.planning.rounds import Round, joined_moves
 from elastocal.planning.scene import (
+    OF_WRONG_CELLS,
     cell_surface,
     collision_scene,
     surface_findings,
@@ -61,7 +62,6 @@ from elastocal.planning.scene import (
 from elastocal.planning.search import Cover, CoverSelection, SearchTechnique, Selection, technique
 from elastocal.planning.search_pool import SearchPool
 from elastocal.planning.surface import (
-    OF_WRONG_MESHES,
     Surface,
     arm_reach,
     sample_uniform,
@@ -320,7 +320,7 @@ def _require_enough(cell: Cell, sampled: SampledPool, findings: tuple[Finding, .
     if found >= wanted:
         return
     refused = ", ".join(f"{name} {pool.refused[name]}" for name in pool.commonest_refusals)
-    odd = [each for each in findings if each.kind in OF_WRONG_MESHES]
+    odd = [each for each in findings if each.kind in OF_WRONG_CELLS]
     why = "; ".join([*odd, pool.advice])
     short = f", and {wanted} poses are wanted (search.poses)" if wanted > 1 else ""
     raise PlanningError(

@@ -26,9 +26,9 @@ whose farthest joint is nearest to a posture of production is taken.
 
 import math
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from itertools import pairwise
 from typing import Self
@@ -46,6 +46,7 @@ from elastocal.parallel import process_count, process_pool
 from elastocal.planning import checks as exported
 from elastocal.planning.checks import (
     Checks,
+    CollisionCheck,
     EdgeCheck,
     Margins,
     PointCheck,
@@ -56,13 +57,15 @@ from elastocal.planning.postures import Postures
 from elastocal.planning.surface import (
     Surface,
     SurfacePoints,
+    arm_reach,
     contact_frames,
+    first_joint_positions,
     sample_blue_noise,
     sample_uniform,
 )
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
-from elastocal.robot.inverse import InverseKinematics, inverse_for
+from elastocal.robot.inverse import InverseKinematics, NumericalInverse, inverse_for
 from elastocal.wording import phrase, sentences
 
 _APART = (0.2, float(np.radians(10.0)))
@@ -191,6 +194,8 @@ class Pool:
     refused_by: IndexArray
     """Number in `refusals` of the check that left each sampled point without a posture, or -1 where
     it has one, shape (point,)."""
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    """What is in the way, by the name in `refusals`, where more is known than its advice."""
 
     @property
     def sampled(self) -> int:
@@ -234,9 +239,11 @@ class Pool:
         several checks refuse counts for one of them only.
         """
         texts = dict(zip(self.refusals, (REACH_ADVICE, *self.margins.advice), strict=True))
-        return sentences(
-            [sentences((name, texts[name]), ": ") for name in self.commonest_refusals[:2]], "; "
-        )
+        named = [
+            (name, *([self.reasons[name]] if name in self.reasons else []), texts[name])
+            for name in self.commonest_refusals[:2]
+        ]
+        return sentences([sentences(each, ": ") for each in named], "; ")
 
     def first(self, count: int) -> "Pool":
         """Return the pool without the postures beyond the first ``count`` ones.
@@ -465,7 +472,11 @@ class PostureSolver:
         for contact in np.moveaxis(contact_frames(points, normals, spins), 1, 0):
             off = contact.copy()
             off[:, :3, 3] += self.approach * normals
-            here, there = (self.inverse.solve_many(T, external).q for T in (contact, off))
+            here = self.inverse.solve_many(contact, external).q
+            if isinstance(self.inverse, NumericalInverse):
+                there = self.inverse.beside(off, here)
+            else:
+                there = self.inverse.solve_many(off, external).q
             # NaN where there is no solution. Half a turn: axes 4 and 6 may be given a turn apart.
             reached = np.abs(there - here).max(axis=2) < np.pi
             point, branch = np.nonzero(reached)
@@ -514,6 +525,8 @@ _MOST_IN_VAIN = 1000
 """Points without a single candidate after which no more are tried."""
 _OVERSAMPLING = 1.03
 """Points that are sampled for each that should turn out to be missing."""
+_LOOKED_AT = 24
+"""Refused points by which it is said what is in the way."""
 _LEAST_GAIN = 0.02
 """Share of the points that a further base placement must serve alone."""
 _EXPORTED = tuple(getattr(exported, name) for name in dir(exported))
@@ -618,7 +631,10 @@ def sample_pool(
                 pools.append(pool)
                 progress(CANDIDATES, min(_valid(pools), wanted), wanted)
     pool = join_pools(pools).first(wanted)
-    return SampledPool(SurfacePoints.joined(tried).take(np.arange(pool.sampled)), pool)
+    points = SurfacePoints.joined(tried).take(np.arange(pool.sampled))
+    if len(pool.postures) < wanted:
+        pool = replace(pool, reasons=builder.reasons(placements, points, pool))
+    return SampledPool(points, pool)
 
 
 def _valid(pools: Sequence[Pool]) -> int:
@@ -689,6 +705,47 @@ class PoolBuilder:
         of_points = point_checks(self.cell, self.surface, points)
         solver = replace(self.solver, checks=replace(self.solver.checks, point=of_points))
         return solver.pool(points.position, points.normal, placements)
+
+    def reasons(
+        self, placements: Sequence[BasePlacement], points: SurfacePoints, pool: Pool
+    ) -> dict[str, str]:
+        """Return how far refused points are out of reach, and what collides at them."""
+        found = {}
+        place = {name: pool.refused_by == n for n, name in enumerate(pool.refusals)}
+        if place[UNREACHABLE].any():
+            found[UNREACHABLE] = self._beyond_reach(points.position[place[UNREACHABLE]])
+        for check in self.solver.checks.slow:
+            refused = np.flatnonzero(place[check.name])[:_LOOKED_AT]
+            postures = self._first_postures(placements, points.take(refused))
+            if isinstance(check, CollisionCheck) and len(postures):
+                found[check.name] = check.nearest(postures)
+        return found
+
+    def _beyond_reach(self, positions: FloatArray) -> str:
+        first = first_joint_positions(self.cell.robot, self.cell.external_positions)
+        away = np.linalg.norm(positions[:, None] - first, axis=2).min(axis=1)
+        reach = arm_reach(self.cell.robot)
+        figures = {"far": f"{away.max():.3g}", "reach": f"{reach:.3g}"}
+        if away.max() > reach:
+            return phrase(
+                "up to {far} m from the first joint, and arm and tool stretched out are {reach} m",
+                **figures,
+            )
+        return phrase(
+            "at most {far} m from the first joint, of {reach} m that arm and tool stretched out"
+            " have: the way in which the tool must point, or limits of joints, keep it off",
+            **figures,
+        )
+
+    def _first_postures(
+        self, placements: Sequence[BasePlacement], points: SurfacePoints
+    ) -> Postures:
+        """Return a posture for each of some points, one that passes the quick checks if any."""
+        options = self.solver.options(points.position, points.normal, placements[0].external)
+        passed = check_margins(self.solver.checks.quick, options.postures).passed
+        order = np.lexsort((~passed, options.point))
+        _, first = np.unique(options.point[order], return_index=True)
+        return options.postures.take(order[first])
 
 
 _PoolsOfParts = Callable[[tuple[BasePlacement, ...], Sequence[SurfacePoints]], Iterator[Pool]]

@@ -22,8 +22,10 @@ from elastocal.cell import (
     Sphere as SphereEntry,
 )
 from elastocal.errors import PlanningError, RobotError
-from elastocal.findings import Finding, Grade, Kind
+from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.planning.surface import (
+    INVERTED,
+    OF_WRONG_MESHES,
     ReachableFrom,
     Surface,
     arm_reach,
@@ -39,10 +41,14 @@ from elastocal.planning.surface import (
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, collision_model, tool_link
 from elastocal.robot.inverse import inverse_for
-from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere, solid_of
+from elastocal.shapes import Body, Box, Cylinder, Mesh, Solid, Sphere, box_corners, solid_of
 
 _TILTED = np.radians(60.0)
 """Angle in rad between tool and last axis from which the user is asked to check it."""
+_LEAST_TOOL = 5e-3
+"""Distance of the tcp from the flange in m from which it shows which way the tool points."""
+_INWARD = np.radians(120.0)
+"""Angle between z of the tcp and the way to it from the flange beyond which no tool is bent."""
 _NEIGHBOURS = 1
 """Links this many joints apart touch by construction and are not checked against each other."""
 
@@ -114,20 +120,25 @@ class CollisionScene:
         ]
         return np.logical_not(near)
 
-    def nearest(self, q: FloatArray) -> tuple[str, str]:
+    def nearest(self, q: FloatArray, pressed: bool = False) -> tuple[str, str]:
         """Return the names of the two bodies that are nearest to each other at one posture."""
-        pair = self._geometry.collisionPairs[int(self.distances(q[None])[0].argmin())]
+        pair = self._geometry.collisionPairs[int(self.distances(q[None], pressed)[0].argmin())]
         names = [self._geometry.geometryObjects[i].name for i in (pair.first, pair.second)]
         return names[0], names[1]
 
-    def distances(self, q: FloatArray) -> FloatArray:
-        """Return the exact distance of each pair, shape (pose, pair), in m."""
+    def distances(self, q: FloatArray, pressed: bool = False) -> FloatArray:
+        """Return the exact distance of each pair, shape (pose, pair), in m.
+
+        It is infinite between the tool and what it presses on where it is ``pressed``.
+        """
         model, geometry = self._model, self._geometry
         data, results = model.createData(), geometry.createData()
         distances = np.empty((len(q), len(geometry.collisionPairs)))
         for row, configuration in zip(distances, self._configurations(q), strict=True):
             pin.computeDistances(model, data, geometry, results, configuration)
             row[:] = [result.min_distance for result in results.distanceResults]
+        if pressed:
+            distances[:, self._tool_on_touched] = np.inf
         return distances
 
     def _configurations(self, q: FloatArray) -> FloatArray:
@@ -233,6 +244,20 @@ TILTED = Kind(
     " {advice}",
     shown={"link": repr},
 )
+TCP_INWARD = Kind(
+    "plan.tcp-inward",
+    "z of the tcp points back to the flange, {angle} deg from the way out of the tool: it must"
+    " point into the surface; tcp.abc turns it",
+    shown={"angle": as_number(".0f", 180.0 / np.pi)},
+)
+TOOL_BEYOND_TCP = Kind(
+    "plan.tool-beyond-tcp",
+    "{name} reaches {by} mm beyond the tcp along its z, and would stand in the surface: is the tcp"
+    " where the tool touches (tcp.xyz)?",
+    shown={"by": as_number(".3g", 1e3)},
+)
+OF_WRONG_CELLS = OF_WRONG_MESHES | {TCP_INWARD.name, TOOL_BEYOND_TCP.name}
+"""Kinds that may be why no pose is found."""
 
 
 def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Finding, ...]:
@@ -263,14 +288,19 @@ def surface_findings(cell: Cell, surface: Surface, rng: Generator) -> tuple[Find
             found += size_findings(path, mesh.metres, key, arm_reach(cell.robot))
     if not cell.robot.has_masses and np.isfinite(cell.torque_limits).any():
         found.append(NO_MASSES(name=cell.robot.name))
-    found += _tilted_findings(cell)
-    found += mesh_findings(surface) + placement_findings(
+    of_tcp = _tcp_findings(cell)
+    found += [*_tilted_findings(cell), *of_tcp]
+    found += mesh_findings(surface)
+    placed = placement_findings(
         surface,
         first_joint_positions(cell.robot, external),
         arm_reach(cell.robot),
         ReachableFrom(inverse_for(cell.robot), few),
         rng,
     )
+    # With a tcp that points inwards the robot reaches the surface from the wrong side.
+    inward = any(each.kind == TCP_INWARD.name for each in of_tcp)
+    found += [each for each in placed if not (inward and each.kind == INVERTED.name)]
     for finding in found:
         if finding.grade is Grade.REFUSAL:
             raise PlanningError(finding)
@@ -285,6 +315,26 @@ def _tilted_findings(cell: Cell) -> tuple[Finding, ...]:
     other = tool_link(urdf)  # The flange is no candidate: the tcp depends on it
     advice = "tcp.abc turns it" if other == tcp.tip else f"robot.flange is {other!r}"
     return (TILTED(link=flange, direction=tcp.tip_direction, advice=advice),)
+
+
+def _tcp_findings(cell: Cell) -> tuple[Finding, ...]:
+    """Return that z of the tcp points back into the tool, or that the tool is longer than it."""
+    flange = cell.T_tcp_flange[:3, 3]
+    if (away := float(np.linalg.norm(flange))) > _LEAST_TOOL:
+        angle = float(np.arccos(np.clip(-flange[2] / away, -1.0, 1.0)))
+        if angle > _INWARD:
+            return (TCP_INWARD(angle=angle),)
+    ends = {body.name: float(_corners(body)[:, 2].max()) for body in tool_bodies(cell)}
+    name = max(ends, key=lambda each: ends[each], default="")
+    if not name or not ends[name] > cell.file.engagement.near_contact:
+        return ()
+    return (TOOL_BEYOND_TCP(name=name, by=ends[name]),)
+
+
+def _corners(body: Body) -> FloatArray:
+    """Return the corners of a body's box in its frame, shape (8, 3), in m."""
+    T = body.T_frame_body
+    return np.asarray(box_corners(body.solid.geometry) @ T[:3, :3].T + T[:3, 3])
 
 
 def collision_scene(cell: Cell, surface: Surface) -> CollisionScene:

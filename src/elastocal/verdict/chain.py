@@ -16,7 +16,7 @@ import numpy as np
 
 from elastocal.cell import SENSOR_CORRECTED, SensorLoad
 from elastocal.compensation.conditioning import read_sensor_load
-from elastocal.dataset import Dataset, content_sha256, read_made_from
+from elastocal.dataset import DOUBTS, Dataset, content_sha256, read_made_from
 from elastocal.errors import ElastocalError, SchemaError, present
 from elastocal.files import read_text, sha256
 from elastocal.findings import Kind, group_alike
@@ -42,23 +42,46 @@ _SAME = 1e-4
 machines round differently, and what is smaller changes no verdict."""
 _SAME_PLACE = 1e-6
 """The same for the position of the marker, which is stored as a text."""
+_PART_OF_NOISE, _MOST_OF_NOISE = 0.2, 1.0
+"""Differences from readings derived again, over the noise of each, which the derivation of another
+version makes: root mean square, and largest. By them no error norm changes by more than the first,
+whatever the differences are made for: an editor of a dataset gains no more
+(docs/explanation/threats.md)."""
+_NOISE_OF = {
+    "force": "force_sigma",
+    "force_sigma": "force_sigma",
+    "marker_displacement": "marker_sigma",
+    "controller_displacement": "marker_sigma",
+    "marker_sigma": "marker_sigma",
+}
+"""Variable with the noise of each variable that is judged by it. It is that derived again, since
+what the dataset states may have been edited."""
+_SAME_MARKER = 1e-4
+"""Distance in m by which places of the marker in two such derivations differ at most: with a tool
+that turns by 1 mrad they move a displacement by 0.1 µm."""
 _LATER = ("marker_position",)
 """Attributes that only datasets with hashes have."""
 _FRACTION = re.compile(r"[-+]?\d+\.\d+(?:e[-+]?\d+)?")
 
 
-def changed_text(stated: Dataset, found: Dataset) -> str:
-    """Return the first text of a dataset that differs from the derived one; empty if none does."""
+def changed_text(stated: Dataset, found: Dataset, marker_apart: float = 0.0) -> str:
+    """Return the first text of a dataset that differs from the derived one; empty if none does.
+
+    ``marker_apart`` is the distance in m by which the place of the marker may differ.
+    """
     attributes = ("robot_name", "robot_urdf", "tcp_frame", "marker", "gravity", "history", "check")
     for name in attributes:
         mine, again = stated.attributes.get(name), found.attributes.get(name)
         # The marker's place alone is fitted; what is copied comes back to the letter.
-        if mine != again and not (name == "marker" and _is_same_text(mine, again)):
+        if mine != again and not (name == "marker" and _is_same_text(mine, again, marker_apart)):
             return phrase("its attribute {name} is another", name=name)
+    # Sentences change from version to version; that nothing is suspected any more does not.
+    if found.doubts and not stated.doubts:
+        return phrase("its attribute {name} is another", name=DOUBTS)
     return ""
 
 
-def _is_same_text(stated: object, found: object) -> bool:
+def _is_same_text(stated: object, found: object, apart: float) -> bool:
     """Return whether two texts are the same but for the rounding of the fractions in them."""
     if not (isinstance(stated, str) and isinstance(found, str)):
         return False
@@ -66,11 +89,51 @@ def _is_same_text(stated: object, found: object) -> bool:
     return (
         _FRACTION.sub("", stated) == _FRACTION.sub("", found)
         and a.shape == b.shape
-        and bool(np.all(np.abs(a - b) <= _SAME_PLACE * np.max(np.abs(b), initial=0.0)))
+        and bool(np.all(np.abs(a - b) <= max(apart, _SAME_PLACE * np.max(np.abs(b), initial=0.0))))
     )
 
 
-def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> str:
+@dataclass(frozen=True)
+class PartOfNoise:
+    """Differences of readings from those derived again, over the noise of each."""
+
+    typical: float
+    """Largest root mean square of a variable."""
+    most: float
+
+    @property
+    def is_of_a_version(self) -> bool:
+        """Whether the derivation of another version may make them."""
+        return self.typical <= _PART_OF_NOISE and self.most <= _MOST_OF_NOISE
+
+
+def part_of_noise(stated: Dataset, found: Dataset) -> PartOfNoise:
+    """Return by how much of their noise readings differ from those derived again.
+
+    Infinite where a noise is not known, or the readings are others.
+
+    Parameters
+    ----------
+    stated, found : Dataset
+        As in the file, and derived again.
+    """
+    typical = most = 0.0
+    for name, noise in _NOISE_OF.items():
+        a, b, sigma = stated.arrays.get(name), found.arrays.get(name), found.arrays.get(noise)
+        if a is None and b is None:
+            continue
+        if a is None or b is None or sigma is None or a.shape != b.shape:
+            return PartOfNoise(np.inf, np.inf)
+        gap = _gap(a, b)
+        parts = np.divide(gap, sigma, out=np.where(gap > 0.0, np.inf, 0.0), where=sigma > 0.0)
+        typical = max(typical, float(np.sqrt(np.mean(np.square(parts)))))
+        most = max(most, float(parts.max()))
+    return PartOfNoise(typical, most)
+
+
+def changed_reading(
+    stated: Dataset, found: Dataset, old: bool, source: str, apart_from: Collection[str] = ()
+) -> str:
     """Return how readings differ from those derived again; empty if they do not.
 
     Parameters
@@ -81,6 +144,8 @@ def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> 
         Variables that an older dataset lacks are no difference.
     source : str
         Source of the derivation: streams, logs.
+    apart_from : collection of str
+        Variables that are judged elsewhere (`part_of_noise`).
     """
     if content_sha256(stated) == content_sha256(found):
         return ""
@@ -90,6 +155,8 @@ def changed_reading(stated: Dataset, found: Dataset, old: bool, source: str) -> 
     mine, again = stated.to_labelled(), found.to_labelled()
     for name, array in again.variables.items():
         if array.values.dtype.kind not in "iuf" or (name not in mine and (old or name in _LATER)):
+            continue
+        if name in apart_from:
             continue
         if name not in mine:
             return phrase("it has no {name}", name=name)
@@ -108,8 +175,7 @@ def _largest_difference(
     """Return the place where two arrays differ most, with both numbers; empty where they agree."""
     a, b = np.asarray(stated, dtype=float), np.asarray(found, dtype=float)
     size = float(np.nanmax(np.abs(b), initial=0.0))
-    gap = np.where(np.isnan(a) & np.isnan(b), 0.0, np.abs(a - b))
-    gap = np.where(np.isnan(gap), np.inf, gap)
+    gap = _gap(a, b)
     if not np.any(gap > _SAME * size):
         return ""
     place = np.unravel_index(int(np.argmax(gap)), gap.shape)
@@ -128,8 +194,20 @@ def _largest_difference(
     )
 
 
-def changed_place(stated: object, found: object, place: str = "") -> str:
-    """Return the path of the first entry in which two JSON-ready records differ."""
+def _gap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the distance of each pair of numbers: 0 between two NaN, infinite to one of them."""
+    gap = np.where(np.isnan(a) & np.isnan(b), 0.0, np.abs(a - b))
+    return np.where(np.isnan(gap), np.inf, gap)
+
+
+def changed_place(
+    stated: object, found: object, place: str = "", close: float = 10.0 * _SAME
+) -> str:
+    """Return the path of the first entry in which two JSON-ready records differ.
+
+    ``close`` is the part of a number by which it may: by default a thousandth, since standard
+    deviations of what is hardly determined round most.
+    """
     if isinstance(stated, dict) and isinstance(found, dict) and stated.keys() == found.keys():
         inner = [(f"{place}.{key}".lstrip("."), stated[key], found[key]) for key in stated]
         # Which version derived it is no finding.
@@ -137,15 +215,14 @@ def changed_place(stated: object, found: object, place: str = "") -> str:
     elif isinstance(stated, list) and isinstance(found, list) and len(stated) == len(found):
         pairs = [(f"{place}.{n}", a, b) for n, (a, b) in enumerate(zip(stated, found, strict=True))]
     else:
-        return "" if stated == found or _is_close(stated, found) else place
-    return next((text for key, a, b in pairs if (text := changed_place(a, b, key))), "")
+        return "" if stated == found or _is_close(stated, found, close) else place
+    return next((text for key, a, b in pairs if (text := changed_place(a, b, key, close))), "")
 
 
-def _is_close(a: object, b: object) -> bool:
+def _is_close(a: object, b: object, close: float) -> bool:
     if not (isinstance(a, int | float) and isinstance(b, int | float)):
         return False
-    # A thousandth: standard deviations of what is hardly determined round most.
-    return abs(a - b) <= max(10.0 * _SAME * abs(b), 1e-12)
+    return abs(a - b) <= max(close * abs(b), 1e-12)
 
 
 CHANGED_RECORDING = Kind("verdict.changed-recording", "{reason}")
@@ -160,6 +237,9 @@ class LinkState(Enum):
     """It prevents the green light."""
     UNSTATED = "not verifiable"
     """Nothing contradicts it, and nothing proves it: files older than hashes."""
+    OTHERWISE = "derived by another version"
+    """It differs from what this version derives by less than the noise; it prevents the green light
+    until it is derived again."""
     UNSIGNED = "not signed"
     """Nobody has signed it; an editor of a file can renew hashes."""
 
@@ -382,10 +462,15 @@ def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -
         yield above if reason in reported else _broken("dataset", _with_reason(text, reason))
         return
     text = phrase("the dataset is not what the {source} give", source=source)
-    if difference := changed_reading(dataset, again, old, source):
+    difference = changed_reading(dataset, again, old, source)
+    version = _by_another_version(dataset, again, old, source) if difference else ""
+    if difference and not version:
         yield _broken("dataset", _with_advice(_with_reason(text, difference), advice))
-    elif difference := changed_text(dataset, again):
+    elif difference := changed_text(dataset, again, _SAME_MARKER if version else 0.0):
         yield _unlike(old, "dataset", _with_reason(text, difference), advice)
+    elif version:
+        text = phrase("the dataset {difference}", difference=version)
+        yield Link("dataset", LinkState.OTHERWISE, _with_advice(text, advice))
     else:
         text = phrase("the dataset is what the {source} give, made again from them", source=source)
         yield _whole("dataset", text)
@@ -393,15 +478,41 @@ def _derived(evidence: Evidence, files: ChainFiles, reported: Collection[str]) -
         return
     if again_summary is not None:
         again_summary = replace(again_summary, dataset_sha256=summary.dataset_sha256)
-    if place := changed_place(to_data(summary), to_data(again_summary)):
-        text = phrase(
-            "the summary of the run is not what the streams give: {place} differs", place=place
-        )
-        yield _unlike(old, "summary", text, advice)
-    else:
-        yield _whole("summary", phrase("the summary of the run is what the streams give"))
+    yield _summarised(summary, again_summary, version != "", old, advice)
     if files.run is not None and summary.dataset_sha256:
         yield from _rewritten(files.run, summary)
+
+
+def _summarised(
+    stated: RunSummary, found: RunSummary | None, by_version: bool, old: bool, advice: str
+) -> Link:
+    """Return whether the summary is the one made again; of another version, by as much as it is."""
+    mine, again = to_data(stated), to_data(found)
+    if not (place := changed_place(mine, again)):
+        return _whole("summary", phrase("the summary of the run is what the streams give"))
+    text = phrase(
+        "the summary of the run is not what the streams give: {place} differs", place=place
+    )
+    if by_version and not changed_place(mine, again, close=_PART_OF_NOISE):
+        return Link("summary", LinkState.OTHERWISE, _with_advice(text, advice))
+    return _unlike(old, "summary", text, advice)
+
+
+def _by_another_version(stated: Dataset, found: Dataset, old: bool, source: str) -> str:
+    """Return how readings differ that another version may have derived; empty: they were changed.
+
+    What version a file states is no evidence, so that the differences alone are judged.
+    """
+    part = part_of_noise(stated, found)
+    if not part.is_of_a_version or changed_reading(stated, found, old, source, _NOISE_OF):
+        return ""
+    return phrase(
+        "differs from what this version of elastocal derives from the {source} by up to {most} of"
+        " the noise of a reading, {typical} in the mean: another version may have derived it",
+        source=source,
+        most=f"{part.most:.0%}",
+        typical=f"{part.typical:.0%}",
+    )
 
 
 def _campaigns(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
@@ -420,9 +531,13 @@ def _campaigns(evidence: Evidence, files: ChainFiles) -> Iterator[Link]:
             reason = _with_reason(text, files.plain(error))
             yield _broken("dataset", _with_reason(name, reason))
             continue
-        if difference := changed_reading(each.dataset, again, False, phrase("streams")):
+        source = phrase("streams")
+        if difference := changed_reading(each.dataset, again, False, source):
+            version = _by_another_version(each.dataset, again, False, source)
             reason = _with_reason(phrase("its dataset is not what the streams give"), difference)
-            yield _broken("dataset", _with_reason(name, reason))
+            state = LinkState.OTHERWISE if version else LinkState.BROKEN
+            text = phrase("its dataset {difference}", difference=version) if version else reason
+            yield Link("dataset", state, _with_reason(name, text))
         else:
             text = phrase("its dataset is what its streams give")
             yield _whole("dataset", _with_reason(name, text))

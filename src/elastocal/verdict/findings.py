@@ -385,6 +385,12 @@ UNSTATED = Kind(
     " made from.",
     grade=Grade.NOTE,
 )
+OTHERWISE = Kind(
+    "verdict.derived-otherwise",
+    "derived by another version of elastocal: {names} (see Provenance)",
+    advice="Derive or import it again, then calibrate: what this version makes again is proved.",
+    grade=Grade.WARNING,
+)
 
 
 def missing_findings(evidence: Evidence) -> Iterator[Finding]:
@@ -398,9 +404,10 @@ def missing_findings(evidence: Evidence) -> Iterator[Finding]:
             yield kind(name=each.name, reason=each.reason)
     for doubt in evidence.doubts:
         yield CONTRADICTION(doubt=doubt)
-    unstated = [link.name for link in evidence.chain if link.state is LinkState.UNSTATED]
-    if unstated:
-        yield UNSTATED(names=list(dict.fromkeys(unstated)))
+    for kind, state in ((OTHERWISE, LinkState.OTHERWISE), (UNSTATED, LinkState.UNSTATED)):
+        names = [link.name for link in evidence.chain if link.state is state]
+        if names:
+            yield kind(names=list(dict.fromkeys(names)))
 
 
 FINDINGS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (

@@ -481,7 +481,11 @@ def parse_frame(
     if len(parts) != 6:
         raise error(f"{name} {text!r} {rule}")
     kinds = ("length",) * 3 + ("angle",) * 3
-    return T_from_xyzabc(*(parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)))
+    try:
+        numbers = [parse_quantity(p, kind) for p, kind in zip(parts, kinds, strict=True)]
+    except UnitError as refused:
+        raise UnitError(f"{name} {text!r}: {refused}") from refused
+    return T_from_xyzabc(*numbers)
 
 
 def _robot_at(

@@ -192,7 +192,7 @@ def compensate(settings: CompensateSettings, progress: Progress) -> CompensateRe
     if is_program:
         if forces is None:
             raise FileAccessError(f"{path} has no forces: name a table of them with --forces")
-        T_base_frame = None if settings.base is None else parse_frame(settings.base)
+        T_base_frame = None if settings.base is None else parse_frame(settings.base, "--base")
         found = compensate_program(calibrated, path, forces, settings.out, how, T_base_frame)
         summary, notes = found.summary, found.notes
     else:

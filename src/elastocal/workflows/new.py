@@ -36,6 +36,8 @@ _RETREATS = (0.25, 0.15, 0.4)
 """Distances of HOME from the surface that are tried, in m."""
 _TRIED, _TURNS = 40, 8
 """Points before which HOME is looked for, and turns of the tool at each."""
+_PARTS = 12
+"""Parts in which they are solved for, which is what progress counts."""
 _MOST_POSTURES = 40
 """Postures that are tried as HOME for collisions."""
 _REMARK, _COLUMN = re.compile(r"(?m)^(?=[^#\n]*\S)(.*?\S) +(# .*)$"), 38
@@ -84,7 +86,7 @@ def new(settings: NewSettings, progress: Progress) -> NewResult:
             trial = replace(known, place=place)
             cell = _begun(temporary, out, trial, flip)
             try:
-                surface, home = _prepared(cell)
+                surface, home = _prepared(cell, progress)
             except (PlanningError, SurfaceError) as error:  # of the place; the rest it cannot mend
                 refused = refused or error
                 continue
@@ -117,11 +119,12 @@ def _begun(temporary: Path, out: Path, settings: NewSettings, flip: bool) -> Cel
     return load_cell(temporary)
 
 
-def _prepared(cell: Cell) -> tuple[Surface, FloatArray]:
+def _prepared(cell: Cell, progress: Progress) -> tuple[Surface, FloatArray]:
     """Return the surface, which the arm comes to, and a HOME before it."""
     surface = planning.cell_surface(cell)
     planning.surface_findings(cell, surface, np.random.default_rng(cell.file.search.seed))
-    home = _home(cell, surface, mover_for(cell, planning.collision_scene(cell, surface)))
+    mover = mover_for(cell, planning.collision_scene(cell, surface))
+    home = _home(cell, surface, mover, progress)
     return surface, home
 
 
@@ -137,7 +140,8 @@ def _unbearable(cell: Cell, surface: Surface) -> tuple[str, ...]:
     if check is None or not cell.robot.has_masses:
         return ()
     T = _places(surface, 0.0)
-    q = inverse_for(cell.robot).solve_many(T.reshape(-1, 4, 4), _on_the_rail(cell)).q
+    inverse = inverse_for(cell.robot).quick()
+    q = inverse.solve_many(T.reshape(-1, 4, 4), _on_the_rail(cell)).q
     point, turn, branch = np.nonzero(np.isfinite(q.reshape(*T.shape[:2], -1, q.shape[-1])).all(-1))
     q = q.reshape(*T.shape[:2], -1, q.shape[-1])[point, turn, branch]
     at = T[point, turn]
@@ -152,11 +156,16 @@ def _unbearable(cell: Cell, surface: Surface) -> tuple[str, ...]:
     )
 
 
-def _home(cell: Cell, surface: Surface, mover: Mover) -> FloatArray:
+def _home(cell: Cell, surface: Surface, mover: Mover, progress: Progress) -> FloatArray:
     """Return a posture before the surface that is far from its limits and free of collisions."""
     places = np.concatenate([_places(surface, retreat) for retreat in _RETREATS])
-    external = _on_the_rail(cell)
-    found = inverse_for(cell.robot).solve_many(places.reshape(-1, 4, 4), external).q
+    external, inverse = _on_the_rail(cell), inverse_for(cell.robot).quick()
+    parts = np.array_split(places.reshape(-1, 4, 4), _PARTS)
+    solved = []
+    for number, part in enumerate(parts):
+        progress("postures for HOME", number, len(parts))
+        solved.append(inverse.solve_many(part, external).q)
+    found = np.concatenate(solved)
     q = in_unit(found[np.isfinite(found).all(axis=-1)], "deg")
     q = np.radians(np.round(q, 1))
     q[:, : len(external)] = external
@@ -209,7 +218,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         robot=_quoted(robot.name),
         flange=_quoted(settings.flange),
         masses=_masses(robot),
-        tcp=_frame(str(settings.tcp)),
+        tcp=_frame(str(settings.tcp), "--tcp"),
         tool_mass=_quoted(settings.tool_mass),
         tool_centre=_listed(str(settings.tool_centre)),
         shape=_shape(settings.tip, 2.0 * settings.disk_radius),
@@ -219,7 +228,7 @@ def _text(out: Path, settings: NewSettings, home: FloatArray, flip: bool) -> str
         marker=_listed(str(settings.marker_place)),
         mesh=_quoted(path_from(out.parent, str(settings.mesh))),
         unit=settings.unit,
-        place=_frame(str(settings.place)),
+        place=_frame(str(settings.place), "--place"),
         low=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in low)),
         high=_listed(", ".join(f"{x:.4g} {settings.unit}" for x in high)),
         flip=flip,
@@ -320,7 +329,7 @@ def _listed(text: str) -> str:
     return f"[{', '.join(_quoted(part.strip()) for part in text.split(','))}]"
 
 
-def _frame(text: str) -> str:
-    parse_frame(text)
+def _frame(text: str, name: str) -> str:
+    parse_frame(text, name)
     parts = [part.strip() for part in text.split(",")]
     return f"{{xyz: {_listed(','.join(parts[:3]))}, abc: {_listed(','.join(parts[3:]))}}}"

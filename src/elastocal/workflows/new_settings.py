@@ -166,7 +166,7 @@ class NewSettings:
         force, weight = parse_quantity(self.press, "force"), _GRAVITY * self._mass
         lever = float(np.linalg.norm(self.tip)) + 0.1
         moment = force * lever + weight * float(np.linalg.norm(parse_point(centre)))
-        x, _, z = parse_frame(str(self.place))[:3, 3]
+        x, _, z = parse_frame(str(self.place), "--place")[:3, 3]
         aside = -max(2.0, 1.2 * self.reach)
         return replace(
             self,
@@ -204,7 +204,7 @@ class NewSettings:
         elif name == "rail":
             _ = replace(self, rail=text).travel
         elif name in ("place", "tcp"):
-            parse_frame(text)
+            parse_frame(text, name)
         elif name in ("tool_centre", "marker_place", "tracker"):
             parse_point(text)
         elif name in ("force_range", "moment_range"):
@@ -274,7 +274,7 @@ class NewSettings:
     @property
     def tip(self) -> FloatArray:
         """Tool tip in the flange, shape (3,), in m."""
-        return np.asarray(parse_frame(str(self.tcp))[:3, 3])
+        return np.asarray(parse_frame(str(self.tcp), "--tcp")[:3, 3])
 
     @property
     def disk_radius(self) -> float:
@@ -284,7 +284,7 @@ class NewSettings:
     @property
     def lowest(self) -> float:
         """Height of the lowest corner of the box about the mesh, in base in m."""
-        T = parse_frame(str(self.place))
+        T = parse_frame(str(self.place), "--place")
         corners = np.array(list(product(*(self.bounds * self._metres).T)))
         return float((corners @ T[2, :3] + T[2, 3]).min())
 
@@ -324,7 +324,7 @@ class NewSettings:
     @property
     def _tool(self) -> Robot:
         """The robot up to the tool tip."""
-        T_flange_tip = parse_frame(str(self.tcp))
+        T_flange_tip = parse_frame(str(self.tcp), "--tcp")
         return Robot.from_urdf(with_tool(self.arm.urdf, self.arm.tip, "tcp", T_flange_tip), "tcp")
 
     @property

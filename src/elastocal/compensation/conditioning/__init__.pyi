@@ -8,11 +8,14 @@ from .filters import (
     WrenchFilter as WrenchFilter,
 )
 from .mistakes import (
+    BIAS_JUMPS as BIAS_JUMPS,
     SENSOR_TURNED as SENSOR_TURNED,
+    SensorMistake as SensorMistake,
     other_centre as other_centre,
     other_mass as other_mass,
     refuse_mistakes as refuse_mistakes,
     refuse_other_readings as refuse_other_readings,
+    sensor_mistake as sensor_mistake,
     tool_doubts as tool_doubts,
 )
 from .postures import (

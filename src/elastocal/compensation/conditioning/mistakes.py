@@ -158,6 +158,10 @@ _DEAD, _SAME = 0.1, 0.03
 """Gains of an axis below which it is dead, and nearer to 1 than which it is right."""
 SENSOR_TURNED = "the sensor is not turned as stated"
 """Start of the text of a mistaken rotation, which a caller may explain further."""
+BIAS_JUMPS = "the bias jumps by"
+"""Start of the text of a jump, which does no harm where each pose has a zero of its own."""
+_SIGN_ALONE = 0.2
+"""Largest deviation of a gain from -1 at which the sign alone is turned."""
 _AXES = "xyz"
 _ORDERS = ("zyx", "XYZ", "ZYZ", "ZXZ", "YZX")
 """Senses of three angles beside KUKA's ZYX, as SciPy writes them."""
@@ -173,11 +177,23 @@ class _Reading:
     """Standard deviation of a component."""
     imitated: bool = False
     """Whether cross-talk looks like a little of this mistake."""
+    entry: str = ""
+    """See `SensorMistake`."""
+
+
+@dataclass(frozen=True)
+class SensorMistake:
+    """A mistake in forces or moments."""
+
+    message: str
+    """Sentence without its end, with its figures."""
+    entry: str
+    """Key and value by which the map of a log undoes it; empty where no key does."""
 
 
 def force_mistake(
     postures: StaticPostures, R_flange_sensor: FloatArray, lever: float
-) -> str | None:
+) -> SensorMistake | None:
     """Return the mistake whose correction lets one tool explain the forces; None if there is none.
 
     Parameters
@@ -197,7 +213,7 @@ def force_mistake(
 
 def moment_mistake(
     postures: StaticPostures, R_flange_sensor: FloatArray, lever: float
-) -> str | None:
+) -> SensorMistake | None:
     """Return the mistake without which one tool explains the moments; see `force_mistake`."""
     u, M = postures.gravity_flange @ R_flange_sensor, postures.moment
     terms = [np.cross(axis, u) for axis in np.eye(3)]
@@ -216,9 +232,11 @@ def moment_mistake(
                 f" other axes: {_why(gain)}",
                 left if abs(gain - 1.0) > _SAME else np.inf,
                 imitated=True,
+                entry=_signs(k, gain, "moment"),
             )
         for pair, order in _exchanges("moment"):
-            yield _Reading(pair, _solved(M[:, order], terms)[1])
+            entry = _exchanged(order, "moment")
+            yield _Reading(pair, _solved(M[:, order], terms)[1], entry=entry)
 
     floors = _floors(u, M, postures.force * lever)
     return _judged(_solved(M, terms)[1], readings(), floors, "moment", "N*m")
@@ -250,7 +268,7 @@ def _floors(u: FloatArray, own: FloatArray, other: FloatArray) -> tuple[float, f
 
 def _judged(
     stated: float, others: Iterable[_Reading], floors: tuple[float, float], what: str, unit: str
-) -> str | None:
+) -> SensorMistake | None:
     """Return the mistake of the plainest reading that leaves nearly the least, with its figures.
 
     ``stated`` is left as stated; ``floors`` is what must be left to look for mistakes, and for
@@ -266,9 +284,10 @@ def _judged(
     best = next(each for each in every if each.left <= near)
     if not best.sentence:
         return None
-    return (
+    return SensorMistake(
         f"{best.sentence}; so read, {best.left:.3g} {unit} are left of a {what} component instead"
-        f" of {stated:.3g} {unit}"
+        f" of {stated:.3g} {unit}",
+        best.entry,
     )
 
 
@@ -280,7 +299,8 @@ def _force_readings(postures: StaticPostures, R_flange_sensor: FloatArray) -> It
     yield from _axis_gains(u, F)
     for pair, order in _exchanges("force"):
         (mass,), left = _solved(F[:, order], [u])
-        yield _Reading(pair, left if mass > 0.0 else np.inf)
+        entry = _exchanged(order, "force")
+        yield _Reading(pair, left if mass > 0.0 else np.inf, entry=entry)
     yield from _in_time(u, F)
     yield from _turned_sensor(u, F)
     yield from _other_orientations(postures, R_flange_sensor)
@@ -299,6 +319,7 @@ def _force_readings(postures: StaticPostures, R_flange_sensor: FloatArray) -> It
     yield _Reading(
         "the wrenches are in the sensor's frame already, though they are said to be in base",
         left if mass > 0.0 else np.inf,
+        entry="`frame: sensor`",
     )
 
 
@@ -312,7 +333,19 @@ def _axis_gains(u: FloatArray, F: FloatArray) -> Iterator[_Reading]:
             f" {_why(gain)}",
             left if abs(gain - 1.0) > _SAME else np.inf,
             imitated=True,
+            entry=_signs(k, gain, "force"),
         )
+
+
+def _signs(axis: int, gain: float, what: str) -> str:
+    """Return the entry of a map that turns the sign of an axis; empty where that is not enough."""
+    signs = [-1 if each == axis else 1 for each in range(3)]
+    return f"`signs: {signs}` at {what}" if abs(gain + 1.0) < _SIGN_ALONE else ""
+
+
+def _exchanged(order: list[int], what: str) -> str:
+    """Return the entry of a map that exchanges two columns."""
+    return f"`columns` in the order {', '.join(_AXES[each] for each in order)} at {what}"
 
 
 def _why(gain: float) -> str:
@@ -334,7 +367,7 @@ def _in_time(u: FloatArray, F: FloatArray) -> Iterator[_Reading]:
         late = (np.arange(len(F)) >= row)[:, None]
         (_, *step), left = _solved(F, [u, *(late * axis for axis in np.eye(3))])
         size = float(np.linalg.norm(step))
-        text = f"the bias jumps by {size:.3g} N after posture {row}: was the sensor zeroed there?"
+        text = f"{BIAS_JUMPS} {size:.3g} N after posture {row}: was the sensor zeroed there?"
         steps.append(_Reading(text, left))
         (first, last), left = _solved(F, [u * ~late, u * late])
         text = (
@@ -492,6 +525,14 @@ def refuse_mistakes(
         _refuse_other_point(fit, expected_centre, points or {})
 
 
+def sensor_mistake(
+    postures: StaticPostures, R_flange_sensor: FloatArray, lever: float
+) -> SensorMistake | None:
+    """Return the mistake in forces, else in moments; see `force_mistake`."""
+    found = force_mistake(postures, R_flange_sensor, lever)
+    return found or moment_mistake(postures, R_flange_sensor, lever)
+
+
 def refuse_other_readings(
     postures: StaticPostures, R_flange_sensor: FloatArray, lever: float
 ) -> None:
@@ -511,10 +552,9 @@ def refuse_other_readings(
     CompensationError
         Naming the mistake.
     """
-    for mistake in (force_mistake, moment_mistake):
-        found = mistake(postures, R_flange_sensor, lever)
-        if found is not None:
-            raise CompensationError(found)
+    found = sensor_mistake(postures, R_flange_sensor, lever)
+    if found is not None:
+        raise CompensationError(found.message)
 
 
 def _refuse_misfit(postures: StaticPostures, fit: ToolFit, R_nominal: FloatArray | None) -> None:

@@ -9,8 +9,14 @@ from elastocal.elastic import ElasticModel
 from elastocal.errors import ConventionError
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.conventions import POOR_FIT, check_conventions, check_joints
-from elastocal.identification.mistakes.plausibility import find_implausible, find_wrong_units
-from elastocal.identification.mistakes.undoing import find_undone
+from elastocal.identification.mistakes.plausibility import (
+    COUNTS,
+    UNIT_OF_DISPLACEMENT,
+    UNIT_OF_FORCE,
+    find_implausible,
+    find_wrong_units,
+)
+from elastocal.identification.mistakes.undoing import PARTED, READ_SO, find_undone
 from elastocal.identification.options import FitOptions
 from elastocal.identification.tip_place import as_described
 
@@ -20,6 +26,16 @@ POORLY_FITTED = Kind(
     "the springs leave {left} of the median deflection unexplained",
     shown={"left": as_number(".0%")},
 )
+DOUBTED = Kind("calibration.doubted", "{doubt} (`import` said so of the logs)")
+SURELY_DOUBTED = Kind(
+    "calibration.surely-doubted",
+    "{doubt} (`import` said so of the logs; by the readings alone: {named})",
+    grade=Grade.REFUSAL,
+)
+_OTHER_NAMES = {
+    each.name for each in (READ_SO, PARTED, UNIT_OF_FORCE, UNIT_OF_DISPLACEMENT, COUNTS)
+}
+"""Kinds that name a mistake by its effect on the readings, of which the logs show more."""
 
 
 def find_mistakes(
@@ -48,6 +64,26 @@ def find_mistakes(
     ConventionError
         With the first mistake that is certain, unless the options trust the conventions.
     """
+    doubts = readings.doubts
+    try:
+        found = _found(model, readings, options, marker_offset)
+    except ConventionError as error:
+        if not doubts:
+            raise
+        raise ConventionError(SURELY_DOUBTED(doubt="; ".join(doubts), named=str(error))) from error
+    if not doubts:
+        return found
+    others = [each for each in found if each.kind not in _OTHER_NAMES]
+    return (*(DOUBTED(doubt=each) for each in doubts), *others)
+
+
+def _found(
+    model: ElasticModel,
+    readings: Readings,
+    options: FitOptions,
+    marker_offset: ArrayLike | None,
+) -> tuple[Finding, ...]:
+    """Return the mistakes that the readings show, or refuse them; see `find_mistakes`."""
     seen = _implausible(model, readings, marker_offset)
     # Recorded positions of the tcp are of the description.
     described = as_described(model.robot, options)

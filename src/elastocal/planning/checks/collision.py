@@ -68,6 +68,26 @@ class CollisionCheck(PostureCheck):
             left = np.setdiff1d(left, kept, assume_unique=True)
         return margin
 
+    def nearest(self, postures: Postures) -> str:
+        """Return which bodies are too near at most of some postures, and how near they come.
+
+        Judged in contact and at the approach pose.
+        """
+        met: dict[tuple[str, str], list[float]] = {}
+        for q, q_approach in zip(postures.q, postures.q_approach, strict=True):
+            both = (q, True), (q_approach, False)
+            near = [float(self.scene.distances(at[None], pressed).min()) for at, pressed in both]
+            at, pressed = both[int(np.argmin(near))]
+            met.setdefault(self.scene.nearest(at, pressed), []).append(min(near))
+        (first, second), distances = max(met.items(), key=lambda each: len(each[1]))
+        return phrase(
+            "{first} and {second} come as near as {distance} mm (must be above {clearance} mm)",
+            first=first,
+            second=second,
+            distance=f"{1e3 * min(distances):.3g}",
+            clearance=f"{1e3 * self.clearance:.3g}",
+        )
+
     def _places(self, postures: Postures) -> list[tuple[FloatArray, float | None]]:
         """Return joints at each place, with the distance of the tool from what it presses on.
 

@@ -8,6 +8,7 @@ from .distances import (
     geodesic_distance as geodesic_distance,
 )
 from .findings import (
+    INVERTED as INVERTED,
     OF_WRONG_MESHES as OF_WRONG_MESHES,
     ReachableFrom as ReachableFrom,
     arm_reach as arm_reach,

@@ -92,7 +92,8 @@ INSIDE_OUT = Kind(
 INVERTED = Kind(
     "surface.inverted",
     "{name}: the normals point away from the robot's side: it reaches {front} of the points"
-    " along them and {back} against them; set surface.flip_normals: true to turn them",
+    " along them and {back} against them; set surface.flip_normals: true to turn them, or turn z of"
+    " the tcp (tcp.abc) if it points into the tool",
     shown=dict.fromkeys(("front", "back"), as_number(".0%")),
 )
 OF_WRONG_MESHES = frozenset(kind.name for kind in (TINY, SOLID_TINY, INCHES, INSIDE_OUT, INVERTED))
@@ -289,5 +290,5 @@ class ReachableFrom:
         for position in self.external:
             left = np.flatnonzero(~reached)
             if len(left):
-                reached[left] = self.inverse.solve_many(T_base_tcp[left], position).reachable
+                reached[left] = self.inverse.reachable(T_base_tcp[left], position)
         return reached

@@ -22,6 +22,7 @@ def robot_figures(name: str) -> dict[str, object]:
     robot, known = load(name), entry(name)
     return {
         "name": known.name,
+        "maker": known.maker,
         "reach": known.reach,
         "joints": [
             {"name": joint} | dict(zip(_LIMITS, limits, strict=True))
@@ -34,10 +35,15 @@ def robot_figures(name: str) -> dict[str, object]:
 
 def show_robots(names: Iterable[str]) -> Iterator[Block]:
     """Yield a row a robot, and what the words in it mean."""
-    heads = phrases("Robot", "Reach", "Limits", "Speeds", "Torques", "Masses")
+    heads = phrases("Robot", "Maker", "Reach", "Limits", "Speeds", "Torques", "Masses")
     entries = map(entry, names)
     rows = tuple(
-        (each.name, f"{each.reach:.3f} m" if each.reach else "-", *_marks(load(each.name)))
+        (
+            each.name,
+            each.maker,
+            f"{each.reach:.3f} m" if each.reach else "-",
+            *_marks(load(each.name)),
+        )
         for each in entries
     )
     yield Table(phrase("Robots of the catalogue"), heads, rows)

@@ -9,9 +9,10 @@ Reference: R. M. Murray, Z. Li, S. S. Sastry, *A Mathematical Introduction to Ro
 CRC Press 1994, section 3.2 (subproblems 1 to 3).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
@@ -242,6 +243,10 @@ def derive_parallel(robot: Robot, tolerance: float = _EXACT) -> ParallelGeometry
 
 _MOST_SOLUTIONS = 16
 """A general arm of six revolute joints reaches a pose in at most 16 ways (Primrose, 1986)."""
+_ROWS = 2048
+"""Descents that are made at once: fewer are mostly overhead, more take memory."""
+_AT_ONCE = 8
+"""Starts that are tried at once where one solution is enough."""
 _SAME = 1e-4
 """Two ends of a descent nearer than this (rad, m) are one solution, found twice."""
 _CONVERGED = 1e-11
@@ -338,17 +343,77 @@ class NumericalInverse(InverseKinematics):
         arm_starts = self._arm_starts(length)
         shape = (len(T_base_tcp), _MOST_SOLUTIONS, arm_starts.shape[1])
         found = np.full(shape, np.nan)
-        for slots, T, fixed in zip(found, T_base_tcp, external, strict=True):
-            q = np.hstack([np.tile(fixed, (len(arm_starts), 1)), arm_starts])
-            poses = np.broadcast_to(T, (len(q), 4, 4))
+        many = max(1, _ROWS // len(arm_starts))
+        for start in range(0, len(T_base_tcp), many):
+            part = slice(start, start + many)
+            poses = np.repeat(T_base_tcp[part], len(arm_starts), axis=0)
+            fixed = np.repeat(external[part], len(arm_starts), axis=0)
+            q = np.hstack([fixed, np.tile(arm_starts, (len(external[part]), 1))])
             q = self.descend(q, poses, length)
-            arm = q[reaches(self.robot, q, poses)][:, self.robot.external_axes :]
+            q[~reaches(self.robot, q, poses)] = np.nan
+            arms = q[:, self.robot.external_axes :].reshape(-1, *arm_starts.shape)
+            self._sort(found[part], arms)
+        return found
+
+    def _sort(self, found: FloatArray, arms: FloatArray) -> None:
+        """Put the distinct ends of the descents to each pose into its slots, NaN for no end."""
+        for slots, ends in zip(found, arms, strict=True):
+            arm = ends[np.isfinite(ends).all(axis=-1)]
             arm = nearest_zero(self.robot, arm)
             arm = arm[np.isfinite(arm).all(axis=-1)]
             arm = arm[np.lexsort(np.round(arm, 6).T[::-1])]
             arm = distinct(self.robot, arm, _SAME)[:_MOST_SOLUTIONS]
             slots[: len(arm)] = arm
+
+    def reachable(self, T_base_tcp: FloatArray, external: ArrayLike = ()) -> NDArray[np.bool_]:
+        """Return which poses are reached; no more starts are tried once one has led there."""
+        length = characteristic_length(self.robot)
+        fixed = np.broadcast_to(np.asarray(external, dtype=float), (self.robot.external_axes,))
+        reached = np.zeros(len(T_base_tcp), dtype=bool)
+        for starts in np.array_split(self._arm_starts(length), max(1, self.starts // _AT_ONCE)):
+            left = np.flatnonzero(~reached)
+            if not len(left):
+                break
+            q = np.array([[*fixed, *start] for start in starts])
+            poses = np.repeat(T_base_tcp[left], len(q), axis=0)
+            found = self._ends(np.tile(q, (len(left), 1)), poses, length)
+            reached[left] = np.isfinite(found[:, 0]).reshape(len(left), -1).any(axis=1)
+        return reached
+
+    def beside(self, T_base_tcp: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the configurations at poses beside others, each in the slot of the other.
+
+        Parameters
+        ----------
+        T_base_tcp : ndarray, shape (pose, 4, 4)
+            In m.
+        q : ndarray, shape (pose, slot, joint)
+            Configurations at the other poses, in rad or m; NaN where there is none.
+
+        Returns
+        -------
+        ndarray, shape (pose, slot, joint)
+            Where descents from there end; NaN off the pose or the limits.
+        """
+        found = np.full(q.shape, np.nan)
+        pose, slot = np.nonzero(np.isfinite(q).all(axis=-1))
+        length = characteristic_length(self.robot)
+        found[pose, slot] = self._ends(q[pose, slot], T_base_tcp[pose], length)
         return found
+
+    def quick(self) -> "NumericalInverse":
+        """Return the solver with a sixth of the starts."""
+        return replace(self, starts=max(1, self.starts // 6))
+
+    def _ends(self, q: FloatArray, T_base_tcp: FloatArray, length: float) -> FloatArray:
+        """Return where descents end, shape (row, joint); NaN off the pose or the limits."""
+        fixed = self.robot.external_axes
+        q = self.descend(q, T_base_tcp, length)
+        q[:, fixed:] = nearest_zero(self.robot, q[:, fixed:])
+        q[~np.isfinite(q).all(axis=-1)] = np.nan
+        there = np.flatnonzero(np.isfinite(q[:, 0]))
+        q[there[~reaches(self.robot, q[there], T_base_tcp[there])]] = np.nan
+        return q
 
     def follow(self, T_base_tcp: FloatArray, q: FloatArray) -> FloatArray:
         """Return joints that reach a pose, from a posture beside it and near to that.

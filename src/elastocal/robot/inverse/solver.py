@@ -156,6 +156,22 @@ class InverseKinematics(ABC):
             q[part] = self._proven(q[part], poses[part])
         return InverseSolutions(q)
 
+    def reachable(self, T_base_tcp: FloatArray, external: ArrayLike = ()) -> NDArray[np.bool_]:
+        """Return whether each pose is reached within the limits, shape (pose,).
+
+        Parameters
+        ----------
+        T_base_tcp : ndarray, shape (pose, 4, 4)
+            In m.
+        external : array_like, shape (external axis,)
+            Positions of the external axes, in rad or m.
+        """
+        return self.solve_many(T_base_tcp, external).reachable
+
+    def quick(self) -> "InverseKinematics":
+        """Return a solver that need not find every solution, if that is quicker."""
+        return self
+
     def _proven(self, q: FloatArray, T_base_tcp: FloatArray) -> FloatArray:
         """Return ``q`` with every row polished that misses its pose, and NaN if that fails."""
         q = np.where(np.isfinite(q).all(axis=-1, keepdims=True), q, np.nan)

@@ -14,6 +14,7 @@ from elastocal.wording import counted, phrase, phrases
 _STATES = {
     LinkState.WHOLE: phrase("unchanged"),
     LinkState.BROKEN: phrase("changed or of something else"),
+    LinkState.OTHERWISE: phrase("derived by another version"),
     LinkState.UNSTATED: phrase("not verifiable"),
     LinkState.UNSIGNED: phrase("not signed"),
 }
