@@ -99,7 +99,8 @@ class Climbed:
     """Pose blocks whose score decides, shape (block,); none: all. See `poses_in_company`."""
     apart: float = float("nan")
     """Root mean square distance of its predictions at left-out poses from those of the chosen rung,
-    in m; NaN where it could not be chosen and does not show what that lacks (``beside``)."""
+    in m; NaN where it could not be chosen and does not show what that lacks: by being fitted
+    ``beside``, or by predicting better by more than one standard error."""
     known: tuple[KnownSpring, ...] = ()
     """Prior knowledge of its springs that its fits used."""
     forecast: ProductionForecast | None = None
@@ -387,6 +388,8 @@ def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
     chosen = int(np.nanargmin(on_production)) if known else _simplest(found, score)
     each = found.difference
     figures = (each.mean, each.low, each.high, np.nan_to_num(each.standard_error))
+    # Springs that were asked for by name lack what better ones have.
+    doubts = may | (each.mean < -figures[3])
     ladder = tuple(
         replace(
             rung,
@@ -396,7 +399,7 @@ def take_best(tried: Sequence[Climbed], allowed: Sequence[str]) -> Choice:
             standard_error=float(error),
             chosen=number == chosen,
             production_error=float(on_production[number]),
-            apart=_distance(rung, tried[chosen]) if may[number] else float("nan"),
+            apart=_distance(rung, tried[chosen]) if doubts[number] else float("nan"),
         )
         for number, (rung, mean, low, high, error) in enumerate(zip(tried, *figures, strict=True))
     )
