@@ -78,7 +78,6 @@ def test_sigterm_leaves_nothing_half_written(folder, tmp_path):
 DROPPED = """
 import os, signal, sys, time
 from elastocal.cli import main
-from support.by_day import some_by_day
 
 class Finalised:
     def __del__(self):

@@ -170,6 +170,11 @@ class PathTable:
         PathError
             If a column is none, columns differ in length, or the headings do not fit.
         """
+        if not hasattr(table, "keys"):
+            raise PathError(
+                f"rows are {type(table).__name__}: they must be a file, a dataset, or columns by"
+                " their headings"
+            )
         columns = {str(name): np.asarray(table[name]) for name in table}
         for name, column in columns.items():
             if column.ndim != 1 or len(column) != len(next(iter(columns.values()))):

@@ -239,14 +239,13 @@ def calibrate(
     kept, fitted = problem.take(used), readings.take(used)
     solution = solve(kept, options.loss)
     weighted = kept.reweighted(solution.reading_weight)
-    held_out = leave_poses_out(weighted)
+    held_out, doubting = leave_poses_out(weighted), _doubting(ladder, options.loss)
     unexplained = held_out.mean / float(np.linalg.norm(kept.d, axis=1).mean())
     springs, frames, c = weighted.springs, weighted.frame_columns, solution.compliance
     draws = _resampled(weighted, options.draws, rng, model.parameters)
     few, by = _widening(weighted, c, draws, held_out, ladder, unexplained)
     widened = _stretched(weighted, c, draws, by, model.parameters)
     seen = _seen(model, weighted.of_springs(), c[springs], options)
-    fits = [Fit(model, weighted, c), *_doubting(ladder, options.loss)]
     calibrated = CalibratedModel(
         model,
         c[springs],
@@ -257,7 +256,7 @@ def calibrate(
         unexplained=unexplained,
         domain=CalibrationDomain.of(model.robot, fitted, kept.block),
         encoders=encoder_zeros(model, fitted, c[springs]) if options.encoders else (),
-        spring_ends=_spring_ends(fits, seen, draws, few),
+        spring_ends=_spring_ends(Fit(model, weighted, c), doubting, seen, draws, few),
         tip=(widened - c)[:, weighted.tip_columns] if weighted.tip else None,
     )
     reach = max(attainable_rank(model, marker_offset), calibrated.observability.rank)
@@ -265,7 +264,6 @@ def calibrate(
     warnings += _lever_warnings(calibrated, fitted, kept.residuals(c))
     encoders = _encoders(weighted, solution, held_out, calibrated.encoders)
     contact = _contact(model, weighted, fitted, options, widened, calibrated.tip)
-    warnings += _encoder_warnings(encoders) + _contact_warnings(contact, options)
     return Calibration(
         calibrated=calibrated,
         readings=readings,
@@ -280,7 +278,7 @@ def calibrate(
         spring_widening=few,
         screening=screening,
         solution=solution,
-        warnings=tuple(warnings),
+        warnings=(*warnings, *_encoder_warnings(encoders), *_contact_warnings(contact, options)),
         frames=frame_summaries(weighted.frames, c[frames], interval(widened[:, frames])),
         contact=contact,
         encoders=encoders,
@@ -333,7 +331,7 @@ def _doubting(ladder: Sequence[Climbed], loss: str) -> list[Fit]:
 
 
 def _spring_ends(
-    fits: Sequence[Fit], seen: Observability, draws: FloatArray, by: float
+    fit: Fit, doubting: Sequence[Fit], seen: Observability, draws: FloatArray, by: float
 ) -> FloatArray:
     """Return the ends of the intervals of springs: of draws, and of the profiles of all fits.
 
@@ -342,8 +340,10 @@ def _spring_ends(
 
     Parameters
     ----------
-    fits : sequence of Fit
-        That of the model, then those that have all its springs and more.
+    fit : Fit
+        That of the model.
+    doubting : sequence of Fit
+        Those of models that have all its springs and more.
     seen : Observability
         What the readings tell of its springs.
     draws : ndarray, shape (draw, column)
@@ -351,12 +351,12 @@ def _spring_ends(
     by : float
         Factor by which few poses stretch them.
     """
-    model, fitted, compliance = fits[0]
+    model, fitted, compliance = fit
     rows = spring_rows(model.springs, seen)
     noise = noise_of_a_direction(fitted, compliance, draws)
     stretched = widen_draws(fitted, compliance, draws, by)[:, fitted.springs]
     found = [np.column_stack(interval(stretched @ rows.T))]
-    for other, problem, c in fits:
+    for other, problem, c in (fit, *doubting):
         names = list(other.parameter_names)
         sums = np.zeros((len(rows), problem.columns))
         sums[:, [names.index(name) for name in model.parameter_names]] = rows

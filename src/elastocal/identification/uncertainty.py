@@ -460,7 +460,8 @@ def profile_ends(
         bounds = problem.lower * scale, problem.upper * scale
         far = _farthest(system, compliance * scale, bounds, asked[told], NORMAL_QUANTILE * noise)
         ends[told] = far
-    return np.asarray(ends * [-1.0, 1.0])
+    # Adding zero takes the sign from an end at zero.
+    return np.asarray(ends * [-1.0, 1.0] + 0.0)
 
 
 def _farthest(
