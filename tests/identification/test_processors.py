@@ -27,7 +27,7 @@ def test_two_core_types_decide_alike_on_published_and_simulated_readings():
 
 
 @pytest.mark.slow
-def test_five_core_types_decide_alike_on_two_hundred_campaigns():
+def test_core_types_decide_alike_on_two_hundred_campaigns():
     numbers = range(-1, 200)
     found = {core_type: under(core_type, numbers) for core_type in CORE_TYPES}
     first = found[CORE_TYPES[0]]
@@ -42,7 +42,7 @@ def test_five_core_types_decide_alike_on_two_hundred_campaigns():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["afp", "machining"])
-def test_five_core_types_judge_a_demo_alike(kind, tmp_path):
+def test_core_types_judge_a_demo_alike(kind, tmp_path):
     demo = finished_demo(kind)
     found = []
     for core_type in CORE_TYPES:
