@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from elastocal.errors import FileAccessError, SchemaError, described_type
+from elastocal.errors import FileAccessError, SchemaError, require_type
 from elastocal.locks import show_life, taken_over
 from elastocal.outputs import current_rule
 
@@ -123,7 +123,7 @@ def replacing(path: Path) -> Iterator[Path]:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def as_path(given: object, name: str, *others: str) -> Path:
+def as_path(given: Any, name: str, *others: str) -> Path:
     """Return the path that an argument of a public function is.
 
     Parameters
@@ -138,9 +138,7 @@ def as_path(given: object, name: str, *others: str) -> Path:
     TypeError
         If it is neither a text nor a path.
     """
-    if not isinstance(given, str | os.PathLike):
-        allowed = ", ".join(("path", *others))
-        raise TypeError(f"{name} is {described_type(given)} (allowed: {allowed})")
+    require_type(given, (str, os.PathLike), name, ", ".join(("path", *others)))
     return Path(given)
 
 

@@ -65,7 +65,7 @@ from elastocal.planning.surface import (
 )
 from elastocal.progress import Progress, silent
 from elastocal.results import brief_repr
-from elastocal.robot.inverse import InverseKinematics, NumericalInverse, inverse_for
+from elastocal.robot.inverse import InverseKinematics, inverse_for
 from elastocal.wording import phrase, sentences
 
 _APART = (0.2, float(np.radians(10.0)))
@@ -473,10 +473,7 @@ class PostureSolver:
             off = contact.copy()
             off[:, :3, 3] += self.approach * normals
             here = self.inverse.solve_many(contact, external).q
-            if isinstance(self.inverse, NumericalInverse):
-                there = self.inverse.beside(off, here)
-            else:
-                there = self.inverse.solve_many(off, external).q
+            there = self.inverse.beside(off, here, external)
             # NaN where there is no solution. Half a turn: axes 4 and 6 may be given a turn apart.
             reached = np.abs(there - here).max(axis=2) < np.pi
             point, branch = np.nonzero(reached)

@@ -64,15 +64,12 @@ def find_mistakes(
     ConventionError
         With the first mistake that is certain, unless the options trust the conventions.
     """
-    doubts = readings.doubts
+    if not (doubts := readings.doubts):
+        return _found(model, readings, options, marker_offset)
     try:
         found = _found(model, readings, options, marker_offset)
     except ConventionError as error:
-        if not doubts:
-            raise
         raise ConventionError(SURELY_DOUBTED(doubt="; ".join(doubts), named=str(error))) from error
-    if not doubts:
-        return found
     others = [each for each in found if each.kind not in _OTHER_NAMES]
     return (*(DOUBTED(doubt=each) for each in doubts), *others)
 

@@ -12,7 +12,7 @@ CRC Press 1994, section 3.2 (subproblems 1 to 3).
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from elastocal.arrays import FloatArray
 from elastocal.errors import RobotError
@@ -245,8 +245,6 @@ _MOST_SOLUTIONS = 16
 """A general arm of six revolute joints reaches a pose in at most 16 ways (Primrose, 1986)."""
 _ROWS = 2048
 """Descents that are made at once: fewer are mostly overhead, more take memory."""
-_AT_ONCE = 8
-"""Starts that are tried at once where one solution is enough."""
 _SAME = 1e-4
 """Two ends of a descent nearer than this (rad, m) are one solution, found twice."""
 _CONVERGED = 1e-11
@@ -365,36 +363,13 @@ class NumericalInverse(InverseKinematics):
             arm = distinct(self.robot, arm, _SAME)[:_MOST_SOLUTIONS]
             slots[: len(arm)] = arm
 
-    def reachable(self, T_base_tcp: FloatArray, external: ArrayLike = ()) -> NDArray[np.bool_]:
-        """Return which poses are reached; no more starts are tried once one has led there."""
-        length = characteristic_length(self.robot)
-        fixed = np.broadcast_to(np.asarray(external, dtype=float), (self.robot.external_axes,))
-        reached = np.zeros(len(T_base_tcp), dtype=bool)
-        for starts in np.array_split(self._arm_starts(length), max(1, self.starts // _AT_ONCE)):
-            left = np.flatnonzero(~reached)
-            if not len(left):
-                break
-            q = np.array([[*fixed, *start] for start in starts])
-            poses = np.repeat(T_base_tcp[left], len(q), axis=0)
-            found = self._ends(np.tile(q, (len(left), 1)), poses, length)
-            reached[left] = np.isfinite(found[:, 0]).reshape(len(left), -1).any(axis=1)
-        return reached
-
-    def beside(self, T_base_tcp: FloatArray, q: FloatArray) -> FloatArray:
-        """Return the configurations at poses beside others, each in the slot of the other.
-
-        Parameters
-        ----------
-        T_base_tcp : ndarray, shape (pose, 4, 4)
-            In m.
-        q : ndarray, shape (pose, slot, joint)
-            Configurations at the other poses, in rad or m; NaN where there is none.
-
-        Returns
-        -------
-        ndarray, shape (pose, slot, joint)
-            Where descents from there end; NaN off the pose or the limits.
-        """
+    def beside(
+        self,
+        T_base_tcp: FloatArray,
+        q: FloatArray,
+        external: ArrayLike = (),  # noqa: ARG002 - they are in q
+    ) -> FloatArray:
+        """Return where descents from the other configurations end."""
         found = np.full(q.shape, np.nan)
         pose, slot = np.nonzero(np.isfinite(q).all(axis=-1))
         length = characteristic_length(self.robot)

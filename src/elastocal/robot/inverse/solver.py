@@ -168,6 +168,30 @@ class InverseKinematics(ABC):
         """
         return self.solve_many(T_base_tcp, external).reachable
 
+    def beside(
+        self,
+        T_base_tcp: FloatArray,
+        q: FloatArray,  # noqa: ARG002 - only descents begin there
+        external: ArrayLike = (),
+    ) -> FloatArray:
+        """Return the configurations at poses beside others, each in the slot of the other.
+
+        Parameters
+        ----------
+        T_base_tcp : ndarray, shape (pose, 4, 4)
+            In m.
+        q : ndarray, shape (pose, slot, joint)
+            Configurations at the other poses, in rad or m; NaN where there is none.
+        external : array_like, shape (external axis,)
+            Positions of the external axes, in rad or m.
+
+        Returns
+        -------
+        ndarray, shape (pose, slot, joint)
+            NaN off the pose or the limits.
+        """
+        return self.solve_many(T_base_tcp, external).q
+
     def quick(self) -> "InverseKinematics":
         """Return a solver that need not find every solution, if that is quicker."""
         return self
