@@ -7,13 +7,13 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
 from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
+from elastocal._version import package_versions
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.codec._prepared import (
     Entrant,
@@ -47,7 +47,6 @@ _WORTH_PROCESSES = 4.0
 """Processor time from which on all cores are used, in s; processes need half of it to start."""
 _GROWTH = 1.8
 """Ratio of training sizes at which springs are chosen again."""
-_PACKAGES = ("elastocal", "numpy", "scipy")
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +149,7 @@ def cross_validate(
         robot=robot.name,
         provenance=provenance,
         findings=tuple(findings),
-        versions={name: version(name) for name in _PACKAGES},
+        versions=package_versions(),
         zero_error=np.array([_zero_error(prepared[0].problem, split) for split in splits]),
         layouts=tuple(taken),
         split_layouts=tuple(tuple(each.springs for each in found) for found in curves),

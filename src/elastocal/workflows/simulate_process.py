@@ -8,13 +8,13 @@ brings simulator and estimator together.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, TypeVar
 
 import numpy as np
 
+from elastocal._version import package_versions
 from elastocal.arrays import FloatArray
 from elastocal.cell import Cell, SensorLoad, load_cell
 from elastocal.compensation import (
@@ -346,7 +346,6 @@ __all__ = [
 ]
 PROGRAMMED, STIFFEST = "programmed", "stiffest"
 _Given = TypeVar("_Given")
-_PACKAGES = ("elastocal", "numpy", "scipy")
 _LARGEST_LOAD = 5.0
 _SUDDEN = 0.1
 """Share of a course's largest force that it may begin or end with."""
@@ -574,7 +573,7 @@ class _SeedRuns:
             process=settings.kind or Path(str(settings.path)).name,
             runs=self.runs,
             settings=self.trials[0].settings.model_dump(mode="json"),
-            versions={package: version(package) for package in _PACKAGES},
+            versions=package_versions(),
             lines=usual.pooled(usual.lines),
             budget=self.budget,
             tool=self.trials[0].model.tool_name,

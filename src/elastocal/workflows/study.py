@@ -9,13 +9,13 @@ import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
+from elastocal._version import package_versions
 from elastocal.blocks import Block, Picture
 from elastocal.cell import DEFAULT_POSES, Cell, fingerprint, load_cell
 from elastocal.codec import ALL_LOADS, study as studies
@@ -176,9 +176,6 @@ def study_conditions(cell: Cell, vary: tuple[str, ...]) -> tuple[Condition, ...]
     return studies.make_conditions(studies.read_variations(vary or (DEFAULT_VARIATION,)), base)
 
 
-_PACKAGES = ("elastocal", "numpy", "scipy", "pin")
-
-
 @dataclass(frozen=True, eq=False)
 class _PreparedStudy:
     """A study that may begin."""
@@ -278,5 +275,5 @@ def _design(
             for name, model in models.items()
         }
         | chosen,
-        versions={name: version(name) for name in _PACKAGES},
+        versions=package_versions(),
     )

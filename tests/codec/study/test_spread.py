@@ -107,6 +107,25 @@ def test_workers_of_a_cluster_do_every_batch_and_an_error_of_a_batch_comes_back(
             list(spread.map(lack, parts))
 
 
+@pytest.mark.parametrize("joins", ["early", "late"])
+def test_a_worker_with_other_versions_is_refused_before_it_simulates(monkeypatch, joins):
+    distributed = pytest.importorskip("distributed")
+    theirs = {"elastocal": "0.1", "numpy": "2.0", "scipy": "1.0", "pin": "2.0"}
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        if joins == "early":
+            monkeypatch.setattr(sampling, "version", theirs.__getitem__)
+            with pytest.raises(CodecError, match=r"its worker .* has elastocal 0\.1, this command"):
+                batch_executor(None, address).__enter__()
+        else:
+            with batch_executor(None, address) as spread:
+                work = partial(sampling._as_here, theirs, batch)
+                with pytest.raises(CodecError, match=r"a worker on .* has elastocal .* 0\.1: the"):
+                    list(spread.map(work, [[0]]))
+
+
 def test_a_cluster_without_workers_is_refused_before_the_long_work(monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(sampling, "_PATIENCE", 0.5)

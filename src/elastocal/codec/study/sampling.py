@@ -10,14 +10,17 @@ is queried first, by one message with one deadline.
 
 import asyncio
 import logging
+import platform
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
+from importlib.metadata import version
 from typing import Any
 
+from elastocal._version import package_versions
 from elastocal.codec.study.samples import Sample, SampleResult, Simulate, StudyDesign, StudyStore
 from elastocal.errors import CodecError
 from elastocal.parallel import map_on_cluster, process_count, process_pool
@@ -160,12 +163,14 @@ def batch_executor(
     Raises
     ------
     CodecError
-        If Dask is not installed, the scheduler does not answer or is lost, or a process dies.
+        If Dask is not installed, the scheduler does not answer or is lost, a process dies, or a
+        worker has other versions of what makes the numbers.
     """
     if address is not None:
         with closing(_connected(address)) as client:
             with _lost_cluster_named(address):
                 client.wait_for_workers(1, timeout=_PATIENCE)
+                _check_workers(client)
                 workers = sum(client.ncores().values())
             yield BatchExecutor(workers, partial(_over_cluster, client=client, address=address))
         return
@@ -178,7 +183,30 @@ def _over_cluster(
     work: Work, parts: Sequence[Sequence[int]], client: Any, address: str
 ) -> Iterator[list[SampleResult]]:
     with _lost_cluster_named(address):
-        yield from map_on_cluster(work, parts, client)
+        # Workers may join later: each batch looks once more.
+        yield from map_on_cluster(partial(_as_here, package_versions(), work), parts, client)
+
+
+def _check_workers(client: Any) -> None:
+    """Refuse workers whose numbers might be others, asked by nothing of elastocal's."""
+    for name, here in package_versions().items():
+        for worker, there in client.run(version, name).items():
+            _require_version(f"its worker {worker}", name, here, there)
+
+
+def _as_here(here: dict[str, str], work: Work, numbers: Sequence[int]) -> list[SampleResult]:
+    """Do a batch on a worker that has the versions of the command."""
+    for name, there in package_versions().items():
+        _require_version(f"a worker on {platform.node()}", name, here[name], there)
+    return work(numbers)
+
+
+def _require_version(worker: str, name: str, here: str, there: str) -> None:
+    if there != here:
+        raise CodecError(
+            f"--dask: {worker} has {name} {there}, this command {here}: the numbers would not be"
+            " those of one machine; install the same versions where the workers run"
+        )
 
 
 @contextmanager
