@@ -27,11 +27,14 @@ QUIET = {
 
 
 @cache
-def _folder(like: str) -> tempfile.TemporaryDirectory[str]:
-    """Return an example in a folder that goes when the process ends; a killed one leaves it."""
+def _example(like: str) -> tuple[tempfile.TemporaryDirectory[str], dict[str, object]]:
+    """Return an example in a folder that goes when the process ends, and what its file says.
+
+    A killed process leaves the folder.
+    """
     folder = tempfile.TemporaryDirectory(prefix=f"elastocal_{like}_")
     write_example(Path(folder.name), like)
-    return folder
+    return folder, yaml.safe_load((Path(folder.name) / "cell.yaml").read_text())
 
 
 def example_cell(like: str = "afp", **sections: object) -> Cell:
@@ -43,10 +46,9 @@ def example_cell(like: str = "afp", **sections: object) -> Cell:
     simulation = sections.get("simulation", {})
     if isinstance(simulation, dict):
         sections = sections | {"simulation": {"preset": "kind"} | simulation}
-    folder = Path(_folder(like).name)
-    data = yaml.safe_load((folder / "cell.yaml").read_text()) | sections
-    path = folder / f"changed_{abs(hash(repr(sections)))}.yaml"
-    path.write_text(yaml.safe_dump(data))
+    folder, said = _example(like)
+    path = Path(folder.name) / f"changed_{abs(hash(repr(sections)))}.yaml"
+    path.write_text(yaml.dump(said | sections, Dumper=yaml.CSafeDumper))
     return load_cell(path)
 
 
