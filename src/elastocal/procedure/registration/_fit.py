@@ -146,7 +146,7 @@ _LIKELY = np.log([30e-6, 1.0])
 """Logarithms of the scatter in m and of the robot's errors over those that are thought likely."""
 _FACTOR = np.log([3.0, 2.0])
 """Standard deviations of both: the readings have the last word where they are more than a few."""
-_ROUNDS = 3
+_ROUNDS = 2
 """Times that scatter and errors are adapted to the residuals; they then are steady to a percent."""
 _MOST_STEPS = 20
 """Gauss-Newton steps that are taken at most."""
@@ -157,6 +157,8 @@ _ERRORS_ARRIVED = 1e-9
 moves the marker by about a millimetre, and smaller steps are round-off."""
 _BOUNDS = [(math.log(1e-9), math.log(1e-2)), (math.log(0.05), math.log(20.0))]
 """Bounds of the two logarithms; weights need a scatter above zero."""
+_FIRST_STEP = -0.4
+"""First step of the search for them: down, away from the upper bounds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,7 +363,13 @@ def _likeliest(result: Fit, readings: UnloadedReadings, start: FloatArray) -> Fl
         value += 2.0 * np.log(pivots[:-1]).sum() + pivots[-1] ** 2 - 1.0
         return float(value + (((logs - _LIKELY) / _FACTOR) ** 2).sum())
 
+    # SciPy's own first simplex is a share of the start, and log 1 is 0: it would be a line.
+    simplex = start + _FIRST_STEP * np.eye(3, 2, k=-1)
     found = minimize(
-        minus_twice_log, start, method="Nelder-Mead", bounds=_BOUNDS, options={"xatol": 0.01}
+        minus_twice_log,
+        start,
+        method="Nelder-Mead",
+        bounds=_BOUNDS,
+        options={"xatol": 0.01, "initial_simplex": simplex},
     )
     return np.asarray(found.x, dtype=float)
