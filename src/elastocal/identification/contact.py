@@ -638,13 +638,15 @@ def whitened(rows: FloatArray, shared: FloatArray, block: IndexArray) -> FloatAr
         Readings that share something.
     """
     found = rows.copy()
-    for each in np.unique(block):
-        own = np.flatnonzero(block == each)
-        G = shared[own].reshape(3 * len(own), -1)
+    order = np.argsort(block, kind="stable")
+    _, starts, counts = np.unique(block[order], return_index=True, return_counts=True)
+    for count in np.unique(counts):  # blocks of one size at once
+        own = order[starts[counts == count, None] + np.arange(count)]
+        G = shared[own].reshape(len(own), 3 * count, shared.shape[2])
         U, s, _ = np.linalg.svd(G, full_matrices=False)
-        less = U * (1.0 - 1.0 / np.sqrt(1.0 + np.square(s)))
-        system = rows[own].reshape(len(G), -1)
-        found[own] = (system - less @ (U.T @ system)).reshape(found[own].shape)
+        less = U * (1.0 - 1.0 / np.sqrt(1.0 + np.square(s)))[:, None]
+        system = rows[own].reshape(*G.shape[:2], rows.shape[2])
+        found[own] = (system - less @ (U.mT @ system)).reshape(*own.shape, *rows.shape[1:])
     return found
 
 
