@@ -340,7 +340,11 @@ LOG_MISTAKES = (
         ("place of the marker",),
         _cell(r'position: \["110 mm"', 'position: ["510 mm"'),
     ),
-    LogMistake("A3 reversed", ("joint's sign",), _scaled(q=[1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])),
+    LogMistake(
+        "A3 reversed",
+        ("joint_a3 reversed",),
+        _scaled(q=[1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0]),
+    ),
     LogMistake(
         "A6 frozen from half way on",
         (
