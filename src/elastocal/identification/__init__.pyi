@@ -146,6 +146,7 @@ from .rungs import (
     low_loads as low_loads,
     rung_of as rung_of,
 )
+from .sag_share import with_sag_open as with_sag_open
 from .show import (
     condition_text as condition_text,
     show_budget as show_budget,

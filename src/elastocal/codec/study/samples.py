@@ -27,7 +27,7 @@ from elastocal.dataset import Readings
 from elastocal.elastic import ElasticModel
 from elastocal.errors import CodecError, FileAccessError, SchemaError
 from elastocal.files import sha256, write_text
-from elastocal.identification import FitOptions, build, solve
+from elastocal.identification import FitOptions, build, solve, with_sag_open
 from elastocal.records import read_json, record, to_data
 from elastocal.results import brief_repr
 
@@ -157,8 +157,11 @@ def calibrated(
     IdentificationError
         If nothing can be identified.
     """
-    compliance = solve(build(model, readings, options, marker_offset)).compliance
-    return verification.judge(model, compliance)
+    options = options or FitOptions()
+    problem = build(model, readings, options, marker_offset)
+    every = np.ones(len(readings), dtype=bool)
+    problem = with_sag_open(problem, model, readings, every, options, marker_offset)
+    return verification.judge(model, solve(problem).compliance[problem.springs])
 
 
 @record()
