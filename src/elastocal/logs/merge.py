@@ -294,7 +294,9 @@ def sensor_misfit(postures: StaticPostures, site: Site) -> str | None:
     if not change > _WEIGHS:
         return None
     if (found := _sensor_mistake(postures, site)) is not None:
-        return found.message
+        turned = found.message.startswith(SENSOR_TURNED)
+        with_angles = sensor_doubts(postures, np.empty((0, 3)), site) if turned else ()
+        return next(iter(with_angles), found.message)
     if left < _FITS * change and fit.mass < 0.0:
         return (
             "the weight of the tool points upward in the sensor: does it show the force on the"
