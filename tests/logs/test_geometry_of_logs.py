@@ -158,7 +158,7 @@ def test_of_equally_long_moves_the_deflection_or_the_map_says_which_is_which(
 
 @pytest.mark.parametrize(
     ("seen_as", "named"),
-    some_by_day([([1.0 / 25.4] * 3, "inch"), ([1.0, 1.0, -1.0], "left-handed")]),
+    some_by_day([([1.0 / 25.4] * 3, "`unit: in` at markers"), ([1.0, 1.0, -1.0], "left-handed")]),
 )
 def test_a_mistaken_marker_is_named_before_the_clock_of_equally_long_moves(
     tmp_path, seen_as, named
