@@ -219,7 +219,7 @@ def test_mistakes_from_outside_are_named(name, said):
     assert said in str(found)
 
 
-@pytest.mark.parametrize(("turn", "is_named"), [(0.1, False), (5.0, True)])
+@pytest.mark.parametrize(("turn", "is_named"), [(1.0, False), (5.0, True)])
 def test_a_frame_of_the_tracker_is_turned_by_degrees_not_by_an_arm_that_is_off(turn, is_named):
     made = campaign(SMALL)
     exact, model = made.readings, ElasticModel(made.robot, bearing(made.robot))
