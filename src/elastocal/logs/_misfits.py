@@ -116,7 +116,7 @@ def _brought(here: FloatArray, there: FloatArray) -> FloatArray:
     )
     # Points in a plane have no handedness.
     plainly = _median_length(there - left) < _LEFT_HANDED * _median_length(there - right)
-    return left if plainly else right
+    return np.asarray(left if plainly else right)
 
 
 def _median_length(values: FloatArray) -> float:
