@@ -161,7 +161,12 @@ def test_degrees_in_german_are_no_radians(unit):
 
 @pytest.mark.parametrize(
     ("unit", "dimension", "meant"),
-    [("Grad", "angle", "deg"), ("degrees", "angle", "deg"), ("sec", "time", "s")],
+    [
+        ("Grad", "angle", "deg"),
+        ("degrees", "angle", "deg"),
+        ("sec", "time", "s"),
+        ("inch", "length", "in"),
+    ],
 )
 def test_another_word_for_a_unit_is_refused_with_the_unit_that_is_meant(unit, dimension, meant):
     with pytest.raises(UnitError) as refused:

@@ -57,7 +57,7 @@ _FACTORS: dict[str, dict[str, float]] = {
 
 MEANT = {
     **dict.fromkeys(("°", "degree", "degrees", "grad", "grd", "degrés"), "deg"),
-    "nm": "N*m", "nmm": "N*mm", "sec": "s",
+    "nm": "N*m", "nmm": "N*mm", "sec": "s", "inch": "in", "inches": "in",
 }  # fmt: skip
 """Units by other words for them, in small letters, as logs of three languages have them."""
 SHOWN = {

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from elastocal.elastic import ElasticModel, bearing
 from elastocal.errors import ConventionError
@@ -216,6 +217,17 @@ def test_mistakes_from_outside_are_named(name, said):
     made = KNOWN[name].make(campaign(ON_RAIL))
     (found,) = find_undone(made.robot, made.readings, made.marker)
     assert said in str(found)
+
+
+@pytest.mark.parametrize(("turn", "is_named"), [(1.0, False), (5.0, True)])
+def test_a_frame_of_the_tracker_is_turned_by_degrees_not_by_an_arm_that_is_off(turn, is_named):
+    made = campaign(SMALL)
+    exact, model = made.readings, ElasticModel(made.robot, bearing(made.robot))
+    bent = model.observation_blocks(exact.joint_position, exact.force, None, made.marker)
+    seen = exact.controller_displacement + bent @ np.full(bent.shape[2], 1e-6)
+    turned = Rotation.from_euler("z", turn, degrees=True).apply(seen)
+    found = find_undone(made.robot, replace(exact, marker_displacement=turned), made.marker)
+    assert any("look turned by" in str(each) for each in found) is is_named
 
 
 @pytest.mark.slow

@@ -154,3 +154,18 @@ def test_of_equally_long_moves_the_deflection_or_the_map_says_which_is_which(
         )
     clocks = {each.clock: each for each in ec.import_logs(files, map=path).figures.clocks}
     assert clocks["force.csv"].offset == pytest.approx(OFFSET, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("seen_as", "named"),
+    some_by_day([([1.0 / 25.4] * 3, "`unit: in` at markers"), ([1.0, 1.0, -1.0], "left-handed")]),
+)
+def test_a_mistaken_marker_is_named_before_the_clock_of_equally_long_moves(
+    tmp_path, seen_as, named
+):
+    measured = measure(tooled(), 60, seed=0, noise=2e-5, error=1e-3)
+    files = write_logs(tmp_path, measured, 0, moves=(1.0, 1.0))
+    rows = np.loadtxt(files[2], delimiter=",", skiprows=1) * [1.0, *seen_as]
+    np.savetxt(files[2], rows, "%.6f", delimiter=",", header="t,X,Y,Z", comments="")
+    with pytest.raises(LogError, match=rf"^.*{named}.*\(force\.csv: its clock fits"):
+        ec.import_logs(files, map=tmp_path / "map.yaml")

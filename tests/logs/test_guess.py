@@ -96,6 +96,27 @@ def test_angles_of_other_conventions_are_not_taken(tmp_path):
     assert found.unused == ("Clock", "O[deg]", "A[deg]", "T[deg]")
 
 
+ARM = "time;J1;J2;J3;J4;J5;J6\n" + "".join(f"{n};10;20;30;40;50;60\n" for n in range(9))
+
+
+def test_a_point_list_of_spatial_analyzer_with_dates_is_a_marker(tmp_path):
+    rows = "".join(f"A, main, p{n}, 1200.5, 3.2, 10.1, 11/24/2026 10:03:0{n}\n" for n in range(9))
+    (tmp_path / "points.txt").write_text("// A, main: X, Y, Z in mm\n" + rows)
+    (tmp_path / "arm.csv").write_text(ARM)
+    _, found = ec.guess_map([tmp_path / "arm.csv", tmp_path / "points.txt"]).logs
+    assert {each.key: each.columns for each in found.columns} == {
+        "time": ("7",), "markers": ("4", "5", "6"),
+    }  # fmt: skip
+
+
+def test_a_log_of_which_nothing_is_known_is_not_left_out_in_silence(tmp_path):
+    (tmp_path / "notes.csv").write_text("word;number\n" + "a;1\n" * 9)
+    (tmp_path / "arm.csv").write_text(ARM)
+    found = ec.guess_map([tmp_path / "arm.csv", tmp_path / "notes.csv"])
+    assert "no column looks like joints, a force or a marker" in dict(found.facts())["notes.csv"]
+    assert "- log: notes.csv" in found.text
+
+
 def test_what_is_not_used_is_listed_in_the_map(tmp_path):
     axes = ";".join(f"J{n}" for n in range(1, 7))
     found = guessed(tmp_path, f"time;{axes};Program;Override", "10;20;30;40;50;60;main;100")

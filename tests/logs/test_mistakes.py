@@ -12,7 +12,7 @@ from elastocal.cell import SensorLoad
 from elastocal.compensation.conditioning import static_postures
 from elastocal.geometry import Payload, Positions, position_mistake
 from elastocal.logs._frames import sensor_doubts
-from elastocal.logs.merge import sensor_contradictions
+from elastocal.logs.merge import sensor_contradictions, sensor_misfit
 from elastocal.robot import catalogue
 from support.by_day import some_by_day
 from support.mistake_table import rates, tabulate
@@ -89,6 +89,15 @@ def test_a_sensor_upside_down_is_not_said_to_show_the_force_on_the_tooling():
     assert "acts_on: environment" in doubts(-np.eye(3))
     assert "turns in the sensor" not in doubts(-np.eye(3))
     assert not doubts(np.eye(3))
+
+
+def test_a_turned_sensor_that_allows_no_readings_is_told_with_the_angles_to_write():
+    R = _turns(0.6)
+    force = MASS * DOWN @ R @ Rotation.from_euler("z", 90.0, degrees=True).as_matrix()
+    postures = static_postures(R, force, np.zeros_like(force), DOWN)
+    said = str(sensor_misfit(postures, _site(MASS)))
+    assert "whose abc in the flange is 90, 0, 0 deg" in said
+    assert "--free-rotation" not in said
 
 
 @pytest.mark.slow

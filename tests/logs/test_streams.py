@@ -6,9 +6,12 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.errors import LogError
 from elastocal.logs import ClockFit, days_of
-from elastocal.logs.map import LogEntry, LogMap
+from elastocal.logs._frames import stated_poses
+from elastocal.logs.map import Joints, LogEntry, LogMap, TimeColumn, ToolPose, Vector
 from elastocal.logs.merge import _set_clocks
 from elastocal.logs.streams import body_centre
+from elastocal.logs.table import LogTable
+from elastocal.robot import catalogue
 
 SHAPE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.15, 0.0], [0.02, 0.03, 0.12]])
 
@@ -129,3 +132,29 @@ def test_an_offset_that_would_be_passed_over_is_refused(keys, reason):
 def test_a_clock_far_from_any_date_is_said_in_seconds():
     fit = ClockFit("box", "arm", -1.8e15, 0.1, 0.0, None, 0.9, 1.8e15)
     assert fit.sentence.startswith("box: -1800000000000000.000 s")
+
+
+@pytest.mark.parametrize(
+    ("height", "order", "said"),
+    [
+        (0.55, "ZYX", r"base lies at \(0, 0, 550\) mm in that of the joints: leave `pose` out"),
+        (0.0, "XYZ", "another maker than the map says, or of another tool: leave `angles` out"),
+        (0.55, "XYZ", "in that of the joints, the angles are of another maker.*leave `pose` out"),
+    ],
+)
+def test_a_tool_frame_of_another_base_or_maker_is_told_with_what_to_leave_out(height, order, said):
+    robot = catalogue.load("RX160")
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, (9, 6))
+    T = robot.forward(q)
+    angles = Rotation.from_matrix(T[:, :3, :3]).as_euler(order, degrees=True)
+    place = 1e3 * (T[:, :3, 3] - [0.0, 0.0, height])
+    table = LogTable.from_rows("log", [list("xyzabc"), *np.hstack([place, angles]).tolist()])
+    a_b_c = "abc" if order == "ZYX" else "cba"
+    pose = ToolPose(
+        position=Vector(columns=tuple("xyz"), unit="mm"),
+        angles=Vector(columns=tuple(a_b_c), unit="deg"),
+    )
+    joints = Joints(columns=tuple("123456"), unit="rad")
+    entry = LogEntry(log="log", time=TimeColumn(column="t"), joints=(joints,), pose=pose)
+    with pytest.raises(LogError, match=said):
+        stated_poses(entry, table, q, robot)

@@ -60,6 +60,10 @@ def test_a_point_list_of_spatial_analyzer_is_read(tmp_path):
         ("1970-01-01 00:01:00,5", 60.5),
         ("1.1.1970 00:01:00.5", 60.5),
         ("1970/01/01 00:01:00", 60.0),
+        ("1.1.1970 0:01:00", 60.0),
+        ("1/2/1970 0:01:00.5", 86460.5),
+        ("01/13/1970 12:01:00 AM", 12 * 86400 + 60.0),
+        ("13/01/1970 12:01:00 PM", 12 * 86400 + 43260.0),
         ("01:00:00.25", 3600.25),
         ("1.5e3", 1500.0),
     ],
@@ -67,6 +71,12 @@ def test_a_point_list_of_spatial_analyzer_is_read(tmp_path):
 def test_dates_times_of_day_and_numbers_are_times(tmp_path, cell, seconds):
     table = _log(tmp_path, f"time;x\n{cell};1\n")
     assert table.seconds("time").tolist() == [seconds]
+
+
+def test_of_dates_between_slashes_the_number_that_changes_at_midnight_is_the_day(tmp_path):
+    for dates in (["3/4/2026", "3/5/2026"], ["4/3/2026", "5/3/2026"]):
+        rows = f"{dates[0]} 23:59:59;1\n{dates[1]} 0:00:01;1"
+        assert np.diff(_log(tmp_path, f"time;x\n{rows}\n").seconds("time")).tolist() == [2.0]
 
 
 def test_a_time_of_day_goes_on_beyond_midnight(tmp_path):

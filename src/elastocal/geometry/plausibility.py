@@ -32,6 +32,7 @@ from elastocal.geometry.sessions import undo_changes
 from elastocal.geometry.solve import register
 from elastocal.progress import Progress, silent
 from elastocal.robot import Robot, catalogue, other_joint_readings
+from elastocal.units import MEANT
 from elastocal.wording import counted, listed
 
 LENGTHS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}
@@ -202,8 +203,9 @@ def unit_mistake(factor: float, units: dict[str, float]) -> str:
 
 
 def _unit_of(factor: float, units: dict[str, float]) -> str:
-    """Return the true unit that `unit_mistake` names."""
-    return unit_mistake(factor, units).split()[2].rstrip(",")
+    """Return the true unit that `unit_mistake` names, as a map has it."""
+    named = unit_mistake(factor, units).split()[2].rstrip(",")
+    return MEANT.get(named, named)
 
 
 def _late_rows(robot: Robot, data: Positions) -> Iterator[Undone]:

@@ -25,6 +25,8 @@ _LARGEST_GAP = (20e-3, np.radians(2.0))
 that is not calibrated is off by some millimetres, another frame by more."""
 _PARTS = 10
 """Parts of a log, each of which must agree, since a column may freeze midway."""
+_FAR_APART = 0.2
+"""Range of the places of the tool in m from which another base differs from another tool."""
 _ROWS_TRIED = 200
 """Rows by which joints are tried that are reversed or exchanged."""
 ROWS_AT_A_TIME = 50_000  # tool frames of all rows at once take gigabytes
@@ -107,7 +109,7 @@ def stated_poses(entry: LogEntry, table: LogTable, q: FloatArray, robot: Robot) 
 
 
 def _joints_that_agree(robot: Robot, q: FloatArray, T: FloatArray, turned: bool) -> str:
-    """Return with which joints reversed or exchanged tool frames agree; else an empty string.
+    """Return with which joints, base or angles tool frames agree; else an empty string.
 
     Parameters
     ----------
@@ -131,7 +133,25 @@ def _joints_that_agree(robot: Robot, q: FloatArray, T: FloatArray, turned: bool)
         exchanged[:, [first, second]] = q[:, [second, first]]
         if _agree(robot.forward(exchanged), T, turned):
             return f"with {names[first]} and {names[second]} exchanged they agree"
-    return ""
+    return _frame_that_agrees(robot.forward(q), T, turned)
+
+
+def _frame_that_agrees(here: FloatArray, there: FloatArray, turned: bool) -> str:
+    """Return with which base, or without which angles, tool frames agree; else an empty string."""
+    base = np.median(here[:, :3, 3] - there[:, :3, 3], axis=0)
+    moved = there.copy()
+    moved[:, :3, 3] += base
+    if not _agree(here, moved, False) or np.ptp(here[:, :3, 3], axis=0).max() < _FAR_APART:
+        return ""
+    found, left_out = [], "pose"
+    if not _agree(here, there, False):
+        place = ", ".join(f"{1e3 * each + 0.0:.0f}" for each in np.round(base, 3))
+        found.append(f"the controller's base lies at ({place}) mm in that of the joints")
+    else:
+        left_out = "angles"
+    if turned and not _agree(here, moved, True):
+        found.append("the angles are of another maker than the map says, or of another tool")
+    return f"{listed(found)}: leave `{left_out}` out of the map, the joints say it as well"
 
 
 def _agree(here: FloatArray, there: FloatArray, turned: bool) -> bool:

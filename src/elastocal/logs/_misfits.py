@@ -28,6 +28,9 @@ _LEAST_SAMPLES = 20
 """Samples by which an offset is judged."""
 _MOST_SAMPLES = 800
 """Samples that are enough to judge it."""
+_LEFT_HANDED = 0.5
+"""Ratio of residuals as a left-handed frame leaves to those of a right-handed one, below which it
+is left-handed."""
 
 
 def misfits(
@@ -92,12 +95,33 @@ def _rigid_misfit(log: LogStreams, reference: LogStreams, shift: float, lever: F
     arm, points = present(reference.arm, "arm"), present(log.points, "points")
     place, known = _interpolated(points.time + shift, points.position, arm.time)
     there = (arm.T_base_tcp[:, :3, 3] + arm.T_base_tcp[:, :3, :3] @ lever)[known]
-    here = place[known]
-    if len(here) < _LEAST_SAMPLES:
+    if len(there) < _LEAST_SAMPLES:
         return np.inf
-    here, there = here - here.mean(axis=0), there - there.mean(axis=0)
-    left = there - here @ nearest_rotation(there.T @ here).T
-    return float(np.median(np.linalg.norm(left, axis=1)))
+    return _median_length(there - _brought(place[known], there))
+
+
+def _brought(here: FloatArray, there: FloatArray) -> FloatArray:
+    """Return points of a tracker brought to those of the arm, shape (sample, 3), in m.
+
+    Their unit and handedness are free (S. Umeyama, "Least-squares estimation of transformation
+    parameters between two point patterns", IEEE Transactions on Pattern Analysis and Machine
+    Intelligence 13, 1991): a mistake in them does not hide the clock, which is needed to name it.
+    """
+    middle = there.mean(axis=0)
+    a, b = here - here.mean(axis=0), there - middle
+    M, size = b.T @ a, float((a**2).sum())
+    right, left = (
+        middle + float((Q * M).sum()) / size * a @ Q.T
+        for Q in (nearest_rotation(M), -nearest_rotation(-M))
+    )
+    # Points in a plane have no handedness.
+    plainly = _median_length(there - left) < _LEFT_HANDED * _median_length(there - right)
+    return np.asarray(left if plainly else right)
+
+
+def _median_length(values: FloatArray) -> float:
+    """Return the median norm of vectors, shape (sample, 3)."""
+    return float(np.median(np.linalg.norm(values, axis=1)))
 
 
 class _Deflections:
@@ -119,8 +143,7 @@ class _Deflections:
             return
         R = arm.T_base_tcp[rows, :3, :3]
         here, there = place[rows], arm.T_base_tcp[rows, :3, 3] + R @ site.marker
-        turn = nearest_rotation((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
-        self._deflection = here @ turn.T - there
+        self._deflection = _brought(here, there) - there
         if frame == "base":
             R = np.broadcast_to(np.eye(3), R.shape)
         elif frame == "sensor":
@@ -151,8 +174,7 @@ class _Deflections:
 
         columns, deflection = varying(columns), varying(self._deflection[known])
         c, *_ = np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), deflection.ravel())
-        size = float(np.median(np.linalg.norm(deflection, axis=1)))
-        left = float(np.median(np.linalg.norm(deflection - columns @ c, axis=1)))
+        size, left = _median_length(deflection), _median_length(deflection - columns @ c)
         return left / size if size > 0.0 else np.inf
 
 
@@ -163,8 +185,7 @@ def _speed(arm: ArmStream) -> FloatArray:
 
 
 def _residual(columns: FloatArray, values: FloatArray) -> float:
-    left = values - columns @ np.linalg.lstsq(columns, values)[0]
-    return float(np.median(np.linalg.norm(left, axis=1)))
+    return _median_length(values - columns @ np.linalg.lstsq(columns, values)[0])
 
 
 def _interpolated(

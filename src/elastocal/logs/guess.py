@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -39,7 +39,10 @@ _LETTER = re.compile(r"(?i)((?:.*[._ ])?)(r[12]|[slurbthv])(?:[-_ ]?(?:axis|ax))
 _EXTERNAL = re.compile(r"(?i)(?:.*[._ ])?(?:e1|eax_a|rail|linear|track)")
 _MADE_UP = 8e9
 """ABB writes 9E+09 for an external axis that is not there."""
-_TURNS_OF = {"FANUC": ("r", "p", "w"), "Denso or Yaskawa": ("rz", "ry", "rx")}
+_TURNS_OF = {
+    "FANUC": ("r", "p", "w"),
+    "Denso or Yaskawa; those of Staeubli turn otherwise: leave them out": ("rz", "ry", "rx"),
+}
 """Angles about z, y and x, in the order of the map's a, b, c, as makers name them."""
 _TURN = re.compile(r"(?i)(.*?)(r[xyz]|[wpr])")
 _NO_TIMES = ("deg", "rad", "mm", "m", "N", "kN", "N*m", "N*mm")
@@ -172,10 +175,22 @@ def guess_logs(files: Sequence[Path], joints: Joints | None = None) -> tuple[Gue
             except LogError:
                 continue  # no numbers in it: a log of texts, pictures
             found.append(guess_log(path.name, topic, table, joints))
-    known = tuple(each for each in found if any(c.key not in _ORDER for c in each.columns))
-    if not known:
+    known = [any(c.key not in _ORDER for c in each.columns) for each in found]
+    if not any(known):
         raise LogError("no column looks like joints, a force or a marker: write the map by hand")
-    return known
+    return tuple(
+        each if is_known else replace(each, columns=(*each.columns, _UNSAID))
+        for each, is_known in zip(found, known, strict=True)
+        if is_known or each.topic is None
+    )
+
+
+_UNSAID = GuessedColumns(
+    "markers",
+    (UNKNOWN,) * 3,
+    None,
+    "no column looks like joints, a force or a marker: write what the log holds, or leave it out",
+)
 
 
 _ORDER = ("time", "handshake")
@@ -407,13 +422,15 @@ def _quaternion(names: dict[str, str]) -> tuple[str, ...]:
 
 
 def _without_names(table: LogTable) -> tuple[GuessedColumns, ...]:
-    """Return a point list: three numbers after texts, and what only rises is the time."""
+    """Return a point list: three numbers after texts; what only rises, or is dated, is the time."""
     numeric = [n for n in table.header if np.isfinite(_numbers(table, n)).all()]
     rising = [n for n in numeric if np.all(np.diff(table.numbers(n)) > 0.0)]
     places = [name for name in numeric if name not in rising][:3]
     found = []
     if rising:
         found.append(GuessedColumns("time", (rising[0],), *_time_unit(table, rising[0])))
+    elif dated := next((n for n in table.header if n not in numeric and _is_dated(table, n)), None):
+        found.append(GuessedColumns("time", (dated,), *_time_unit(table, dated)))
     if len(places) == 3:
         unit, why = _unit(table, places, "length")
         found.append(GuessedColumns("markers", tuple(places), unit, f"three numbers, {why}"))
@@ -469,6 +486,14 @@ def _triples(pattern: re.Pattern[str], names: dict[str, str]) -> list[tuple[str,
 def _largest(table: LogTable, columns: Sequence[str]) -> float:
     values = np.abs(np.stack([_numbers(table, name) for name in columns]))
     return float(np.nanmax(values, initial=0.0)) if np.isfinite(values).any() else 0.0
+
+
+def _is_dated(table: LogTable, name: str) -> bool:
+    """Return whether the cells of a column are dates or times of day."""
+    try:
+        return bool(np.isfinite(table.seconds(name)).all())
+    except LogError:
+        return False
 
 
 def _numbers(table: LogTable, name: str) -> FloatArray:

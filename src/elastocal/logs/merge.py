@@ -294,7 +294,9 @@ def sensor_misfit(postures: StaticPostures, site: Site) -> str | None:
     if not change > _WEIGHS:
         return None
     if (found := _sensor_mistake(postures, site)) is not None:
-        return found.message
+        turned = found.message.startswith(SENSOR_TURNED)
+        with_angles = sensor_doubts(postures, np.empty((0, 3)), site) if turned else ()
+        return next(iter(with_angles), found.message)
     if left < _FITS * change and fit.mass < 0.0:
         return (
             "the weight of the tool points upward in the sensor: does it show the force on the"
@@ -311,6 +313,58 @@ def sensor_misfit(postures: StaticPostures, site: Site) -> str | None:
 
 def _sensor_mistake(postures: StaticPostures, site: Site) -> SensorMistake | None:
     return sensor_mistake(postures, site.T_flange_sensor[:3, :3], _LEVER)
+
+
+def aligned(
+    logs: Sequence[LogStreams], log_map: LogMap, site: Site, still: Sequence[str]
+) -> tuple[tuple[LogStreams, ...], tuple[ClockFit, ...]]:
+    """Return the logs in the time of the joints, and the fit of each clock.
+
+    Parameters
+    ----------
+    logs : sequence of LogStreams
+        One of them with joints.
+    log_map : LogMap
+        What the map says.
+    site : Site
+        Robot, sensor and marker.
+    still : sequence of str
+        Columns that are constant.
+
+    Raises
+    ------
+    LogError
+        If a clock cannot be determined; the message begins with a mistake that is known without
+        it.
+    """
+    try:
+        return align(logs, site)
+    except LogError as error:
+        known = next(iter(still), None) or _marker_mistake(logs, log_map, site)
+        raise LogError(f"{known} ({error})") if known else error from error
+
+
+def _marker_mistake(logs: Sequence[LogStreams], log_map: LogMap, site: Site) -> str | None:
+    """Return the mistake of a marker that shows without the clock of the sensor, if any."""
+    seeing = [log for log in logs if log.arm is not None or log.points is not None]
+    try:
+        streams = merged(align(seeing, site)[0], site)
+    except LogError:
+        return None  # the clock that cannot be determined is that of a marker
+    spans = _spans_unfelt(streams, site)
+    try:
+        return next(marker_contradictions(streams, spans, log_map, site), None)
+    except LogError as certain:
+        return str(certain)
+
+
+def _spans_unfelt(streams: Streams, site: Site) -> list[tuple[float, float]]:
+    """Return the averaged parts of the plateaus of arm and marker, whatever the sensor feels.
+
+    Its clock follows from the weight, which turns with the joints, and may be mistaken with them.
+    """
+    alone = replace(streams, wrench=stream_rows(streams.wrench, slice(0)))
+    return [averaged_part(*each) for each in standing_spans(alone, site.marker)]
 
 
 def marker_contradictions(
@@ -426,22 +480,16 @@ def import_streams(
     logs = read_streams_of(log_map, files, site.robot)
     progress("clocks", 1, 4)
     still = tuple(still_columns(logs, site.robot))
-    try:
-        logs, clocks = align(logs, site)
-    except LogError as error:
-        raise LogError(f"{still[0]} ({error})") if still else error from error
+    logs, clocks = aligned(logs, log_map, site, still)
     streams = merged(logs, site)
     progress("plateaus", 2, 4)
     by_word = next((log for log in logs if log.arm is not None and log.handshake), None)
     at_rest = standing(streams, site, by_word)
     poses = [each.pose for each in at_rest.bare]
     postures = postures_at_rest(at_rest.readings, poses, site)
-    # The sensor's clock follows from the weight, which turns with the joints; the marker is not
-    # needed.
-    alone = replace(streams, wrench=stream_rows(streams.wrench, slice(0)))
     spans = [(each.start, each.end) for each in at_rest.bare]
     if by_word is None:
-        spans = [averaged_part(*each) for each in standing_spans(alone, site.marker)]
+        spans = _spans_unfelt(streams, site)
     # What is named first explains what comes after: joints that are mistaken turn the weight, too.
     astray = () if still else tuple(marker_contradictions(streams, spans, log_map, site))
     judged = None if still or astray else postures

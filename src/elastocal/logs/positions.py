@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import LogError
-from elastocal.logs.clocks import ClockFit, align
+from elastocal.logs.clocks import ClockFit
 from elastocal.logs.map import LogMap, Site
 from elastocal.logs.merge import (
+    aligned,
     marker_contradictions,
     merged,
     standing,
@@ -118,7 +119,7 @@ def import_positions(
         )
     progress("clocks", 1, 3)
     still = tuple(still_columns(logs, site.robot))
-    logs, clocks = align(logs, site)
+    logs, clocks = aligned(logs, log_map, site, still)
     progress("plateaus", 2, 3)
     streams = merged(logs, site)
     by_word = next((log for log in logs if log.arm is not None and log.handshake), None)

@@ -40,6 +40,9 @@ _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?", re.ASCII)
 _DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?!\d)", re.ASCII)
 _YEAR_FIRST = re.compile(r"^(\d{4})/(\d\d)/(\d\d)", re.ASCII)
 """Dates that are read alike everywhere, unlike 11/12/2026."""
+_SLASHED = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{4})(?!\d)", re.ASCII)
+_DATED = re.compile(r"\s*(?:\d{4}[-/]\d\d[-/]\d\d|\d{1,2}([./])\d{1,2}\1\d{4})[ T]+\d.*", re.ASCII)
+_HOUR = re.compile(r"(?i)(?<!\d)(\d{1,2})(:\d\d:\d\d(?:[.,]\d+)?)(?:\s*([ap])m)?$", re.ASCII)
 _NUMBER = re.compile(r"\s*[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?\s*", re.ASCII)
 _UNIT = re.compile(
     r"[\[(]?\s*(?:mm|m|[uµ]m|in|s|sec|ms|us|deg|°|rad|k?N|N[*·]?m|N[*·]?mm|°C|mbar|hPa|%)\s*[\])]?"
@@ -122,18 +125,38 @@ class LogTable:
     def seconds(self, name: str) -> FloatArray:
         """Return the times of a column without unit, shape (row,), in s.
 
-        Dates with a time of day (ISO 8601, ``27.11.2026`` or ``2026/11/27``) count from 1970 UTC,
-        times of day from midnight and go on beyond 24 h when midnight passes.
+        Dates with a time of day (ISO 8601, ``27.11.2026``, ``2026/11/27`` or ``11/27/2026``) count
+        from 1970 UTC, times of day from midnight and go on beyond 24 h when midnight passes. Of
+        two numbers between slashes the first is the month, unless the day first lets the log be
+        of dates, or shorter.
 
         Raises
         ------
         LogError
             If there is no such column, or a cell is no time.
         """
-        times = self._read(name, self._time, "is no date and time, no time of day and no number")
+        problem = "is no date and time, no time of day and no number"
+        first = next((c.strip() for c in self.column(name) if isinstance(c, str) and c.strip()), "")
+        if _SLASHED.match(first):
+            return self._slashed(name, f"{problem} (dates: 2026-11-27, 27.11.2026 or 11/27/2026)")
+        times = self._read(name, self._time, problem)
         if any(isinstance(c, str) and _CLOCK.fullmatch(c.strip()) for c in self.column(name)):
             times = times + 86400.0 * np.cumsum(np.diff(times, prepend=times[:1]) < -43200.0)
         return times
+
+    def _slashed(self, name: str, problem: str) -> FloatArray:
+        """Return the times of dates whose first number is the month or the day."""
+        try:
+            american = self._read(name, self._time, problem)
+        except LogError:
+            american = None
+        try:
+            other = self._read(name, partial(self._time, day_first=True), problem)
+        except LogError:
+            if american is None:
+                raise
+            return american
+        return other if american is None or np.ptp(other) < np.ptp(american) else american
 
     def texts(self, name: str) -> tuple[str, ...]:
         """Return the cells of a column as texts without blanks around them, shape (row,)."""
@@ -172,27 +195,43 @@ class LogTable:
             return parse_number(text.replace(",", ".") if self.decimal_comma else text)
         return math.nan if cell is None else float(cell)  # type: ignore[arg-type]
 
-    def _time(self, cell: object) -> float:
+    def _time(self, cell: object, *, day_first: bool = False) -> float:
         if isinstance(cell, datetime):
             return (cell if cell.tzinfo else cell.replace(tzinfo=UTC)).timestamp()
-        text = cell.strip() if isinstance(cell, str) else ""
+        text = _HOUR.sub(_of_a_day, cell.strip()) if isinstance(cell, str) else ""
         if clock := _CLOCK.fullmatch(text):
             hours, minutes, seconds = clock.groups()
             return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
         if text and not _NUMBER.fullmatch(text):
-            found = datetime.fromisoformat(_as_iso(text.replace(",", ".")))
+            found = datetime.fromisoformat(_as_iso(text.replace(",", "."), day_first))
             return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
         return self._number(cell)
 
 
-def _as_iso(text: str) -> str:
-    """Return a date as ISO 8601 writes it: ``27.11.2026``, ``2026/11/27`` and what is so already.
+def _of_a_day(clock: re.Match[str]) -> str:
+    """Return a time of day with two digits of the hour, from 0 to 23.
+
+    >>> _HOUR.sub(_of_a_day, "9:41:38.4"), _HOUR.sub(_of_a_day, "12:41:38 am")
+    ('09:41:38.4', '00:41:38')
+    """
+    hour, rest, half = clock.groups()
+    if half is None:
+        return f"{hour:0>2}{rest}"
+    return f"{int(hour) % 12 + 12 * (half in 'pP'):02d}{rest}"
+
+
+def _as_iso(text: str, day_first: bool = False) -> str:
+    """Return a date as ISO 8601 writes it, whatever it is written like.
 
     >>> _as_iso("27.11.2026 09:41:38.4"), _as_iso("2026/11/27 09:41:38")
     ('2026-11-27 09:41:38.4', '2026-11-27 09:41:38')
+    >>> _as_iso("11/12/2026 09:41:38"), _as_iso("11/12/2026 09:41:38", day_first=True)
+    ('2026-11-12 09:41:38', '2026-12-11 09:41:38')
     """
-    if match := _DAY_FIRST.match(text):
+    if match := _DAY_FIRST.match(text) or _SLASHED.match(text):
         day, month, year = match.groups()
+        if "/" in match[0] and not day_first:
+            day, month = month, day
         return f"{year}-{month:0>2}-{day:0>2}{text[match.end() :]}"
     return _YEAR_FIRST.sub(r"\1-\2-\3", text, count=1)
 
@@ -378,9 +417,8 @@ def _split(line: str) -> list[str]:
 
 def _is_data(row: Sequence[str]) -> bool:
     """Return whether half of the cells of a row are numbers or times."""
-    return 2 * sum(bool(_NUMBER.fullmatch(c) or _CLOCK.fullmatch(c.strip())) for c in row) >= len(
-        row
-    )
+    times = (_NUMBER, _CLOCK, _DATED)
+    return 2 * sum(any(each.fullmatch(c.strip()) for each in times) for c in row) >= len(row)
 
 
 def _header(above: Sequence[Sequence[str]], width: int) -> tuple[str, ...] | None:

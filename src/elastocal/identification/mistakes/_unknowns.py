@@ -63,6 +63,9 @@ _LARGEST_MIXTURE = 1.0
 """Angle in rad of a tilt about an axis, and part of one axis in another, still believed."""
 _LONGEST_LAG = 2.0
 """Factor of the change since the load case before that is still believed."""
+_LEAST_FRAME_TURN = 2.0
+"""Turn of the tracker's frame in deg from which it is reported: an arm that is off by millimetres
+turns the registration by some hundredths, which shows where springs miss little."""
 _FARTHEST = 2.0
 """Distance in m between two places of a marker that is still believed."""
 
@@ -552,6 +555,8 @@ def _any_marker_frame(rows: Rows) -> Iterator[OtherReading]:
         message = (
             "marker displacements look {gain} times too large (0.039: inches in a column of mm)"
         ).format(gain=f"{1.0 / scale:.3g}")
+    elif angle < _LEAST_FRAME_TURN:
+        return
     else:
         message = (
             "marker displacements look turned by {angle} deg: the tracker's frame called base?"
