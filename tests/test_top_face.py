@@ -107,6 +107,15 @@ def test_every_field_of_the_settings_stands_in_help_and_in_the_signature():
         assert "Annotated" not in str(inspect.signature(command))
 
 
+def test_help_on_settings_shows_no_option_of_a_command_line():
+    assert ec.new
+    for name in ("CheckSettings", "PlanSettings", "CalibrateSettings", "NewSettings"):
+        settings = getattr(ec.workflows, name)
+        assert (
+            "Option(" not in f"{inspect.signature(settings)}{inspect.signature(settings.__init__)}"
+        )
+
+
 def test_what_has_no_default_may_be_given_by_place():
     assert [*inspect.signature(ec.compare).parameters][:3] == ["old", "new", "progress"]
     with pytest.raises(TypeError, match=r"compare\(\) needs 'new'"):

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from elastocal.errors import described_type
+
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
 
@@ -74,6 +76,23 @@ BoolArray = Annotated[NDArray[np.bool_], _ArrayField("?")]
 
 Triple = tuple[float, float, float]
 """A vector of three in a record, whose file holds plain numbers."""
+
+
+def as_numbers(value: object, name: str) -> FloatArray:
+    """Return an argument of a public function as an array of floats.
+
+    Raises
+    ------
+    TypeError
+        If it is no array of real numbers. The message names the argument and what it is.
+    """
+    try:
+        array = np.asarray(value)
+        if not np.iscomplexobj(array):
+            return np.asarray(array, dtype=float)
+    except (TypeError, ValueError):
+        pass
+    raise TypeError(f"{name} is {described_type(value)} (allowed: real numbers, in an array)")
 
 
 def triple(vector: FloatArray) -> Triple:

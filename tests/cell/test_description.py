@@ -223,7 +223,8 @@ def test_process_poses_are_read(folder, example):
         ("robot.rail.axis", [False, True, False], "robot.rail.axis: must be a number"),
         ("search.pool", 10_000_001, "search.pool: Input should be less than or equal to 10000000"),
         ("search.seed", 2**64, "search.seed: Input should be less"),
-        ("search.poses", "three", "search.poses: Input should be a valid integer, got 'three'"),
+        ("search.poses", "15 kg", "should be a valid integer, without a unit or quotes, got '15"),
+        ("load_cases.level", "120 kg", "valid number, without a unit or quotes, got '120 kg'"),
         ("engagement.disk_radius", "1001 m", "engagement.disk_radius: '1001 m' is too large"),
         ("tcp.abc.0", "1e300 deg", "tcp.abc.0: '1e300 deg' is too large"),
         ("motion.home.rail", "1e300 m", "home.rail: '1e300 m' is too large"),
@@ -248,6 +249,11 @@ def test_process_poses_are_read(folder, example):
 )
 def test_what_does_not_fit_is_refused_by_its_path(folder, example, key, value, words):
     assert words in refusal(folder, changed(example, key, value))
+
+
+def test_a_misspelt_section_is_named_not_what_misses_it(folder, example):
+    data = {("markr" if key == "marker" else key): value for key, value in example.items()}
+    assert "unknown key 'markr'; did you mean 'marker'?" in refusal(folder, data)
 
 
 def test_two_stations_of_one_name_are_refused(folder, example):

@@ -185,8 +185,27 @@ def test_the_torque_of_a_force_through_the_axis_is_zero():
     assert spring_torques(jacobian, [3.0, 4.0, 5.0], [0.0, 0.0, 7.0]) == pytest.approx(7.0)
 
 
-@pytest.mark.parametrize("c", [np.ones(17), np.full(18, np.nan), 1.0, np.ones((18, 1))])
-def test_compliances_of_another_shape_or_not_finite_are_refused(model, c):
+def test_a_compliance_that_is_not_finite_is_named(model):
+    c = np.ones(18)
+    c[2] = np.nan
+    with pytest.raises(SpringError, match=f"compliance of {model.parameter_names[2]} is nan"):
+        model.deflection(c, Q, FORCE)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"joint_a1": 1e-6}, "home", 1j * np.ones(18), [[1.0], [1.0, 2.0]]]
+)
+def test_what_is_no_array_of_real_numbers_is_named(model, wrong):
+    with pytest.raises(TypeError, match=r"^compliances is .*allowed: real numbers"):
+        model.deflection(wrong, Q, FORCE)
+    with pytest.raises(TypeError, match=r"^joint positions is .*allowed: real numbers"):
+        model.deflection(np.ones(18), wrong, FORCE)
+    with pytest.raises(TypeError, match=r"^force is .*allowed: real numbers"):
+        model.deflection(np.ones(18), Q, wrong)
+
+
+@pytest.mark.parametrize("c", [np.ones(17), 1.0, np.ones((18, 1))])
+def test_compliances_of_another_shape_are_refused(model, c):
     with pytest.raises(SpringError, match=r"18 finite numbers, one a spring, got shape \("):
         model.deflection(c, Q, FORCE)
 

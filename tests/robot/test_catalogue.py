@@ -1,6 +1,8 @@
 """The catalogue: sourced numbers, kinematics by an independent solver, honest about gaps."""
 
 import math
+import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -353,3 +355,9 @@ def test_what_is_shown_of_a_robot_has_its_numbers_and_their_sources():
     assert [row[0] for row in joints.rows] == list(robot.joint_names)
     assert f"{np.degrees(robot.limits.upper[0]):.1f}" in joints.rows[0][2]
     assert {f"source of {field}" for field in known.sources} <= {fact for fact, _ in facts.pairs}
+
+
+def test_the_catalogue_is_there_without_an_import_of_its_own():
+    code = "import elastocal as ec; print(ec.robot.catalogue.load('BXP210L').name)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout == "BXP210L\n"

@@ -11,9 +11,18 @@ from elastocal.verdict import (
     EvidenceOptions,
     gather_evidence,
 )
-from elastocal.verdict._files import EvidenceFolders, PartReader
+from elastocal.verdict._files import EvidenceFolders, PartReader, find_folders
 from support.cli import elastocal
 from support.reported import MADE, POSES
+
+
+def test_a_single_run_of_another_name_is_found_and_of_several_none_is_guessed(tmp_path):
+    (tmp_path / "model.json").write_text("{}")
+    for name, found in (("lauf", "lauf"), ("second", None), ("run", "run")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "journal.jsonl").write_text("")
+        run = find_folders(tmp_path).run
+        assert (None if run is None else run.path.name) == found
 
 
 def absent(parts):

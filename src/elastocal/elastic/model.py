@@ -40,7 +40,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray, as_numbers
 from elastocal.elastic.springs import Parameter, Spring, SpringLoad, check_springs
 from elastocal.errors import SpringError, require_type
 from elastocal.results import brief_repr
@@ -635,13 +635,15 @@ class ElasticModel:
         SpringError
             If there is not one finite number a parameter.
         """
-        c = np.asarray(compliance, dtype=float)
-        n = len(self.parameters)
-        if c.shape != (n,) or not np.all(np.isfinite(c)):
+        c, n = as_numbers(compliance, "compliances"), len(self.parameters)
+        if c.shape != (n,):
             each = "spring" if n == len(self.springs) else "parameter"
             raise SpringError(
                 f"compliances must be {n} finite numbers, one a {each}, got shape {c.shape}"
             )
+        for name, value in zip(self.parameter_names, c, strict=True):
+            if not np.isfinite(value):
+                raise SpringError(f"the compliance of {name} is {value}, not a finite number")
         return c
 
 
@@ -703,7 +705,7 @@ def check_vectors(name: str, vectors: ArrayLike) -> FloatArray:
     SpringError
         If the last axis is not x, y, z or a value is not finite.
     """
-    array = np.asarray(vectors, dtype=float)
+    array = as_numbers(vectors, name)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise SpringError(f"{name} has shape {array.shape}: the last axis must be x, y, z")
     if not np.all(np.isfinite(array)):

@@ -20,6 +20,8 @@ _LONGEST_SHOWN = 60
 """Longer values are left out of messages."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 """How a validator calls a key that it does not know."""
+_NUMBER = ("float_type", "float_parsing", "int_type", "int_parsing")
+"""How it calls a text, or anything else, where a number is asked for."""
 _MOST_PROBLEMS = 10_000
 """Each takes a kilobyte as soon as one of them is looked at."""
 
@@ -83,7 +85,7 @@ def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
     """Return the first problem in the words of the file."""
     if error.error_count() > _MOST_PROBLEMS:
         return f"it does not fit its schema at {error.error_count()} places"
-    first = _misspelt(error.errors(include_url=False))
+    first = _misspelt(error.errors(include_url=False), cls)
     # An item of an array is known by its place in it; see `elastocal.arrays`.
     item = first.get("ctx", {})
     # A part in angle brackets is the tag of a class among several; the file has no such key.
@@ -97,6 +99,8 @@ def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
         return f"key {path!r} is missing"
     # How a validator failed to read a text is its own affair.
     reason = first["msg"].removeprefix("Value error, ").partition(", unable to parse")[0]
+    if first["type"] in _NUMBER and isinstance(first["input"], str):
+        reason = f"{reason}, without a unit or quotes"
     text = _at(data, first["loc"])
     bound = _bound(item)
     in_its_unit = None
@@ -112,17 +116,23 @@ def _first_problem(error: ValidationError, cls: type, data: Any) -> str:
     return message if given in reason or len(given) > _LONGEST_SHOWN else f"{message}, got {given}"
 
 
-def _misspelt(problems: Sequence[Any]) -> Any:
-    """Return the first problem; of a key that is missing the unknown one that was meant for it."""
+def _misspelt(problems: Sequence[Any], cls: type) -> Any:
+    """Return the first problem; of a key that is missing the unknown one that was meant for it.
+
+    What contradicts the rest may do so for want of an optional key, which no problem names.
+    """
     first = problems[0]
-    if first["type"] not in ("missing", "missing_argument"):
+    if first["type"] not in ("missing", "missing_argument", "value_error"):
         return first
     *section, wanted = first["loc"]
+    allowed = [str(wanted)]
+    if first["type"] == "value_error":
+        allowed = _known_keys(cls, tuple(section))
     beside = (
         each
         for each in problems[1:]
         if each["type"] in _UNKNOWN and list(each["loc"][:-1]) == section
-        if nearest(str(each["loc"][-1]), [str(wanted)])
+        if nearest(str(each["loc"][-1]), allowed)
     )
     return next(beside, first)
 

@@ -1,3 +1,4 @@
+from . import catalogue as catalogue
 from .chain import (
     ChainJoint as ChainJoint,
     ChainModel as ChainModel,

@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from elastocal.arrays import FloatArray, IndexArray
+from elastocal.arrays import FloatArray, IndexArray, as_numbers
 from elastocal.errors import RobotError, require_type
 from elastocal.files import as_path, sha256
 from elastocal.results import brief_repr
@@ -351,7 +351,7 @@ class Robot:
         RobotError
             If the last axis is not the number of joints or a value is not finite.
         """
-        array = np.asarray(q, dtype=float)
+        array = as_numbers(q, "joint positions")
         count = len(self.chain.joints)
         if array.ndim == 0 or array.shape[-1] != count:
             raise RobotError(

@@ -214,8 +214,8 @@ def find_folders(run: Path) -> EvidenceFolders:
     Parameters
     ----------
     run : Path
-        A run folder, a folder that holds one called ``run``, a folder with other parts but
-        no run, or a model file.
+        A run folder, a folder that holds one called ``run``, or a single one of another name, a
+        folder with other parts but no run, or a model file.
 
     Raises
     ------
@@ -228,8 +228,10 @@ def find_folders(run: Path) -> EvidenceFolders:
         raise FileAccessError(f"cannot read {run}: there is no such file or folder")
     if (run / JOURNAL).exists():
         return EvidenceFolders(RunFolder(run), (run, run.resolve().parent))
-    if (run / _RUN / JOURNAL).exists():
-        return EvidenceFolders(RunFolder(run / _RUN), (run / _RUN, run))
+    named = (run / _RUN / JOURNAL).exists()
+    inside = [run / _RUN] if named else [each.parent for each in run.glob(f"*/{JOURNAL}")]
+    if len(inside) == 1:
+        return EvidenceFolders(RunFolder(inside[0]), (inside[0], run))
     if any((run / name).exists() for name in (MODEL, CODEC, PROCESS)):
         return EvidenceFolders(None, (run,))
     raise FileAccessError(

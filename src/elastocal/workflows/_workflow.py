@@ -79,6 +79,7 @@ def workflow(
         Field with the folder of a run whose record is written; no other workflow may.
     """
     fields = inspect.signature(settings).parameters
+    _show_plainly(settings)
     placed = [name for name, each in fields.items() if each.kind is not each.KEYWORD_ONLY]
     needed = [name for name in placed if fields[name].default is inspect.Parameter.empty]
     by_place = needed or placed[:1]
@@ -153,6 +154,16 @@ def _signature(
     follows = inspect.signature(function).parameters["progress"].replace(default=silent)
     rest = (each for each in shown if each.name not in by_place)
     return inspect.Signature([*placed, follows, *rest])
+
+
+def _show_plainly(settings: type[Any]) -> None:
+    """Let `help` show the fields of settings without what a command line adds to them."""
+    made = settings.__init__
+    signature = inspect.signature(made)
+    shown = [
+        each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()
+    ]
+    made.__signature__ = signature.replace(parameters=shown)
 
 
 def _plain(annotation: Any) -> Any:

@@ -68,6 +68,12 @@ def test_a_mesh_in_mm_that_is_read_as_m_is_found_by_the_reach(cell):
     assert "mm" in found["far"]
 
 
+def test_a_surface_that_is_out_of_reach_is_named(cell):
+    gone = 4.0 * arm_reach(cell.robot)
+    far = build_surface(placed(cell).mesh, np.eye(4) + _shift(gone))
+    assert "no part of it is within reach" in kinds(cell, far)["out-of-reach"]
+
+
 def test_a_mesh_in_m_that_is_read_as_mm_is_tiny(cell):
     assert "tiny" in kinds(cell, placed(cell, unit=1e-6))
 

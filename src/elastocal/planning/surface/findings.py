@@ -60,6 +60,12 @@ FAR = Kind(
     grade=Grade.REFUSAL,
     shown=dict.fromkeys(("gap", "reach"), as_number(".3g")),
 )
+OUT_OF_REACH = Kind(
+    "surface.out-of-reach",
+    "{name}: no part of it is within reach: it lies {gap} m from the shoulder of the robot, whose"
+    " reach is {reach} m (surface.pose)",
+    shown=dict.fromkeys(("gap", "reach"), as_number(".3g")),
+)
 HUGE = Kind(
     "surface.huge",
     "{name} is {size} m across; the reach of the robot is {reach} m: is the mesh in {unit}"
@@ -96,7 +102,9 @@ INVERTED = Kind(
     " the tcp (tcp.abc) if it points into the tool",
     shown=dict.fromkeys(("front", "back"), as_number(".0%")),
 )
-OF_WRONG_MESHES = frozenset(kind.name for kind in (TINY, SOLID_TINY, INCHES, INSIDE_OUT, INVERTED))
+OF_WRONG_MESHES = frozenset(
+    kind.name for kind in (TINY, SOLID_TINY, INCHES, INSIDE_OUT, INVERTED, OUT_OF_REACH)
+)
 """Kinds that may be why no pose is found."""
 
 
@@ -136,7 +144,14 @@ def placement_findings(
         return (FAR(name=name, gap=gap, reach=reach, unit=_misread(size, reach)),)
     if not size <= _HUGE * reach:
         return (HUGE(name=name, size=size, reach=reach, unit=_misread(size, reach)),)
-    return tiny_finding(surface, reach) + inverted_finding(surface, reachable, rng)
+    found = tiny_finding(surface, reach) + inverted_finding(surface, reachable, rng)
+    # No face is nearer than the box around all of them.
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    outside = np.maximum(np.maximum(low - first_joints, first_joints - high), 0.0)
+    gap = float(np.linalg.norm(outside, axis=1).min())
+    if gap > reach:
+        found += (OUT_OF_REACH(name=name, gap=gap, reach=reach),)
+    return found
 
 
 def tiny_finding(surface: Surface, reach: float) -> tuple[Finding, ...]:

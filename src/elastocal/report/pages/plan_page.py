@@ -80,8 +80,8 @@ def write_plan_page(
             "z in mm",
             "Smallest margin",
             "Seen by",
-            "Way to it",
-            "In contact",
+            "Time to get there",
+            "Time in contact",
         ),
         expected=None if plan.production is None else expected(plan, plan.production),
         subtitle=phrase(

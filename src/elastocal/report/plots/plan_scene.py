@@ -81,7 +81,7 @@ def _plan_layers(
         _candidates(pool, lift),
         Layer(phrase("Poses, in visiting order"), style.BLUE, (_poses(plan, 5.0 * lift),)),
         Layer(phrase("Approach, along the normal"), "--muted", (_approaches(plan),)),
-        Layer(phrase("Way of the tool from HOME to HOME"), style.TOUR, _tour(path)),
+        Layer(phrase("Path of the tool, from HOME to HOME"), style.TOUR, _tour(path)),
         *_refused(pool),
     ]
 

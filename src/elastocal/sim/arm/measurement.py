@@ -384,7 +384,8 @@ def press_poses(
         where = ", ".join(f"{value:.3f}" for value in points[missing[0]])
         raise UnreachableError(
             f"{linkage.name} cannot press at ({where}) m within its joint limits: none of"
-            f" {_ATTEMPTS} spins is reached, and so for {len(missing)} of {count} points"
+            f" {_ATTEMPTS} spins is reached, and so for {len(missing)} of {count} points;"
+            " surface and start (a posture before it) must be this arm's"
         )
     return PressPoses(joints, goals)
 
