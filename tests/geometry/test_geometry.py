@@ -122,6 +122,7 @@ def test_as_many_errors_are_told_apart_as_theory_says(arm, markers, count):
     arm_errors = [i for i in free if problem.unknowns[i].rung != "registration"]
     assert len(arm_errors) == count
     assert all(each.why.startswith(("as ", "moves no")) for each in fixed)
+    assert any(" + " in each.why for each in fixed)
 
 
 def test_sag_under_weight_and_payload_is_told_from_geometry():

@@ -80,7 +80,5 @@ def _why(
     names = [
         problem.unknowns[kept[i]].name for i in big if abs(share[i]) > 0.05 * abs(share[big[0]])
     ]
-    alike = names[0]
-    for name in names[1:4]:
-        alike = phrase("{first} with {second}", first=alike, second=name)
+    alike = " + ".join(names[:4])
     return phrase("as {names} and others" if len(names) > 4 else "as {names}", names=alike)

@@ -19,6 +19,7 @@ from elastocal.report.document import find_browser, open_tab, write_pdf, write_r
 from elastocal.report.language import LANGUAGES
 from elastocal.report.pages import templating
 from elastocal.verdict import Evidence
+from elastocal.wording import phrase
 from support.browser import Look, look
 from support.measured_arms import kuka, measure, write_positions
 from support.pages import with_script
@@ -334,7 +335,9 @@ def test_the_certificate_alone_is_one_sheet_in_every_language_whatever_it_has_to
 ):
     monkeypatch.setattr(templating, "themed_svg", lambda *_: b"")
     stated = {key: " ".join([key] * 9) for key in ("operator", "robot.serial", "sensor.serial")}
-    wordy = replace(parts, stated=stated, doubts=tuple(f"{k} {LONG}" for k in range(9)))
+    more = "{first} (and {more} more of this kind)"
+    doubts = tuple(phrase(more, first=f"{k} {LONG}", more=9) for k in range(9))
+    wordy = replace(parts, stated=stated, doubts=doubts)
     sizes, sheets = {}, {}
     with open_tab(browser) as tab:
         tab.call("Emulation.setDeviceMetricsOverride", width=688, height=1017,
@@ -348,11 +351,14 @@ def test_the_certificate_alone_is_one_sheet_in_every_language_whatever_it_has_to
             sizes[path.name] = tab.evaluate(SIZES)
             tab.call("Emulation.setEmulatedMedia", media="")
     assert set(sheets.values()) == {1}
-    for high, room in sizes.values():
+    for high, room, lines in sizes.values():
         assert high <= room + 1, "something of the certificate is cut"
+        assert lines < 2.5, "a reason that is partly in English takes more lines than others"
 
 
-SIZES = """(({ scrollHeight, clientHeight }) => [scrollHeight, clientHeight])(
+SIZES = """(({ scrollHeight, clientHeight }) => [scrollHeight, clientHeight, Math.max(0,
+  ...[...document.querySelectorAll(".reasons li")].map((each) =>
+    each.offsetHeight / parseFloat(getComputedStyle(each).lineHeight)))])(
   document.querySelector(".certificate"))"""
 
 
