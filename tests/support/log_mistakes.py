@@ -424,7 +424,9 @@ LOG_MISTAKES = (
     ),
     LogMistake("tracker in inches for mm", ("inch",), _scaled(position=1 / 25.4)),
     LogMistake(
-        "tracker in m for mm", ("mm in a column of m",), _map("6], unit: mm", "6], unit: m")
+        "tracker in m for mm",
+        ("column is in mm, but its heading says m",),
+        _map("6], unit: mm", "6], unit: m"),
     ),
     LogMistake("tracker left-handed", ("left-handed",), _scaled(position=[1, 1, -1])),
     LogMistake("tracker x, y exchanged", ("left-handed",), _map("[4, 5, 6]", "[5, 4, 6]")),

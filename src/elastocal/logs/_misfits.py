@@ -28,9 +28,9 @@ _LEAST_SAMPLES = 20
 """Samples by which an offset is judged."""
 _MOST_SAMPLES = 800
 """Samples that are enough to judge it."""
-_LEFT_HANDED = 0.5
-"""Ratio of residuals as a left-handed frame leaves to those of a right-handed one, below which it
-is left-handed."""
+_PLAINLY = 0.5
+"""Part of the residual below which another unit or a left-handed frame is plainly the better
+explanation: the motion of other joints is a little better explained by nearly any."""
 
 
 def misfits(
@@ -103,20 +103,20 @@ def _rigid_misfit(log: LogStreams, reference: LogStreams, shift: float, lever: F
 def _brought(here: FloatArray, there: FloatArray) -> FloatArray:
     """Return points of a tracker brought to those of the arm, shape (sample, 3), in m.
 
-    Their unit and handedness are free (S. Umeyama, "Least-squares estimation of transformation
-    parameters between two point patterns", IEEE Transactions on Pattern Analysis and Machine
-    Intelligence 13, 1991): a mistake in them does not hide the clock, which is needed to name it.
+    Where that is plainly better their unit and handedness are free (S. Umeyama, "Least-squares
+    estimation of transformation parameters between two point patterns", IEEE Transactions on
+    Pattern Analysis and Machine Intelligence 13, 1991): a mistake in them does not hide the clock,
+    which is needed to name it.
     """
     middle = there.mean(axis=0)
     a, b = here - here.mean(axis=0), there - middle
     M, size = b.T @ a, float((a**2).sum())
-    right, left = (
-        middle + float((Q * M).sum()) / size * a @ Q.T
-        for Q in (nearest_rotation(M), -nearest_rotation(-M))
-    )
-    # Points in a plane have no handedness.
-    plainly = _median_length(there - left) < _LEFT_HANDED * _median_length(there - right)
-    return np.asarray(left if plainly else right)
+    turn = nearest_rotation(M)
+    stated = middle + a @ turn.T
+    others = [middle + float((Q * M).sum()) / size * a @ Q.T for Q in (turn, -nearest_rotation(-M))]
+    best = min(others, key=lambda each: _median_length(there - each))
+    plainly = _median_length(there - best) < _PLAINLY * _median_length(there - stated)
+    return np.asarray(best if plainly else stated)
 
 
 def _median_length(values: FloatArray) -> float:
