@@ -124,14 +124,14 @@ def _misspelt(problems: Sequence[Any], cls: type) -> Any:
     first = problems[0]
     if first["type"] not in ("missing", "missing_argument", "value_error"):
         return first
-    *section, wanted = first["loc"]
-    allowed = [str(wanted)]
+    section, wanted = first["loc"][:-1], first["loc"][-1:]
+    allowed = [*map(str, wanted)]
     if first["type"] == "value_error":
-        allowed = _known_keys(cls, tuple(section))
+        allowed = _known_keys(cls, section)
     beside = (
         each
         for each in problems[1:]
-        if each["type"] in _UNKNOWN and list(each["loc"][:-1]) == section
+        if each["type"] in _UNKNOWN and each["loc"][:-1] == section
         if nearest(str(each["loc"][-1]), allowed)
     )
     return next(beside, first)

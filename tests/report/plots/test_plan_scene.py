@@ -58,7 +58,7 @@ def test_robot_moves_from_posture_to_posture_and_its_foot_stays(view, plan):
 
 
 def test_way_runs_from_home_through_every_approach_pose_and_back(view, cell, plan):
-    ends = layer(view, "Way").parts[0].ends
+    ends = layer(view, "Path").parts[0].ends
     np.testing.assert_array_equal(ends[1:, 0], ends[:-1, 1])
     home = cell.robot.forward(plan.robot.home)[:3, 3]
     np.testing.assert_allclose([ends[0, 0], ends[-1, 1]], [home, home], atol=1e-9)
