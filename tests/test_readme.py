@@ -149,6 +149,22 @@ def test_the_page_on_the_table_quotes_what_the_tour_prints(toured):
             words = words[after(re.sub(r"\d{5,}", "many", part).split(), words) :]
 
 
+@pytest.mark.slow
+def test_the_page_on_studies_quotes_what_its_commands_print(tmp_path):
+    page = (ROOT / "docs/how-to/study-before-you-travel.md").read_text(encoding="utf-8")
+    shell = "".join(re.findall(r"^```sh\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)[:2])
+    quoted = re.findall(r"^```text\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
+    with contextlib.chdir(tmp_path):
+        made, *studies = (
+            elastocal(*shlex.split(line)[1:]) for line in shell.replace("\\\n", "").splitlines()
+        )
+    assert made.code == 0
+    for told, block in zip(studies, quoted, strict=True):
+        words = told.err.split()
+        for part in re.split(r"^…$", block, flags=re.MULTILINE):
+            words = words[after(part.split(), words) :]
+
+
 def after(wanted: list[str], words: list[str]) -> int:
     """Return where the words that follow the wanted ones begin; fail when they do not stand."""
     for start in range(len(words) - len(wanted) + 1):
