@@ -641,9 +641,9 @@ class ElasticModel:
             raise SpringError(
                 f"compliances must be {n} finite numbers, one a {each}, got shape {c.shape}"
             )
-        for name, value in zip(self.parameter_names, c, strict=True):
-            if not np.isfinite(value):
-                raise SpringError(f"the compliance of {name} is {value}, not a finite number")
+        if (wrong := np.flatnonzero(~np.isfinite(c))).size:
+            name, value = self.parameter_names[wrong[0]], c[wrong[0]]
+            raise SpringError(f"the compliance of {name} is {value}, not a finite number")
         return c
 
 
