@@ -39,7 +39,9 @@ types: $(VENV)/installed-dev
 	$(BIN)/mypy
 
 # All at once: every process collects the suite once, and where a browser is waited for others work.
+# In a fresh clone one process compiles what all of them read.
 tests: $(VENV)/installed-dev
+	@test -d tests/__pycache__ || $(BIN)/pytest --collect-only -qq > /dev/null
 	$(BIN)/pytest $(SHARED_OUT)
 
 units: $(VENV)/installed-dev
@@ -185,7 +187,7 @@ $(VENV)/bin/python:
 comma := ,
 # uv takes a third of pip's time; where it cannot be had, pip does it.
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
-install = { $(PIP) uv && $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python \
+install = { $(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python \
 	-e $(1); } 2>/dev/null || $(PIP) -e $(1)
 
 NEEDED = sed -n '/^dependencies = \[/,/^\]/s/^ *"\([A-Za-z0-9_-]*\).*/\1/p' pyproject.toml

@@ -64,6 +64,8 @@ _LINKED = 0.1
 """Correlation above which springs are hidden together."""
 _SMALL_PART = 0.02
 """Smaller parts of a hidden combination are not named, in likely sizes."""
+_EXCHANGED = 0.1
+"""The same of what known springs take of one that is hidden beside them."""
 
 
 @brief_repr
@@ -324,7 +326,8 @@ def find_hidden(
     the readings then say three times as much as the likely size does. That of a fit with a normal
     prior is the posterior's (A. Gelman and others, *Bayesian Data Analysis*, 2013, section 14.8).
     Readings at one pose share their errors, so poses count. Bounds are not looked at: one that
-    holds a spring at zero gives its share to those beside it.
+    holds a spring at zero gives its share to those beside it. A spring that is hidden only beside
+    known ones is in a combination with them, and they stay known.
 
     Parameters
     ----------
@@ -352,12 +355,17 @@ def find_hidden(
     members = np.flatnonzero(unsure)
     if not len(members):
         return seen
+    # Whether the readings would tell a spring if all others were known.
+    alone = 1.0 / (np.square(Vt.T) @ information + 1.0 / width**2)
+    shown = alone <= np.square(_TOLD * usual)
     left = Vt[spread > _TOLD**2][:, members].T
     hidden, faint = list[tuple[Term, ...]](), list[FaintParameter]()
     for component in _linked(left):
         own = members[component]
         for vector in _combinations(left[component]):
             parts = [(i, vector[j]) for j, i in enumerate(own) if abs(vector[j]) > _SMALL_PART]
+            if len(parts) == 1 and shown[parts[0][0]]:
+                parts = _exchanged(parts[0][0], Vt, spread)
             if len(parts) == 1:
                 faint.append(_faint(parts[0][0], problem, parameters, sizes, variance))
                 continue
@@ -411,6 +419,16 @@ def _combinations(left: FloatArray) -> FloatArray:
     return np.array(list(eliminated(basis)))
 
 
+def _exchanged(index: int, Vt: FloatArray, spread: FloatArray) -> list[tuple[int, float]]:
+    """Return by how much the others change with a spring that noise moves by its likely size."""
+    moved = Vt.T @ (spread * Vt[:, index])
+    moved /= moved[index]
+    most = np.argsort(-np.abs(moved), kind="stable")[:MOST_TERMS].tolist()
+    return [(index, 1.0)] + [
+        (i, float(moved[i])) for i in most if i != index and abs(moved[i]) > _EXCHANGED
+    ]
+
+
 def _three_digits(weight: float) -> float:
     """Return a weight of what is estimated itself."""
     return float(f"{weight:.3g}")
@@ -423,7 +441,7 @@ def _faint(
     sizes: FloatArray,
     variance: FloatArray,
 ) -> FaintParameter:
-    """Return a parameter that noise hides alone, since others make like deflections."""
+    """Return a parameter whose own column is below the noise."""
     reach = _TWICE * float(sizes[index] * np.sqrt(variance[index]))
     column = float(np.sqrt(np.mean(np.square(problem.O[:, :, index]).sum(axis=1))))
     size = float(sizes[index])
