@@ -311,8 +311,8 @@ def spring_summaries(
             group, reach = seen.group_of(parts), seen.faint_reach(parts)
             value = float(calibrated.compliance[own] @ weights)
             low, high = next(ends)
-            # Noise may mix the parts of a gear and leave what they come to, and hide a spring beside
-            # one that is known.
+            # Noise may mix the parts of a gear and leave what they come to, and hide another spring
+            # beside one that is known.
             whole = np.count_nonzero(weights) > 1 and 0.5 * (high - low) <= abs(value)
             told = bool(np.all(np.array(seen.observable[own])[weights != 0.0]))
             if (whole or told) and group is not None and group > len(seen.unobservable):
