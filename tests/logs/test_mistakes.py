@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.cell import SensorLoad
 from elastocal.compensation.conditioning import static_postures
 from elastocal.geometry import Payload, Positions, position_mistake
-from elastocal.logs._frames import sensor_doubts
-from elastocal.logs.merge import sensor_contradictions, sensor_misfit
+from elastocal.logs.doubts import sensor_contradictions, sensor_doubts, sensor_misfit
 from elastocal.robot import catalogue
 from support.by_day import some_by_day
 from support.mistake_table import rates, tabulate
@@ -70,7 +69,9 @@ def test_a_light_tool_tells_forces_in_kgf():
     R = _turns(0.2)
     force = MASS / 9.80665 * (DOWN @ R)
     postures = static_postures(R, force, np.zeros_like(force), DOWN)
-    assert any("forces in kgf?" in text for text in sensor_contradictions(postures, _site(MASS)))
+    assert any(
+        "forces in kgf?" in each.message for each in sensor_contradictions(postures, _site(MASS))
+    )
     assert not [*sensor_contradictions(postures, _site(MASS / 9.80665))]
 
 

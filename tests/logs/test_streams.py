@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.errors import LogError
 from elastocal.logs import ClockFit, days_of
 from elastocal.logs._frames import stated_poses
+from elastocal.logs.doubts import _set_clocks
 from elastocal.logs.map import Joints, LogEntry, LogMap, TimeColumn, ToolPose, Vector
-from elastocal.logs.merge import _set_clocks
 from elastocal.logs.streams import body_centre
 from elastocal.logs.table import LogTable
 from elastocal.robot import catalogue

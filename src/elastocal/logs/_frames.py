@@ -1,9 +1,4 @@
-"""Comparison of the frames of the map with the logs.
-
-The tool frame that a controller states must be that of its joints. The direction of the tool's
-weight in the sensor changes with the arm's orientation, which shows the sensor's rotation on the
-flange.
-"""
+"""Comparison of the frames of the map with the logs: a controller's tool frame is its joints'."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -12,11 +7,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.arrays import FloatArray
-from elastocal.compensation.conditioning import StaticPostures
 from elastocal.errors import LogError, present
-from elastocal.logs.map import LogEntry, MarkerColumns, Site, ToolPose, Vector
+from elastocal.logs.map import LogEntry, MarkerColumns, ToolPose, Vector
 from elastocal.logs.table import LogTable
-from elastocal.robot import Robot, nearest_rotation, xyzabc_from_T
+from elastocal.robot import Robot
 from elastocal.units import factor, largest
 from elastocal.wording import listed
 
@@ -35,19 +29,6 @@ _WRONG_UNIT = 1e3
 arm."""
 _UNIT_NORM = 1e-2
 """Distance of a quaternion's norm from 1: four columns of few digits are nearer."""
-_PULL = 0.5
-"""Part of a load along z of the tcp from which on it is a press, or a pull."""
-_LEAST_WEIGHT = 5.0
-"""Smallest change of the unloaded force between poses that is usable, RMS in N."""
-_LEAST_TURN = np.radians(3.0)
-"""Rotation of a sensor that is a usual mounting error."""
-_MOST_LEFT = 0.2
-"""Part of the change that another turn may leave and still be believed."""
-_BETTER, _TELLS = 0.5, 0.02
-"""Ratio of the residuals of both senses of the forces, and the residual, at which a sense is
-decided."""
-_LEAST_SPREAD = 0.05
-"""Second spread of the directions of gravity in the sensor from which a rotation is determined."""
 
 
 def vectors(table: LogTable, vector: Vector | MarkerColumns, dimension: str) -> FloatArray:
@@ -225,74 +206,3 @@ def _rotations(pose: ToolPose, stated: FloatArray, R_joints: FloatArray) -> Floa
     if pose.angles is not None:
         return np.asarray(Rotation.from_euler("ZYX", stated).as_matrix())
     return np.asarray(Rotation.from_quat(stated).as_matrix())
-
-
-def sensor_doubts(
-    postures: StaticPostures | None, loads: FloatArray, site: Site
-) -> tuple[str, ...]:
-    """Return why the sensor contradicts the map, by the sense of the loads and the weight.
-
-    Unloaded, its force is a constant plus the weight of the tool. With the means over the poses
-    subtracted, it is gravity in the sensor times the tool's mass, rotated by the error of the
-    sensor's rotation in the map (Kabsch, Acta Crystallographica A32, 1976).
-
-    Parameters
-    ----------
-    postures : StaticPostures, optional
-        At which nothing presses.
-    loads : ndarray, shape (load, 3)
-        Force on the robot in the tcp, as the map has it, in N.
-    site : Site
-        What the map says.
-    """
-    along = float(np.median(loads[:, 2])) if len(loads) else 0.0
-    left, turned = _turned_sensor(postures, 1.0, site)
-    if not (along > 0.0 and along > _PULL * float(np.linalg.norm(loads, axis=1).mean())):
-        return turned
-    left_reversed, turned_reversed = _turned_sensor(postures, -1.0, site)
-    if left < min(_MOST_LEFT, _BETTER * left_reversed) and left_reversed > _TELLS:
-        return turned  # an upside-down sensor: forces of the other sense would fit no tool
-    return (
-        f"the loads pull at the tool ({along:+.0f} N along z of the tcp; a press is negative):"
-        " does the sensor show the force on the tooling (acts_on: environment), does z of the"
-        " tcp point into the tool?",
-        *turned_reversed,
-    )
-
-
-def _turned_sensor(
-    postures: StaticPostures | None, sense: float, site: Site
-) -> tuple[float, tuple[str, ...]]:
-    """Return the part of the weight's change that the best rotation leaves, and its description.
-
-    The part is infinite where weight and poses do not determine it.
-    """
-    if postures is None:
-        return np.inf, ()
-    gravity = postures.gravity_flange @ site.T_flange_sensor[:3, :3]
-    force = sense * postures.force
-    gravity, force = gravity - gravity.mean(axis=0), force - force.mean(axis=0)
-    spread = np.linalg.svd(gravity / np.linalg.norm(postures.gravity), compute_uv=False)
-    size = float(np.sqrt((force**2).sum(axis=1).mean()))
-    if size < _LEAST_WEIGHT or spread[1] < _LEAST_SPREAD * np.sqrt(len(postures)):
-        return np.inf, ()
-    Q = nearest_rotation(force.T @ gravity)
-    mass = float((force * (gravity @ Q.T)).sum() / (gravity**2).sum())
-    left = float(np.sqrt(((force - mass * gravity @ Q.T) ** 2).sum(axis=1).mean())) / size
-    turn = float(Rotation.from_matrix(Q).magnitude())
-    return left, (_turned(site, Q, mass),) if left < _MOST_LEFT and turn > _LEAST_TURN else ()
-
-
-def _turned(site: Site, Q: FloatArray, mass: float) -> str:
-    """Return the sentence about a sensor that is turned by Q^T more than the map says."""
-    T = site.T_flange_sensor.copy()
-    T[:3, :3] = T[:3, :3] @ Q.T
-    said, found = (
-        ", ".join(f"{angle + 0.0:.0f}" for angle in np.round(np.degrees(xyzabc_from_T(each)[3:])))
-        for each in (site.T_flange_sensor, T)
-    )
-    return (
-        f"the weight of the tool turns in the sensor as in one whose abc in the flange is {found}"
-        f" deg (with {mass:.3g} kg behind it), not {said} deg as the map says: every force is"
-        " turned by as much"
-    )

@@ -13,15 +13,9 @@ from numpy.typing import NDArray
 from elastocal.arrays import FloatArray, IndexArray
 from elastocal.errors import LogError
 from elastocal.logs.clocks import ClockFit
+from elastocal.logs.doubts import marker_contradictions, still_columns, stream_doubts
 from elastocal.logs.map import LogMap, Site
-from elastocal.logs.merge import (
-    aligned,
-    marker_contradictions,
-    merged,
-    standing,
-    still_columns,
-    stream_doubts,
-)
+from elastocal.logs.merge import aligned, merged, standing
 from elastocal.logs.plateaus import Plateau, name_loads
 from elastocal.logs.streams import LogStreams, read_streams_of
 from elastocal.procedure.record import SAME_TIME, Streams

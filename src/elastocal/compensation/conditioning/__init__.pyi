@@ -8,8 +8,6 @@ from .filters import (
     WrenchFilter as WrenchFilter,
 )
 from .mistakes import (
-    BIAS_JUMPS as BIAS_JUMPS,
-    SENSOR_TURNED as SENSOR_TURNED,
     SensorMistake as SensorMistake,
     other_centre as other_centre,
     other_mass as other_mass,

@@ -17,6 +17,7 @@ Doubtful points that are not certain mistakes are returned as warnings.
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -156,10 +157,8 @@ _LEAST_TURN = np.radians(3.0)
 """A rotation of base or sensor below this angle is a usual mounting error."""
 _DEAD, _SAME = 0.1, 0.03
 """Gains of an axis below which it is dead, and nearer to 1 than which it is right."""
-SENSOR_TURNED = "the sensor is not turned as stated"
-"""Start of the text of a mistaken rotation, which a caller may explain further."""
-BIAS_JUMPS = "the bias jumps by"
-"""Start of the text of a jump, which does no harm where each pose has a zero of its own."""
+About = Literal["rotation of the sensor", "zero of the sensor", ""]
+"""What a mistake is about, where a caller knows more of it."""
 _SIGN_ALONE = 0.2
 """Largest deviation of a gain from -1 at which the sign alone is turned."""
 _AXES = "xyz"
@@ -179,6 +178,8 @@ class _Reading:
     """Whether cross-talk looks like a little of this mistake."""
     entry: str = ""
     """See `SensorMistake`."""
+    about: About = ""
+    """See `SensorMistake`."""
 
 
 @dataclass(frozen=True)
@@ -187,8 +188,11 @@ class SensorMistake:
 
     message: str
     """Sentence without its end, with its figures."""
-    entry: str
+    entry: str = ""
     """Key and value by which the map of a log undoes it; empty where no key does."""
+    about: About = ""
+    """A rotation may be explained further; another zero from some time on does no harm where each
+    pose has a zero of its own."""
 
 
 def force_mistake(
@@ -288,6 +292,7 @@ def _judged(
         f"{best.sentence}; so read, {best.left:.3g} {unit} are left of a {what} component instead"
         f" of {stated:.3g} {unit}",
         best.entry,
+        best.about,
     )
 
 
@@ -367,8 +372,8 @@ def _in_time(u: FloatArray, F: FloatArray) -> Iterator[_Reading]:
         late = (np.arange(len(F)) >= row)[:, None]
         (_, *step), left = _solved(F, [u, *(late * axis for axis in np.eye(3))])
         size = float(np.linalg.norm(step))
-        text = f"{BIAS_JUMPS} {size:.3g} N after posture {row}: was the sensor zeroed there?"
-        steps.append(_Reading(text, left))
+        text = f"the bias jumps by {size:.3g} N after posture {row}: was the sensor zeroed there?"
+        steps.append(_Reading(text, left, about="zero of the sensor"))
         (first, last), left = _solved(F, [u * ~late, u * late])
         text = (
             f"the tool weighs {first:.3g} kg up to posture {row} and {last:.3g} kg after it: was"
@@ -384,10 +389,11 @@ def _turned_sensor(u: FloatArray, F: FloatArray) -> Iterator[_Reading]:
     angle = float(Rotation.from_matrix(Q).magnitude())
     left = _solved(F, [u @ Q.T], unknowns=4 + 3)[1]
     yield _Reading(
-        f"{SENSOR_TURNED} (--sensor, cell, map): it sits"
+        "the sensor is not turned as stated (--sensor, cell, map): it sits"
         f" {np.degrees(angle):.1f} deg from there; correct it, or give --free-rotation",
         left if angle > _LEAST_TURN else np.inf,
         imitated=True,
+        about="rotation of the sensor",
     )
 
 
