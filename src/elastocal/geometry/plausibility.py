@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from elastocal.arrays import FloatArray, longest_run
-from elastocal.errors import GeometryError, RobotError
+from elastocal.errors import GeometryError, RobotError, present
 from elastocal.geometry.arm import arm_length
 from elastocal.geometry.ladder import GeometryLadder, climb
 from elastocal.geometry.position_file import AXES
@@ -196,16 +196,22 @@ def ratios(units: dict[str, float]) -> tuple[float, ...]:
 
 def unit_mistake(factor: float, units: dict[str, float]) -> str:
     """Return which unit a column is in that differs by a factor; empty if it is none."""
-    for real, heading in permutations(units, 2):
-        if abs(factor * units[heading] / units[real] - 1.0) < 1e-6:
-            return f"is in {real}, but its heading says {heading}"
-    return ""
+    confused = _confused(factor, units)
+    return "is in {}, but its heading says {}".format(*confused) if confused else ""
 
 
 def _unit_of(factor: float, units: dict[str, float]) -> str:
     """Return the true unit that `unit_mistake` names, as a map has it."""
-    named = unit_mistake(factor, units).split()[2].rstrip(",")
-    return MEANT.get(named, named)
+    real, _ = present(_confused(factor, units), "unit of the factor")
+    return MEANT.get(real, real)
+
+
+def _confused(factor: float, units: dict[str, float]) -> tuple[str, str] | None:
+    """Return the unit of a column and that of its heading, by their factor; None: no such pair."""
+    for real, heading in permutations(units, 2):
+        if abs(factor * units[heading] / units[real] - 1.0) < 1e-6:
+            return real, heading
+    return None
 
 
 def _late_rows(robot: Robot, data: Positions) -> Iterator[Undone]:

@@ -41,9 +41,11 @@ _MADE_UP = 8e9
 """ABB writes 9E+09 for an external axis that is not there."""
 _TURNS_OF = {
     "FANUC": ("r", "p", "w"),
-    "Denso or Yaskawa; those of Staeubli turn otherwise: leave them out": ("rz", "ry", "rx"),
+    "Denso or Yaskawa": ("rz", "ry", "rx"),
 }
 """Angles about z, y and x, in the order of the map's a, b, c, as makers name them."""
+_TURN_OTHERWISE = {"Denso or Yaskawa": "; those of Staeubli turn otherwise: leave them out"}
+"""What to look at where another maker names other angles alike."""
 _TURN = re.compile(r"(?i)(.*?)(r[xyz]|[wpr])")
 _NO_TIMES = ("deg", "rad", "mm", "m", "N", "kN", "N*m", "N*mm")
 _TIMES = ("s", "ms", "us")
@@ -388,7 +390,8 @@ def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[Gu
     elif turned := _of_makers(names, _TURN, _TURNS_OF):
         maker, columns = turned
         unit, why = _unit(table, columns, "angle")
-        found.append(GuessedColumns("pose.angles", columns, unit, f"{why}; angles of {maker}"))
+        why = f"{why}; angles of {maker}{_TURN_OTHERWISE.get(maker, '')}"
+        found.append(GuessedColumns("pose.angles", columns, unit, why))
     elif turns := _quaternion(names):
         found.append(GuessedColumns("pose.quaternion", turns, None, "w, x, y, z"))
     return found
