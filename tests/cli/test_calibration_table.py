@@ -1,6 +1,8 @@
 """The table of springs in a terminal: every number whole, and at bound only where it is one."""
 
 import io
+import re
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -62,6 +64,26 @@ def test_every_spring_of_a_rich_model_has_one_line_of_80_columns():
     ]
     assert rows[3].rstrip().endswith("above 8.696  below 0.115")
     assert rows[4].rstrip().endswith("in group 1")
+
+
+def test_no_figure_is_cut_at_any_width():
+    """At 80 columns "below 0.454" was "below 0.45", and "in group 32" was "in group 3"."""
+    gear = "joint_a1.axial"
+    springs = (
+        SpringSummary("rail.axial", "hinge", "m/N", 0.0, 0.0, 4.54e-7, True, at_bound=True),
+        SpringSummary(f"{gear} lost motion", "gear", "rad", 5e-5, 4e-5, 1.2e-4, True),
+        SpringSummary("joint_a1.bend-normal", "hinge", "rad/(N*m)", 1e-7, 0.0, 1e-6, True),
+        SpringSummary("joint_a1.x", "hinge", "rad/(N*m)", 0.0, 0.0, 1e-7, False, group=32),
+    )
+    table = spring_table(springs)
+    cells = [getattr(cell, "text", cell) for row in table.rows for cell in row[1:]]
+    figures = Counter(re.findall(r"\d+(?:\.\d+)?", " ".join(cells)))
+    for width in range(40, 121):
+        screen = console(stderr=False, file=io.StringIO(), width=width)
+        print_blocks(screen, [table])
+        shown = Counter(re.findall(r"\d+(?:\.\d+)?", screen.file.getvalue()))
+        assert not figures - shown, width
+        assert max(map(len, screen.file.getvalue().splitlines())) <= width
 
 
 def known(value, low, high, **more):

@@ -11,7 +11,7 @@ import re
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _HEADS = (80, 18, 14, 10)
 """Characters that a line of a heading may have: the first with which a table fits."""
+_BETWEEN = 2
+"""Spaces between columns."""
 _NAME = 18
 """Characters that the name of a row is given at least."""
 _STYLES = ("bold", "dim", "red", "yellow", "green")
@@ -153,7 +155,7 @@ def print_blocks(screen: "Console", shown: "Iterable[Block]") -> None:
             for number, part in enumerate(_parts(block, screen.width)):
                 if number:
                     screen.print()
-                screen.print(table_of(part, screen.width))
+                screen.print(table_of(part, screen.width), crop=False)
         for line in _lines(block):
             screen.print(line, soft_wrap=True)
 
@@ -194,10 +196,10 @@ def _parts(block: "Table", width: int) -> "Iterator[Table]":
     least = [_least(block, number) for number in range(len(block.heads))]
     groups, room = [[0]], width - least[0]
     for number, needed in enumerate(least[1:], start=1):
-        room -= needed + 2
+        room -= needed + _BETWEEN
         if room < 0 and len(groups[-1]) > 1:
             groups.append([0])
-            room = width - least[0] - needed - 2
+            room = width - least[0] - needed - _BETWEEN
         groups[-1].append(number)
     for group in groups:
         yield replace(
@@ -233,31 +235,40 @@ def table_of(block: "Table", width: int = 80) -> "RichTable":
 
     from elastocal.blocks import cell_text
 
-    table = RichTable(box=None, pad_edge=False)
-    last = len(block.heads) - 1
+    columns = range(len(block.heads))
     longest = [
-        max((len(cell_text(row[number])) for row in block.rows), default=0)
-        for number in range(last + 1)
+        max((len(visible(cell_text(row[k]))) for row in block.rows), default=0) for k in columns
     ]
     for widest in _HEADS:
         heads = [_folded(head, max(longest[k], widest)) for k, head in enumerate(block.heads)]
-        needed = sum(max(longest[k], *map(len, lines)) + 2 for k, lines in enumerate(heads)) - 2
-        if needed <= width:
+        widths = [max(longest[k], *map(len, lines)) for k, lines in enumerate(heads)]
+        if _across(widths) <= width:
             break
+    words = [number < block.texts or _are_words(block, number) for number in columns]
+    # The library takes from all columns alike what is too much, and a number that is cut would be
+    # another number: words alone are folded, the widest first.
+    spare = {k: widths[k] - _least(block, k) for k in columns if words[k]}
+    while _across(widths) > width and any(left > 0 for left in spare.values()):
+        widest_words = max(spare, key=lambda k: (spare[k] > 0, widths[k]))
+        widths[widest_words] -= 1
+        spare[widest_words] -= 1
+    table = RichTable(box=None, pad_edge=False, width=_across(widths))
     for number, lines in enumerate(heads):
-        # A number that is cut would be another number.
-        is_text = number < block.texts or _are_words(block, number)
         table.add_column(
             "\n".join(lines),
-            justify="left" if is_text else "right",
-            no_wrap=not is_text,
-            # Beside wide numbers a name would shrink to nothing.
-            min_width=min(longest[0], _NAME) if number == 0 else None,
-            overflow="fold" if is_text or number == last else "crop",
+            justify="left" if words[number] else "right",
+            no_wrap=not words[number],
+            width=widths[number],
+            overflow="fold",
         )
     for row in block.rows:
         table.add_row(*map(_cell, row))
     return table
+
+
+def _across(widths: Sequence[int]) -> int:
+    """Return the width of a table with columns of such widths."""
+    return sum(widths) + _BETWEEN * (len(widths) - 1)
 
 
 def _folded(head: str, width: int) -> list[str]:
