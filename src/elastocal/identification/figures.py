@@ -344,7 +344,7 @@ def spring_summaries(
 
 
 def sum_summaries(calibrated: CalibratedModel) -> tuple[SumSummary, ...]:
-    """Return what the readings tell of springs that noise hides (`Observability.seen_beside`)."""
+    """Return what the readings tell of springs in a combination (`Observability.seen_beside`)."""
     parameters = calibrated.model.parameters
     units = {each.name: each.unit.si for each in parameters}
     sums = calibrated.observability.seen_beside(parameters)

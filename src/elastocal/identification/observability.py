@@ -163,9 +163,9 @@ class Observability:
         return float(np.linalg.norm(weights * self.reach[own])) if self.reach else 0.0
 
     def seen_beside(self, parameters: Sequence[Parameter]) -> tuple[tuple[Term, ...], ...]:
-        """Return what the readings do tell of the springs that noise hides: sums of them.
+        """Return what the readings do tell of springs that are in a combination: sums of them.
 
-        A sum is told if no hidden combination changes it. Those that are too long to read, or add
+        A sum is told if no combination changes it. Those that are too long to read, or add
         up numbers of different units, are left out.
 
         Parameters
@@ -179,7 +179,7 @@ class Observability:
         open_ = sum_weights((*self.unobservable, *self.hidden), names)
         together = (open_ != 0.0).astype(float) @ (open_ != 0.0).T.astype(float)
         _, label = connected_components(together > 0.0)
-        for number in dict.fromkeys(label[len(self.unobservable) :].tolist()):
+        for number in dict.fromkeys(label.tolist()):
             rows = open_[label == number]
             own = np.flatnonzero(np.any(rows != 0.0, axis=0)).tolist()
             if len({parameters[i].unit for i in own}) > 1:

@@ -347,9 +347,7 @@ def show_sums(sums: Sequence[SumSummary]) -> Iterator[Block]:
         phrase("Compliance, {unit}", unit=_USUAL_UNIT.shown),
         phrase("95 % interval"),
     )
-    yield Table(
-        phrase("Sums that the readings tell of springs hidden by noise"), heads, tuple(rows)
-    )
+    yield Table(phrase("Sums that the readings tell of springs in a group"), heads, tuple(rows))
 
 
 def _meaning(
