@@ -472,6 +472,7 @@ def test_lines_of_a_page_end_before_no_unit_and_code_keeps_its_characters():
     read = re.sub(r"<[^>]*>", "", broken[: broken.index("<pre>")])
     assert read == "0.3\xa0mm " + code[6:-7]
     assert BREAKS("<td>91.9 (90.0 to 93.8)</td>") == "<td>91.9 (90.0\xa0to\xa093.8)</td>"
+    assert BREAKS("<td>0.4 → 0.1</td>") == "<td>0.4\xa0→\xa00.1</td>"
     assert BREAKS(r"<td><code>C:\KRC\ROBOTER\Config</code></td>").count("<wbr>") == 2
 
 
