@@ -13,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import get_args
 
+import griffe
 import pytest
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -36,6 +37,8 @@ OPTIONS = runpy.run_path(str(ROOT / "docs" / "hooks" / "command_options.py"))
 """What fills the reference with the options of commands."""
 BREAKS = runpy.run_path(str(ROOT / "docs" / "hooks" / "line_breaks.py"))["on_page_content"]
 """What says where lines of a page may end."""
+PLAIN = runpy.run_path(str(ROOT / "docs" / "hooks" / "plain_types.py"))["PlainTypes"]
+"""What takes from the types of the reference what a command line adds to them."""
 FACE = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
 """What docs/hooks/faces.py fills with the names that a package exports."""
 FACES = runpy.run_path(str(ROOT / "docs" / "hooks" / "faces.py"))
@@ -468,3 +471,24 @@ def test_lines_of_a_page_end_before_no_unit_and_code_keeps_its_characters():
     assert '<span class="whole">--free</span>-frame' in broken
     read = re.sub(r"<[^>]*>", "", broken[: broken.index("<pre>")])
     assert read == "0.3\xa0mm " + code[6:-7]
+    assert BREAKS("<td>91.9 (90.0 to 93.8)</td>") == "<td>91.9 (90.0\xa0to\xa093.8)</td>"
+    assert BREAKS("<td>0.4 → 0.1</td>") == "<td>0.4\xa0→\xa00.1</td>"
+    assert BREAKS(r"<td><code>C:\KRC\ROBOTER\Config</code></td>").count("<wbr>") == 2
+
+
+def test_the_reference_shows_types_without_what_a_command_line_adds():
+    code = """
+from typing import Annotated
+Force = Annotated[float, 2]
+class Settings:
+    paths: tuple[Annotated[str, 3], ...] | None = None
+def read(path: Annotated[str, 3]) -> Annotated[int, 4]: ...
+"""
+    extensions = griffe.load_extensions(PLAIN)
+    with griffe.temporary_visited_package(
+        "plain", {"__init__.py": code}, extensions=extensions
+    ) as package:
+        read, paths = package["read"], package["Settings.paths"]
+        assert str(package["Force"].value) == "float"
+        assert str(paths.annotation) == "tuple[str, ...] | None"
+        assert (str(read.parameters["path"].annotation), str(read.returns)) == ("str", "int")

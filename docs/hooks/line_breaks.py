@@ -16,9 +16,11 @@ _SHORT, _MIDDLE, _LONG = 12, 16, 30
 is divided outside tables, too."""
 _OPTION = re.compile(r"(?<![\w-])--[a-z]+")
 _QUANTITY = re.compile(r"[\d.]+\xa0[^\s\"]+")
-_JOINED = re.compile(r" (?=→)|(?<=\d) (?=\d{3}\b)")
-"""Before an arrow, and in a number with groups of digits."""
-_WORD_END = re.compile(r"(?<=\w[_|/+=])(?=\w\w)|(?<=\w\.)(?=\w{5})|(?<=[(;,])(?=\w)")
+_JOINED = re.compile(
+    r" (?=→)|(?<=\d) (?=\d{3}\b)|(?<=\d) (?=to [-+−]?\d)|(?<=\d to) (?=[-+−]?\d)|(?<=→) (?=\d)"
+)
+"""Beside an arrow, in a number with groups of digits, and in an interval."""
+_WORD_END = re.compile(r"(?<=\w[_|/+=\\])(?=\w\w)|(?<=\w\.)(?=\w{5})|(?<=[(;,])(?=\w)")
 """Where a name may be divided, but before no ending of a file."""
 
 

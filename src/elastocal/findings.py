@@ -130,6 +130,11 @@ class Finding(Phrase):
     def _inner(self) -> list["Finding"]:
         return [each for each in self.values.values() if isinstance(each, Finding)]
 
+    def without(self, text: str) -> "Finding":
+        """Return the finding with a text left out of its values, such as the name of a folder."""
+        values = {name: _without(text, value) for name, value in self.values.items()}
+        return Finding(self.kind, values, str.__str__(self).replace(text, ""))
+
     def stored(self) -> Any:
         """Return the data in a file: kind, values, text; the text alone where there is no kind."""
         text = str.__str__(self)
@@ -222,6 +227,12 @@ def as_count(noun: str) -> Callable[[int], str]:
 def _plain(value: object) -> object:
     """Return a value as a sentence shows it where its kind does not say otherwise."""
     return ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
+
+
+def _without(text: str, value: Any) -> Any:
+    if isinstance(value, Finding):
+        return value.without(text)
+    return value.replace(text, "") if isinstance(value, str) else value
 
 
 def _data(value: Any) -> Any:

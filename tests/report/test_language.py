@@ -13,8 +13,10 @@ import elastocal
 from elastocal.errors import ReportError
 from elastocal.findings import KINDS, Finding, group_alike
 from elastocal.identification.calibration import SAME_CONFIGURATION
+from elastocal.identification.mistakes.search import IN_SPITE
 from elastocal.planning import checks
 from elastocal.planning.pool import UNREACHABLE
+from elastocal.planning.surface.findings import OPEN
 from elastocal.procedure.record import ReadingStatus
 from elastocal.report import language_of
 from elastocal.report.language import LANGUAGES
@@ -186,6 +188,14 @@ class TestTextsFromFiles:
         assert self.german.say(kept) == (
             "Posen 3, 4 sind eine Stellung: gemeinsam gezogen und ausgelassen"
             " (und 4 weitere dieser Art)"
+        )
+
+    def test_a_finding_is_said_without_the_folder_that_it_names(self):
+        found = OPEN(name="afp/dome.stl", count=128).without("afp/")
+        assert found.startswith("dome.stl is an open mesh")
+        assert self.german.say(found).startswith("dome.stl ist ein offenes Netz")
+        assert (
+            IN_SPITE(error=found).without("dome.").parts["error"].startswith("stl is an open mesh")
         )
 
     def test_a_sentence_of_an_older_file_stays_english(self):

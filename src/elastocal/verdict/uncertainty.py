@@ -84,7 +84,7 @@ def state_uncertainty(evidence: Evidence) -> UncertaintyStatement | None:
     spread = float(np.sqrt(np.mean(unseen.error**2) / 3.0))
     sources = [
         UncertaintySource(
-            phrase("Error at poses left out of the fit: model, repeatability, noise, set-up"),
+            phrase("error at poses left out of the fit: model, repeatability, noise, set-up"),
             "A",
             spread,
             phrase(
@@ -111,7 +111,7 @@ def _zero(evidence: Evidence) -> Iterator[UncertaintySource]:
     contact = None if evidence.figures is None else evidence.figures.contact
     if contact is not None:
         yield UncertaintySource(
-            phrase("Compliance of the contact that held the tool, without a tracker"),
+            phrase("compliance of the contact that held the tool, without a tracker"),
             "A",
             contact.zero,
             phrase(
@@ -124,7 +124,7 @@ def _zero(evidence: Evidence) -> Iterator[UncertaintySource]:
 
 
 def _tracker(evidence: Evidence) -> UncertaintySource:
-    name, stated = phrase("Calibration of the tracker"), evidence.certificate.tracker.uncertainty
+    name, stated = phrase("calibration of the tracker"), evidence.certificate.tracker.uncertainty
     if stated is None:
         return UncertaintySource(name, "B", None, _NOT_STATED)
     return UncertaintySource(name, "B", stated / COVERAGE_FACTOR, _FROM_CERTIFICATE)
@@ -133,7 +133,7 @@ def _tracker(evidence: Evidence) -> UncertaintySource:
 def _sensor(evidence: Evidence) -> UncertaintySource:
     """Return the contribution of the sensor's calibration: forces scale the deflections."""
     name, stated = (
-        phrase("Calibration of the force sensor"),
+        phrase("calibration of the force sensor"),
         evidence.certificate.sensor.uncertainty,
     )
     dataset = evidence.calibrated_from

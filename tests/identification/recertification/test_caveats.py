@@ -49,7 +49,7 @@ def test_two_campaigns_whose_files_have_equal_names_are_independent():
 def test_other_springs_and_rows_beyond_the_limits_are_told():
     told = notes(PLAN.format("in May"), PLAN.format("in June"), False, 3)
     assert "the models have different springs" in told
-    assert "3 rows lie outside the joint limits" in told
+    assert "3 rows outside the joint limits" in told
 
 
 @pytest.mark.parametrize(("old", "new"), [(1e-3, 1.2e-3), (1e-3, None), (None, 1.0), (0.0, 1e-3)])

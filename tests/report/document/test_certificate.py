@@ -75,6 +75,7 @@ def test_a_demo_ends_with_the_words_of_the_first_page(parts, tmp_path):
     verdict = judge_evidence(replace(parts, limits=replace(parts.limits, tolerance=1e-6)))
     told = DemoResult(tmp_path, parts.process.table, verdict).closing()
     page = PageText(verdict_html(parts, verdict)).text.replace(" %", "%")
+    assert f"{verdict.next_step}.".replace("`", "") in page
     for line in (verdict.effect.figures, verdict.effect.rest, verdict.next_step, verdict.word):
         assert any(line in each for each in told)
         assert line.replace("`", "") in page
@@ -125,6 +126,9 @@ class TestUncertainty:
         assert 0.0 < sensor < 1e-4
         assert found.standard == pytest.approx(np.sqrt(alone**2 + tracker**2 + sensor**2))
         assert found.is_complete
+
+    def test_what_is_not_known_ends_a_sentence_in_small_letters(self, certificate):
+        assert "not in it: calibration of the tracker, calibration of" in certificate.uncertainty
 
     def test_without_errors_none_is_stated(self):
         assert state_uncertainty(Evidence(made=MADE)) is None

@@ -17,6 +17,7 @@ from elastocal.identification.calibrated import CalibratedModel
 from elastocal.identification.domain import CalibrationDomain
 from elastocal.results import brief_repr
 from elastocal.robot import Robot, link_gap, of_one_arm, probe_configurations, same_joints, tool_gap
+from elastocal.wording import phrase
 
 _WEIGHT = 1e-3
 """Largest difference of two weights of one arm, as a part of the largest gravity torque."""
@@ -117,27 +118,44 @@ def arm_notes(
     for calibrated, name in zip(models, names, strict=True):
         robot = calibrated.model.robot
         gap = tool_gap(robot, arm)
+        about = {"name": name, "gap": str(gap), "tip": arm.tip}
         if not gap.closed and calibrated.tip is not None:
             notes.append(
-                f"{name} has its tip where it was found beside the springs, {gap} from the tcp"
-                f" compared at, {arm.tip}: its springs are taken to be those of the arm alone"
+                phrase(
+                    "{name} has its tip where it was found beside the springs, {gap} from the tcp"
+                    " compared at, {tip}: its springs are taken to be those of the arm alone",
+                    **about,
+                )
             )
         elif not gap.closed:
             notes.append(
-                f"{name} was calibrated with another tool (tcp {robot.tip}, {gap} from the one"
-                f" compared at, {arm.tip}): its springs are taken to be those of the arm alone"
+                phrase(
+                    "{name} was calibrated with another tool (tcp {own}, {gap} from the one"
+                    " compared at, {tip}): its springs are taken to be those of the arm alone",
+                    own=robot.tip,
+                    **about,
+                )
             )
         if not calibrated.model.bears_weight:
             continue
         if _weighs_otherwise(robot, arm):
             notes.append(
-                f"{name} was calibrated under another weight of the arm (tool or mounting):"
-                " deflections are compared under one"
+                phrase(
+                    "{name} was calibrated under another weight of the arm (tool or mounting):"
+                    " deflections are compared under one",
+                    name=name,
+                )
             )
         elif robot.has_masses != arm.has_masses:
             notes.append(
-                f"{name} knows {'a' if robot.has_masses else 'no'} weight of the arm, which the"
-                f" other side does {'not' if robot.has_masses else 'know'}: gears stiffen with it"
+                phrase(
+                    "{name} knows a weight of the arm, which the other side does not: gears"
+                    " stiffen with it"
+                    if robot.has_masses
+                    else "{name} knows no weight of the arm, which the other side does know: gears"
+                    " stiffen with it",
+                    name=name,
+                )
             )
     return tuple(notes)
 

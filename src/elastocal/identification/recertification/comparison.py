@@ -32,7 +32,7 @@ or under other loads the model error does not cancel, so the misfit of both mode
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -76,10 +76,11 @@ from elastocal.identification.uncertainty import CONFIDENCE, NORMAL_QUANTILE, in
 from elastocal.records import read_json
 from elastocal.robot import Robot
 from elastocal.units import in_unit, quantity
-from elastocal.wording import counted, mm
+from elastocal.wording import Phrase, counted, mm, phrase
 
 _SHIFTS = 10
 """Number of draws of the new model that each draw of the old one is paired with."""
+_NAMES = (phrase("the old model"), phrase("the new model"))
 _CHUNK = 100
 """Rows at a time, so that the pairs of a long path fit into memory."""
 _ONE_SIDE = 50.0 * (1.0 + CONFIDENCE)
@@ -497,35 +498,53 @@ def _notes_on(
     notes = []
     if not same_springs:
         notes.append(
-            "the models have different springs: a spring's value depends on which others are in the"
-            " model, so the springs do not tell whether the robot changed; predictions do, as far"
-            " as both models can express the arm"
+            phrase(
+                "the models have different springs: a spring's value depends on which others are in"
+                " the model, so the springs do not tell whether the robot changed; predictions do,"
+                " as far as both models can express the arm"
+            )
         )
     if old.provenance and old.provenance == new.provenance and not _other_readings(old, new):
         notes.append(
-            f"both models state the same origin ({old.provenance}): calibrations of one set of"
-            " readings are not independent, and the intervals do not hold for them"
+            phrase(
+                "both models state the same origin: calibrations of one set of readings are not"
+                " independent, and the intervals do not hold for them"
+            )
         )
     elif ground is None and not _same_plan(old, new):
         notes.append(
-            "the models do not state one and the same plan: the intervals hold if both calibrations"
-            " spread their poses over the same region under the same forces; elsewhere the arm does"
-            " what springs cannot express, and this looks like a change"
+            phrase(
+                "the models do not state one and the same plan: the intervals hold if both"
+                " calibrations spread their poses over the same region under the same forces;"
+                " elsewhere the arm does what springs cannot express, and this looks like a change"
+            )
         )
-    if ground is not None and ground.left_out:
-        notes.append(
-            f"{ground.left_out} of {counted(ground.rows or 0, 'row')} lie outside of what both"
-            " campaigns cover, by pose or by load, and were left out: nothing is known of them"
-        )
-    if ground is not None and ground.rows and not ground.alike:
-        notes.append(
-            f"the campaigns were made at other poses or loads ({ground.old_covered:.0%} and"
-            f" {ground.new_covered:.0%} of their readings lie where the other measured too): the"
-            " intervals of the change hold what springs cannot express"
-        )
+    if ground is not None:
+        notes += _ground_notes(ground)
     if outside:
-        notes.append(f"{outside} rows lie outside the joint limits of the robot")
+        notes.append(
+            phrase("{rows} outside the joint limits of the robot", rows=counted(outside, "row"))
+        )
     return tuple(notes)
+
+
+def _ground_notes(ground: CommonGround) -> Iterator[Phrase]:
+    """Yield what lies outside of the region and the loads that both campaigns cover."""
+    if ground.left_out:
+        yield phrase(
+            "{left} of {rows} lie outside of what both campaigns cover, by pose or by load, and"
+            " were left out: nothing is known of them",
+            left=ground.left_out,
+            rows=counted(ground.rows or 0, "row"),
+        )
+    if ground.rows and not ground.alike:
+        yield phrase(
+            "the campaigns were made at other poses or loads ({old} and {new} of their readings lie"
+            " where the other measured too): the intervals of the change hold what springs cannot"
+            " express",
+            old=f"{ground.old_covered:.0%}",
+            new=f"{ground.new_covered:.0%}",
+        )
 
 
 def _load_note(old: float | None, new: float | None) -> str | None:
@@ -540,10 +559,11 @@ def _load_note(old: float | None, new: float | None) -> str | None:
         return None
     if not abs(np.log(new / old)) > np.log(_LIKE):
         return None
-    return (
-        f"the arm was deflected by {mm(old)} on average in the old calibration and by"
-        f" {mm(new)} in the new one: with other forces gears that stiffen under load look"
-        " like a change"
+    return phrase(
+        "the arm was deflected by {old} on average in the old calibration and by {new} in the new"
+        " one: with other forces gears that stiffen under load look like a change",
+        old=mm(old),
+        new=mm(new),
     )
 
 
@@ -555,9 +575,11 @@ def _frame_note(old: CalibrationSummary | None, new: CalibrationSummary | None) 
     ]
     if free[0] == free[1]:
         return None
-    return (
-        f"the old calibration estimated frames of the tracker by: {free[0]}, the new one by:"
-        f" {free[1]}; a tracker or marker that moved looks like a change where none were estimated"
+    return phrase(
+        "the old calibration estimated frames of the tracker by: {old}, the new one by: {new}; a"
+        " tracker or marker that moved looks like a change where none were estimated",
+        old=free[0],
+        new=free[1],
     )
 
 
@@ -620,7 +642,7 @@ def recertify(
     *,
     rows: ComparedRows | None = None,
     limit: float | None = None,
-    names: tuple[str, str] = ("the old model", "the new model"),
+    names: tuple[str, str] = _NAMES,
 ) -> CompareResult:
     """Compare two calibrations of one cell.
 

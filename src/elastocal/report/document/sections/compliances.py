@@ -133,9 +133,7 @@ def _recertification(evidence: Evidence) -> Iterator[blocks.Block]:
             " moved beyond what both calibrations leave open."
         ),
     )
-    # The origin of the readings is a path; where a folder lies is no part of a report.
-    origin = f" ({found.old_provenance})"
-    yield blocks.Bullets(tuple(note.replace(origin, "") for note in found.notes))
+    yield blocks.Bullets(found.notes)
 
 
 RECERTIFICATION = Section(

@@ -88,7 +88,7 @@ def _notes(plan: PlanResult) -> Iterator[blocks.Block]:
         return
     # Where the folder lies is no part of a report.
     folder = plan.cell.file.rpartition("/")[0]
-    notes = tuple(text.replace(f"{folder}/", "") if folder else text for text in plan.findings)
+    notes = tuple(each.without(f"{folder}/") if folder else each for each in plan.findings)
     yield blocks.Details(phrase("Notes of the planner"), (blocks.Bullets(notes),))
 
 
