@@ -37,8 +37,8 @@ OPTIONS = runpy.run_path(str(ROOT / "docs" / "hooks" / "command_options.py"))
 """What fills the reference with the options of commands."""
 BREAKS = runpy.run_path(str(ROOT / "docs" / "hooks" / "line_breaks.py"))["on_page_content"]
 """What says where lines of a page may end."""
-PLAIN = runpy.run_path(str(ROOT / "docs" / "hooks" / "plain_types.py"))["PlainTypes"]
-"""What takes from the types of the reference what a command line adds to them."""
+PLAIN = runpy.run_path(str(ROOT / "docs" / "hooks" / "plainly.py"))["Plainly"]
+"""What shows types and examples of the reference plainly."""
 FACE = re.compile(r"<!-- face: (elastocal[\w.]*) -->")
 """What docs/hooks/faces.py fills with the names that a package exports."""
 FACES = runpy.run_path(str(ROOT / "docs" / "hooks" / "faces.py"))
@@ -476,13 +476,26 @@ def test_lines_of_a_page_end_before_no_unit_and_code_keeps_its_characters():
     assert BREAKS(r"<td><code>C:\KRC\ROBOTER\Config</code></td>").count("<wbr>") == 2
 
 
-def test_the_reference_shows_types_without_what_a_command_line_adds():
+def test_the_reference_shows_types_and_examples_plainly():
     code = """
 from typing import Annotated
 Force = Annotated[float, 2]
 class Settings:
     paths: tuple[Annotated[str, 3], ...] | None = None
-def read(path: Annotated[str, 3]) -> Annotated[int, 4]: ...
+def read(path: Annotated[str, 3]) -> Annotated[int, 4]:
+    '''Return it.
+
+    >>> read("a")
+    1
+
+    Raises
+    ------
+    TypeError
+        Or not.
+
+    >>> read("b")
+    2
+    '''
 """
     extensions = griffe.load_extensions(PLAIN)
     with griffe.temporary_visited_package(
@@ -492,3 +505,6 @@ def read(path: Annotated[str, 3]) -> Annotated[int, 4]: ...
         assert str(package["Force"].value) == "float"
         assert str(paths.annotation) == "tuple[str, ...] | None"
         assert (str(read.parameters["path"].annotation), str(read.returns)) == ("str", "int")
+        fenced = '```pycon\n>>> read("a")\n1\n```'
+        assert read.docstring.value.startswith(f"Return it.\n\n{fenced}\n\nRaises")
+        assert read.docstring.value.endswith('Or not.\n\nExamples\n--------\n>>> read("b")\n2')

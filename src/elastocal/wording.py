@@ -203,6 +203,17 @@ def counted(number: int, name: str) -> str:
     return phrase(f"{{number}} {name}{'' if number == 1 else 's'}", number=number)
 
 
+def one_of(names: Sequence[str]) -> str:
+    """Return one or two names of which one holds; a text stays as it is.
+
+    >>> one_of(["kN"]), one_of(["kgf", "lbf"]), one_of("kgf or lbf")
+    ('kN', 'kgf or lbf', 'kgf or lbf')
+    """
+    if isinstance(names, str):
+        return names
+    return phrase("{one} or {other}", one=names[0], other=names[1]) if names[1:] else names[0]
+
+
 def listed(names: Sequence[str], most: int = 30) -> str:
     """Return names, the first of them where there are too many to read.
 

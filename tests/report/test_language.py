@@ -13,6 +13,7 @@ import elastocal
 from elastocal.errors import ReportError
 from elastocal.findings import KINDS, Finding, group_alike
 from elastocal.identification.calibration import SAME_CONFIGURATION
+from elastocal.identification.mistakes.plausibility import UNIT_OF_FORCE
 from elastocal.identification.mistakes.search import IN_SPITE
 from elastocal.planning import checks
 from elastocal.planning.pool import UNREACHABLE
@@ -197,6 +198,11 @@ class TestTextsFromFiles:
         assert (
             IN_SPITE(error=found).without("dome.").parts["error"].startswith("stl is an open mesh")
         )
+
+    def test_units_of_which_one_holds_are_said_too(self):
+        found = UNIT_OF_FORCE(unit=["kgf", "lbf"], share=0.2, times=9.8)
+        assert "look like kgf or lbf in" in found
+        assert "kgf oder lbf" in self.german.say(Finding.read(found.stored()))
 
     def test_a_sentence_of_an_older_file_stays_english(self):
         text = "poses 3, 4 are one configuration: resampled and left out together"

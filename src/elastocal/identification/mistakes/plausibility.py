@@ -19,7 +19,7 @@ from elastocal.elastic import ElasticModel, actuated
 from elastocal.findings import Finding, Grade, Kind, as_number
 from elastocal.identification.mistakes._motion import AXES, MM, contradictions, median_norm
 from elastocal.robot import Robot
-from elastocal.wording import phrase
+from elastocal.wording import one_of, phrase
 
 WIND_UP = 2e-3
 """Angle by which a gear is assumed to wind up under the permissible torque of its joint, in rad:
@@ -53,7 +53,7 @@ UNIT_OF_FORCE = Kind(
     "forces look like {unit} in a column of N: they load the arm with {share} of"
     " its torques, and it seems {times} times as compliant as the rule of thumb for"
     " such arms; check the unit of the sensor",
-    shown={"share": as_number(".1%"), "times": as_number(".2g")},
+    shown={"unit": one_of, "share": as_number(".1%"), "times": as_number(".2g")},
 )
 COUNTS = Kind(
     "mistakes.counts",
@@ -90,7 +90,7 @@ def find_wrong_units(
     }
     if units := [unit for unit, gain in likelier.items() if gain > _LIKELIER]:
         likeliest = units[:2] if likelier["kN"] < likelier["lbf"] else units[-1:]
-        yield UNIT_OF_FORCE(unit=" or ".join(likeliest), share=share, times=ratio)
+        yield UNIT_OF_FORCE(unit=likeliest, share=share, times=ratio)
         return
     if share > (_TOO_MUCH if _states_torques(robot) else _FAR_TOO_MUCH):
         yield COUNTS(share=share)

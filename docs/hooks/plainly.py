@@ -1,15 +1,25 @@
-"""Show plain types in the API pages: without what a command line or a validator adds to them.
+"""Show the reference of Python plainly.
 
-``Annotated[float, Field(gt=0.0)]`` is read as ``float``.
+Types come without what a command line or a validator adds to them: ``Annotated[float,
+Field(gt=0.0)]`` is read as ``float``. Examples of a docstring stand in blocks of code, where they
+have no section of their own: the signs before them would be those of a quotation.
 """
 
+import re
 from typing import Any
 
 import griffe
 
+_EXAMPLE = re.compile(r"^>>> .*?(?=\n\n|\Z)", flags=re.MULTILINE | re.DOTALL)
 
-class PlainTypes(griffe.Extension):
-    """Takes ``Annotated`` from fields, parameters and results."""
+
+class Plainly(griffe.Extension):
+    """Takes ``Annotated`` from fields, parameters and results, and fences examples."""
+
+    def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
+        """Set the examples of a docstring as code."""
+        if obj.docstring and "\nExamples\n---" not in obj.docstring.value:
+            obj.docstring.value = _EXAMPLE.sub(as_code, obj.docstring.value)
 
     def on_attribute(self, *, attr: griffe.Attribute, **_: Any) -> None:
         """Show the type of a field, and a type that is named, plainly."""
@@ -20,6 +30,12 @@ class PlainTypes(griffe.Extension):
         func.returns = plain(func.returns)
         for each in func.parameters:
             each.annotation = plain(each.annotation)
+
+
+def as_code(example: re.Match[str]) -> str:
+    """Return an example as code; behind a section it would be read as part of that."""
+    behind = "\n---" in example.string[: example.start()]
+    return f"Examples\n--------\n{example[0]}" if behind else f"```pycon\n{example[0]}\n```"
 
 
 def plain(annotation: Any) -> Any:
