@@ -147,9 +147,16 @@ def test_a_number_may_stand_between_spaces_of_any_kind():
 
 @pytest.mark.parametrize(
     ("unit", "dimension", "si"),
-    [("kgf", "force", 9.80665), ("kgf*m", "moment", 9.80665), ("kgf*cm", "moment", 0.0980665)],
+    [
+        ("kgf", "force", 9.80665),
+        ("kgf*m", "moment", 9.80665),
+        ("kgf*cm", "moment", 0.0980665),
+        ("lbf", "force", 4.4482216),
+        ("lbf*in", "moment", 0.11298483),
+        ("lbf*ft", "moment", 1.3558179),
+    ],
 )
-def test_kilograms_force_are_read_as_newtons(unit, dimension, si):
+def test_kilograms_and_pounds_of_force_are_read_as_newtons(unit, dimension, si):
     assert parse_quantity(f"1 {unit}", dimension) == pytest.approx(si)
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _FACTORS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "angle": {"rad": 1.0, "deg": math.pi / 180.0},
-    # The kilogram-force is exact by definition; Japanese sensors still log in it.
-    "force": {"N": 1.0, "kN": 1e3, "kgf": 9.80665},
+    # Both are exact by definition; Japanese sensors still log in kgf, American ones in lbf.
+    "force": {"N": 1.0, "kN": 1e3, "kgf": 9.80665, "lbf": 4.4482216152605},
     "moment": {
         "N*m": 1.0,
         "Nm": 1.0,
@@ -26,6 +26,8 @@ _FACTORS: dict[str, dict[str, float]] = {
         "N*mm": 1e-3,
         "kgf*m": 9.80665,
         "kgf*cm": 9.80665e-2,
+        "lbf*in": 4.4482216152605 * 0.0254,
+        "lbf*ft": 4.4482216152605 * 0.3048,
     },
     "mass": {"kg": 1.0, "t": 1e3},
     "speed": {"m/s": 1.0, "mm/s": 1e-3},
@@ -57,7 +59,8 @@ _FACTORS: dict[str, dict[str, float]] = {
 
 MEANT = {
     **dict.fromkeys(("°", "degree", "degrees", "grad", "grd", "degrés"), "deg"),
-    "nm": "N*m", "nmm": "N*mm", "sec": "s", "inch": "in", "inches": "in",
+    "nm": "N*m", "n-m": "N*m", "nmm": "N*mm", "n-mm": "N*mm", "lb": "lbf", "lbs": "lbf",
+    "lbf-in": "lbf*in", "lbf-ft": "lbf*ft", "sec": "s", "inch": "in", "inches": "in",
 }  # fmt: skip
 """Units by other words for them, in small letters, as logs of three languages have them."""
 SHOWN = {

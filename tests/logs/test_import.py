@@ -413,9 +413,9 @@ def test_the_units_of_a_sensor_box_and_the_pose_of_an_abb_are_guessed(tmp_path):
     )
     sensor, controller = ec.guess_map([box, arm]).logs
     force = next(each for each in sensor.columns if each.key == "force")
-    assert (force.unit, force.counts) == ("N", pytest.approx(1e6 / 4.4482216))
+    assert (force.unit, force.counts) == ("lbf", 1e6)
     moment = next(each for each in sensor.columns if each.key == "moment")
-    assert (moment.unit, moment.counts) == ("N*m", pytest.approx(2e6 / 0.11298483))
+    assert (moment.unit, moment.counts) == ("lbf*in", 2e6)
     found = {each.key: each.columns for each in controller.columns}
     assert found["joints"] == tuple(axes)
     assert found["pose.quaternion"] == tuple(turn)

@@ -61,12 +61,6 @@ _ANGLE = re.compile(r"(?i)(.*?)([abc])")
 _QUATERNION = re.compile(r"(?i)(.*?q[._ ]?)([wxyz]|[1-4])")
 _COUNTS = re.compile(r"(?i)counts per unit (force|torque)\W+([\d.]+(?:e[+-]?\d+)?)")
 _BOX_UNIT = re.compile(r"(?i)(force|torque) units?\W+([\w-]+)")
-_OF_BOXES = {
-    "n": ("N", 1.0), "kn": ("kN", 1.0), "lbf": ("N", 4.4482216), "nm": ("N*m", 1.0),
-    "n-m": ("N*m", 1.0), "nmm": ("N*mm", 1.0), "n-mm": ("N*mm", 1.0),
-    "lbf-in": ("N*m", 0.11298483), "lbf-ft": ("N*m", 1.3558179),
-}  # fmt: skip
-"""Units of the boxes of sensors: SI unit, and its number in one of theirs."""
 _STEP = re.compile(r"(?i)(step|reading|handshake|plateau|messpunkt)")
 _LEAST_AXES = 5
 """Columns with numbers that are the joints of an arm."""
@@ -369,11 +363,11 @@ def _boxed(table: LogTable, key: str, columns: tuple[str, ...] = ()) -> GuessedC
     """Return columns with the unit and the counts that a sensor's box wrote above them."""
     word = {"force": "force", "moment": "torque"}[key]
     counts = {kind.lower(): float(number) for kind, number in _COUNTS.findall(table.above)}
-    units = {kind.lower(): unit.lower() for kind, unit in _BOX_UNIT.findall(table.above)}
-    unit, size = _OF_BOXES.get(units.get(word, ""), ("", 1.0))
-    if not (columns and unit and counts.get(word, 0.0) > 0.0):
+    units = {kind.lower(): unit for kind, unit in _BOX_UNIT.findall(table.above)}
+    if not (columns and word in units and counts.get(word, 0.0) > 0.0):
         return None
-    return GuessedColumns(key, columns, unit, "the lines above", counts[word] / size)
+    unit = MEANT.get(units[word].lower(), units[word])
+    return GuessedColumns(key, columns, unit, "the lines above", counts[word])
 
 
 def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[GuessedColumns]:
@@ -390,7 +384,7 @@ def _places(table: LogTable, names: dict[str, str], *, of_tool: bool) -> list[Gu
     elif turned := _of_makers(names, _TURN, _TURNS_OF):
         maker, columns = turned
         unit, why = _unit(table, columns, "angle")
-        why = f"{why}; angles of {maker}{_TURN_OTHERWISE.get(maker, '')}"
+        why = f"{why}; read as angles of {maker}{_TURN_OTHERWISE.get(maker, '')}"
         found.append(GuessedColumns("pose.angles", columns, unit, why))
     elif turns := _quaternion(names):
         found.append(GuessedColumns("pose.quaternion", turns, None, "w, x, y, z"))
