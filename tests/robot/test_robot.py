@@ -168,6 +168,11 @@ class TestDescription:
         with pytest.raises(FileAccessError, match=r"cannot read .*none\.urdf"):
             Robot.from_file(tmp_path / "none.urdf", "tcp")
 
+    def test_the_text_of_a_urdf_in_place_of_its_file_is_refused_in_one_short_line(self):
+        with pytest.raises(RobotError, match=r"Robot\.from_urdf reads a text") as refused:
+            Robot.from_file(opw_arm_urdf(**KR_LIKE, mount=FLOOR), "tcp")
+        assert len(str(refused.value)) < 100
+
 
 class TestRefusals:
     @pytest.mark.parametrize("q", [0.0, [], np.zeros(5), np.zeros((6, 7))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations  # signatures show ArrayLike by its name
 
+import reprlib
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -144,6 +145,10 @@ class Robot:
     @classmethod
     def from_file(cls, path: Path | str, tip: str, base: str | None = None) -> Robot:
         """Return the robot that a URDF file describes; see `from_urdf`."""
+        if isinstance(path, str) and path.lstrip().startswith("<"):
+            raise RobotError(
+                f"a file is expected, not {reprlib.repr(path)} (Robot.from_urdf reads a text)"
+            )
         path = as_path(path, "path")
         text = read_urdf(path)
         with refusals_naming(path):
