@@ -101,4 +101,5 @@ def test_an_arm_whose_weight_is_not_known_is_told_in_one_line(arm, said):
     assert len(told) == (said is not None)
     for text in told:
         assert f"robot arm: {said}: the arm's own weight" in text
+        assert text.endswith("; give the links their masses in a URDF")
         assert "\n" not in text

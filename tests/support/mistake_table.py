@@ -19,7 +19,7 @@ HARMFUL = 0.05
 _DRAWS = 40
 _NO_ALARMS = (
     "poses and load cases determine",
-    "the arm's own weight bends it otherwise",
+    "the arm's own weight bends it",
     "of the median deflection unexplained",
 )
 """What `calibrate` says of campaigns with few poses, of arms whose masses are not known, and of

@@ -82,8 +82,8 @@ SAME_CONFIGURATION = Kind(
 )
 WEIGHT_GAP = Kind(
     "calibration.weight-gap",
-    "robot {name}: {gap}: the arm's own weight bends it otherwise at the reference"
-    " than under load, and here that passes as deflection",
+    "robot {name}: {gap}: the arm's own weight bends it more or less under load than"
+    " before, and this is taken for deflection; give the links their masses in a URDF",
 )
 NOT_DETERMINED = Kind(
     "calibration.not-determined",

@@ -256,8 +256,8 @@ def _at_bound(value: float, low: float, high: float) -> str:
 
 def _hidden_note() -> Phrase:
     return phrase(
-        "Noise hides some springs: the readings tell them less well than the size that is likely of"
-        " such an arm does."
+        "Noise hides some springs: the usual size of such springs is known better than the readings"
+        " tell theirs."
     )
 
 
