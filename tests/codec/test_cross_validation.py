@@ -152,5 +152,5 @@ def test_sentences_say_who_is_better_by_how_much_and_on_what(readings):
     sentences = judge(found).sentences
     assert sentences[0].startswith("actuated: ")
     assert sentences[1].startswith("bearing: ")
-    assert "10 verification sets of 3 held-out poses" in sentences[2]
+    assert "10 verification sets of 3 poses" in sentences[2]
     assert " µm" in sentences[2]

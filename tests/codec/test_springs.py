@@ -151,7 +151,9 @@ def test_files_and_words_say_which_springs_were_taken(readings, tmp_path):
     found = codec_summary(again, judge(again))
     assert found.variants["default"].springs == "auto"
     assert sum(found.variants["default"].layouts.values()) == 3
-    assert found.springs[0].startswith(f"springs, as calibrate judges: {data.layouts[0]} is taken")
+    assert found.springs[0].startswith(
+        f"springs, as calibrate judges, with each pose left out in turn: {data.layouts[0]} is taken"
+    )
     assert "chosen in each split from its training poses alone" in found.springs[1]
 
 

@@ -40,8 +40,8 @@ def sentence(*curves, number=0):
 def test_saturation_is_told_with_the_largest_error_of_the_median_and_of_the_worst_set():
     said = sentence([900, 300, 102, 100, 100])
     assert "saturated from 3 training poses on (95 % interval 3 to 3)" in said
-    assert "largest error with 3: 204.1 µm in the median set, 1019.0" in said
-    assert "µm in the worst; 8 verification sets of 2 held-out poses" in said
+    assert "largest error with 3: 204.1 µm, 1019.0" in said
+    assert "µm in the worst set; medians over 8 verification sets of 2 poses" in said
 
 
 def test_an_error_that_leaves_its_tolerance_again_is_not_called_saturated_before():

@@ -135,8 +135,8 @@ class Saturation(SaturationInterval):
             )
         worst = largest[:, self.n_train - 1]
         extent = (
-            f"largest error with {self.n_train}: {um(float(np.median(worst)))} in the"
-            f" median set, {um(float(worst.max()))} in the worst; {where}"
+            f"largest error with {self.n_train}: {um(float(np.median(worst)))},"
+            f" {um(float(worst.max()))} in the worst set; medians over {where}"
         )
         if self.n_train == self.last:
             early = ""
@@ -159,9 +159,9 @@ class Saturation(SaturationInterval):
                 f" from {self.stays} on"
             )
         return (
-            f"{self.variant}: {from_on}: mean error (median set) {um(self.error)} there,"
-            f" {um(self.last_error)} with {self.last} (tolerance"
-            f" {100.0 * tolerance.relative:.3g} % of that, or {um(tolerance.floor)})"
+            f"{self.variant}: {from_on}: mean error {um(self.error)} there,"
+            f" {um(self.last_error)} with {self.last} (tolerance:"
+            f" {100.0 * tolerance.relative:.3g} % of that or {um(tolerance.floor)} more)"
         )
 
     def _caveat(self) -> str:

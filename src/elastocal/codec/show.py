@@ -51,7 +51,7 @@ def split_facts(data: CodecData) -> Facts:
 
 
 def error_table(curves: Mapping[str, Curve], most: int | None = None) -> Table:
-    """Return the median errors at held-out poses by number of training poses.
+    """Return the median errors at verification poses by number of training poses.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def error_table(curves: Mapping[str, Curve], most: int | None = None) -> Table:
     sizes = next(iter(curves.values())).n_train
     shown = np.linspace(0, len(sizes) - 1, min(len(sizes), most or len(sizes)))
     return Table(
-        phrase("Error norm at held-out poses in µm, median over the splits: mean / largest"),
+        phrase("Error norm at verification poses in µm, median over the splits: mean / largest"),
         (phrase("Training poses"), *curves),
         tuple(
             (

@@ -32,6 +32,7 @@ from elastocal.wording import counted
 VERDICTS_SCHEMA = "elastocal.codec_verdicts/2"
 VERDICTS = "codec.json"
 """Name of the file in a codec's folder."""
+_AS_CALIBRATE = "springs, as calibrate judges, with each pose left out in turn: "
 
 
 @brief_repr
@@ -161,7 +162,7 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
         )
         for a, b in combinations(errors, 2)
     )
-    where = f"{sets} verification set{'s' if sets > 1 else ''} of {size} held-out poses"
+    where = f"{sets} verification set{'s' if sets > 1 else ''} of {size} poses"
     sentences = (
         *(each.sentence(tolerance, data.errors(each.variant, "max"), where) for each in found),
         *(each.sentence(where) for each in pairs),
@@ -171,7 +172,7 @@ def judge(data: CodecData, tolerance: Tolerance | None = None) -> Verdicts:
 
 def _springs(data: CodecData) -> tuple[str, ...]:
     """Return the springs that readings and splits carry, in words."""
-    found = [f"springs, as calibrate judges: {ladder_sentence(data.ladder)}"] if data.ladder else []
+    found = [_AS_CALIBRATE + ladder_sentence(data.ladder)] if data.ladder else []
     rows = zip(data.variants, data.layouts, data.split_layouts, strict=True)
     for variant, layout, splits in rows:
         if variant.springs != layout:

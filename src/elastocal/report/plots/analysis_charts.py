@@ -318,7 +318,7 @@ def index_chart(
         axes = figure.add_panel(left, bottom, across, _GROWTH)
         _draw_growth(axes, data, indices, name, styles)
         label_sizes(axes, int(data.n_train[-1]), across, shown=row == rows - 1)
-    title = f"{data.robot or 'Robot'}: do indices foretell the error at held-out poses?"
+    title = f"{data.robot or 'Robot'}: do indices foretell the error at verification poses?"
     figure.add_title(title, 0.3)
     draw_legend(figure, styles, 0.3, 0.42, legend)
     _explain_indices(figure, data, start)

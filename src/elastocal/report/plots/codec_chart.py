@@ -103,7 +103,7 @@ def codec_chart(data: CodecData, verdicts: Verdicts, axis: str = "norm") -> Figu
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class ErrorCurve:
-    """Mean error at held-out poses of one variant over the number of training poses."""
+    """Mean error at verification poses of one variant over the number of training poses."""
 
     variant: Variant
     n_train: IndexArray
@@ -169,7 +169,7 @@ def pose_count_figure(curves: Sequence[ErrorCurve], tolerance: float | None) -> 
     axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel(phrase("number of poses to fit"))
-    axes.set_ylabel(phrase("mean error at held-out poses in mm"))
+    axes.set_ylabel(phrase("mean error at verification poses in mm"))
     style.open_frame(axes, grid="both")
     figure.legend(
         loc="upper left", bbox_to_anchor=(0.075, 0.995), ncols=2, frameon=False, fontsize=8.5
@@ -261,7 +261,7 @@ def saturation_words(found: Saturation) -> str:
 def headline(data: CodecData) -> str:
     """Return the title of a codec's charts."""
     poses, splits = counted(len(data.contact), "pose"), counted(len(data.seed_pose), "split")
-    return f"{data.robot or 'Robot'}: error at held-out poses, {poses}, {splits}"
+    return f"{data.robot or 'Robot'}: error at verification poses, {poses}, {splits}"
 
 
 def how_to_read(data: CodecData) -> str:

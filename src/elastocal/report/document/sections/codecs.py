@@ -31,8 +31,8 @@ def _body(evidence: Evidence) -> Iterator[blocks.Block]:
             partial(pose_count_figure, curves, evidence.limits.tolerance),
             _alt(curves),
             phrase(
-                "Median over the splits of the mean error at held-out poses; the band holds the"
-                " middle half of the splits. Diamonds: more poses no longer help from there on."
+                "Median over the splits of the mean error at verification poses; the band holds"
+                " the middle half of the splits. Diamonds: more poses no longer help from there on."
             ),
         )
     else:
@@ -61,7 +61,7 @@ def _key(variant: Variant) -> tuple[str, ...]:
 
 def _alt(curves: list[ErrorCurve]) -> Phrase:
     return phrase(
-        "Error at held-out poses over the number of training poses, of {variants}",
+        "Error at verification poses over the number of training poses, of {variants}",
         variants=counted(len(curves), "variant"),
     )
 
