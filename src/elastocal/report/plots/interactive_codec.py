@@ -58,7 +58,8 @@ def _error_view(data: CodecData, verdicts: Verdicts, axis: str) -> _Json:
         traces += _saturation_traces(verdicts, styles, ends[0])
     name = _AXIS_NAMES[axis]
     words = (
-        "Box plots of mean and maximum error at verification poses over the number of training poses"
+        "Box plots of mean and maximum error at verification poses over the number of training"
+        " poses"
         f" ({name.lower()}); the table below has the medians of the norm"
     )
     return _view(name, words, traces, int(data.n_train[-1]), panels)
