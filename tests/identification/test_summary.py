@@ -15,6 +15,7 @@ from elastocal.identification import (
     spring_summaries,
     summary,
 )
+from elastocal.identification.show import show_calibration
 from elastocal.records import to_data
 from elastocal.sim.arm import (
     Blunder,
@@ -78,6 +79,14 @@ def test_suspicious_readings_come_worst_first_and_say_whether_they_were_set_asid
     assert where[:2] == [(3, "west", True), (9, "north", False)]
     scores = [row.score for row in listed]
     assert scores == sorted(scores, reverse=True)
+
+
+def test_the_reading_to_leave_out_is_one_that_is_still_in_the_fit():
+    figures = summary(calibration())
+    said = " ".join(str(block) for block in show_calibration(figures))
+    assert "--exclude 9:north" in said
+    aside = replace(figures, suspicious=figures.suspicious[:1])
+    assert "--exclude" not in " ".join(str(block) for block in show_calibration(aside))
 
 
 @pytest.mark.slow

@@ -536,8 +536,9 @@ def _suspicious(suspicious: Sequence[SuspiciousReading]) -> Iterator[Block]:
     if len(suspicious) > _MOST_SUSPICIOUS:
         left = len(suspicious) - _MOST_SUSPICIOUS
         yield Paragraph(phrase("… and {left} more (--json lists all)", left=left))
-    key = f"{suspicious[0].pose}:{suspicious[0].load_case}"
-    yield Paragraph(phrase("to leave one out: --exclude {key}", key=key))
+    for kept in [each for each in suspicious if not each.set_aside][:1]:
+        key = f"{kept.pose}:{kept.load_case}"
+        yield Paragraph(phrase("to leave one out: --exclude {key}", key=key))
 
 
 def suspicious_table(suspicious: Sequence[SuspiciousReading]) -> Table:
