@@ -247,11 +247,9 @@ def table_of(block: "Table", width: int = 80) -> "RichTable":
     words = [number < block.texts or _are_words(block, number) for number in columns]
     # The library takes from all columns alike what is too much, and a number that is cut would be
     # another number: words alone are folded, the widest first.
-    spare = {k: widths[k] - _least(block, k) for k in columns if words[k]}
-    while _across(widths) > width and any(left > 0 for left in spare.values()):
-        widest_words = max(spare, key=lambda k: (spare[k] > 0, widths[k]))
-        widths[widest_words] -= 1
-        spare[widest_words] -= 1
+    least = {k: _least(block, k) for k in columns if words[k]}
+    while _across(widths) > width and (wide := [k for k in least if widths[k] > least[k]]):
+        widths[max(wide, key=widths.__getitem__)] -= 1
     table = RichTable(box=None, pad_edge=False, width=_across(widths))
     for number, lines in enumerate(heads):
         table.add_column(

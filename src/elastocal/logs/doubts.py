@@ -1,4 +1,4 @@
-"""What the logs of an import say against their map, or against one another.
+"""Contradictions between the logs of an import and their map, or among the logs.
 
 A constant column, an interrupted stream, inconsistent clocks, a sensor that does not show the
 changing direction of the tool's weight, a marker that does not follow the arm: each is named, first

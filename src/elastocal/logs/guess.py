@@ -45,7 +45,7 @@ _TURNS_OF = {
 }
 """Angles about z, y and x, in the order of the map's a, b, c, as makers name them."""
 _TURN_OTHERWISE = {"Denso or Yaskawa": "; those of Staeubli turn otherwise: leave them out"}
-"""What to look at where another maker names other angles alike."""
+"""A warning where another maker gives the same names to other angles."""
 _TURN = re.compile(r"(?i)(.*?)(r[xyz]|[wpr])")
 _NO_TIMES = ("deg", "rad", "mm", "m", "N", "kN", "N*m", "N*mm")
 _TIMES = ("s", "ms", "us")

@@ -158,7 +158,7 @@ _LEAST_TURN = np.radians(3.0)
 _DEAD, _SAME = 0.1, 0.03
 """Gains of an axis below which it is dead, and nearer to 1 than which it is right."""
 About = Literal["rotation of the sensor", "zero of the sensor", ""]
-"""What a mistake is about, where a caller knows more of it."""
+"""The part that a mistake concerns, where a caller knows more of it."""
 _SIGN_ALONE = 0.2
 """Largest deviation of a gain from -1 at which the sign alone is turned."""
 _AXES = "xyz"
