@@ -95,5 +95,4 @@ def test_95_percent_intervals_cover_about_95_percent_of_200_campaigns():
         covered.append(inside.mean())
     coverage = float(np.mean(covered))
     print(f"coverage {coverage:.4f} +- {np.std(covered) / np.sqrt(200):.4f}")
-    # The doubt whether the springs are the arm's (decision 3) widens intervals where they are.
-    assert 0.93 < coverage < 0.98
+    assert 0.93 < coverage < 0.97
