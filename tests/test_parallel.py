@@ -178,6 +178,7 @@ def test_workers_end_when_their_parent_is_killed(tmp_path):
     pytest.fail(f"{workers} outlive their parent")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at /dev/shm")
 @pytest.mark.parametrize("group", [True, False], ids=["terminated_group", "killed_parent"])
 def test_a_pool_that_is_ended_leaves_nothing_in_shared_memory(group):

@@ -2,6 +2,7 @@
 
 import ast
 import contextlib
+import inspect
 import io
 import re
 import runpy
@@ -27,6 +28,7 @@ from elastocal.cli.main import app
 from elastocal.plugins import KINDS
 from elastocal.procedure.run.steps import Fault
 from elastocal.sim.truth import FaultKind
+from elastocal.workflows.codec import codec
 from elastocal.workflows.demo import chapters
 from support.cli import Result, elastocal
 from support.demos import demo_result, finished_demo
@@ -262,6 +264,7 @@ def reference_entries() -> dict[str, list[str]]:
     return entries
 
 
+@pytest.mark.slow
 def test_each_name_stands_once_in_the_reference_on_the_page_that_names_its_module():
     entries = reference_entries()
     assert "elastocal.workflows.calibrate_pair" in entries["workflows-pair"]
@@ -474,6 +477,21 @@ def test_lines_of_a_page_end_before_no_unit_and_code_keeps_its_characters():
     assert BREAKS("<td>91.9 (90.0 to 93.8)</td>") == "<td>91.9 (90.0\xa0to\xa093.8)</td>"
     assert BREAKS("<td>0.4 → 0.1</td>") == "<td>0.4\xa0→\xa00.1</td>"
     assert BREAKS(r"<td><code>C:\KRC\ROBOTER\Config</code></td>").count("<wbr>") == 2
+
+
+def test_the_reference_shows_workflows_as_they_are_called():
+    extensions = griffe.load_extensions(PLAIN)
+    home = griffe.load(
+        "elastocal.workflows.codec", search_paths=[ROOT / "src"], extensions=extensions
+    )
+    called = inspect.signature(codec).parameters
+    shown = home["codec"]
+    assert [each.name for each in shown.parameters] == list(called)
+    assert shown.parameters["saturation"].default == repr(called["saturation"].default)
+    assert shown.docstring.value == codec.__doc__
+    assert "<" not in shown.signature()
+    # Fields of settings are told once, as parameters.
+    assert not [each for each in home["CodecSettings"].attributes.values() if each.docstring]
 
 
 def test_the_reference_shows_types_and_examples_plainly():

@@ -143,6 +143,7 @@ def test_calibrate_takes_datasets_and_springs_as_objects(readings, tmp_path):
     assert named.calibration.readings == 2 * len(readings.poses)
 
 
+@pytest.mark.slow
 def test_calibrate_takes_a_robot_and_the_path_of_springs(readings, tmp_path):
     robot = ec.Robot.from_urdf(readings.robot_urdf, readings.tcp_frame)
     sideways = dataclasses.replace(robot, gravity=(0.0, 9.80665, 0.0))

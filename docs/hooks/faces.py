@@ -88,6 +88,11 @@ def parted(package: str) -> set[str]:
     }
 
 
+def functions_first(entry: tuple[str, str]) -> tuple[bool, str]:
+    """Return where a name stands: functions before the records that they take and return."""
+    return entry[0][0].isupper(), entry[0]
+
+
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     """Return the page with an entry for every exported name."""
     if not page.file.src_uri.startswith("reference/api/"):
@@ -109,7 +114,7 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
         # A function called like its module would show the module.
         paths = (
             f"{package}.{home}.{name}" if name == home else f"{package}.{name}"
-            for name, home in sorted(rest.items())
+            for name, home in sorted(rest.items(), key=functions_first)
         )
         return "\n\n".join(f"::: {path}" for path in paths)
 

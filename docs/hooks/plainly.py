@@ -2,15 +2,20 @@
 
 Types come without what a command line or a validator adds to them: ``Annotated[float,
 Field(gt=0.0)]`` is read as ``float``. Examples of a docstring stand in blocks of code, where they
-have no section of their own: the signs before them would be those of a quotation.
+have no section of their own: the signs before them would be those of a quotation. A workflow is
+shown as it is called: with the fields of its settings, which are then not told again.
 """
 
+import inspect
 import re
+from importlib import import_module
 from typing import Any
 
 import griffe
 
 _EXAMPLE = re.compile(r"^>>> .*?(?=\n\n|\Z)", flags=re.MULTILINE | re.DOTALL)
+_MODULE = re.compile(r"\b(?:[a-z_]\w*\.)+(?=\w)")
+"""What a type or default is read from, before its name."""
 
 
 class Plainly(griffe.Extension):
@@ -26,10 +31,43 @@ class Plainly(griffe.Extension):
         attr.annotation, attr.value = plain(attr.annotation), plain(attr.value)
 
     def on_function(self, *, func: griffe.Function, **_: Any) -> None:
-        """Show the types of parameters and of the result plainly."""
+        """Show the types of parameters and of the result plainly, and a workflow as called."""
+        for decorator in func.decorators:
+            call = decorator.value
+            if isinstance(call, griffe.ExprCall) and call.canonical_name == "workflow":
+                show_as_called(func, str(call.arguments[0]))
         func.returns = plain(func.returns)
         for each in func.parameters:
             each.annotation = plain(each.annotation)
+
+
+def show_as_called(func: griffe.Function, settings: str) -> None:
+    """Give a workflow the parameters and the docstring that Python shows of it."""
+    called = getattr(import_module(func.module.canonical_path), func.name)
+    func.docstring.value = called.__doc__
+    func.parameters = griffe.Parameters(
+        *map(parameter, inspect.signature(called).parameters.values())
+    )
+    for each in func.module.members[settings].attributes.values():
+        each.docstring = None
+
+
+def parameter(each: inspect.Parameter) -> griffe.Parameter:
+    """Return a parameter of a signature."""
+    return griffe.Parameter(
+        each.name,
+        annotation=_MODULE.sub("", inspect.formatannotation(each.annotation)),
+        kind=griffe.ParameterKind(each.kind.description),
+        default=None if each.default is each.empty else shown(each.default),
+    )
+
+
+def shown(default: object) -> str:
+    """Return a default as one would write it."""
+    name = getattr(default, "__name__", repr(default))
+    if name == "<lambda>":
+        return "..."
+    return f"{type(default).__name__}()" if name.startswith("<") else name
 
 
 def as_code(example: re.Match[str]) -> str:

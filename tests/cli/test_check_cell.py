@@ -107,6 +107,7 @@ def test_what_check_refuses_plan_refuses_in_the_same_words(folder, changes, word
     assert planned.reason == reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     some_by_day(

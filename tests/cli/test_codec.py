@@ -19,6 +19,7 @@ def data(tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_arrays_and_figures_are_written_and_printed(data, tmp_path):
     out = tmp_path / "codec"
     result = elastocal(
@@ -36,6 +37,7 @@ def test_arrays_and_figures_are_written_and_printed(data, tmp_path):
     assert str(data) in arrays.provenance
 
 
+@pytest.mark.slow
 def test_pictures_and_indices_are_written_when_asked_for(data, tmp_path):
     out = tmp_path / "c"
     result = elastocal("codec", data, "--out", out, "--indices", "--per-axis", "--splits", "4")

@@ -93,6 +93,7 @@ def test_calibrate_json_has_the_ladder_and_the_measured_coverage_of_its_interval
     assert "the true deflection is not measured" in fit["reason"]
 
 
+@pytest.mark.slow
 def test_calibrate_json_has_the_contract_keys_and_nothing_else_on_standard_output(folder):
     result = elastocal("calibrate", folder / "data.nc", "--out", folder / "again.json", "--json")
     figures = json.loads(result.out)

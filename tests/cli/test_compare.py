@@ -55,6 +55,7 @@ def test_a_softened_gear_is_named_to_people(folder):
     assert "Largest change at: row " in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit", "verdict"), [("0.03 mm", "fail"), ("0.17 mm", "undecided"), ("1 mm", "pass")]
 )

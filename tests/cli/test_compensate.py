@@ -44,6 +44,7 @@ def run(folder: Path, *arguments: object, path: str = "path.csv", out: str = "ou
     )
 
 
+@pytest.mark.slow
 def test_it_says_what_was_left_and_what_was_assumed(folder):
     result = run(folder)
     assert result.code == 0, result.err

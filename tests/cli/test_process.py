@@ -37,6 +37,7 @@ def test_output_that_is_closed_or_full_is_one_line_and_exit_code_1(folder, to):
     assert result.stderr.startswith("elastocal: cannot write output: ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", some_by_day(["<&-", "</dev/null"]))
 def test_where_nobody_can_answer_a_question_is_a_line(tmp_path, end):
     result = subprocess.run(

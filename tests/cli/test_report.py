@@ -63,6 +63,7 @@ def test_without_a_tolerance_there_is_no_light(copied, tmp_path):
     assert "No tolerance was given" in figures["verdict"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tolerance", "light"), some_by_day([("1 um", "red"), ("10 mm", "yellow")])
 )

@@ -61,6 +61,7 @@ def started(planned, out):
     return process
 
 
+@pytest.mark.slow
 def test_a_run_commits_every_pose_and_writes_the_dataset(whole):
     out, result = whole
     assert result.code == 0, result.err
@@ -258,6 +259,7 @@ def seen_once_by_another_station(planned):
     return PlannedCell(cell, folder)
 
 
+@pytest.mark.slow
 def test_a_reading_that_derive_calls_missing_is_counted_and_warned_of(planned, tmp_path):
     few = seen_once_by_another_station(planned)
     assert "warning: station station_2 sees 1 of the 3" in run(few, tmp_path, "--dry-run").err

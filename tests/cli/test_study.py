@@ -141,6 +141,7 @@ def test_more_noise_of_either_instrument_is_worse():
         assert np.all(found[:, 1] > found[:, 0])
 
 
+@pytest.mark.slow
 def test_arms_of_no_spread_are_the_cell_files():
     found = errors(prepared("poses=6", "truth=0,0.3").simulate, 3, "deflection_mean")
     assert np.ptp(found[:, 0]) == 0.0

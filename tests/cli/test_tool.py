@@ -20,6 +20,7 @@ def postures():
     return TOOL.raw(turned(10, rng), rng)
 
 
+@pytest.mark.slow
 def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures):
     out = tmp_path / "tool.json"
     result = elastocal(
@@ -38,6 +39,7 @@ def test_a_table_gives_the_planted_tool_within_its_intervals(tmp_path, postures)
     assert json.loads(out.read_text())["schema"] == "elastocal.tool/1"
 
 
+@pytest.mark.slow
 def test_people_see_the_intervals(tmp_path, postures):
     out = tmp_path / "tool.json"
     data = posture_table(tmp_path / "s.csv", postures)

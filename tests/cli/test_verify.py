@@ -40,6 +40,7 @@ def signed(keys, tmp_path_factory):
     return out.parent
 
 
+@pytest.mark.slow
 def test_a_signed_report_asks_for_entries_that_nobody_stated(signed, keys, tmp_path, monkeypatch):
     """Number, operator and place; the place once more after ``back``."""
     keyboard = io.StringIO("C-7\nM. Tanaka\nHall 2\nback\nHall 3\nskip\n")

@@ -107,6 +107,7 @@ def test_ratio_and_seed_are_followed(readings):
     assert data.training_poses == 6
 
 
+@pytest.mark.slow
 def test_missing_readings_are_left_out_of_training_and_verification(readings):
     rng = np.random.default_rng(5)
     left = readings.take(rng.random(len(readings)) < 0.7)

@@ -38,6 +38,7 @@ def data() -> CodecData:
     )
 
 
+@pytest.mark.slow
 def test_every_field_comes_back_bit_for_bit(tmp_path, data):
     found = read_codec(write_codec(tmp_path, data))
     for field in fields(CodecData):

@@ -56,6 +56,7 @@ def rows_of(trainee, poses):
     return trainee.rows(np.asarray(poses), trainee.trains).reshape(-1, trainee.problem.columns)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cv", "n"), [(0, 1), (3, 4), (9, 7)])
 def test_indices_are_those_of_the_singular_values(known, cv, n):
     trainee, found = known.trainees[BEARING], known.insight.indices[BEARING].values

@@ -41,12 +41,14 @@ def ladder(readings):
     return choose_model(robot(), readings, "auto", FitOptions()).ladder
 
 
+@pytest.mark.slow
 def test_the_ladder_is_that_of_calibrate(readings):
     found = cross_validate(robot(), readings, [Variant()], FEW)
     assert found.ladder == tuple(map(rung_summary, ladder(readings)))
     assert found.layouts == tuple(rung.name for rung in ladder(readings) if rung.chosen)
 
 
+@pytest.mark.slow
 def test_a_pair_of_springs_is_judged_by_the_errors_and_interval_of_calibrate(readings):
     (pair,) = judge(cross_validate(robot(), readings, PAIR, FEW)).pairs
     forced = choose_model(robot(), readings, "bearing", FitOptions()).ladder
@@ -97,6 +99,7 @@ def test_friction_is_refused_without_a_load_case_of_low_load(readings):
         cross_validate(robot(), readings, [Variant(springs="gears+friction")], FEW)
 
 
+@pytest.mark.slow
 def test_verification_poses_have_no_part_in_the_choice_of_springs(readings):
     """Their readings are replaced by noise, and nothing that was trained changes."""
     before = cross_validate(robot(), readings, [Variant()], FEW)

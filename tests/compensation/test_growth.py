@@ -73,6 +73,7 @@ def test_it_predicts_what_links_that_grow_unevenly_do_elsewhere():
     assert max(ratios) < 0.6
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_share_holds_the_share_of_an_arm_that_grows_evenly():
     share, inside = 20e-6, 0
     warm = grown(arm(), np.full(6, share))

@@ -46,6 +46,7 @@ def processed(story, out, *options):
     return json.loads(told)["lines"]
 
 
+@pytest.mark.slow
 def test_a_run_records_what_gears_yield_by(story):
     data = read(story / "run" / "dataset.nc")
     arm = slice(data.joint_names.index("joint_a1"), None)
@@ -57,6 +58,7 @@ def test_a_run_records_what_gears_yield_by(story):
     assert found["joints"] == list(data.joint_names[arm])
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_the_exported_c_with_encoders_closes_the_loop(story, tmp_path, monkeypatch):
     """Simulator, C step, drives, and the deviation that is left: the figures are Python's."""
@@ -81,6 +83,7 @@ def test_the_exported_c_with_encoders_closes_the_loop(story, tmp_path, monkeypat
     assert abs(first["after"]["mean"] - model_alone[0]["after"]["mean"]) > 1e-7
 
 
+@pytest.mark.slow
 def test_a_cell_without_encoders_refuses_to_read_them(tmp_path):
     planned = planned_cell(tmp_path, 4)
     folder = planned.cell.parent

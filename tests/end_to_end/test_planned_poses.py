@@ -73,6 +73,7 @@ def planned(request, folders):
     return case(request.param, folders[request.param])
 
 
+@pytest.mark.slow
 def test_the_robot_touches_where_the_plan_says(planned):
     for pose in planned.raw["poses"]:
         T = planned.frame(pose["joints"])
@@ -185,6 +186,7 @@ def test_nothing_collides_on_the_way_to_the_surface_and_back(planned):
         assert distance[2:].min() >= clearance
 
 
+@pytest.mark.slow
 def test_moves_between_poses_keep_clear(planned):
     scene = collision_scene(planned.cell, cell_surface(planned.cell))
     stops = {None: np.array(planned.plan.robot.home)}

@@ -53,6 +53,7 @@ def test_all_load_cases_at_twelve_poses_reach_what_can_be_reached(data):
     assert [text for text in figures["warnings"] if "has a mass" not in text] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bounds", some_by_day(["0,0", "1e-9,2e-9", "1,2"]))
 def test_bounds_that_leave_the_data_no_part_are_refused(data, bounds):
     out = data.with_suffix(".json")

@@ -168,6 +168,7 @@ def test_a_tool_weight_left_in_the_forces_is_named(tmp_path):
     assert any("tool weight left in" in warning for warning in json.loads(result.out)["warnings"])
 
 
+@pytest.mark.slow
 def test_forces_zeroed_at_the_wrong_moment_are_named(tmp_path):
     forces = arrays()["force"]
     R = robot().forward(arrays()["joint_position"])[..., :3, :3]
@@ -186,6 +187,7 @@ def test_a_blunder_of_500_mm_is_set_aside_and_named(tmp_path):
     assert figures["held_out"]["mean"] < 0.1 * figures["deflection"]["mean"]
 
 
+@pytest.mark.slow
 def test_readings_that_slipped_and_a_missing_load_case_are_left_out(tmp_path):
     status = np.zeros((POSES, 5), dtype=np.int8)
     status[2, 1], status[4:7, 3] = 1, 4

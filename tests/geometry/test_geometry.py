@@ -49,6 +49,7 @@ def ladder(measured, draws=100):
     return problem, climb(problem, draws, np.random.default_rng(1), silent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [0.0, 0.05])
 def test_motions_of_a_point_are_those_of_finite_differences(error):
     """Also of an arm with errors, which turn the axes of those behind them."""
@@ -177,6 +178,7 @@ def test_bearings_that_bend_under_weight_and_payload_are_found(name, payload, be
         assert low[index] < size * bearings < high[index]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "payload", "planted", "most"),
     some_by_day([("KR 210 R2700-2", 120.0, 6e-7, 2.5), ("UR20", 10.0, 4e-6, 1.2)]),
@@ -263,6 +265,7 @@ def test_with_joint_origins_moves_a_joint_in_its_own_frame():
     assert np.allclose(moved.chain.joints[3].placement, placement, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_command_writes_model_and_urdf_and_prints_the_contract(tmp_path):
     measured = measure(kuka(), 60, blunders=5)
     path = write_positions(tmp_path / "positions.csv", measured)

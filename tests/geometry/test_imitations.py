@@ -39,6 +39,7 @@ def test_four_series_of_an_arm_with_parallel_axes_reach_the_floor():
     assert np.mean(errors) < 1.03 * FLOOR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_eight_hundred_random_poses_neither_over_nor_underfit(seed):
     measured = measure(universal(), 1000, seed=seed, **SMALL)

@@ -111,6 +111,7 @@ def test_the_normal_equations_are_those_of_all_columns():
     assert np.allclose(h, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_planted_functions_are_found_to_the_noise(model, measured):
     unseen = measured.data.rows(np.arange(700) >= 500)
     assert rung(model) == "joint-functions"
@@ -178,6 +179,7 @@ def test_ranges_are_what_lies_near_measured_angles():
     assert measured_ranges(np.array([3.1, -3.1]))[0][1] > np.pi
 
 
+@pytest.mark.slow
 def test_where_no_angle_was_measured_errors_are_larger_and_that_is_said(measured):
     """Joint 2 is measured on one side of a half turn, and used on the other, too."""
     known, asked = measured.data.rows(np.arange(500)), measured.data.rows(np.arange(500, 700))
@@ -211,6 +213,7 @@ def test_a_urdf_does_without_them(model):
     assert model.chain.held_out.mean < model.held_out.registration.mean
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", some_by_day([kuka, seven_axes]))
 def test_no_functions_are_found_where_there_are_none(arm):
     chosen = [rung(fitted(measure(arm(), 150, seed=seed, **PLANTED))) for seed in range(2)]

@@ -34,6 +34,7 @@ def elsewhere(measured: Measured, rows: np.ndarray, joint: int, by: float) -> Me
     return replace(measured, data=replace(measured.data, markers=markers))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_an_error_of_the_arm_counts_in_what_is_stated(seed):
     """As much is stated as unseen rows miss by: it was 0.312 for 0.427 mm."""
@@ -90,6 +91,7 @@ def test_a_cluster_by_the_sum_of_two_joints_is_named():
     assert "where j2 + j3 is" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", some_by_day(ARMS))
 @pytest.mark.parametrize("markers", [1, 3])
 def test_six_bad_poses_of_twenty_are_found(arm, markers):

@@ -55,6 +55,7 @@ def test_joints_of_another_convention_are_refused_by_it(recorded, message):
         plausible_ladder(problem, 40, _rng())
 
 
+@pytest.mark.slow
 def test_a_coupled_joint_is_named_where_single_joints_were_swept():
     """As of a public FANUC: six rows of 36 were set aside as blunders, without a word of it."""
     z, y, x = "0 0 1", "0 1 0", "1 0 0"
@@ -73,6 +74,7 @@ def test_a_coupled_joint_is_named_where_single_joints_were_swept():
         plausible_ladder(GeometryProblem(arm, replace(data, q=swept)), 40, _rng())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-4, 3e-4, 5e-3])
 def test_a_station_that_moved_is_named_with_the_row(size):
     data = measure(kuka(), 100).data

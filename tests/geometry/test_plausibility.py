@@ -244,6 +244,7 @@ def test_the_command_refuses_a_mirrored_tracker_and_writes_nothing(tmp_path):
     assert not (tmp_path / "model.json").exists()
 
 
+@pytest.mark.slow
 def test_a_zero_that_no_arm_has_is_refused_though_the_fit_explains_it():
     measured = campaign("kuka", 30, markers=1, stations=1)
     said = refusal(joint(2, lambda q: q + np.radians(10.0))(measured.data), measured.robot)
@@ -367,6 +368,7 @@ def test_mistakes_are_refused_by_their_name_or_do_no_harm(arm):
     assert named >= 0.9 * refused
 
 
+@pytest.mark.slow
 def test_a_robot_of_the_same_family_is_named():
     measured = campaign("kuka", 40, markers=1, stations=1)
     said = refusal(measured.data, catalogue.load("KR 210 R3100-2"))

@@ -29,6 +29,7 @@ def planned(cell: Cell, search: str) -> PositionPlan:
     return plan_positions(cell, 24, search, seed=1)
 
 
+@pytest.mark.slow
 def test_a_station_sees_each_pose_and_nothing_collides(cell):
     plan = planned(cell, "i_optimal")
     q = np.array([pose.joints for pose in plan.poses])

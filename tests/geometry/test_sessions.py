@@ -58,6 +58,7 @@ def test_three_sessions_in_one_table_are_named_with_their_rows(frame, marker, ki
     assert [(each.kind, each.values["row"]) for each in found] == [(kind, 30), (kind, 60)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("frame", "marker"), [(2e-3, 0.0), (0.0, 2e-3), (2e-2, 2e-2)])
 def test_large_changes_are_undone_whether_one_place_fits_or_not(frame, marker):
     data = changed(measure(ARM, 90, markers=1, stations=1), [30, 60], frame, marker)

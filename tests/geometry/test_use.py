@@ -45,6 +45,7 @@ def station_error(measured: Measured, model: GeometryModel, real, programmed) ->
     return np.linalg.norm((seen - own[:3, 3]) @ own[:3, :3] - programmed, axis=1)
 
 
+@pytest.mark.slow
 def test_the_corrected_tool_stands_where_it_is_programmed():
     """Of an arm that was measured without noise, with nothing pressing on it."""
     measured = measure(kuka(), 100, noise=0.0)

@@ -25,6 +25,7 @@ def doubtful():
     return replace(readings, marker_displacement=marker)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", some_by_day(["huber", "cauchy"]))
 def test_refits_keep_the_weights_that_the_loss_gave(loss):
     readings = doubtful()
@@ -51,6 +52,7 @@ def test_the_estimate_lies_in_its_interval():
     assert np.all((low <= found.calibrated.compliance) & (found.calibrated.compliance <= high))
 
 
+@pytest.mark.slow
 def test_a_marker_far_from_the_tcp_gives_the_springs_when_its_lever_is_told():
     readings, lever = campaign(), [0.2, 0.0, 0.4]
     c = np.full(6, 1e-6)
@@ -85,6 +87,7 @@ def test_a_fit_that_explains_little_is_worth_a_warning():
 TOOL_ALONE = with_tool(urdf(), "tcp", "cutter", np.eye(4), 12.0, (0.0, 0.0, 0.1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arm", "said"),
     [

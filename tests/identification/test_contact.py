@@ -51,6 +51,7 @@ def solved(contact: Contact, how: Held = SOFT):
     return problem, solve(problem).compliance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_wrong_presses_at_half_of_the_places_spoil_neither_noise_nor_the_others(seed):
     """What the presses of a place share is spoilt by one, and with it the median of all."""
@@ -91,6 +92,7 @@ def test_readings_that_no_tracker_measured_are_refused_where_nothing_is_said_of_
         build(model, readings(Held(tracked=4)))
 
 
+@pytest.mark.slow
 def test_gears_are_refused_by_name_where_the_normal_compliance_is_free():
     options = weigh_contact(arm(), readings(), FitOptions(contact=Contact()))
     with pytest.raises(IdentificationError, match=r"contact\.normal is free.*most: joint_a"):
@@ -366,6 +368,7 @@ def with_drift(good: Readings) -> dict[str, np.ndarray]:
     return {"force": good.force + 0.3 * PRESS * late * np.array([0.4, 0.3, 0.8])}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "said", "grade"),
     [

@@ -133,6 +133,7 @@ def test_noise_of_the_encoders_shows_in_what_is_left():
     assert np.sqrt(np.mean(np.square(left))) == pytest.approx(2e-5 * np.sqrt(2.0), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("joint", "factor", "message"),
     [(1, -1.0, "see what no load on their gears makes"), (2, 0.0, "see nothing of their gears")],

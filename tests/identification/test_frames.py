@@ -98,6 +98,7 @@ def test_joint_2_comes_out_right_though_the_tracker_moved_between_the_payloads()
     assert np.sqrt(np.mean(np.square(tied - 1.0))) > 5.0 * np.sqrt(np.mean(np.square(free - 1.0)))
 
 
+@pytest.mark.slow
 def test_the_interval_of_joint_2_counts_the_frames_and_holds_the_truth():
     readings, _ = moved(payload_readings(), payload_readings().load_case)
     low, high = (
@@ -289,6 +290,7 @@ def test_a_payload_hangs_where_it_hangs():
     assert np.abs(model.deflection(c, q, force) - expected).max() > 0.05 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_a_payload_beside_the_tcp_is_a_load_case_with_a_moment():
     """The springs that truth and moment plant come back through the whole calibration."""
     readings = payload_readings()

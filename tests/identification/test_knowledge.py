@@ -190,6 +190,7 @@ def test_a_data_sheets_stiffnesses_are_mean_compliances_between_its_torques(tmp_
         assert each.sigma == pytest.approx(0.2e-6 / K)
 
 
+@pytest.mark.slow
 def test_a_certain_data_sheet_holds_the_gear_and_a_vague_one_does_not(tmp_path):
     known, certain, _ = with_gear(tmp_path, 0.0001)
     for each in known:

@@ -60,6 +60,7 @@ WARNED = (
 )
 
 
+@pytest.mark.slow
 def test_what_import_suspected_is_said_in_place_of_another_name():
     """Exchanged axes look to a fit like an axis reversed, or two load cases exchanged."""
     made = campaign(SMALL)
@@ -78,6 +79,7 @@ def test_what_import_suspected_is_said_in_place_of_another_name():
     assert not sound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_by_day(REFUSED))
 def test_a_certain_mistake_is_refused_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
@@ -85,6 +87,7 @@ def test_a_certain_mistake_is_refused_by_name(name):
     assert found.named, found.said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*some_by_day(WARNED), "force in counts of 1/16 N"])
 def test_a_likely_mistake_is_warned_of_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
@@ -175,6 +178,7 @@ def test_weights_and_forces_that_were_asked_for_are_not_clipped():
         assert not any("stops at" in str(each) for each in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sound", "name", "said"),
     [
@@ -196,6 +200,7 @@ def test_forces_that_are_wrong_for_a_part_or_drift_are_named(sound, name, said):
     assert said in str(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "said"),
     some_by_day(
@@ -288,6 +293,7 @@ def test_the_documentation_shows_every_mistake_from_outside():
     require_whole("outside", found=0.88, named=0.9, most_alarms=0.0)
 
 
+@pytest.mark.slow
 def test_a_tool_weight_is_named_once():
     made = KNOWN["weight of the tool left in"].make(campaign(ON_RAIL))
     model, rng = ElasticModel(made.robot, bearing(made.robot)), np.random.default_rng(0)

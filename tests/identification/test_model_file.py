@@ -51,6 +51,7 @@ def edited(path):
     return read
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gravity", [GRAVITY, (0.0, 9.80665, 0.0)])
 def test_a_model_keeps_where_gravity_points(path, gravity):
     calibrated = calibration().calibrated

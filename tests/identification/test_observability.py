@@ -466,6 +466,7 @@ def payloads(
     return readings, truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_parallel_loads_at_postures_turned_about_the_base_make_no_value_out_of_nothing(seed):
     """Two weights and a vertical axis: the loads are one, and the levers those of one posture."""
@@ -477,6 +478,7 @@ def test_parallel_loads_at_postures_turned_about_the_base_make_no_value_out_of_n
     assert found.hidden or len([row for row in found.springs if row.too_weak]) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jitter", [1e-6, 1e-9])
 def test_a_spring_that_some_draws_do_not_turn_stays_that_of_an_arm(jitter):
     """They had hundreds of rad/(N m) in draws, which the model file refuses."""

@@ -16,6 +16,7 @@ def calibration():
     return calibrate(model, readings, np.random.default_rng(0))
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_calibration(calibration):
     unseen = unseen_errors(calibration, np.random.default_rng(0))
     np.testing.assert_array_equal(unseen.error, calibration.held_out.error)

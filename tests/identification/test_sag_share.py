@@ -44,6 +44,7 @@ def showing(share: float) -> Readings:
     return replace(seen, marker_displacement=seen.controller_displacement + rows @ PLANTED + noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
 def test_springs_are_found_whatever_share_of_the_sag_readings_show(share):
     found = calibrate(model(), showing(share), np.random.default_rng(0)).calibrated

@@ -33,6 +33,7 @@ def calibration(springs="bearing", keep=False) -> Calibration:
     return calibrate(elastic(springs), readings, np.random.default_rng(0), options)
 
 
+@pytest.mark.slow
 def test_it_is_json_without_nan():
     text = json.dumps(to_data(summary(calibration())), allow_nan=False)
     assert json.loads(text)["schema"] == "elastocal.calibration/2"

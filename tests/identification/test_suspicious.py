@@ -75,6 +75,7 @@ def test_one_reading_in_ten_may_be_set_aside():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("springs", "blocks"), [(5, 3), (5, 10), (16, 10), (16, 40)])
 def test_normal_noise_names_a_reading_in_few_of_a_hundred_campaigns(springs, blocks):
     """The fit takes up to half of the noise away: leverage and scale make up for it."""

@@ -42,6 +42,7 @@ def found(how: Held = NOISY):
     return with_tip_found(described(WRONG), readings, FitOptions(contact=KNOWN))
 
 
+@pytest.mark.slow
 def test_the_place_across_the_normal_is_found():
     tip = found()[1].contact.tip_found
     np.testing.assert_allclose(tip.place[:2], -WRONG[:2], atol=1e-3)
@@ -76,6 +77,7 @@ def calibrated(seed: int = 0) -> CalibrateResult:
     return ec.calibrate(elsewhere(seed), contact=KNOWN, springs="actuated", draws=40)
 
 
+@pytest.mark.slow
 def test_calibrate_says_where_the_tip_is_with_an_interval_that_holds_it():
     tip = calibrated().calibration.contact.tip
     assert np.all((np.array(tip.low) <= -WRONG) & (np.array(tip.high) >= -WRONG))
@@ -205,6 +207,7 @@ def test_why_the_tip_is_not_found_beside_gears_is_said(monkeypatch):
         with_tip_found(described(WRONG), readings, free)
 
 
+@pytest.mark.slow
 def test_one_blunder_does_not_move_the_tip():
     displacement = elsewhere().controller_displacement.copy()
     displacement[4, 1, 2] += 3e-3

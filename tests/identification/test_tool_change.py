@@ -55,6 +55,7 @@ def calibrated() -> CalibratedModel:
     return calibrate(model, data.readings(robot.joint_names), rng, FitOptions(draws=40)).calibrated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("T", [LONGER, ASIDE], ids=["longer", "aside"])
 def test_another_tool_is_predicted_nearly_as_well_as_the_calibrated_one(calibrated, T):
     arm = truth(with_tool(URDF, "tcp", "other", T), "other")

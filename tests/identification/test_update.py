@@ -57,6 +57,7 @@ def worn_unseen(softer):
     return replace(readings, marker_displacement=marker)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("poses", some_by_day([5, 31]))
 def test_an_arm_that_got_softer_is_followed_at_poses_that_nothing_has_seen(poses):
     model = problems.elastic("bearing")
@@ -184,6 +185,7 @@ def test_springs_learn_nothing_from_production_with_a_mistake(few, mistake, said
     assert said in worth.refusal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("softer", [0.9, 1.0, 1.25])
 def test_an_arm_that_has_worn_or_not_is_no_mistake(few, softer):
     for seed in (2, 3):

@@ -76,6 +76,7 @@ def test_no_tight_interval_stands_beside_a_spring_that_is_too_weak_to_see():
     assert row.high > 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "lever"), [(20e-6, 4.0), (0.0, 2e-3)])
 def test_with_a_longer_lever_or_without_noise_the_same_spring_is_seen(noise, lever):
     assert faint(noise, lever).calibrated.observability.faint == ()
@@ -111,6 +112,7 @@ def useless() -> Calibration:
     return calibrate(elastic("actuated"), bad, np.random.default_rng(0), TRUST)
 
 
+@pytest.mark.slow
 def test_a_model_that_leaves_more_than_half_says_so():
     found = useless()
     assert found.calibrated.unexplained > MOST_UNEXPLAINED

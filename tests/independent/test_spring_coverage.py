@@ -211,6 +211,7 @@ def test_one_campaign_of_a_small_arm_says_what_it_knows():
     assert sum(held.values()) >= len(held) - 1
 
 
+@pytest.mark.slow
 def test_a_gear_is_doubted_where_tilts_that_were_left_out_could_be_part_of_it():
     """Springs of the axes alone predicted as well: joint 3 was 0.627 to 0.638, planted 0.522."""
     found = campaign("210 kg", POSES["many"], 3, tilting=0.25)

@@ -132,6 +132,7 @@ def test_a_log_is_named_by_its_file_or_its_path_from_the_map(tmp_path, log, mean
     assert _is_named(tmp_path / "day1" / "krc.csv", log) is means
 
 
+@pytest.mark.slow
 def test_a_map_names_the_cell_file_from_its_own_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     cell = ec.init("cells", kind="afp").cell

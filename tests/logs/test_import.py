@@ -58,6 +58,7 @@ def test_every_reading_of_the_run_is_found(imported, derived):
     assert imported.figures.warnings == ()
 
 
+@pytest.mark.slow
 def test_the_readings_are_those_of_the_run_within_their_noise(imported, derived):
     found = imported.dataset
     assert derived.marker_sigma is not None
@@ -262,6 +263,7 @@ def test_logs_of_other_work_are_told(rows, tmp_path):
         ec.import_logs(files, map=path)
 
 
+@pytest.mark.slow
 def test_a_guessed_map_needs_but_the_units_that_sizes_do_not_tell(rows, tmp_path, derived):
     files = write_logs(rows, tmp_path)
     cell = reported.finished() / "cell" / "cell.yaml"
@@ -384,6 +386,7 @@ def test_a_column_in_seconds_is_the_time_whatever_it_is_called(tmp_path):
         ec.import_logs([log], map=tmp_path / "map.yaml")
 
 
+@pytest.mark.slow
 def test_the_figures_are_one_json_object(imported, rows, tmp_path):
     files = write_logs(rows, tmp_path)
     path = write_map(tmp_path, reported.finished() / "cell" / "cell.yaml")
@@ -442,6 +445,7 @@ def test_a_sensor_that_is_mapped_wrongly_is_told_by_press_and_weight(rows, tmp_p
     )
 
 
+@pytest.mark.slow
 def test_a_certain_mistake_is_refused_with_the_entry_that_undoes_it(rows, tmp_path):
     """The tool frame in the log is that of the joints: the tracker alone can be mirrored."""
     cell, out = reported.finished() / "cell" / "cell.yaml", tmp_path / "data.nc"

@@ -168,6 +168,7 @@ def test_what_a_shell_pipes_is_read(tmp_path):
     os.close(reading)
 
 
+@pytest.mark.slow
 def test_a_sheet_of_a_workbook_is_read(tmp_path):
     book, path = Workbook(), tmp_path / "log.xlsx"
     book.active.append(["time", "x"])

@@ -58,6 +58,7 @@ def test_a_tool_longer_than_its_tcp_is_named(cell):
     assert "stem reaches 40 mm beyond the tcp along its z" in said
 
 
+@pytest.mark.slow
 def test_refused_points_say_what_collides_and_how_near(cell):
     limits = cell.file.limits.model_copy(update={"clearance": 0.5})
     narrow = changed(cell, limits=limits)
@@ -68,6 +69,7 @@ def test_refused_points_say_what_collides_and_how_near(cell):
     )
 
 
+@pytest.mark.slow
 def test_points_out_of_reach_say_how_far_they_are(cell):
     far = cell.file.surface.pose.model_copy(update={"xyz": (6.0, 0.0, 0.5)})
     away = changed(cell, surface=cell.file.surface.model_copy(update={"pose": far}))

@@ -32,6 +32,7 @@ def folders(tmp_path_factory):
 
 @pytest.mark.parametrize("like", ["afp", "machining"])
 class TestExample:
+    @pytest.mark.slow
     def test_most_points_have_a_posture_and_the_edge_refuses_most_others(self, like, folders):
         *_, pool = planned(like, folders[like])
         assert len(pool.postures) > 0.65 * POINTS

@@ -24,6 +24,7 @@ class Sealed:
     compliance: tuple[float, ...]
 
 
+@pytest.mark.slow
 def test_json_is_read_at_one_place():
     found = set()
     for path in SOURCES.rglob("*.py"):

@@ -127,6 +127,7 @@ def all_phrases():
 
 @pytest.mark.parametrize("code", CATALOGUES)
 class TestEveryCatalogue:
+    @pytest.mark.slow
     def test_it_has_every_phrase(self, code):
         missing = sorted(all_phrases() - CATALOGUES[code].keys())
         assert not missing, f"not in words/{code}.json:\n" + "\n".join(missing)

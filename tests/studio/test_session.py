@@ -261,6 +261,7 @@ def test_a_run_that_is_stopped_comes_to_its_own_end():
     assert news.live == {"heard": "stop"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("second", "state", "result"),
     [
@@ -301,6 +302,7 @@ def test_a_work_that_fails_says_why():
     assert (news.state, news.message) == (WorkState.FAILED, "it cannot be done")
 
 
+@pytest.mark.slow
 def test_work_may_begin_when_other_work_has_ended():
     news = []
     worker = Worker(lambda: news.append(worker.news))
@@ -390,6 +392,7 @@ def asking(tmp_path_factory):
     return Asking(path, live_bench.write_model_of(path, path.with_name("model.json")))
 
 
+@pytest.mark.slow
 def test_a_survey_and_a_comparison_are_made_of_the_pool_of_the_cell(asking):
     found, _ = asking.ask("survey")
     free = [p for p, name in zip(found["points"], found["refused"], strict=True) if not name]
@@ -411,6 +414,7 @@ def test_the_devices_are_heard_until_somebody_says_stop(asking):
     assert {len(each["cells"]) for each in shown["devices"]} == {len(shown["columns"])}
 
 
+@pytest.mark.slow
 def test_a_plan_is_made_shown_and_run_and_a_run_that_is_stopped_can_be_gone_on_with(asking):
     made, _ = asking.ask("plan", folder="planned")
     shown = asking.look("poses", **made)

@@ -41,6 +41,7 @@ def true_deviation(cell, q, force):
     return first.equilibrium(q[0], force).deflection - other @ R.T
 
 
+@pytest.mark.slow
 def test_the_deviation_at_unseen_meetings_is_that_of_the_truth(cell, models, unseen):
     q, force = unseen
     found = relative_deviation(models, cell.T_first_second, q, force)

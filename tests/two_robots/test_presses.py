@@ -178,11 +178,13 @@ def sound(cell, pair):
     return identify_pair(pair, np.random.default_rng(0), cell.contact, "gears", draws=40)
 
 
+@pytest.mark.slow
 def test_presses_without_blunders_are_all_kept(pair, sound):
     assert len(sound.pair) == len(pair)
     assert not {SET_ASIDE.name, LOOKS_WRONG.name} & {each.kind for each in sound.findings}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", some_by_day([1e-3, 3e-3, 50e-3]))
 def test_a_blunder_is_set_aside_named_and_moves_neither_arm(cell, pair, sound, off):
     wrong = moved(pair, 40, [0.0, 0.6 * off, 0.8 * off])
@@ -218,6 +220,7 @@ def one_in_five(pair, kind, rng):
     return np.flatnonzero(np.isin(pair.first.pose, slipped))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [50e-3, 3e-3])
 @pytest.mark.parametrize("kind", ["presses", "meetings"])
 def test_where_one_press_in_five_is_wrong_these_are_set_aside_and_no_other(cell, pair, kind, off):

@@ -344,6 +344,7 @@ def shift_readings(folder, part, kind="sound"):
     sealed.edit(summary, lambda record: record.update(dataset_sha256=file_sha256(path)))
 
 
+@pytest.mark.slow
 def test_what_another_version_derived_is_not_called_changed(copied):
     folder = copied()
     shift_readings(folder, 0.15)
@@ -355,6 +356,7 @@ def test_what_another_version_derived_is_not_called_changed(copied):
     assert any("derived by another version of elastocal: dataset" in str(each) for each in held)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("part", "kind"), [(0.3, "sound"), (0.15, "louder")])
 def test_a_change_of_more_than_a_part_of_the_noise_is_broken_whoever_states_it(copied, part, kind):
     """Neither the version nor the noise that an edited file states makes room for it."""

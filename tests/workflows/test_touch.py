@@ -97,6 +97,7 @@ def test_only_the_contact_force_is_pressed_with(touched):
     assert limit < 100.0
 
 
+@pytest.mark.slow
 def test_a_finished_warm_run_is_read_and_not_made_again(touched):
     folder, made, data = touched
     journal = folder / "state-run" / "journal.jsonl"
@@ -210,6 +211,7 @@ def test_half_a_warm_run_is_gone_on_with_and_not_taken_for_all_of_it(
     assert 86400.0 - 3600.0 < pause(timedelta(days=1)) < 86400.0
 
 
+@pytest.mark.slow
 def test_a_warm_run_that_a_fault_has_ended_is_not_taken_for_all_of_it(touched, tmp_path):
     folder, made, _ = touched
     half = copied(folder / "state-run", tmp_path / "half", 4)
@@ -220,6 +222,7 @@ def test_a_warm_run_that_a_fault_has_ended_is_not_taken_for_all_of_it(touched, t
     assert not (tmp_path / "w.json").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moved", ["cold", "state-run"])
 def test_a_tracker_that_moved_during_the_touches_is_refused(touched, monkeypatch, moved):
     folder, _, _ = touched

@@ -53,6 +53,7 @@ def unseen(done):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", [0, 1])
 def test_both_arms_are_found_without_a_tracker(done, unseen, arm):
     q, force, true = unseen[arm]
@@ -212,6 +213,7 @@ def test_arms_that_cannot_reach_each_other_make_no_plan(tmp_path):
     assert not (tmp_path / "plan.json").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_with_files_is_not_filled_again_unless_forced(done, tmp_path):
     out = tmp_path / "run"
     given = (done / "cell.yaml",)

@@ -78,8 +78,7 @@ def workflow(
     record : str, optional
         Field with the folder of a run whose record is written; no other workflow may.
     """
-    fields = inspect.signature(settings).parameters
-    _show_plainly(settings)
+    fields = _shown_plainly(settings)
     placed = [name for name, each in fields.items() if each.kind is not each.KEYWORD_ONLY]
     needed = [name for name in placed if fields[name].default is inspect.Parameter.empty]
     by_place = needed or placed[:1]
@@ -144,10 +143,7 @@ def _signature(
     function: Callable[..., Any], fields: Mapping[str, inspect.Parameter], by_place: Sequence[str]
 ) -> inspect.Signature:
     """Return the signature that shows the fields: those given by place, the progress, the rest."""
-    shown = [
-        each.replace(kind=each.KEYWORD_ONLY, annotation=_plain(each.annotation))
-        for each in fields.values()
-    ]
+    shown = [each.replace(kind=each.KEYWORD_ONLY) for each in fields.values()]
     placed = [
         each.replace(kind=each.POSITIONAL_OR_KEYWORD) for each in shown if each.name in by_place
     ]
@@ -156,14 +152,20 @@ def _signature(
     return inspect.Signature([*placed, follows, *rest])
 
 
-def _show_plainly(settings: type[Any]) -> None:
-    """Let `help` show the fields of settings without what a command line adds to them."""
-    made = settings.__init__
-    signature = inspect.signature(made)
+def _shown_plainly(settings: type[Any]) -> Mapping[str, inspect.Parameter]:
+    """Let `help` show the fields of settings without what a command line adds, and return them."""
+    signature = inspect.signature(settings.__init__)
+    made = {
+        each.name: each.default_factory()
+        for each in dataclasses.fields(settings)
+        if each.default_factory is not dataclasses.MISSING
+    }
     shown = [
-        each.replace(annotation=_plain(each.annotation)) for each in signature.parameters.values()
+        each.replace(annotation=_plain(each.annotation), default=made.get(name, each.default))
+        for name, each in signature.parameters.items()
     ]
-    made.__signature__ = signature.replace(parameters=shown)
+    settings.__init__.__signature__ = signature.replace(parameters=shown)
+    return {each.name: each for each in shown[1:]}
 
 
 def _plain(annotation: Any) -> Any:

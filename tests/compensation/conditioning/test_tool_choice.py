@@ -56,6 +56,7 @@ def test_the_weight_is_known_to_the_noise_although_the_matrix_is_not():
     assert np.abs(left[3:]).max() < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some_by_day([3, 8]))
 def test_without_a_matrix_intervals_reach_as_far_as_beside_its_prior(seed):
     # Few postures, hardly turned: they cannot show a cross-talk of 1 %, and do not ask for it.
@@ -169,6 +170,7 @@ def test_halves_that_disagree_are_within_the_interval():
     assert abs(9.80665 * fit.mass - 12.16) < reach
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("order", "reason"),
     some_by_day(

@@ -30,6 +30,7 @@ def test_a_mistake_in_postures_is_named_as_the_documentation_shows(name):
     assert found.refused is (name in REFUSED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sound", some_by_day(WALK.sound[3:6]), ids=lambda each: each.title)
 def test_a_sound_table_of_postures_passes_in_silence(sound):
     assert tool_alarms(sound) == ()

@@ -94,6 +94,7 @@ class Sinking(OneAxisSpring):
         return (((2.0 * slope,),),)
 
 
+@pytest.mark.slow
 def test_a_law_that_divides_by_the_load(tmp_path):
     robot = Robot.from_urdf(ARMS["on a rail"], "tcp")
     joints = robot.chain.joints[1:4]
@@ -203,6 +204,7 @@ def grown_arm(robot):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_by_day(["gears", "hinges"]))
 def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
     model = geared() if name == "gears" else compensated.arm("on a rail")
@@ -224,6 +226,7 @@ def test_the_growth_of_an_arm_is_corrected_as_by_python(tmp_path, name):
         np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("orders", "payload", "assumed"),
     some_by_day([(40, 30.0, False), (2, 0.0, False), (2, 30.0, True)]),
@@ -302,6 +305,7 @@ def test_offsets_of_courses_are_those_of_python(tmp_path, name):
     assert (found[:, 4] > 0.0).sum() >= 20
 
 
+@pytest.mark.slow
 def test_every_way_of_the_step_is_taken_by_that_course(tmp_path):
     numbers = design(compensated.arm("on a rail"), compensated.settings(), compensated.load())
     executable = build(written(tmp_path, numbers), "-O2")
@@ -317,6 +321,7 @@ def folder(tmp_path_factory):
 
 
 class TestSelfTest:
+    @pytest.mark.slow
     def test_it_is_zero_at_every_level_of_optimisation(self, folder):
         for level in ("-O0", "-O3"):
             assert build(folder, level, name=f"run{level}").selftest() == 0
@@ -324,6 +329,7 @@ class TestSelfTest:
     def test_it_is_zero_with_fused_products_allowed(self, folder):
         assert build(folder, "-O2", "-ffp-contract=fast", name="fused").selftest() == 0
 
+    @pytest.mark.slow
     @pytest.mark.skipif(
         not PROCESSOR.exists() or " fma " not in PROCESSOR.read_text(), reason="nothing is fused"
     )
@@ -339,6 +345,7 @@ class TestSelfTest:
         assert np.array_equal(status[5:10], status[15:])
         assert int(status[-1]) & Status.DEADBAND.value
 
+    @pytest.mark.slow
     def test_a_change_of_any_one_constant_is_found(self, folder, tmp_path):
         text = (folder / "elastocal_model.c").read_text()
         head, definitions, rest = re.split(r"(?m)^(?=/\* ---- (?:Constants|Sine))", text)
@@ -418,6 +425,7 @@ class TestFastMath:
         assert done.returncode != 0
         assert 'error: #error "elastocal: compile with' in done.stderr
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("level", ["-O1", "-O3"])
     def test_nan_is_refused_without_the_help_of_the_compiler(self, folder, level):
         flags = (level, "-ffinite-math-only", *UNNAMED)
@@ -447,6 +455,7 @@ def with_friction(tmp_path_factory):
 
 
 class TestFriction:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("old", "new", "code"),
         [

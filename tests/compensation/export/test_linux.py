@@ -196,6 +196,7 @@ def random_line(seed):
     return np.array(rows, dtype=float), np.array(found, dtype=float)
 
 
+@pytest.mark.slow
 def test_python_and_c_see_the_same_correction_in_effect(program, tmp_path):
     folder = program[0].parent
     harness = Path(HARNESS.with_name("held_harness.c"))

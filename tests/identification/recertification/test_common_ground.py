@@ -35,6 +35,7 @@ def _part(seed, choose) -> CalibratedModel:
     return replace(found, provenance=f"campaign {seed}")
 
 
+@pytest.mark.slow
 def test_campaigns_of_one_region_and_load_judge_springs():
     found = recertify(calibrated(linear_truth(), 0), calibrated(soft_truth(), 50_000)).summary
     assert found.ground.springs_judged
@@ -51,6 +52,7 @@ def test_springs_of_campaigns_at_other_poses_are_not_held_against_one_another():
     assert "Springs are not held against one another" in found.moved_sentence
 
 
+@pytest.mark.slow
 def test_springs_of_campaigns_under_other_forces_are_not_held_against_one_another():
     model = calibrated(linear_truth(), 0)
     domain = model.domain

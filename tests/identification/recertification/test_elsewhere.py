@@ -100,6 +100,7 @@ def test_gears_of_campaigns_under_other_forces_are_held_against_one_another():
     assert not recertify(before("bearing"), after("bearing", 1.0)[0]).summary.springs_judged
 
 
+@pytest.mark.slow
 def test_a_gear_amounts_to_its_mean_compliance_between_the_torques_that_both_met():
     old, (new, _) = before("gears"), after("gears", 1.0)
     number = next(each for each in shared_numbers(old, new) if each.name == "joint_2.axial")

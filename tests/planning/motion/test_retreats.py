@@ -35,6 +35,7 @@ def clear(cell, surface, postures):
     return clear_retreats(cell, mover_for(cell, collision_scene(cell, surface)), postures)
 
 
+@pytest.mark.slow
 def test_postures_of_the_pool_retreat_freely(tmp_path, postures):
     assert np.all(clear(*planned(tmp_path), postures))
 

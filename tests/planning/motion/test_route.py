@@ -162,6 +162,7 @@ def example(like, folder, count) -> tuple:
     return cell, surface, pool.postures.take(np.arange(min(count, len(pool.postures))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("like", some_by_day(["afp", "machining"]))
 def test_the_poses_of_an_example_are_visited(like, tmp_path):
     cell, surface, postures = example(like, tmp_path, 6)

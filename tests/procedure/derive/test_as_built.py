@@ -57,6 +57,7 @@ def in_the_truth(measured, built, q):
     return R, true
 
 
+@pytest.mark.slow
 def test_the_force_lies_as_the_true_tool_does(measured, built, drawn, rebuilt):
     R, true = in_the_truth(measured, built, drawn.joint_position)
     tools = np.array([[0.0, 0.0, -900.0], [270.0, 0.0, -900.0], [0.0, 270.0, -900.0]])

@@ -38,6 +38,7 @@ def values(derived: DerivedRun, name: str) -> np.ndarray:
     return derived.dataset.to_xarray()[name].values
 
 
+@pytest.mark.slow
 def test_forces_come_out_in_base_without_tool_weight_and_bias(run, derived):
     # 0.5 N of noise, 101 samples, twice: 0.07 N.
     np.testing.assert_allclose(values(derived, "force"), run.force, atol=0.4)
@@ -151,6 +152,7 @@ def test_a_reading_that_slipped_keeps_its_numbers_and_its_status(tmp_path):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("station", "status"),
     some_by_day(
@@ -243,6 +245,7 @@ def test_a_load_case_that_was_never_had_is_left_out_with_a_warning(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_a_tool_that_is_heavier_than_the_cell_says_is_told(tmp_path):
     truth = Truth(mass=75.0, force_noise=0.1, drift=np.zeros(3))
     derived = derive_run(record_run(tmp_path / "run", truth).path)
@@ -259,6 +262,7 @@ def test_the_wrong_mass_hardly_touches_the_forces(tmp_path):
     np.testing.assert_allclose(values(derive_run(run.path), "force"), run.force, atol=0.6)
 
 
+@pytest.mark.slow
 def test_a_drift_after_release_is_told(tmp_path):
     def two_references(pose: int, window: Window) -> Window:
         # The last load stands for the window after release.
@@ -301,6 +305,7 @@ def no_sensor(run: Path) -> None:
     edit_journal(journal, lambda text: text.replace(known, fingerprint(load_cell(path))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "error", "message"),
     [
@@ -323,6 +328,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
         derive_run(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_tool_that_gets_heavier_is_told_with_its_pose(tmp_path):
     run = record_run(tmp_path / "run", Truth(heavier_from=3, heavier_by=20.0))
     found = to_data(derive_run(run.path).summary)
@@ -349,6 +355,7 @@ def change_streams(run: Run) -> Path:
     return streams / "pose_0001_1.mcap"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [change_cell, change_plan, change_streams])
 def test_what_was_changed_in_the_folder_since_is_refused_by_name(tmp_path, change):
     run = record_run(tmp_path / "run")

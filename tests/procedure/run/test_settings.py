@@ -78,6 +78,7 @@ CHANGES = [
 ]
 
 
+@pytest.mark.slow
 def test_a_plan_fits_the_cell_that_it_was_made_for(made):
     cell, plan = made
     check_compatible(plan, cell)

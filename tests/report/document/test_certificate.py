@@ -34,6 +34,7 @@ def test_the_bar_has_every_mark_at_its_part_of_the_scale(certificate, parts):
     assert bar.tolerance.text == "0.300 mm"
 
 
+@pytest.mark.slow
 def test_every_reading_is_drawn_before_and_after(certificate, parts):
     readings = parts.dataset.readings(parts.dataset.joint_names)
     assert certificate.picture.before.count("M") == len(readings)

@@ -318,6 +318,7 @@ def test_a_script_that_the_page_did_not_come_with_is_not_run(browser, tmp_path):
     assert all("Content Security Policy" in line for line in seen.complaints)
 
 
+@pytest.mark.slow
 def test_it_prints_to_pages_of_a4_with_its_appendix(browser, report, tmp_path):
     data = write_pdf(report, tmp_path / "report.pdf", browser).read_bytes()
     assert data.startswith(b"%PDF-")

@@ -45,6 +45,7 @@ def shown(text):
     return json.loads(Page(text).data)
 
 
+@pytest.mark.slow
 def test_page_loads_nothing_and_forbids_itself_the_network(text):
     tags = Page(text).tags
     for tag, attributes in tags:

@@ -40,6 +40,7 @@ def words(figure) -> str:
     return " ".join(text.get_text() for text in figure.texts)
 
 
+@pytest.mark.slow
 def test_every_spring_is_drawn_with_both_intervals(found):
     values, tested, rows = drawn(found).axes
     names = [label.get_text() for label in values.get_yticklabels()]

@@ -114,6 +114,7 @@ def test_states_are_a_tenth_of_a_second_apart(client):
     assert 1e-6 * (stamps[-1] - stamps[0]) > 4 * 0.1 * RATE
 
 
+@pytest.mark.slow
 def test_a_line_moves_the_joints_and_the_program_runs_until_they_are_there(client):
     q = joints_of(client.state())
     wanted = [q[0] + (0.1 if q[0] < 0.05 else -0.1), *q[1:]]

@@ -40,6 +40,7 @@ def off_by(rest, state, cell):
 
 @pytest.mark.parametrize("like", LIKES)
 class TestLoadedReading:
+    @pytest.mark.slow
     def test_marker_minus_controller_is_the_deflection_of_the_true_robot(self, like):
         session = Session.of(example_cell(like, simulation=QUIET))
         place, cell = places(like)[1], session.sim.plant.cell
@@ -129,6 +130,7 @@ def test_force_rises_no_faster_than_the_rate_and_settles():
     assert np.all(np.diff(forces) <= 1e-9)
 
 
+@pytest.mark.slow
 def test_the_free_robot_is_off_by_the_sag_that_its_controller_leaves():
     place = places()[0]
     errors = {}
@@ -146,6 +148,7 @@ def test_the_free_robot_is_off_by_the_sag_that_its_controller_leaves():
     assert errors[1.0] < 1e-6
 
 
+@pytest.mark.slow
 def test_stops_scatter_by_the_repeatability():
     entry = {"controller": {**QUIET["controller"], "repeatability": "20 um"}}
     session = Session.of(example_cell(simulation=QUIET | entry))

@@ -53,6 +53,7 @@ def error(like, springs):
 
 @pytest.mark.parametrize("like", some_by_day(["afp", "machining"]))
 class TestHiddenTruth:
+    @pytest.mark.slow
     def test_eighteen_springs_predict_unseen_poses_better_than_six(self, like):
         assert error(like, "bearing") < 0.85 * error(like, "actuated")
 

@@ -34,6 +34,7 @@ def settled(like="afp") -> TrueReadings:
     return CampaignSimulator.of(cell).settle(where(like), cell.file.load_cases.force_tcp)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("like", ["afp", "machining"])
 def test_quick_readings_are_those_of_the_devices(like):
     cell, quick = example_cell(like, simulation=QUIET), settled(like)

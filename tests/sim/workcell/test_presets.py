@@ -334,6 +334,7 @@ class TestProcessStiffness:
         assert force == pytest.approx(1100.0, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", PRESETS)
 def test_devices_and_quick_readings_agree_on_every_preset(preset):
     cell = example_cell(simulation=QUIET | {"preset": preset})
