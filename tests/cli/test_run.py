@@ -61,7 +61,6 @@ def started(planned, out):
     return process
 
 
-@pytest.mark.slow
 def test_a_run_commits_every_pose_and_writes_the_dataset(whole):
     out, result = whole
     assert result.code == 0, result.err

@@ -48,7 +48,6 @@ def spring_error(result: CalibrateResult) -> float:
     return float(np.abs(result.calibrated.compliance / SPRINGS - 1.0).max())
 
 
-@pytest.mark.slow
 def test_springs_are_those_of_the_arm_as_built(campaign, tmp_path):
     _, _, folder = campaign
     drawn = ec.calibrate(folder / "data.nc", springs="actuated")

@@ -111,7 +111,6 @@ def test_the_normal_equations_are_those_of_all_columns():
     assert np.allclose(h, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.slow
 def test_planted_functions_are_found_to_the_noise(model, measured):
     unseen = measured.data.rows(np.arange(700) >= 500)
     assert rung(model) == "joint-functions"

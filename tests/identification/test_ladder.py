@@ -249,7 +249,6 @@ def test_friction_is_not_offered_without_a_load_case_of_low_load():
         climb(robot(), campaign(), [RUNGS["gears+friction"]], ["gears+friction"], OPTIONS)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("springs", ["auto", "gears"])
 def test_planted_friction_is_found_where_there_is_a_low_load(springs):
     readings = with_low_load(campaign())

@@ -79,7 +79,6 @@ def test_what_import_suspected_is_said_in_place_of_another_name():
     assert not sound
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", some_by_day(REFUSED))
 def test_a_certain_mistake_is_refused_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
@@ -87,8 +86,7 @@ def test_a_certain_mistake_is_refused_by_name(name):
     assert found.named, found.said
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [*some_by_day(WARNED), "force in counts of 1/16 N"])
+@pytest.mark.parametrize("name", some_by_day((*WARNED, "force in counts of 1/16 N"), every=9))
 def test_a_likely_mistake_is_warned_of_by_name(name):
     found = outcome(campaign(ON_RAIL), KNOWN[name], with_harm=False)
     assert not found.refused, found.said

@@ -77,7 +77,6 @@ def calibrated(seed: int = 0) -> CalibrateResult:
     return ec.calibrate(elsewhere(seed), contact=KNOWN, springs="actuated", draws=40)
 
 
-@pytest.mark.slow
 def test_calibrate_says_where_the_tip_is_with_an_interval_that_holds_it():
     tip = calibrated().calibration.contact.tip
     assert np.all((np.array(tip.low) <= -WRONG) & (np.array(tip.high) >= -WRONG))

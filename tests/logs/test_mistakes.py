@@ -40,8 +40,7 @@ REFUSED = (
 MASS, DOWN = 38.0, np.array([0.0, 0.0, -9.80665])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", some_by_day((*WARNED, *REFUSED), every=6))
+@pytest.mark.parametrize("name", some_by_day((*WARNED, *REFUSED), every=9))
 def test_a_mistake_in_logs_is_named_as_the_documentation_shows(name):
     found = require_same("import", 0, name)
     assert found.named, found.said

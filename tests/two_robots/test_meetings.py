@@ -79,7 +79,6 @@ def test_arms_that_cannot_reach_each_other_are_refused(tmp_path):
         plan_meetings(two_arms.cell(tmp_path, far))
 
 
-@pytest.mark.slow
 def test_an_arm_that_cannot_bear_the_press_is_refused(tmp_path):
     heavy = CELL.replace('force: "1 kN"', 'force: "80 kN"')
     with pytest.raises(PlanningError, match="static torque"):

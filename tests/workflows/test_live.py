@@ -284,7 +284,6 @@ class TestCourses:
 
         return correct, described
 
-    @pytest.mark.slow
     def test_what_the_tracker_shows_in_light_contact_is_corrected_within_the_limits(self, landed):
         correct, described = landed
         loop = correct().loop

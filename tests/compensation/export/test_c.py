@@ -425,7 +425,6 @@ class TestFastMath:
         assert done.returncode != 0
         assert 'error: #error "elastocal: compile with' in done.stderr
 
-    @pytest.mark.slow
     @pytest.mark.parametrize("level", ["-O1", "-O3"])
     def test_nan_is_refused_without_the_help_of_the_compiler(self, folder, level):
         flags = (level, "-ffinite-math-only", *UNNAMED)

@@ -27,7 +27,6 @@ def true_change(arm, softer, loads) -> np.ndarray:
     return np.linalg.norm(after - before, axis=1)
 
 
-@pytest.mark.slow
 def test_a_gear_that_became_softer_by_a_fifth_is_found_named_and_measured(loads):
     for seed in range(2):
         found = compare(

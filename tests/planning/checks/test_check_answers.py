@@ -130,7 +130,6 @@ def test_in_contact_the_tool_may_touch_what_it_presses_on():
     assert pressed.keeps(one.q_approach, 0.01)[0]
 
 
-@pytest.mark.slow
 def test_a_tool_that_stands_in_the_tooling_is_a_collision():
     """Wider than the disk and longer than the stem: 20 mm deep when the tcp touches."""
     one = postures().take([0])
