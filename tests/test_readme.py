@@ -8,6 +8,7 @@ import re
 import runpy
 import shlex
 import shutil
+import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -479,19 +480,22 @@ def test_lines_of_a_page_end_before_no_unit_and_code_keeps_its_characters():
     assert BREAKS(r"<td><code>C:\KRC\ROBOTER\Config</code></td>").count("<wbr>") == 2
 
 
-def test_the_reference_shows_workflows_as_they_are_called():
-    extensions = griffe.load_extensions(PLAIN)
-    home = griffe.load(
-        "elastocal.workflows.codec", search_paths=[ROOT / "src"], extensions=extensions
-    )
-    called = inspect.signature(codec).parameters
-    shown = home["codec"]
-    assert [each.name for each in shown.parameters] == list(called)
-    assert shown.parameters["saturation"].default == repr(called["saturation"].default)
-    assert shown.docstring.value == codec.__doc__
-    assert "<" not in shown.signature()
-    # Fields of settings are told once, as parameters.
-    assert not [each for each in home["CodecSettings"].attributes.values() if each.docstring]
+def test_the_reference_shows_workflows_as_they_are_called(monkeypatch):
+    module = sys.modules[codec.__module__]
+    monkeypatch.setitem(sys.modules, "plain", module)
+    code = Path(module.__file__).read_text(encoding="utf-8")
+    with griffe.temporary_visited_package(
+        "plain", {"__init__.py": code}, extensions=griffe.load_extensions(PLAIN)
+    ) as package:
+        called, shown = inspect.signature(codec).parameters, package["codec"]
+        assert [each.name for each in shown.parameters] == list(called)
+        assert shown.parameters["saturation"].default == repr(called["saturation"].default)
+        assert shown.docstring.value == codec.__doc__
+        assert "<" not in shown.signature()
+        # Fields of settings are told once, as parameters.
+        fields = package["CodecSettings"].attributes.values()
+        assert fields
+        assert not [each for each in fields if each.docstring]
 
 
 def test_the_reference_shows_types_and_examples_plainly():

@@ -47,6 +47,8 @@ _RATIO = 0.02
 """A scale within so much of itself of a round one is taken for it."""
 _UNMOVED = 0.02
 """Range of joints, in rad or m, within which an arm has not moved."""
+_SCORING = 20
+"""Steps of a registration that only ranks mistakes: what belongs to no arm settles slowly."""
 _FRAME = 3
 """Positions that determine the frame of a station."""
 _LAGS = (1, -1, 2, -2)
@@ -642,7 +644,7 @@ def _as_drawn(robot: Robot, data: Positions) -> float:
     if not kept.seen.any(axis=0).all():
         kept = data
     problem = GeometryProblem(robot, kept)
-    return float(np.median(np.linalg.norm(problem.residual(register(problem)), axis=1)))
+    return float(np.median(np.linalg.norm(problem.residual(register(problem, _SCORING)), axis=1)))
 
 
 def _in_any_frame(robot: Robot, data: Positions) -> float:

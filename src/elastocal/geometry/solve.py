@@ -16,6 +16,8 @@ from elastocal.robot import nearest_rotation
 
 _STEPS, _ROBUST_STEPS = 60, 5
 """Most steps of a fit, and how many of the first weigh far positions less."""
+_ALIGNED = 60
+"""Most steps of a registration."""
 _RETURNS = 20
 """Steps after which a position that was left out once stays out, so that the set settles."""
 _DONE = 1e-6
@@ -35,42 +37,52 @@ _FINEST = 1e-7
 """No tracker is finer, in m."""
 
 
-def register(problem: GeometryProblem) -> State:
-    """Return stations and markers of the nominal arm: robust, by least absolute distances."""
+def register(problem: GeometryProblem, steps: int = _ALIGNED) -> State:
+    """Return stations and markers of the nominal arm: robust, by least absolute distances.
+
+    Parameters
+    ----------
+    problem : GeometryProblem
+        Positions of an arm.
+    steps : int
+        Most steps; positions that belong to the arm settle in a few.
+    """
     data = problem.data
-    joints = len(problem.robot.joint_names)
     markers = np.zeros((data.markers.shape[1], 3))
     T_tcp = problem.robot.forward(data.q)[problem.row]
+    R_tcp, tcp = T_tcp[:, :3, :3], T_tcp[:, :3, 3]
+    of_station = [np.flatnonzero(problem.station == each) for each in range(len(data.stations))]
+    of_marker = [np.flatnonzero(problem.marker == each) for each in range(len(markers))]
     weight = np.ones(len(problem))
     T = np.broadcast_to(np.eye(4), (len(data.stations), 4, 4)).copy()
-    for _ in range(60):
-        points = T_tcp[:, :3, 3] + np.einsum(
-            "nij,nj->ni", T_tcp[:, :3, :3], markers[problem.marker]
-        )
-        before = T.copy(), markers.copy()
-        for station in range(len(T)):
-            own = problem.station == station
-            T[station] = _aligned(points[own], problem.measured[own], weight[own])
+    for _ in range(steps):
+        points = tcp + (R_tcp @ markers[problem.marker, :, None])[..., 0]
+        before = T, markers
+        T = _aligned(points, problem.measured, weight, of_station)
         R, t = T[problem.station, :3, :3], T[problem.station, :3, 3]
-        at_tcp = np.einsum("nji,nj->ni", R, problem.measured - t) - T_tcp[:, :3, 3]
-        local = np.einsum("nji,nj->ni", T_tcp[:, :3, :3], at_tcp)
-        for marker in range(len(markers)):
-            own = problem.marker == marker
-            markers[marker] = (weight[own, None] * local[own]).sum(axis=0) / weight[own].sum()
+        at_tcp = ((problem.measured - t)[:, None] @ R)[:, 0] - tcp
+        local = (at_tcp[:, None] @ R_tcp)[:, 0]
+        markers = np.array([weight[own] @ local[own] / weight[own].sum() for own in of_marker])
         left = np.linalg.norm(local - markers[problem.marker], axis=1)
         weight = 1.0 / np.maximum(left, max(1e-4, 0.2 * float(np.median(left))))
         if np.abs(T - before[0]).max() < 1e-7 and np.abs(markers - before[1]).max() < 1e-7:
             break
-    return State(T, markers, ArmErrors.none(joints))
+    return State(T, markers, ArmErrors.none(len(problem.robot.joint_names)))
 
 
-def _aligned(points: FloatArray, measured: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return the transform that brings points onto measured ones (Kabsch)."""
-    w = weight / weight.sum()
-    a, b = w @ points, w @ measured
-    T = np.eye(4)
-    T[:3, :3] = nearest_rotation(((measured - b) * w[:, None]).T @ (points - a))
-    T[:3, 3] = b - T[:3, :3] @ a
+def _aligned(
+    points: FloatArray, measured: FloatArray, weight: FloatArray, stations: Sequence[IndexArray]
+) -> FloatArray:
+    """Return the transform of each station that brings points onto measured ones (Kabsch)."""
+    a, b = np.empty((len(stations), 3)), np.empty((len(stations), 3))
+    M = np.empty((len(stations), 3, 3))
+    for number, own in enumerate(stations):
+        w = weight[own] / weight[own].sum()
+        a[number], b[number] = w @ points[own], w @ measured[own]
+        M[number] = ((measured[own] - b[number]) * w[:, None]).T @ (points[own] - a[number])
+    T = np.tile(np.eye(4), (len(stations), 1, 1))
+    T[:, :3, :3] = nearest_rotation(M)
+    T[:, :3, 3] = b - (T[:, :3, :3] @ a[..., None])[..., 0]
     return T
 
 
