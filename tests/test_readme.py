@@ -503,6 +503,15 @@ def test_the_reference_shows_types_and_examples_plainly():
 from typing import Annotated
 Force = Annotated[float, 2]
 class Settings:
+    '''What it takes.
+
+    ======= ==============
+    `paths` files that are
+            read
+    `none`  nothing
+    ======= ==============
+    '''
+
     paths: tuple[Annotated[str, 3], ...] | None = None
 def read(path: Annotated[str, 3]) -> Annotated[int, 4]:
     '''Return it.
@@ -524,6 +533,8 @@ def read(path: Annotated[str, 3]) -> Annotated[int, 4]:
         "plain", {"__init__.py": code}, extensions=extensions
     ) as package:
         read, paths = package["read"], package["Settings.paths"]
+        listed = "- `paths`: files that are read\n- `none`: nothing"
+        assert package["Settings"].docstring.value == f"What it takes.\n\n\n{listed}"
         assert str(package["Force"].value) == "float"
         assert str(paths.annotation) == "tuple[str, ...] | None"
         assert (str(read.parameters["path"].annotation), str(read.returns)) == ("str", "int")

@@ -2,8 +2,9 @@
 
 Types come without what a command line or a validator adds to them: ``Annotated[float,
 Field(gt=0.0)]`` is read as ``float``. Examples of a docstring stand in blocks of code, where they
-have no section of their own: the signs before them would be those of a quotation. A workflow is
-shown as it is called: with the fields of its settings, which are then not told again.
+have no section of their own: the signs before them would be those of a quotation. Tables of a
+docstring are lists. A workflow is shown as it is called: with the fields of its settings, which are
+then not told again.
 """
 
 import inspect
@@ -14,6 +15,7 @@ from typing import Any
 import griffe
 
 _EXAMPLE = re.compile(r"^>>> .*?(?=\n\n|\Z)", flags=re.MULTILINE | re.DOTALL)
+_TABLE = re.compile(r"^(=+) +=+\n(.*?)^=+ +=+$", flags=re.MULTILINE | re.DOTALL)
 _MODULE = re.compile(r"\b(?:[a-z_]\w*\.)+(?=\w)")
 """What a type or default is read from, before its name."""
 
@@ -22,7 +24,9 @@ class Plainly(griffe.Extension):
     """Takes ``Annotated`` from fields, parameters and results, and fences examples."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Set the examples of a docstring as code."""
+        """Set the examples of a docstring as code, and its tables as lists."""
+        if obj.docstring:
+            obj.docstring.value = _TABLE.sub(as_list, obj.docstring.value)
         if obj.docstring and "\nExamples\n---" not in obj.docstring.value:
             obj.docstring.value = _EXAMPLE.sub(as_code, obj.docstring.value)
 
@@ -68,6 +72,18 @@ def shown(default: object) -> str:
     if name == "<lambda>":
         return "..."
     return f"{type(default).__name__}()" if name.startswith("<") else name
+
+
+def as_list(table: re.Match[str]) -> str:
+    """Return the rows of a table of two columns as items of a list."""
+    width, items = len(table[1]), []
+    for line in table[2].splitlines():
+        name, text = line[:width].strip(), line[width:].strip()
+        if name:
+            items.append(f"- {name}: {text}")
+        else:
+            items[-1] += f" {text}"
+    return "\n".join(["", *items])
 
 
 def as_code(example: re.Match[str]) -> str:
