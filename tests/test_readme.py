@@ -268,6 +268,8 @@ def reference_entries() -> dict[str, list[str]]:
 @pytest.mark.slow
 def test_each_name_stands_once_in_the_reference_on_the_page_that_names_its_module():
     entries = reference_entries()
+    every = [entry for page in entries.values() for entry in page]
+    assert len(every) == len(set(every))
     assert "elastocal.workflows.calibrate_pair" in entries["workflows-pair"]
     # Pages that show a module whole have the names that its package exports from it.
     assert "elastocal.compensation.online.Design" not in entries["compensation"]
