@@ -25,9 +25,10 @@ class Plainly(griffe.Extension):
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
         """Set the examples of a docstring as code, and its tables as lists."""
-        if obj.docstring:
-            obj.docstring.value = _TABLE.sub(as_list, obj.docstring.value)
-        if obj.docstring and "\nExamples\n---" not in obj.docstring.value:
+        if not obj.docstring:
+            return
+        obj.docstring.value = _TABLE.sub(as_list, obj.docstring.value)
+        if "\nExamples\n---" not in obj.docstring.value:
             obj.docstring.value = _EXAMPLE.sub(as_code, obj.docstring.value)
 
     def on_attribute(self, *, attr: griffe.Attribute, **_: Any) -> None:
