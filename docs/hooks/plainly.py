@@ -4,7 +4,7 @@ Types come without what a command line or a validator adds to them: ``Annotated[
 Field(gt=0.0)]`` is read as ``float``. Examples of a docstring stand in blocks of code, where they
 have no section of their own: the signs before them would be those of a quotation. Tables of a
 docstring are lists. A workflow is shown as it is called: with the fields of its settings, which are
-then not told again.
+then not told again. A result of which a docstring has only the type has no dash behind it.
 """
 
 import inspect
@@ -18,6 +18,12 @@ _EXAMPLE = re.compile(r"^>>> .*?(?=\n\n|\Z)", flags=re.MULTILINE | re.DOTALL)
 _TABLE = re.compile(r"^(=+) +=+\n(.*?)^=+ +=+$", flags=re.MULTILINE | re.DOTALL)
 _MODULE = re.compile(r"\b(?:[a-z_]\w*\.)+(?=\w)")
 """What a type or default is read from, before its name."""
+_UNDESCRIBED = re.compile(r"–\s*<div class=\"doc-md-description\">\s*</div>")
+
+
+def on_page_content(html: str, **_: object) -> str:
+    """Return the page without the dashes that nothing follows."""
+    return _UNDESCRIBED.sub("", html)
 
 
 class Plainly(griffe.Extension):
@@ -55,6 +61,10 @@ def show_as_called(func: griffe.Function, settings: str) -> None:
     )
     for each in func.module.members[settings].attributes.values():
         each.docstring = None
+    for section in func.docstring.parsed:
+        if section.kind is griffe.DocstringSectionKind.parameters:
+            for each in section.value:
+                each.annotation = choices(each.annotation)
 
 
 def parameter(each: inspect.Parameter) -> griffe.Parameter:
@@ -73,6 +83,13 @@ def shown(default: object) -> str:
     if name == "<lambda>":
         return "..."
     return f"{type(default).__name__}()" if name.startswith("<") else name
+
+
+def choices(annotation: Any) -> Any:
+    """Return the values that a docstring allows in braces, which are read as a tuple of types."""
+    if isinstance(annotation, griffe.ExprTuple):
+        return "{" + ", ".join(f"'{each}'" for each in annotation.elements) + "}"
+    return annotation
 
 
 def as_list(table: re.Match[str]) -> str:

@@ -233,6 +233,11 @@ BESIDE = """(() => {
   return { after: before.textContent, pinned: position, seen };
 })()"""
 """Where the message is: after which button, and whether it is in sight."""
+DEVICES_FIT = """(() => {
+  const { clientWidth, scrollWidth, clientHeight } = document.getElementById("devices");
+  return scrollWidth <= clientWidth && clientHeight > 50 && clientHeight < 500;
+})()"""
+"""Whether the figures of three devices have lines of a readable length."""
 NAMES = (
     """[...document.querySelectorAll("button")].map((each) => each.ariaLabel || each.textContent)"""
 )
@@ -283,6 +288,7 @@ def watch_it(page, cell, told):
     page.wait("/locked/.test(document.getElementById('devices').textContent)")
     page.wait("/\\d N/.test(document.getElementById('devices').textContent)")
     told["devices"] = page.text("devices")
+    told["room for devices"] = page.get(DEVICES_FIT)
     page.keep("devices")
     page.click("#work-stop")
     page.wait("document.documentElement.dataset.work === 'watch stopped'")
@@ -387,6 +393,7 @@ def test_a_plan_is_made_and_its_poses_are_shown(told):
 def test_the_devices_are_shown_live(told):
     shown = told["devices"]
     assert [each in shown for each in ("arm simulated", "sensor simulated", " N")] == [True] * 3
+    assert told["room for devices"]
 
 
 def test_a_run_is_watched_and_stopped_in_position_control_and_can_be_gone_on_with(told, cell):

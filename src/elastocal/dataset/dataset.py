@@ -484,9 +484,11 @@ class Dataset(Result):
             As the fields of these names. Displacements are those of the TCP, or both of the marker
             where ``marker`` is given; the tracker's is left out where there was no metrology.
         moment, tcp_position, marker_position, sequence, contacts : array_like, optional
-        reference_joint_position, reference_force : array_like, optional
-        link_joint_position, reference_link_joint_position : array_like, optional
             As the fields of these names.
+        reference_joint_position, reference_force : array_like, optional
+            When the zero of both displacements was read, as the fields of these names.
+        link_joint_position, reference_link_joint_position : array_like, optional
+            By secondary encoders, as the fields of these names.
         joint_names, load_cases : sequence of str
             Labels of the joints and the load cases.
         poses : sequence of int, optional

@@ -26,6 +26,7 @@ from elastocal.studio.recorded import RunView, find_runs
 from elastocal.studio.springs import StudioSprings
 from elastocal.studio.trials import compare_techniques, survey_reach
 from elastocal.studio.worker import Data, Outbox, Worker, WorkState
+from elastocal.units import with_fixed_units
 from elastocal.viewer import scene_data
 from elastocal.wording import duration, readable
 
@@ -357,9 +358,11 @@ class Session:
         search = plan.search
         return {
             "folder": message.folder,
-            "summary": f"{len(plan.poses)} poses by {search.name}, covering radius"
-            f" {readable(search.covering_radius, 'm')}, {duration(plan.total_time)}",
-            "findings": list(plan.findings),
+            "summary": with_fixed_units(
+                f"{len(plan.poses)} poses by {search.name}, covering radius"
+                f" {readable(search.covering_radius, 'm')}, {duration(plan.total_time)}"
+            ),
+            "findings": [with_fixed_units(each) for each in plan.findings],
             "poses": [
                 {
                     "id": pose.id,

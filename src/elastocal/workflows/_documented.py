@@ -9,6 +9,7 @@ from typing import Any
 from elastocal.options import OWN, REQUIRED, SettingsField, settings_fields
 
 _SECTION = re.compile(r"\n\n(?=[A-Z]\w+\n-+\n)|\Z")
+_CHOICES = re.compile(r"^Literal\[(.*)\]$")
 _WIDTH = 96
 
 
@@ -44,6 +45,7 @@ def documented(function: Callable[..., Any], settings: type) -> str:
 def _entry(field: SettingsField) -> Iterator[str]:
     """Yield the lines of a parameter."""
     kind = field.kind.replace("[str]", "") if "PathLike" in field.kind else field.kind
+    kind = _CHOICES.sub(r"{\1}", kind)
     default = "" if field.default is REQUIRED else ", optional"
     if field.default not in (REQUIRED, OWN, None):
         default = f", default {field.default!r}"

@@ -11,18 +11,20 @@ export function showWork(work) {
   const busy = work.state === "busy";
   $("work").hidden = !busy;
   $("work-kind").textContent = KINDS[work.kind] || "";
-  $("work-stage").textContent = work.total > 1 ? `${work.stage}: ${work.done} of ${work.total}` : work.stage;
+  $("work-stage").textContent = work.total > 1 ? `${work.stage}: ${work.done} of ${work.total}` : work.live?.devices ? "" : work.stage;
   $("work-stop").textContent = work.kind === "run" ? "Stop: release, retract, stand still" : "Stop";
+  $("work-bar").hidden = work.kind === "watch"; // it has no end
   $("work-bar").value = work.total ? work.done / work.total : 0;
   for (const id of ["survey", "compare", "watch"]) $(id).disabled = busy;
   for (const id of ["plan-form", "run-form"]) $(id).querySelector("button").disabled = busy;
   $("live").hidden = !(busy && work.kind === "run");
   if (busy && work.kind === "run") showLive(work.live);
-  if (work.kind === "watch") showDevices(work.live);
   const now = `${work.kind} ${work.state}`, before = seen;
   seen = now;
   document.documentElement.dataset.work = now;
   if (busy && before !== now && work.kind === "run") curves = { force: [], slip: [], name: "" };
+  if (busy && before !== now && work.kind === "watch") $("devices").replaceChildren();
+  if (work.kind === "watch") showDevices(work.live);
   if (before && before !== now && !busy) ended(work);
 }
 
@@ -39,18 +41,17 @@ function ended({ kind, state: how, result, message }) {
     // What was stopped is there to be gone on with: the next start does that.
     $("run-form").elements.resume.checked = interrupted;
     tell(interrupted ? `The run was stopped: ${poses}, the arm is ${figures.arm}. Start goes on with it.` : `The run is ${figures.state}: ${poses}, the arm is ${figures.arm}.`, true);
+    if (figures.arm === "at HOME") follow(state.cell.home);
     showFolders().then(() => openRecord(result.folder));
   }
 }
 
 function showDevices({ columns, devices }) {
   if (!devices) return;
-  $("devices").hidden = false;
-  $("devices").tHead.rows[0].replaceChildren(...["device", ...columns].map((text) => element("th", text, { scope: "col" })));
-  $("devices").tBodies[0].replaceChildren(...devices.map(({ device, wrong, cells }) => {
-    const row = element("tr");
-    row.append(element("td", `${wrong ? "\u2717" : "\u2713"} ${device}`), ...cells.map((text) => element("td", text)));
-    return row;
+  $("devices").replaceChildren(...devices.flatMap(({ device, wrong, cells }) => {
+    const figures = element("dl");
+    fill(figures, columns.map((column, k) => [column, cells[k]]).filter(([, text]) => text));
+    return [element("h3", `${wrong ? "\u2717" : "\u2713"} ${device}`, { className: wrong ? "bad" : "" }), figures];
   }));
 }
 
@@ -193,7 +194,7 @@ async function openPose(folder, pose, button) {
 }
 
 let charted = null;
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charted && chart(...charted));
+const chartAnew = () => charted && chart(...charted);
 
 // Of a run there is no time to choose.
 const ofTheRun = (points) => points === curves?.force;
@@ -248,6 +249,8 @@ function plot(canvas, label, points, name, windows, now) {
 }
 
 export function openRuns() {
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", chartAnew);
+  new ResizeObserver(chartAnew).observe($("charts"));
   const begin = (action, message = {}) => attempt(() => ask(action, message));
   $("survey").addEventListener("click", () => begin("survey"));
   $("compare").addEventListener("click", () => begin("compare"));
