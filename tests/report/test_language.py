@@ -16,11 +16,13 @@ from elastocal.identification.calibration import SAME_CONFIGURATION
 from elastocal.identification.mistakes.plausibility import UNIT_OF_FORCE
 from elastocal.identification.mistakes.search import IN_SPITE
 from elastocal.planning import checks
+from elastocal.planning.plan import ASSUMED
 from elastocal.planning.pool import UNREACHABLE
 from elastocal.planning.surface.findings import OPEN
 from elastocal.procedure.record import ReadingStatus
 from elastocal.report import language_of
 from elastocal.report.language import LANGUAGES
+from elastocal.robot import catalogue
 from elastocal.wording import counted, in_words, mm, phrase, sentences
 
 SOURCE = Path(elastocal.__file__).parent
@@ -118,11 +120,20 @@ CHECKS = {UNREACHABLE} | {
 }
 """What may refuse a candidate: names in files, words on a page."""
 STATUSES = {status.value for status in ReadingStatus}
+ASSUMPTIONS = {
+    text
+    for name in catalogue.names()
+    for each in catalogue.load(name).assumptions
+    for text in (each.field, each.reason)
+}
+"""What the catalogue assumes of its robots: a URDF holds the sentences."""
 
 
 @functools.cache
 def all_phrases():
-    return phrases_of_the_program() | counts_of_the_pages() | LIGHTS | CHECKS | STATUSES
+    return (
+        phrases_of_the_program() | counts_of_the_pages() | LIGHTS | CHECKS | STATUSES | ASSUMPTIONS
+    )
 
 
 @pytest.mark.parametrize("code", CATALOGUES)
@@ -182,6 +193,15 @@ class TestTextsFromFiles:
         read = Finding.read(json.loads(json.dumps(SAME_CONFIGURATION(poses=(3, 4)).stored())))
         assert self.german.say(read) == (
             "Posen 3, 4 sind eine Stellung: gemeinsam gezogen und ausgelassen"
+        )
+
+    def test_what_the_catalogue_assumes_is_said_too(self):
+        assumed = {
+            each.field: each.reason for each in catalogue.load("KR 210 R3100 ultra").assumptions
+        }
+        said = self.german.say(ASSUMED(field="shape", reason=assumed["shape"]))
+        assert (
+            said == "angenommen, Form: Quader und Zylinder nach den Maßen, nicht nach Zeichnungen"
         )
 
     def test_findings_within_it_are_said_too(self):

@@ -10,7 +10,7 @@ No arm is moved farther than its limit; what one may not do the other does, as f
 lets it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,8 +86,7 @@ class CooperationSummary(Result):
             (phrase("Rows"), str(self.rows)),
             (phrase("Relative deviation before, mean"), mm(self.before)),
             (phrase("Relative deviation before, largest"), mm(self.before_max)),
-            (phrase("Relative deviation after, mean (predicted)"), mm(self.after)),
-            (phrase("Relative deviation after, largest (predicted)"), mm(self.after_max)),
+            *self._left(),
             (phrase("95 % interval of the deviation, mean"), f"±{mm(self.uncertainty)}"),
             *(
                 (
@@ -97,6 +96,12 @@ class CooperationSummary(Result):
                 for arm, most, part in own
             ),
         )
+
+    def _left(self) -> Iterator[tuple[str, str]]:
+        # Without limits it is zero by its making, and says nothing of the arms.
+        if self.limited:
+            yield phrase("Relative deviation that limits leave, mean"), mm(self.after)
+            yield phrase("Relative deviation that limits leave, largest"), mm(self.after_max)
 
     def show(self) -> Iterable[Block]:
         """Return the deviation before and after, and what limits leave."""

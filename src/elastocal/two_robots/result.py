@@ -236,9 +236,10 @@ class PairResult(Result):
         yield Paragraph(
             phrase(
                 "How far the tools yield from each other at the presses of this campaign, against"
-                " unloaded arms, and what a correction by compensate-pair leaves, shared as the"
-                " cell file says. What is left is predicted by the same models: at left-out poses"
-                " these err by {error} on average, and that remains.",
+                " unloaded arms, and what a correction by compensate-pair takes of each arm, shared"
+                " as the cell file says. After it the same models predict no deviation but what"
+                " limits leave; at left-out poses they err by {error} on average, and that"
+                " remains.",
                 error=mm(self.held_out),
             ),
             "sentence",
