@@ -53,7 +53,7 @@ def _default(value: Any) -> str:
 
 def _meaning(text: str) -> str:
     """Return a text for a cell of a table, the options in it set as code; code stays as it is."""
-    line = " ".join(text.split()).replace("|", "\\|")
+    line = " ".join(text.split()).replace("|", "\\|").replace("``", "`")
     parts = re.split("(`[^`]*`)", line)
     parts[::2] = [re.sub(r"(?<![\w-])(--[a-z][\w-]*)", r"`\1`", each) for each in parts[::2]]
     return "".join(parts)

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.pages import Page
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
@@ -93,10 +94,30 @@ def functions_first(entry: tuple[str, str]) -> tuple[bool, str]:
     return entry[0][0].isupper(), entry[0]
 
 
+def absent(markdown: str) -> list[str]:
+    """Return the names that a page lists of modules that do not have them: nothing shows those."""
+    found = []
+    for path, options in _BLOCK.findall(markdown):
+        package, _, module = path.rpartition(".")
+        is_package = SOURCE.joinpath(*path.split("."), "__init__.pyi").is_file()
+        names = exported(path) if is_package else defined(package, module)
+        listed = _MEMBER.findall(options) if names else ()
+        found += [f"{path}.{name}" for name in listed if name not in names]
+    return found
+
+
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
-    """Return the page with an entry for every exported name."""
+    """Return the page with an entry for every exported name.
+
+    Raises
+    ------
+    PluginError
+        If the page lists a name that its module does not have.
+    """
     if not page.file.src_uri.startswith("reference/api/"):
         return markdown
+    if names := absent(markdown):
+        raise PluginError(f"{page.file.src_uri} lists what is not there: {', '.join(names)}")
     known, elsewhere = shown(markdown), shown_elsewhere(Path(page.file.src_uri).name)
     whole = shown_whole()
 
@@ -116,7 +137,7 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
             f"{package}.{home}.{name}" if name == home else f"{package}.{name}"
             for name, home in sorted(rest.items(), key=functions_first)
         )
-        return "\n\n".join(f"::: {path}" for path in paths)
+        return "\n\n".join(f"::: {path}\n    options:\n      heading_level: 3" for path in paths)
 
     def others(package: str) -> str:
         in_parts = parted(package)

@@ -14,6 +14,7 @@ _NAME = re.compile(r"<(/?)(\w*)")
 _SHORT, _MIDDLE, _LONG = 12, 16, 30
 """Characters of code that stay on one line, of code that does so on wide screens, and of code that
 is divided outside tables, too."""
+_HEADINGS = ("h1", "h2", "h3")
 _OPTION = re.compile(r"(?<![\w-])--[a-z]+")
 _QUANTITY = re.compile(r"[\d.]+\xa0[^\s\"]+")
 _JOINED = re.compile(
@@ -34,10 +35,15 @@ def on_page_content(html: str, **_: object) -> str:
 
 
 def _pieces(html: str) -> Iterator[str]:
-    end, within = 0, {"code": False, "td": False}
+    end, within = 0, dict.fromkeys(("code", "td", *_HEADINGS), False)
     for tag in _TAG.finditer(html):
         text = html[end : tag.start()]
-        yield _code(text, within["td"]) if within["code"] else _prose(text)
+        if within["code"]:
+            yield _code(text, within["td"])
+        elif any(within[each] for each in _HEADINGS):
+            yield _WORD_END.sub("<wbr>", _prose(text))
+        else:
+            yield _prose(text)
         yield tag[0]
         end = tag.end()
         slash, name = _NAME.match(tag[0]).groups()

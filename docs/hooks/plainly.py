@@ -9,37 +9,65 @@ then not told again. A result of which a docstring has only the type has no dash
 
 import inspect
 import re
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 import griffe
+from mkdocs.structure.pages import Page
+
+from elastocal import errors
 
 _EXAMPLE = re.compile(r"^>>> .*?(?=\n\n|\Z)", flags=re.MULTILINE | re.DOTALL)
 _TABLE = re.compile(r"^(=+) +=+\n(.*?)^=+ +=+$", flags=re.MULTILINE | re.DOTALL)
+_PAGE = re.compile(r"\bdocs/([\w/-]+)/([\w-]+)\.md")
 _MODULE = re.compile(r"\b(?:[a-z_]\w*\.)+(?=\w)")
 """What a type or default is read from, before its name."""
 _UNDESCRIBED = re.compile(r"–\s*<div class=\"doc-md-description\">\s*</div>")
 
 
-def on_page_content(html: str, **_: object) -> str:
-    """Return the page without the dashes that nothing follows."""
+_REFUSALS = re.compile(r"<code>\w+Error(, \w+Error)*</code>")
+_REFUSAL = re.compile(r"\w+Error")
+
+
+def on_page_content(html: str, page: Page, **_: object) -> str:
+    """Return the page with links to refusals, and without the dashes that nothing follows."""
+    if page.file.src_uri.startswith("reference/api/"):
+        html = _REFUSALS.sub(lambda code: _REFUSAL.sub(linked, code[0]), html)
     return _UNDESCRIBED.sub("", html)
+
+
+def linked(name: re.Match[str]) -> str:
+    """Return a refusal as a link; a name that is none of elastocal's stays."""
+    ours = getattr(errors, name[0], None)
+    return f'<a href="errors.html#{ours.__module__}.{name[0]}">{name[0]}</a>' if ours else name[0]
 
 
 class Plainly(griffe.Extension):
     """Takes ``Annotated`` from fields, parameters and results, and fences examples."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Set the examples of a docstring as code, and its tables as lists."""
+        """Set the examples of a docstring as code, its tables as lists, and pages as links."""
         if not obj.docstring:
             return
-        obj.docstring.value = _TABLE.sub(as_list, obj.docstring.value)
+        obj.docstring.value = _PAGE.sub(as_link, _TABLE.sub(as_list, obj.docstring.value))
         if "\nExamples\n---" not in obj.docstring.value:
             obj.docstring.value = _EXAMPLE.sub(as_code, obj.docstring.value)
+
+    def on_class_instance(self, *, cls: griffe.Class, **_: Any) -> None:
+        """Show a record as the dataclass that it is, with all its fields."""
+        for decorator in cls.decorators:
+            call = decorator.value
+            if isinstance(call, griffe.ExprCall) and call.canonical_name == "record":
+                call.function = griffe.ExprName("dataclass", parent="dataclasses")
+                cls.labels.add("dataclass")
 
     def on_attribute(self, *, attr: griffe.Attribute, **_: Any) -> None:
         """Show the type of a field, and a type that is named, plainly."""
         attr.annotation, attr.value = plain(attr.annotation), plain(attr.value)
+        owned = "class-attribute" in attr.labels and attr.docstring is None
+        if owned and has_no_signature(attr.parent):
+            attr.docstring = griffe.Docstring("", parent=attr)
 
     def on_function(self, *, func: griffe.Function, **_: Any) -> None:
         """Show the types of parameters and of the result plainly, and a workflow as called."""
@@ -52,26 +80,38 @@ class Plainly(griffe.Extension):
             each.annotation = plain(each.annotation)
 
 
+def has_no_signature(owner: griffe.Object) -> bool:
+    """Return whether a class shows its members one by one alone, so that none may be left out."""
+    return owner.is_class and not any(
+        each.callable_path.endswith(("dataclass", "record")) for each in owner.decorators
+    )
+
+
 def show_as_called(func: griffe.Function, settings: str) -> None:
     """Give a workflow the parameters and the docstring that Python shows of it."""
     called = getattr(import_module(func.module.canonical_path), func.name)
     func.docstring.value = called.__doc__
-    func.parameters = griffe.Parameters(
-        *map(parameter, inspect.signature(called).parameters.values())
-    )
-    for each in func.module.members[settings].attributes.values():
+    fields = func.module.members[settings].attributes
+    signature = inspect.signature(called).parameters.values()
+    func.parameters = griffe.Parameters(*(parameter(each, fields) for each in signature))
+    for each in fields.values():
         each.docstring = None
+        if isinstance(each.value, griffe.ExprName):  # a constant
+            each.value = func.parameters[each.name].default
     for section in func.docstring.parsed:
         if section.kind is griffe.DocstringSectionKind.parameters:
             for each in section.value:
                 each.annotation = choices(each.annotation)
 
 
-def parameter(each: inspect.Parameter) -> griffe.Parameter:
-    """Return a parameter of a signature."""
+def parameter(each: inspect.Parameter, fields: Mapping[str, griffe.Attribute]) -> griffe.Parameter:
+    """Return a parameter of a signature, its type as the settings write it."""
+    field = fields.get(each.name)
     return griffe.Parameter(
         each.name,
-        annotation=_MODULE.sub("", inspect.formatannotation(each.annotation)),
+        annotation=_MODULE.sub("", inspect.formatannotation(each.annotation))
+        if field is None
+        else field.annotation,
         kind=griffe.ParameterKind(each.kind.description),
         default=None if each.default is each.empty else shown(each.default),
     )
@@ -102,6 +142,14 @@ def as_list(table: re.Match[str]) -> str:
         else:
             items[-1] += f" {text}"
     return "\n".join(["", *items])
+
+
+def as_link(page: re.Match[str]) -> str:
+    """Return the link to a page of the documentation, from a page of the reference."""
+    folder, name = page[1], page[2]
+    number = name.partition("-")[0]
+    text = f"decision {int(number)}" if folder == "decisions" else name.replace("-", " ")
+    return f"[{text}](../../{folder}/{name}.md)"
 
 
 def as_code(example: re.Match[str]) -> str:

@@ -263,6 +263,6 @@ def _meant(module: str, kind: ast.expr) -> ast.expr:
 
 
 def _plain(text: str) -> str:
-    """Return a docstring on one line, as it is read on a terminal."""
-    paragraphs = (" ".join(part.split()) for part in text.replace("``", "").split("\n\n"))
+    """Return a docstring with each paragraph on one line."""
+    paragraphs = (" ".join(part.split()) for part in text.split("\n\n"))
     return "\n\n".join(paragraphs).strip()

@@ -250,7 +250,7 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
     """Return the parameter of a field."""
     option, shown = each.option, described(each)
     required, default = _is_required(each), _typed_default(each)
-    help = shown.text
+    help = shown.text.replace("``", "")  # code, which a terminal does not set apart
     if option.default and not required:
         help = f"{help} [default: {option.default}]"
     # A bracket without the backslash would be a mark-up of rich's, and would not be printed.

@@ -101,7 +101,7 @@ class CommandSuite:
         assert f"elastocal {command}" in shown.out
         assert made.summary.endswith(".")
         for each in made.fields():
-            text = each.option.help or each.doc
+            text = (each.option.help or each.doc).replace("``", "")
             assert text, f"{each.name} has no docstring: it is the help of {each.flag}"
             assert text.partition("\n")[0] in shown.out
             if each.option.default and not each.option.required:

@@ -26,7 +26,7 @@ from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
 from elastocal.geometry import PositionPlan, read_geometry, read_position_map
-from elastocal.identification import read_model
+from elastocal.identification import read_contact, read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.planning.surface import load_surface, mesh_findings
@@ -183,6 +183,12 @@ def springs_file(path: Path) -> FileDescription:
     file = read_springs(path)
     schema = {"schema": "elastocal.springs/1"}
     return "spring file", schema | {"include": file.include, "springs": len(file.springs)}
+
+
+def contact_file(path: Path) -> FileDescription:
+    """Describe what a file states of a contact, in its units."""
+    read_contact(path)
+    return "contact file", {"schema": "elastocal.contact/1"} | read_yaml_data(path)["contact"]
 
 
 def log_map_file(path: Path) -> FileDescription:

@@ -154,6 +154,7 @@ _NETCDF_KINDS: dict[str, _Describe] = {
 """NetCDF files by their schema."""
 _YAML_KINDS: dict[str, _Describe] = {
     "elastocal.cell": kinds.cell_file,
+    "elastocal.contact": kinds.contact_file,
     "elastocal.compensator": kinds.compensator_file,
     "elastocal.springs": kinds.springs_file,
     "elastocal.log-map": kinds.log_map_file,
@@ -342,8 +343,12 @@ def _json(path: Path) -> FileDescription:
 
 
 def _settings(path: Path) -> FileDescription:
-    """Describe a YAML file by the schema that it states."""
-    return _kind(path, _stated(read_yaml_data(path)), _YAML_KINDS)(path)
+    """Describe a YAML file by the schema that it states; that of a contact may be left out."""
+    data = read_yaml_data(path)
+    stated = _stated(data)
+    if stated is None and isinstance(data, dict) and list(data) == ["contact"]:
+        stated = "elastocal.contact"
+    return _kind(path, stated, _YAML_KINDS)(path)
 
 
 def _stated(data: object) -> object:

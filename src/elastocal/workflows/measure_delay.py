@@ -52,6 +52,7 @@ class MeasureDelaySettings:
     confirmed: Annotated[bool, Option("--yes")] = False
     """A person has looked at the cell: do not ask."""
     operator: Operator = field(default_factory=Unattended)
+    """Person who is asked and warned; by default nobody, and what asks is refused."""
     force: bool = False
     """Replace a file that is there."""
 

@@ -275,8 +275,10 @@ def plan_figures(
         The plan.
     folder : Path
         Where it is.
-    program, language : str
-        Name of the robot program, and the language that was asked for.
+    program : str
+        Name of the robot program.
+    language : str, optional
+        Its language; by default that of the robot's controller.
     free : PositionPlan, optional
         Poses in free space, where the plan has them.
     """

@@ -128,7 +128,8 @@ def predict(settings: PredictSettings, progress: Progress) -> PredictResult:  # 
     >>> readings = ec.datasets.fanuc_r2000ic()
     >>> model = ec.calibrate(readings, springs="actuated", draws=40)
     >>> rows = {f"joint_{n}[deg]": [0.0, 10.0] for n in range(1, 7)}
-    >>> rows |= {"force_x[N]": [0.0, 0.0], "force_y[N]": [0.0, 0.0], "force_z[N]": [500.0, 900.0]}
+    >>> rows |= {"force_x[N]": [0.0, 0.0], "force_y[N]": [0.0, 0.0]}
+    >>> rows |= {"force_z[N]": [500.0, 900.0]}
     >>> ec.predict(model, rows).prediction.deflection.round(6).tolist()
     [[-0.000548, 7e-06, 0.002038], [0.000595, -0.000164, 0.003256]]
     >>> ec.predict(model, readings).prediction.deflection.shape

@@ -61,6 +61,7 @@ class ReleaseSettings:
     confirmed: Annotated[bool, Option("--yes")] = False
     """A person has looked at the cell: do not ask."""
     operator: Operator = field(default_factory=Unattended)
+    """Person who is asked and warned; by default nobody, and what asks is refused."""
 
 
 @brief_repr

@@ -111,6 +111,7 @@ class RunSettings:
     seed: Annotated[int | None, Option(least=0)] = None
     """Seed of simulated devices; by default the cell's."""
     operator: Operator = field(default_factory=Unattended)
+    """Person who is asked and warned; by default nobody, and what asks is refused."""
     sign: Annotated[Path | None, Option(metavar="KEY")] = None
     """Private key that signs the journal at the end; made by `elastocal verify --new-key`."""
     state: Statements = field(default_factory=dict)
@@ -121,10 +122,17 @@ class RunSettings:
     is ``cold`` or ``warm``; a simulated arm is made so."""
     arming: Arming | None = None
     """Arming by a person who agreed before: the cell file must be unchanged since."""
-    until: Annotated[float | None, Option(metavar="LENGTH", read="length")] = None
-    """Stop as soon as the expected error on production is surely below this, e.g. '0.05 mm'. It is
-    stated after each pose, with its interval; the poses are visited in rounds, those first that
-    the search chose first."""
+    until: Annotated[
+        float | None,
+        Option(
+            metavar="LENGTH",
+            read="length",
+            help="Stop as soon as the expected error on production is surely below this, e.g."
+            " '0.05 mm'. It is stated after each pose, with its interval; the poses are visited in"
+            " rounds, those first that the search chose first.",
+        ),
+    ] = None
+    """Stop as soon as the expected error on production is surely below this, in m."""
     risk: Annotated[float, Option(metavar="P")] = RISK
     """Risk that the error is larger than that although the run stopped for it."""
 

@@ -66,7 +66,7 @@ class StudySettings:
             " truth; repeatable, then every combination. Default: poses=6,10,15,20,31.",
         ),
     ] = (DEFAULT_VARIATION,)
-    """Factors to vary, each ``"KEY=A,B"``; see `codec.study.FACTORS`. Every combination is a
+    """Factors to vary, each ``"KEY=A,B"``; see `elastocal.codec.study.conditions.FACTORS`. Every combination is a
     condition; other factors are as in the cell file."""
     target: Annotated[
         float | None,

@@ -24,7 +24,7 @@ _STEP = 0.035
 
 @dataclass(frozen=True, eq=False)
 class CollisionCheck(PostureCheck):
-    """Largest of the `_DISTANCES_BEYOND` distances that is kept beyond the clearance asked for.
+    """Largest of 1, 10, 30 and 100 mm that is kept beyond the clearance asked for.
 
     In contact, and at places on the straight way to the approach pose. In contact the tool is not
     checked against what it presses on; near contact it must not touch it; from the first step of

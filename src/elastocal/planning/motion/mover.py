@@ -214,7 +214,7 @@ class Mover:
 
         Returns
         -------
-        ndarray, shape (`_DETOURS`, joint)
+        ndarray, shape (detour, joint)
         """
         limits = self.solver.robot.limits
         lower = np.maximum(np.minimum(start, end) - _WIDTH, limits.lower)

@@ -84,7 +84,7 @@ def wrench_on_robot(loaded: RawWrench, tare: RawWrench, sensor: SensorLoad) -> R
     loaded : RawWrench
         Under load.
     tare : RawWrench
-        UnloadedWrenches, at the same pose.
+        Unloaded, at the same pose.
     sensor : SensorLoad
         Its matrix, the tool's weight on it, and its place.
     """
@@ -255,7 +255,7 @@ def estimate_tool(
     Parameters
     ----------
     unloaded : UnloadedWrenches
-        At least none; with few or similar orientations little is determined.
+        May be empty; with few or similar orientations little is determined.
     nominal_mass : float
         Mass of the tool by the cell file, in kg: the scale of what is too wide, and the divisor
         of the centre of mass where the mass is not determined.
