@@ -44,7 +44,7 @@ def test_the_page_has_every_figure_that_was_measured(tables):
 def test_a_table_tells_its_seeds_and_stands_beside_the_paper(tables, kind):
     *rows, paper = tables.table(kind).split("\n\n")[0].splitlines()[2:]
     assert paper.startswith("| paper |")
-    cells = [row.strip("| ").split(" | ") for row in rows]
+    cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in rows]
     assert kind != "afp" or "typical" in {row[0] for row in cells}
     for row in cells:
         # An interval over several seeds; two values of two; none of a single one.
@@ -95,15 +95,23 @@ def test_touches_before_production_are_held_against_springs_alone_on_the_same_se
 
 @pytest.mark.parametrize("kind", ["afp", "machining"])
 def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone(tables, kind):
-    rows = [row.strip("| ").split(" | ") for row in tables.procedures(kind).splitlines()[2:]]
-    assert {row[1] for row in rows} <= set(tables.MORE.values())
+    lines = tables.procedures(kind).splitlines()[2:]
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in lines]
+    assert {row[1] for row in rows} <= {"springs alone", *tables.MORE.values()}
+    springs_alone = {}
+    offset = {}
     for row in rows:
+        if row[1] == "springs alone":
+            springs_alone[row[0]] = row
+            continue
+        assert row[-1] == springs_alone[row[0]][-1]  # the same seeds
         assert "min" in row[2]
         assert ("course" in row[1]) == ("s a course" in row[2])
-    offset = {row[0]: row for row in rows if "offset" in row[1]}
+        if "offset" in row[1]:
+            offset[row[0]] = (springs_alone[row[0]], row)
     assert kind != "afp" or "typical" in offset
-    for truth, row in offset.items():
-        alone, with_it = (float(cell.partition(" ")[0]) for cell in row[5:7])
+    for truth, pair in offset.items():
+        alone, with_it = (float(row[4].partition(" ")[0]) for row in pair)
         # On `kind` there is next to nothing to learn, and a hundredth at most may be spoilt.
         assert with_it > alone - 1.0 if truth == "kind" else with_it > alone + 2.0
 

@@ -19,7 +19,7 @@ def on_page_content(html: str, **_: object) -> str:
     '<code><a>PathError</a>, SchemaError</code>, <code>(q, force)</code>'
     """
     shaped = _TUPLE.sub(lambda match: f"<code>{match[1]} ({_shape(match[2])})</code>", html)
-    return _ERRORS.sub(r"<code>\1</code>", shaped)
+    return _ERRORS.sub(r"<code>\1</code>", shaped).replace("path - like", "path-like")
 
 
 def _shape(axes: str) -> str:

@@ -57,17 +57,13 @@ def plan(runs: list[Run]) -> str:
     minutes = _MANY * figures["worker_s_a_campaign"] / _WORKERS / _MINUTE
     carried = _MANY * figures["bytes_a_campaign"] / _GIGA
     tables = _MANY / campaigns * sum(figures["tables_bytes"].values()) / _GIGA
-    compared = "; ".join(
-        f"{run['date']}, {run['campaigns']} campaigns of commit {run['commit']}:"
-        f" {'equal bit for bit' if run['same_as_one_process'] else 'not equal'}"
-        for run in runs
-    )
+    compared = "are equal bit for bit" if figures["same_as_one_process"] else "are not equal"
     return (
         f"Measured {figures['date']}: {campaigns} campaigns ({samples} arms), a scheduler and two"
         " workers on one machine of two cores that other work shared. One worker was killed at a"
         " third and replaced, the command at two thirds and given again:"
         f" {figures['begun_twice']} arms were begun twice, those under way at a kill. The first"
-        f" arms of each run beside those of one process: {compared}.\n\n"
+        f" arms of the run and those of one process {compared}.\n\n"
         f"A full task takes {task:.1f} s of a worker. Per task the busier of scheduler and command"
         f" took {_milliseconds(busiest)}, all that it did while it waited counted: one of each"
         f" carries at least {_BAND * task / busiest:.0f} workers at {_BAND:.0%} of a core. On"

@@ -58,13 +58,13 @@ def shown(markdown: str) -> set[str]:
 
 
 def shown_elsewhere(page: str) -> set[str]:
-    """Return the members that other pages of the reference show, with their packages."""
+    """Return what other pages of the reference show: entries, and members of modules."""
     return {
-        f"{package}.{member}"
+        f"{entry}.{member}" if member else entry
         for path in PAGES.glob("*.md")
         if path.name != page
-        for package, options in _BLOCK.findall(path.read_text(encoding="utf-8"))
-        for member in _MEMBER.findall(options)
+        for entry, options in _BLOCK.findall(path.read_text(encoding="utf-8"))
+        for member in ("", *_MEMBER.findall(options))
     }
 
 
@@ -128,7 +128,7 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
             for name, home in exported(package).items()
             if wanted(home)
             and name not in known
-            and f"{package}.{name}" not in elsewhere
+            and elsewhere.isdisjoint((f"{package}.{name}", f"{package}.{home}.{name}"))
             and f"{package}.{home}" not in whole
             and name in defined(package, home)
         }

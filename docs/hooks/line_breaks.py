@@ -15,7 +15,8 @@ _SHORT, _MIDDLE, _LONG = 12, 16, 30
 """Characters of code that stay on one line, of code that does so on wide screens, and of code that
 is divided outside tables, too."""
 _HEADINGS = ("h1", "h2", "h3")
-_OPTION = re.compile(r"(?<![\w-])--[a-z]+")
+_OPTION = re.compile(r"(?<![\w-])(?:--[a-z]+|-[A-Za-z]\w*)")
+_EXPONENT = re.compile(r"(?<=\de-)(?=\d)")
 _QUANTITY = re.compile(r"[\d.]+\xa0[^\s\"]+")
 _JOINED = re.compile(
     r" (?=→)|(?<=\d) (?=\d{3}\b)|(?<=\d) (?=to [-+−]?\d)|(?<=\d to) (?=[-+−]?\d)|(?<=→) (?=\d)"
@@ -35,11 +36,11 @@ def on_page_content(html: str, **_: object) -> str:
 
 
 def _pieces(html: str) -> Iterator[str]:
-    end, within = 0, dict.fromkeys(("code", "td", *_HEADINGS), False)
+    end, within = 0, dict.fromkeys(("code", "td", "th", *_HEADINGS), False)
     for tag in _TAG.finditer(html):
         text = html[end : tag.start()]
         if within["code"]:
-            yield _code(text, within["td"])
+            yield _code(text, within["td"] or within["th"])
         elif any(within[each] for each in _HEADINGS):
             yield _WORD_END.sub("<wbr>", _prose(text))
         else:
@@ -53,7 +54,8 @@ def _pieces(html: str) -> Iterator[str]:
 
 
 def _prose(text: str) -> str:
-    return with_fixed_units(_JOINED.sub("\N{NO-BREAK SPACE}", text))
+    joined = _EXPONENT.sub("\N{WORD JOINER}", _JOINED.sub("\N{NO-BREAK SPACE}", text))
+    return with_fixed_units(joined)
 
 
 def _code(text: str, in_cell: bool) -> str:

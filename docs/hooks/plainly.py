@@ -23,6 +23,8 @@ _TABLE = re.compile(r"^(=+) +=+\n(.*?)^=+ +=+$", flags=re.MULTILINE | re.DOTALL)
 _PAGE = re.compile(r"\bdocs/([\w/-]+)/([\w-]+)\.md")
 _MODULE = re.compile(r"\b(?:[a-z_]\w*\.)+(?=\w)")
 """What a type or default is read from, before its name."""
+_LONGEST, _SHORT = 300, 40
+"""Characters of a value beyond which it is not shown, and of one that stands for its name."""
 _UNDESCRIBED = re.compile(r"–\s*<div class=\"doc-md-description\">\s*</div>")
 
 
@@ -65,6 +67,9 @@ class Plainly(griffe.Extension):
     def on_attribute(self, *, attr: griffe.Attribute, **_: Any) -> None:
         """Show the type of a field, and a type that is named, plainly."""
         attr.annotation, attr.value = plain(attr.annotation), plain(attr.value)
+        computed = "instance-attribute" in attr.labels and "class-attribute" not in attr.labels
+        if computed or len(str(attr.value)) > _LONGEST:
+            attr.value = None
         owned = "class-attribute" in attr.labels and attr.docstring is None
         if owned and has_no_signature(attr.parent):
             attr.docstring = griffe.Docstring("", parent=attr)
@@ -78,6 +83,38 @@ class Plainly(griffe.Extension):
         func.returns = plain(func.returns)
         for each in func.parameters:
             each.annotation = plain(each.annotation)
+            each.default = of_constant(each.default, func.module)
+        if func.docstring:
+            tell_apart(func)
+
+
+def of_constant(default: Any, module: griffe.Module) -> Any:
+    """Return the value of a private constant that is a default, if it is a short one."""
+    known = module.members.get(default.name) if isinstance(default, griffe.ExprName) else None
+    is_ours = isinstance(known, griffe.Attribute) and known.name.startswith("_")
+    return known.value if is_ours and len(str(known.value)) < _SHORT else default
+
+
+def tell_apart(func: griffe.Function) -> None:
+    """Give each parameter of a group that a docstring tells together its own type and default."""
+    own = {each.name: each for each in func.parameters}
+    for section in func.docstring.parsed:
+        if section.kind is not griffe.DocstringSectionKind.parameters:
+            continue
+        for each in section.value:
+            known = own.get(each.name.lstrip("*"))
+            if known is None:
+                continue
+            others = (other.annotation for other in own.values() if other is not known)
+            of_another = any(each.annotation is other for other in others)
+            if of_another or is_list_of_types(each.annotation):
+                each.annotation = known.annotation
+            each.value = None if each.name.startswith("*") else known.default
+
+
+def is_list_of_types(annotation: Any) -> bool:
+    """Return whether an annotation is "A, B", the types of two parameters; a shape is none."""
+    return isinstance(annotation, griffe.ExprTuple) and "shape" not in str(annotation)
 
 
 def has_no_signature(owner: griffe.Object) -> bool:
@@ -91,7 +128,8 @@ def show_as_called(func: griffe.Function, settings: str) -> None:
     """Give a workflow the parameters and the docstring that Python shows of it."""
     called = getattr(import_module(func.module.canonical_path), func.name)
     func.docstring.value = called.__doc__
-    fields = func.module.members[settings].attributes
+    members = func.module.members[settings].members
+    fields = {name: each for name, each in members.items() if isinstance(each, griffe.Attribute)}
     signature = inspect.signature(called).parameters.values()
     func.parameters = griffe.Parameters(*(parameter(each, fields) for each in signature))
     for each in fields.values():

@@ -11,7 +11,7 @@ table of shorter campaigns, ``<!-- process touched: afp -->`` that of touches be
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -32,9 +32,8 @@ _CAMPAIGNS = ("campaign", "springs", "poses", "minutes in the cell", "left-out e
               "left of the mean, µm", "reduction, %", "seeds")  # fmt: skip
 _TOUCHED = ("truth", "correction", "minutes before production", "reduction of the mean, %",
             "3-D, %", "at half load, %", "seeds")  # fmt: skip
-_PROCEDURES = ("truth", "procedure", "time in the cell, beside springs alone",
-               "mean, %: springs alone", "with it", "3-D, %: springs alone", "with it",
-               "half load, %: springs alone", "with it", "seeds")  # fmt: skip
+_PROCEDURES = ("truth", "procedure", "time in the cell beyond springs alone",
+               "mean, %", "3-D, %", "half load, %", "seeds")  # fmt: skip
 _INSTRUMENTS = ("measured by", "springs", "minutes in the cell", "reduction of the mean, %",
                 "3-D, %", "at half load, %", "3-D, at half load, %", "seeds")  # fmt: skip
 INSTRUMENTS = {
@@ -146,30 +145,38 @@ def touched(kind: str) -> str:
         for name, found in zip(("springs alone", "touched"), pairs, strict=True):
             some = [found[seed] for seed in seeds]
             minutes = {each.get("touch_minutes") or 0.0 for each in some}
-            cells = [
-                _percent([_reduction(_measure(each, which, load)["mean"]) for each in some])
-                for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
-            ]
-            rows.append((truth, name, _span(minutes, ".1f"), *cells, str(len(some))))
+            rows.append((truth, name, _span(minutes, ".1f"), *_reductions(some)))
     return _markdown(_TOUCHED, rows)
 
 
 def procedures(kind: str) -> str:
-    """Return what each procedure costs and brings, on the seeds that were run with and without."""
-    rows = []
+    """Return what each procedure costs and brings, on the seeds that were run with and without.
+
+    Springs alone stand once before the procedures that were run on the same seeds.
+    """
+    rows: list[tuple[str, ...]] = []
     for truth in TRUTHS:
-        alone = _by_seed(kind, truth, campaign="template", springs="auto")
+        alone, told = _by_seed(kind, truth, campaign="template", springs="auto"), []
         for name, title in MORE.items():
             found = _by_seed(kind, truth, campaign=name)
-            pairs = [(alone[seed], found[seed]) for seed in sorted(alone.keys() & found.keys())]
+            seeds = sorted(alone.keys() & found.keys())
+            pairs = [(alone[seed], found[seed]) for seed in seeds]
+            if pairs and seeds != told:
+                told = seeds
+                rows.append((truth, "springs alone", "", *_reductions(side[0] for side in pairs)))
             if pairs:
-                cells = [
-                    _percent([_reduction(_measure(each, which, load)["mean"]) for each in side])
-                    for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
-                    for side in zip(*pairs, strict=True)
-                ]
-                rows.append((truth, title, _cost(pairs), *cells, str(len(pairs))))
+                rows.append((truth, title, _cost(pairs), *_reductions(side[1] for side in pairs)))
     return _markdown(_PROCEDURES, rows)
+
+
+def _reductions(runs: Iterable[Figures]) -> list[str]:
+    """Return the reductions of the mean, in space and at half load, and the number of seeds."""
+    some = list(runs)
+    cells = [
+        _percent([_reduction(_measure(each, which, load)["mean"]) for each in some])
+        for which, load in ((0, 1.0), (1, 1.0), (0, 0.5))
+    ]
+    return [*cells, str(len(some))]
 
 
 def instruments(kind: str) -> str:
@@ -301,7 +308,10 @@ def _of(found: list[Figures], kind: str, preset: str, **others: str) -> list[Fig
 
 
 def _rows(seeds: list[Figures]) -> list[tuple[str, ...]]:
-    """Return a row for each measure at each load, of the same model over seeds."""
+    """Return a row for each measure at each load, of the same model over seeds.
+
+    What they have in common stands in the first of them alone.
+    """
     if not seeds:
         return []
     first = seeds[0]
@@ -316,10 +326,8 @@ def _rows(seeds: list[Figures]) -> list[tuple[str, ...]]:
         cells: list[str] = []
         for key in ("mean", "max"):
             cells += _before_and_after(some, key)
-        rows.append((
-            first["case"]["preset"], springs, left_out, _title(own), *cells,
-            str(len(seeds)),
-        ))  # fmt: skip
+        common = ("", "", "") if rows else (first["case"]["preset"], springs, left_out)
+        rows.append((*common, _title(own), *cells, str(len(seeds))))
     return rows
 
 

@@ -1,7 +1,7 @@
 """Units: SI and radians inside, everything else only at the edges (docs/conventions.md).
 
 A person writes ``"175 mm"`` in YAML and ``force_x[kN]`` in a CSV header; the rest of the
-package only ever sees metres, radians, newtons. The table below is the whole list.
+package only ever sees metres, radians, newtons. A refusal names the units that are allowed.
 """
 
 import math
@@ -70,9 +70,11 @@ SHOWN = {
 """Factors from SI to units for people, in the only table of them."""
 _BEGINNINGS = {re.split(r"\W", unit)[0] for table in (*_FACTORS.values(), SHOWN) for unit in table}
 """Signs that a unit begins with: ``N`` of ``N*m``."""
+_OF_PAGES = {"h", "kHz", "kB", "MB", "GB", "µs", "nm", "m²", "rpm"}
+"""Units that pages write and no file does."""
 _BEFORE_UNIT = re.compile(
-    r"(?<=\d)(?:[ \n]?(?=%)|[ \n](?=(?:"
-    + "|".join(sorted(_BEGINNINGS - {"", "in"} | {"h", "kHz", "kB", "MB", "GB"}))
+    r"(?<=\))[ \n](?=%)|(?<=\d)(?:[ \n]?(?=%)|[ \n](?=(?:"
+    + "|".join(sorted(_BEGINNINGS - {"", "in"} | _OF_PAGES))
     + r")(?!\w)))"
 )
 """What stands between a number and its unit; ``in`` is nearly always the word."""

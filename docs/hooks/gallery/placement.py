@@ -82,8 +82,8 @@ def _springs(folder: Path, done: Campaign) -> dict[str, str]:
     readings = int(done.calibration.used.sum())
     return {
         "springs": f"{len(bars)} compliances from {readings} readings at"
-        f" {len(done.planned.plan.poses)} poses, all of them fitted; each with the interval that"
-        " holds it with 95 %, by the bootstrap over poses"
+        f" {len(done.planned.plan.poses)} poses, all of them fitted; with the interval that holds"
+        " it with 95 %, by the bootstrap over poses, where the readings tell a spring by itself"
     }
 
 

@@ -188,6 +188,7 @@ class Pose(StrictModel):
 
 
 IDENTITY = Pose()
+"""The pose of a frame in itself."""
 
 
 def vector(values: tuple[float, ...]) -> FloatArray:

@@ -304,7 +304,7 @@ class WallClock:
         monotonic: Callable[[], float] = time.monotonic,
         pause: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Show ``start`` s now.
+        """Set the clock to ``start`` s.
 
         Parameters
         ----------

@@ -43,6 +43,7 @@ _ERROR_DIMS = ("variant", "cv", "n_train", "axis")
 NO_POSE = -1
 """Fills `CodecData.chosen` behind the last chosen pose."""
 ARRAYS_SCHEMA = "elastocal.codec/2"
+"""Schema of the arrays of a codec."""
 _OLDER = ("elastocal.codec/1",)
 """Its findings are sentences alone."""
 ARRAYS = "codec.nc"
@@ -142,10 +143,10 @@ class CodecData:
     """Springs behind the errors, by variant, split and number of training poses; chosen from the
     training poses of that split where there is a choice."""
     ladder: tuple[RungSummary, ...] = ()
-    """The ladder of `calibrate` on this file, and other compared layouts; empty in files before."""
+    """The ladder of `calibrate` on this file, and other compared layouts; empty in older files."""
     left_out: FloatArray | None = None
     """Errors at left-out poses by which `calibrate` judges, shape (variant, left-out pose), in m;
-    NaN for variants that it cannot judge; none in files before."""
+    NaN for variants that it cannot judge; none in older files."""
     made_from: dict[str, str] = field(default_factory=dict)
     """SHA-256 of what the dataset says (`elastocal.dataset.content_sha256`), by its file."""
 

@@ -84,7 +84,7 @@ def _um(length: float) -> str:
 
 
 def saturation_table(found: Iterable[tuple[Variant, Saturation]]) -> Table:
-    """Return from how many poses on more do not help, a row for each variant."""
+    """Return a table of the number of poses beyond which more do not help, a row a variant."""
     heads = phrases("Search", "Springs", "Load cases", "Enough from", "95 % interval",
                     "Error there", "Error with the most", "Certain?")  # fmt: skip
     caption = phrase("Number of poses to fit from which on more do not lower the error")
@@ -93,7 +93,7 @@ def saturation_table(found: Iterable[tuple[Variant, Saturation]]) -> Table:
 
 
 def enough_sentence(best: Saturation) -> Phrase:
-    """Return the value of the row that counts for the verdict."""
+    """Return in words how many poses are enough, or that it is not proved."""
     if not best.explains or best.low is None or best.high is None:
         return phrase("How many poses are enough is not proved.")
     values = {"enough": counted(best.n_train, "pose"), "low": best.low, "high": best.high}

@@ -30,6 +30,7 @@ from elastocal.results import brief_repr
 from elastocal.wording import counted
 
 VERDICTS_SCHEMA = "elastocal.codec_verdicts/2"
+"""Schema of the verdicts of a codec."""
 VERDICTS = "codec.json"
 """Name of the file in a codec's folder."""
 _AS_CALIBRATE = "springs, as calibrate judges, with each pose left out in turn: "

@@ -30,7 +30,7 @@ Arrays = Mapping[str, np.ndarray]
 """Values of each variable that is present, by its name."""
 
 SCHEMA = "elastocal.dataset/1"
-"""The schema of a dataset that has nothing of the next one."""
+"""The schema of a dataset without the variables that `SCHEMA_2` adds."""
 
 SCHEMA_2 = "elastocal.dataset/2"
 """The schema with the order in time, the reference's joints and force, secondary encoders,

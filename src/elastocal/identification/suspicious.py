@@ -21,10 +21,11 @@ _FALSE_ALARM = 0.01
 """Probability that a data set with normal noise and no blunder names any reading."""
 
 BLUNDER_SCORE = 25.0
-"""Robust score above which a reading may be set aside ..."""
+"""Robust score above which a reading may be set aside, if `BLUNDER_SIZE` is exceeded too."""
 BLUNDER_SIZE = 0.25
-"""... if its residual is also above this part of the median deflection. Both together are
-beyond any model error: a broken beam, a marker knocked off, a reading of another pose."""
+"""Residual over the median deflection above which a reading may be set aside, if its score is
+above `BLUNDER_SCORE` too. Both together are beyond any model error: a broken beam, a marker
+knocked off, a reading of another pose."""
 MOST_BLUNDERS = 0.1
 """Largest part of the readings that may be set aside; more is a bad campaign, not blunders."""
 

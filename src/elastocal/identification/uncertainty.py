@@ -37,6 +37,7 @@ from elastocal.records import record
 from elastocal.results import brief_repr
 
 CONFIDENCE = 0.95
+"""Probability that intervals are made for."""
 NORMAL_QUANTILE = float(ndtri(0.5 * (1.0 + CONFIDENCE)))
 """Half of a 95 % interval of a normal distribution, in standard deviations."""
 MOST_UNEXPLAINED = 0.5

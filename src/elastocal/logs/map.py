@@ -53,6 +53,7 @@ from elastocal.units import factor
 from elastocal.wording import listed
 
 SCHEMA = "elastocal.log-map/1"
+"""Schema of a map of logs."""
 UNKNOWN = "?"
 """What a person must still write: `elastocal import --guess` could not determine it."""
 

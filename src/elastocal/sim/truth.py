@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 Preset = Literal["kind", "typical", "harsh"]
 """Names of the presets: a well-kept small arm, what published arms show, and about twice that."""
 PRESETS: tuple[Preset, ...] = get_args(Preset)
+"""Names of the presets, from the least imperfections to the most."""
 
 _Value = str | float | tuple[str | float, ...] | None
 
@@ -228,6 +229,7 @@ PRESET_FIGURES = (
         " repeatability; 50 um is a warmed-up robot",
     ),
 )
+"""Every figure of the simulated truth, in every preset, with its origin."""
 _BY_KEY = {figure.key: figure for figure in PRESET_FIGURES}
 _INSTEAD = {"gears.lost_motion": ("hysteresis", "reference_angle")}
 """Figures that are left out where a file says the same in other words."""

@@ -465,3 +465,4 @@ def _places(
 
 
 DRIVER = EmsconDriver()
+"""The driver that cell files name; see `EmsconDriver`."""

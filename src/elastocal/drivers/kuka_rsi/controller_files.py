@@ -174,6 +174,7 @@ def _numbers(*values: float) -> str:
 PROGRAMS = {"measure": "elcal_meas", "contact": "elcal_run", "compensation": "elcal_comp"}
 """Name of program, RSI context and ETHERNET file of each mode."""
 SHEET = "SIGN-OFF.md"
+"""File that two people sign before the files go on the controller."""
 LONGEST_NAME = 24
 """Longest name of a file on the controller, with its suffix; not verified on one."""
 FORMS = {"rsi": ("rsi", "rsi.xml", "rsi.diagram"), "rsix": ("rsix",)}

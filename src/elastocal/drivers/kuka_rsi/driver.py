@@ -261,3 +261,4 @@ class KukaRsiDriver:
 
 
 DRIVER = KukaRsiDriver()
+"""The driver that cell files name; see `KukaRsiDriver`."""

@@ -596,3 +596,4 @@ class LineStreamDriver:
 
 
 DRIVER = LineStreamDriver()
+"""The driver that cell files name; see `LineStreamDriver`."""

@@ -574,3 +574,4 @@ class NetFtDriver:
 
 
 DRIVER = NetFtDriver()
+"""The driver that cell files name; see `NetFtDriver`."""

@@ -280,3 +280,4 @@ class OperatorEntryDriver:
 
 
 DRIVER = OperatorEntryDriver()
+"""The driver that cell files name; see `OperatorEntryDriver`."""

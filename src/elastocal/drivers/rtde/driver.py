@@ -614,3 +614,4 @@ def _require_same_tcp(cell: Cell, line: UrLine) -> None:
 
 
 DRIVER = RtdeDriver()
+"""The driver that cell files name; see `RtdeDriver`."""

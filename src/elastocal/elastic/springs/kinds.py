@@ -54,7 +54,7 @@ else:
 
 
 def unit_of(si: str) -> Unit:
-    """Return the unit that files state so; one that no kind has is shown as it is."""
+    """Return the unit for the name of one in a file; an unknown name is returned as it is."""
     known = (unit for kind in KINDS.values() for unit in kind.units if unit.si == si)
     return next(known, Unit(si, si))
 
