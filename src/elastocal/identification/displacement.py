@@ -196,7 +196,8 @@ def friction_states(
 
     Returns
     -------
-    loaded, reference : ndarray, shape (reading, element)
+    loaded : ndarray, shape (reading, element)
+    reference : ndarray, shape (reading, element)
         In N·m.
     """
     rest = np.zeros((len(readings), 3))

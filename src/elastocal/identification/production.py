@@ -301,8 +301,10 @@ def near_postures(
 
     Parameters
     ----------
-    q, poses : ndarray, shapes (row, joint) and (pose, joint)
-        Rows and postures, in rad or m.
+    q : ndarray, shape (row, joint)
+        Rows, in rad or m.
+    poses : ndarray, shape (pose, joint)
+        Postures.
     reaches : float
         How many times `posture_reach` they may be apart.
     """

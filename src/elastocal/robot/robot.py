@@ -340,7 +340,8 @@ class Robot:
 
         Returns
         -------
-        force, moment : ndarray, shape (..., 3)
+        force : ndarray, shape (..., 3)
+        moment : ndarray, shape (..., 3)
             On the robot at the tool centre point, in base, in N and N·m.
         """
         R_base_tcp = self.forward(q)[..., :3, :3]

@@ -200,7 +200,7 @@ class Evidence:
 
     @property
     def run_record(self) -> RunRecord | None:
-        """The begin of the run, by its journal."""
+        """The beginning of the run, by its journal."""
         return self.journal[0].run if self.journal else None
 
     @property

@@ -66,8 +66,8 @@ class StudySettings:
             " truth; repeatable, then every combination. Default: poses=6,10,15,20,31.",
         ),
     ] = (DEFAULT_VARIATION,)
-    """Factors to vary, each ``"KEY=A,B"``; see `elastocal.codec.study.conditions.FACTORS`. Every combination is a
-    condition; other factors are as in the cell file."""
+    """Factors to vary, each ``"KEY=A,B"``; see `elastocal.codec.study.conditions.FACTORS`. Every
+    combination is a condition; other factors are as in the cell file."""
     target: Annotated[
         float | None,
         Option(metavar="LENGTH", read="length", help="Error that is good enough, e.g. '0.05 mm'."),

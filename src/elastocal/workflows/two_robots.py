@@ -397,9 +397,9 @@ def compensate_pair(settings: CompensatePairSettings, progress: Progress) -> Coo
     >>> for arm, names, q, f in zip(
     ...     plan.arms, plan.joints, plan.q(), ([0, 0, 500], [0, 0, -500] @ R), strict=True
     ... ):
-    ...     heads = [*(f"{name}[rad]" for name in names), "force_x[N]", "force_y[N]", "force_z[N]"]
-    ...     rows = [",".join(map(repr, [*q[0].tolist(), *map(float, f)]))]
-    ...     _ = Path(f"{arm}.csv").write_text("\n".join([",".join(heads), *rows]) + "\n")
+    ...     heads = [*(f"{name}[rad]" for name in names), *(f"force_{a}[N]" for a in "xyz")]
+    ...     row = map(repr, [*q[0].tolist(), *map(float, f)])
+    ...     _ = Path(f"{arm}.csv").write_text(f"{','.join(heads)}\n{','.join(row)}\n")
     >>> found = ec.compensate_pair(
     ...     cell, models="models", first="left.csv", second="right.csv", out="corrected"
     ... )

@@ -63,7 +63,7 @@ def displacement_figure(
         Label of the pose of each reading, in order.
     commanded, residual : ndarray, shape (reading,)
         Norms, in m.
-    used : ndarray, shape (reading,), bool
+    used : ndarray of bool, shape (reading,)
         Whether a reading entered the fit.
     """
     figure = new_figure(_READINGS_WIDTH, 4.0)

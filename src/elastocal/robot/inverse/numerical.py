@@ -271,7 +271,7 @@ def inverse_for(robot: Robot, seed: int = 0) -> InverseKinematics:
 
     Returns
     -------
-    OpwInverse, ParallelInverse, NearInverse or NumericalInverse
+    OpwInverse or ParallelInverse or NearInverse or NumericalInverse
         The last one's ``reason`` says what the closed forms failed on.
     """
     reasons = []

@@ -233,7 +233,7 @@ class GearLaws:
 @brief_repr
 @dataclass(frozen=True, eq=False)
 class RobotSprings:
-    """Springs of the robot with the memory of its gears: an `elastocal.sim.arm` `SpringBank`."""
+    """Springs of the robot with the memory of its gears: a `SpringBank`."""
 
     stiffness: FloatArray
     """k: at high torque, shape (spring,), in N·m/rad or N/m."""

@@ -92,7 +92,8 @@ def moved_axes(screws: Screws, before: FloatArray) -> tuple[FloatArray, FloatArr
 
     Returns
     -------
-    axis, point : ndarray, shape (element, batch, 3)
+    axis : ndarray, shape (element, batch, 3)
+    point : ndarray, shape (element, batch, 3)
         Where the axes are now, in base.
     """
     rotation = before[..., :3, :3]

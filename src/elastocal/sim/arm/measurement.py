@@ -306,7 +306,8 @@ class SphericalCap:
 
         Returns
         -------
-        points, normals : ndarray, shape (count, 3)
+        points : ndarray, shape (count, 3)
+        normals : ndarray, shape (count, 3)
             In base, in m; outward unit vectors.
         """
         index = np.arange(count)
