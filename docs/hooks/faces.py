@@ -48,12 +48,7 @@ def defined(package: str, home: str) -> set[str]:
             names.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            names.update(
-                each.id
-                for target in targets
-                for each in (target.elts if isinstance(target, ast.Tuple) else (target,))
-                if isinstance(each, ast.Name)
-            )
+            names.update(each.id for each in targets if isinstance(each, ast.Name))
     return names
 
 
