@@ -500,6 +500,55 @@ def test_the_reference_shows_workflows_as_they_are_called(monkeypatch):
         assert not [each for each in fields if each.docstring]
 
 
+def test_the_reference_leaves_out_no_field_and_confuses_no_parameters():
+    code = """
+import enum
+from elastocal.records import record
+@record("doc.base/1", kw_only=True)
+class Base:
+    kept: int = 1
+    '''Told once.'''
+@record("doc.made/1")
+class Made(Base):
+    told: float
+    silent: str = "none"
+class Colour(enum.Enum):
+    GREEN = "green"
+_BOUND = 0.5
+def both(force: float, limit: int = 3, share: float = _BOUND, *, name: str = "") -> None:
+    '''Do it.
+
+    Parameters
+    ----------
+    force, limit
+        Two. See docs/explanation/observability.md.
+    share, name : float, str
+        Two more.
+    '''
+"""
+    with griffe.temporary_visited_package(
+        "plain",
+        {"__init__.py": code},
+        extensions=griffe.load_extensions(PLAIN),
+        docstring_parser="numpy",
+    ) as package:
+        made = [each.name for each in package["Made"].parameters]
+        assert {"told", "silent"} <= set(made)
+        assert package["Base.kept"].docstring.value == "Told once."
+        assert package["Colour.GREEN"].docstring is not None  # or it is not shown
+        told = {each.name: each for each in package["both"].docstring.parsed[1].value}
+        types = {name: str(each.annotation) for name, each in told.items()}
+        assert types == {"force": "float", "limit": "int", "share": "float", "name": "str"}
+        defaults = [str(told[name].default) for name in ("limit", "share", "name")]
+        assert defaults == ["3", "0.5", "''"]
+        assert "[observability](../../explanation/observability.md)" in told["force"].description
+
+
+def test_a_name_that_a_page_of_the_reference_lists_is_there():
+    page = "::: elastocal.codec\n    options:\n      members:\n        - judge\n        - nothing\n"
+    assert FACES["absent"](page) == ["elastocal.codec.nothing"]
+
+
 def test_the_reference_shows_types_and_examples_plainly():
     code = """
 from typing import Annotated

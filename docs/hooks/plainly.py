@@ -28,8 +28,9 @@ _LONGEST, _SHORT = 300, 40
 _UNDESCRIBED = re.compile(r"–\s*<div class=\"doc-md-description\">\s*</div>")
 
 
-_REFUSALS = re.compile(r"<code>\w+Error(, \w+Error)*</code>")
-_REFUSAL = re.compile(r"\w+Error")
+_REFUSALS = re.compile(r"<code>(?:\w+Error|, |<[^>]*>)+</code>")
+_REFUSAL = re.compile(r"<(a|autoref)\b.*?</\1>|(\w+Error)", flags=re.DOTALL)
+"""A link, or the name of a refusal that is none yet."""
 
 
 def on_page_content(html: str, page: Page, **_: object) -> str:
@@ -40,8 +41,8 @@ def on_page_content(html: str, page: Page, **_: object) -> str:
 
 
 def linked(name: re.Match[str]) -> str:
-    """Return a refusal as a link; a name that is none of elastocal's stays."""
-    ours = getattr(errors, name[0], None)
+    """Return a refusal as a link; a name that is none of elastocal's stays, and so does a link."""
+    ours = getattr(errors, name[2] or "", None)
     return f'<a href="errors.html#{ours.__module__}.{name[0]}">{name[0]}</a>' if ours else name[0]
 
 
