@@ -10,13 +10,9 @@ Checks run in the order of their cost. Those of the point alone (edge, flatness)
 postures; quick checks are made for every posture of a branch; the slow one (collision) only for the
 best, round by round, until a point has a posture or its branch has no more.
 
-The pool of a cell: points are sampled until the requested number of candidates is valid.
-
-Points are processed in parts, on all cores. The parts do not depend on the number of cores, so
-neither do the candidates. `CHECKS` and `POINT_CHECKS` list the checks.
-
-Postures are taken near those of production: in the position of the rail, the rotation of the tool,
-and the branch.
+Points are sampled until the requested number of candidates is valid. They are processed in parts,
+on all cores. The parts do not depend on the number of cores, so neither do the candidates. `CHECKS`
+and `POINT_CHECKS` list the checks.
 
 A calibration holds where it was made (paper 3.1, 4.1: the "spectrum of action in production"). So
 the pool of a cell that names its process is searched there: at the positions of the external axes

@@ -4,15 +4,13 @@ The tool is turned by one angle for all courses; the rail does not move along ea
 calibration the posture is the one farthest from limits (`with_postures`); a calibrated model
 determines the stiffest one (`stiffest_posture`, paper section 4.3.1).
 
-Fibre placement courses across a tooling (paper section 4.2).
+*Fibre placement* lays courses across a tooling (paper section 4.2). The compaction of 1100 N along
+the tool and amplitudes up to 280 N aside are the paper's load cases for this process; the acting
+share, and the speed of the head, are assumed here.
 
-Forces: the compaction of 1100 N along the tool and amplitudes up to 280 N aside are the paper's
-load cases for this process (4.2); the acting share, and the speed of the head, are assumed here.
-
-Rings of a dome that is roughed from the top of a block (paper section 4.3, Fig. 13).
-
-Feed 70 mm/s and 12 000 rpm are the paper's; a cutter of two teeth then passes 400 teeth a second
-over a run-out line at 200 Hz. The paper gives neither the dome nor the forces: both are assumed,
+*Roughing* cuts the rings of a dome from the top of a block (paper section 4.3, Fig. 13). Feed
+70 mm/s and 12 000 rpm are the paper's; a cutter of two teeth then passes 400 teeth a second over a
+run-out line at 200 Hz. The paper gives neither the dome nor the forces: both are assumed,
 the forces within the load cases of its Fig. 12 (500 N aside, 1500 N along the tool).
 """
 

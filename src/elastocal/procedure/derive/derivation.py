@@ -14,11 +14,8 @@ position in time, since it changed the state of friction. Presses of a failed at
 a free motion retracted the arm after them, and the reference was read again.
 
 An angular error of ``R_base_tracker`` rotates the marker's displacement: 1 mrad gives 1 µm per
-millimetre; the tracker's position does not enter.
-
-The summary collects the findings, with warnings for the user.
-
-The kinds of warnings are declared here.
+millimetre; the tracker's position does not enter. The summary collects the findings, with warnings
+for the user.
 """
 
 import json

@@ -3,10 +3,9 @@
 Raw means as the devices gave it: forces in the sensor's frame with bias and tool weight still in,
 marker positions in the frame of the station that measured.
 
-The form of stream files: MCAP containers, and samples as JSON messages in them.
-
-The `mcap` package writes and reads the containers; what it takes beside messages packed by hand is
-measured in ``benchmarks/record.py``.
+Files are MCAP containers with samples as JSON messages in them. The `mcap` package writes and reads
+the containers; what it takes beside messages packed by hand is measured in
+``benchmarks/record.py``.
 
 One message a sample, because that is what both viewers draw: Foxglove plots ``/wrench.force.z``
 and PlotJuggler lists ``/wrench/force/z``. A block of samples as arrays would be three times as

@@ -1,17 +1,14 @@
 """Procedure 1 over all poses: visit each, commit it, go HOME (paper 2.2).
 
-The states of one attempt, in the order of Procedure 1: one action each.
-
-The order makes readings valid and the cell safe. The sensor is tared in free air just before
-contact, so that its drift since the last pose and the weight of the tool do not count as load; the
-reference of the tracker is taken there too, so that only changes between it and the load count as
-deflection. With ``procedure.reference: light_contact`` that is read again, in contact, as the first
-press or the second: no step is added, since its force is in the plan's list of presses. Contact is
-made in position control, slowly and up to a small force; only then is force control switched on. It
-is switched off, with the force ramped to zero, before the tool leaves the surface: an arm in force
-control in free air would accelerate.
-
-Run one attempt at a pose state after state, and make the cell safe when a state fails.
+An attempt at a pose goes through states in the order of Procedure 1, one action each; where a state
+fails, the cell is made safe. The order makes readings valid and the cell safe. The sensor is tared
+in free air just before contact, so that its drift since the last pose and the weight of the tool do
+not count as load; the reference of the tracker is taken there too, so that only changes between it
+and the load count as deflection. With ``procedure.reference: light_contact`` that is read again, in
+contact, as the first press or the second: no step is added, since its force is in the plan's list
+of presses. Contact is made in position control, slowly and up to a small force; only then is force
+control switched on. It is switched off, with the force ramped to zero, before the tool leaves the
+surface: an arm in force control in free air would accelerate.
 
 The retreat is always the same, and its order matters. First the force is ramped to zero while the
 tool still rests on the surface: a stop at once would leave it pressing, and only position control,
