@@ -29,4 +29,4 @@ def test_the_plan_for_many_workers_is_computed_from_the_figures_that_the_benchma
     said = hook.plan([slower, *runs])
     seconds = 16 * 5 * slower["worker_s_a_campaign"]
     assert f"carries at least {0.8 * seconds / 2.0:.0f} workers" in said
-    assert f"{slower['commit']}: not equal" in said
+    assert "one process are not equal" in said

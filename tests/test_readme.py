@@ -515,11 +515,15 @@ class Made(Base):
 class Colour(enum.Enum):
     GREEN = "green"
 _BOUND = 0.5
-def both(force: float, limit: int = 3, share: float = _BOUND, *, name: str = "") -> None:
+def both(
+    x: float, y: int, force: float, limit: int = 3, share: float = _BOUND, *, name: str = ""
+) -> None:
     '''Do it.
 
     Parameters
     ----------
+    x, y
+        Where, and how often.
     force, limit
         Two. See docs/explanation/observability.md.
     share, name : float, str
@@ -538,7 +542,9 @@ def both(force: float, limit: int = 3, share: float = _BOUND, *, name: str = "")
         assert package["Colour.GREEN"].docstring is not None  # or it is not shown
         told = {each.name: each for each in package["both"].docstring.parsed[1].value}
         types = {name: str(each.annotation) for name, each in told.items()}
-        assert types == {"force": "float", "limit": "int", "share": "float", "name": "str"}
+        assert types == {
+            "force": "float", "limit": "int", "share": "float", "name": "str", "x, y": "float, int",
+        }  # fmt: skip
         defaults = [str(told[name].default) for name in ("limit", "share", "name")]
         assert defaults == ["3", "0.5", "''"]
         assert "[observability](../../explanation/observability.md)" in told["force"].description

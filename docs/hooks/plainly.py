@@ -9,8 +9,9 @@ then not told again. A result of which a docstring has only the type has no dash
 
 import inspect
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
+from itertools import groupby
 from typing import Any
 
 import griffe
@@ -111,6 +112,23 @@ def tell_apart(func: griffe.Function) -> None:
             if of_another or is_list_of_types(each.annotation):
                 each.annotation = known.annotation
             each.value = None if each.name.startswith("*") else known.default
+        section.value = list(together(section.value))
+
+
+def together(told: list[griffe.DocstringParameter]) -> Iterator[griffe.DocstringParameter]:
+    """Yield parameters, those in one that have one description and one default."""
+    for (text, _), each in groupby(told, key=lambda one: (one.description, str(one.value))):
+        group = list(each)
+        if len(group) == 1 or not text:
+            yield from group
+            continue
+        types = list(dict.fromkeys(str(one.annotation) for one in group))
+        yield griffe.DocstringParameter(
+            ", ".join(one.name for one in group),
+            annotation=group[0].annotation if len(types) == 1 else ", ".join(types),
+            description=text,
+            value=group[0].value,
+        )
 
 
 def is_list_of_types(annotation: Any) -> bool:
