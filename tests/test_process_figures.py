@@ -104,7 +104,7 @@ def test_every_procedure_states_its_time_and_what_it_brings_beside_springs_alone
         if row[1] == "springs alone":
             springs_alone[row[0]] = row
             continue
-        assert row[-1] == springs_alone[row[0]][-1]  # the same seeds
+        assert row[-1] == springs_alone[row[0]][-1]  # as many seeds
         assert "min" in row[2]
         assert ("course" in row[1]) == ("s a course" in row[2])
         if "offset" in row[1]:

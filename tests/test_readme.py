@@ -516,13 +516,14 @@ class Colour(enum.Enum):
     GREEN = "green"
 _BOUND = 0.5
 def both(
-    x: float, y: int, force: float, limit: int = 3, share: float = _BOUND, *, name: str = ""
+    x: float, y: float, n: int, force: float, limit: int = 3, share: float = _BOUND, *,
+    name: str = "",
 ) -> None:
     '''Do it.
 
     Parameters
     ----------
-    x, y
+    x, y, n
         Where, and how often.
     force, limit
         Two. See docs/explanation/observability.md.
@@ -543,7 +544,8 @@ def both(
         told = {each.name: each for each in package["both"].docstring.parsed[1].value}
         types = {name: str(each.annotation) for name, each in told.items()}
         assert types == {
-            "force": "float", "limit": "int", "share": "float", "name": "str", "x, y": "float, int",
+            "force": "float", "limit": "int", "share": "float", "name": "str",
+            "x, y, n": "float, float, int",
         }  # fmt: skip
         defaults = [str(told[name].default) for name in ("limit", "share", "name")]
         assert defaults == ["3", "0.5", "''"]

@@ -21,7 +21,7 @@ from elastocal import errors
 
 _EXAMPLE = re.compile(r"^>>> .*?(?=\n\n|\Z)", flags=re.MULTILINE | re.DOTALL)
 _TABLE = re.compile(r"^(=+) +=+\n(.*?)^=+ +=+$", flags=re.MULTILINE | re.DOTALL)
-_PAGE = re.compile(r"\bdocs/([\w/-]+)/([\w-]+)\.md")
+_PAGE = re.compile(r"\bdocs/((?:[\w-]+/)*)([\w-]+)\.md")
 _MODULE = re.compile(r"\b(?:[a-z_]\w*\.)+(?=\w)")
 """What a type or default is read from, before its name."""
 _LONGEST, _SHORT = 300, 40
@@ -30,8 +30,8 @@ _UNDESCRIBED = re.compile(r"–\s*<div class=\"doc-md-description\">\s*</div>")
 
 
 _REFUSALS = re.compile(r"<code>(?:\w+Error|, |<[^>]*>)+</code>")
-_REFUSAL = re.compile(r"<(a|autoref)\b.*?</\1>|(\w+Error)", flags=re.DOTALL)
-"""A link, or the name of a refusal that is none yet."""
+_REFUSAL = re.compile(r"<(a|autoref)\b.*?</\1>|<[^>]*>|(\w+Error)", flags=re.DOTALL)
+"""A link, a tag, or the name of a refusal that is no link yet."""
 
 
 def on_page_content(html: str, page: Page, **_: object) -> str:
@@ -122,10 +122,10 @@ def together(told: list[griffe.DocstringParameter]) -> Iterator[griffe.Docstring
         if len(group) == 1 or not text:
             yield from group
             continue
-        types = list(dict.fromkeys(str(one.annotation) for one in group))
+        types = [str(one.annotation) for one in group]
         yield griffe.DocstringParameter(
             ", ".join(one.name for one in group),
-            annotation=group[0].annotation if len(types) == 1 else ", ".join(types),
+            annotation=group[0].annotation if len({*types}) == 1 else ", ".join(types),
             description=text,
             value=group[0].value,
         )
@@ -205,8 +205,8 @@ def as_link(page: re.Match[str]) -> str:
     """Return the link to a page of the documentation, from a page of the reference."""
     folder, name = page[1], page[2]
     number = name.partition("-")[0]
-    text = f"decision {int(number)}" if folder == "decisions" else name.replace("-", " ")
-    return f"[{text}](../../{folder}/{name}.md)"
+    text = f"decision {int(number)}" if number.isdecimal() else name.replace("-", " ")
+    return f"[{text}](../../{folder}{name}.md)"
 
 
 def as_code(example: re.Match[str]) -> str:

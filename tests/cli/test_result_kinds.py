@@ -55,6 +55,22 @@ def test_a_row_that_lacks_a_cell_is_refused_by_its_line(study):
         describe_file(table)
 
 
+def test_a_contact_file_is_known_with_its_schema_and_without(tmp_path):
+    path = tmp_path / "contact.yaml"
+    for schema in ("", "schema: elastocal.contact/1\n"):
+        path.write_text(f'{schema}contact: {{normal: "50 N/um"}}\n', encoding="utf-8")
+        kind, facts = describe_file(path)
+        assert (kind, facts["normal"], facts["lateral"]) == ("contact file", 5e7, "free")
+    for text, named in (
+        ("contact: {}\nfoo: 1\n", "unknown key 'foo'"),
+        ("contact:\n", "contact"),
+        ("schema: elastocal.contact/9\ncontact: {}\n", "elastocal.contact/9"),
+    ):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(SchemaError, match=re.escape(named)):
+            describe_file(path)
+
+
 def test_the_ports_of_a_simulated_cell_are_known(tmp_path):
     write_json(tmp_path / "ports.json", Ports("127.0.0.1", {"net_ft": {"udp": 49152}}))
     kind, facts = describe_file(tmp_path / "ports.json")

@@ -62,7 +62,11 @@ def draw_displacements(path: Path, done: Campaign) -> None:
 def _plan(folder: Path, done: Campaign) -> dict[str, str]:
     planned = done.planned
     write_plan_figure(folder / "cover-and-ioops.png", planned.surface, planned.plan, planned.pool)
-    write_plan_page(folder / "plan.html", done.cell, planned.surface, planned.plan, planned.pool)
+    page = folder / "plan.html"
+    write_plan_page(page, done.cell, planned.surface, planned.plan, planned.pool)
+    # The same page wherever the site is made.
+    made_in = f"{done.cell.path.parent.parent}/"
+    page.write_text(page.read_text(encoding="utf-8").replace(made_in, ""), encoding="utf-8")
     search, other = planned.plan.search.spread, planned.plan.comparison.spread
     text = (
         f"{len(planned.plan.poses)} poses of {planned.plan.pool.valid} candidates; geometry alone,"

@@ -69,7 +69,7 @@ class Command:
     @property
     def summary(self) -> str:
         """Its line in the help."""
-        return summary_of(self.module, self.function)
+        return on_a_terminal(summary_of(self.module, self.function))
 
     def fields(self) -> list[SettingsField]:
         """Return the fields of its settings that can be given on the command line."""
@@ -221,6 +221,11 @@ class Described:
     """`REQUIRED`; None where the settings have it and the text says which."""
 
 
+def on_a_terminal(text: str) -> str:
+    """Return a docstring's text without the marks of code, which a terminal does not set apart."""
+    return text.replace("``", "")
+
+
 def described(each: SettingsField) -> Described:
     """Return the text on a field in help and the reference."""
     option = each.option
@@ -250,7 +255,7 @@ def _parameter(each: SettingsField) -> inspect.Parameter:
     """Return the parameter of a field."""
     option, shown = each.option, described(each)
     required, default = _is_required(each), _typed_default(each)
-    help = shown.text.replace("``", "")  # code, which a terminal does not set apart
+    help = on_a_terminal(shown.text)
     if option.default and not required:
         help = f"{help} [default: {option.default}]"
     # A bracket without the backslash would be a mark-up of rich's, and would not be printed.

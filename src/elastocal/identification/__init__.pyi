@@ -19,6 +19,7 @@ from .calibration import (
     calibrate as calibrate,
 )
 from .contact import (
+    CONTACT_SCHEMA as CONTACT_SCHEMA,
     CUT as CUT,
     Contact as Contact,
     ContactEntry as ContactEntry,

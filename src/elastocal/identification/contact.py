@@ -43,7 +43,8 @@ from elastocal.units import parse_quantity, parse_share
 from elastocal.wording import Phrase, counted, phrase, um
 
 NORMAL, LATERAL = "normal", "lateral"
-_SCHEMA = "elastocal.contact/1"
+CONTACT_SCHEMA = "elastocal.contact/1"
+"""Schema of a contact file."""
 _SIZE = 1e-7
 """A sensible compliance of a contact, in m/N: 10 N/um."""
 _SIDEWAYS = 0.05
@@ -336,8 +337,8 @@ def read_contact(path: Path) -> Contact:
     data = read_yaml_data(path)
     if isinstance(data, dict):
         # A file of one line need not state it.
-        data = {"schema": _SCHEMA} | data
-    return from_data(ContactFile, data, str(path), _SCHEMA).contact.contact
+        data = {"schema": CONTACT_SCHEMA} | data
+    return from_data(ContactFile, data, str(path), CONTACT_SCHEMA).contact.contact
 
 
 def require_metrology(readings: Readings) -> None:

@@ -9,7 +9,7 @@ the compliances. Both are fitted together (Gauss-Newton), a shift ``s`` as three
 with a normal prior of the stated width about the place that the description has. The columns stay
 in the last fit, so that left-out poses, draws and intervals move the tip with the springs. It is
 first found beside gears that stiffen: springs without them make up by the tip for what they lack.
-See docs/decisions/0137-place-of-the-tip.md and 0146-draws-move-the-tip.md.
+See docs/decisions/0137-place-of-the-tip.md and docs/decisions/0146-draws-move-the-tip.md.
 """
 
 from dataclasses import replace

@@ -18,6 +18,7 @@ import pytest
 
 from elastocal import plugins
 from elastocal.cli import COMMANDS, Command, Given, plugged, run
+from elastocal.cli.generator import on_a_terminal
 from elastocal.options import OWN, REQUIRED, settings_fields
 from elastocal.records import parse_json
 
@@ -100,8 +101,9 @@ class CommandSuite:
         assert shown.code == 0
         assert f"elastocal {command}" in shown.out
         assert made.summary.endswith(".")
+        assert "``" not in shown.out
         for each in made.fields():
-            text = (each.option.help or each.doc).replace("``", "")
+            text = on_a_terminal(each.option.help or each.doc)
             assert text, f"{each.name} has no docstring: it is the help of {each.flag}"
             assert text.partition("\n")[0] in shown.out
             if each.option.default and not each.option.required:

@@ -26,6 +26,8 @@ from elastocal.robot.inverse import joints_beside
 from elastocal.two_robots.presses import relative_blocks
 from elastocal.wording import mm, phrase
 
+_MADE_ZERO = 1e-6
+"""Deviation in m below which a correction by the models that predict it leaves nothing."""
 _ROUNDS = 3
 """Rounds in which the deviation is predicted at the corrected joints."""
 
@@ -98,8 +100,8 @@ class CooperationSummary(Result):
         )
 
     def _left(self) -> Iterator[tuple[str, str]]:
-        # Without limits it is zero by its making, and says nothing of the arms.
-        if self.limited:
+        # Where no limit is reached it is zero by its making, and says nothing of the arms.
+        if self.limited or self.after_max > _MADE_ZERO:
             yield phrase("Relative deviation that limits leave, mean"), mm(self.after)
             yield phrase("Relative deviation that limits leave, largest"), mm(self.after_max)
 

@@ -26,7 +26,7 @@ from elastocal.drivers.kuka_rsi import CommissioningRecord
 from elastocal.elastic import read_springs
 from elastocal.errors import SchemaError
 from elastocal.geometry import PositionPlan, read_geometry, read_position_map
-from elastocal.identification import read_contact, read_model
+from elastocal.identification import CONTACT_SCHEMA, read_contact, read_model
 from elastocal.identification.recertification import CompareSummary
 from elastocal.planning.motion import mover_for, require_free_home
 from elastocal.planning.surface import load_surface, mesh_findings
@@ -186,9 +186,11 @@ def springs_file(path: Path) -> FileDescription:
 
 
 def contact_file(path: Path) -> FileDescription:
-    """Describe what a file states of a contact, in its units."""
-    read_contact(path)
-    return "contact file", {"schema": "elastocal.contact/1"} | read_yaml_data(path)["contact"]
+    """Describe what is known of a contact."""
+    found = read_contact(path)
+    known = {name: getattr(found, name) for name in ("normal", "lateral")}
+    free = {name: "free" if value is None else value for name, value in known.items()}
+    return "contact file", {"schema": CONTACT_SCHEMA, **free, "uncertainty": found.uncertainty}
 
 
 def log_map_file(path: Path) -> FileDescription:

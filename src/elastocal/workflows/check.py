@@ -346,7 +346,7 @@ def _settings(path: Path) -> FileDescription:
     """Describe a YAML file by the schema that it states; that of a contact may be left out."""
     data = read_yaml_data(path)
     stated = _stated(data)
-    if stated is None and isinstance(data, dict) and list(data) == ["contact"]:
+    if stated is None and isinstance(data, dict) and "contact" in data:
         stated = "elastocal.contact"
     return _kind(path, stated, _YAML_KINDS)(path)
 

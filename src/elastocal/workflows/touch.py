@@ -48,6 +48,7 @@ class TouchSettings:
     seed: Annotated[int | None, Option(least=0)] = None
     """Seed of simulated devices; by default the cell's."""
     operator: Operator = field(default_factory=Unattended)
+    """Person who is asked and warned; by default nobody, and what asks is refused."""
     state: Statements = field(default_factory=dict)
     """For the certificate, beside the cell file's: see `elastocal.cell.read_statements`."""
     arming: Arming | None = None

@@ -18,12 +18,18 @@ from elastocal.planning.checks import (
     TravelLimitsCheck,
     WristCheck,
 )
+from elastocal.planning.checks.collision import _DISTANCES_BEYOND
 from elastocal.planning.postures import Postures
 from elastocal.robot import Rail, Robot, on_rail
 from elastocal.shapes import Body, Box, Sphere
 from support.postures import FORCE_TCP, arm, postures
 
 NO_TOOL = (0.0, np.zeros(3))
+
+
+def test_a_collision_check_says_which_distances_it_tries():
+    *some, most = (f"{1e3 * distance:g}" for distance in _DISTANCES_BEYOND)
+    assert f"{', '.join(some)} and {most} mm" in CollisionCheck.__doc__
 
 
 def test_friction_is_what_holds_less_what_pulls():

@@ -41,7 +41,7 @@ function ended({ kind, state: how, result, message }) {
     // What was stopped is there to be gone on with: the next start does that.
     $("run-form").elements.resume.checked = interrupted;
     tell(interrupted ? `The run was stopped: ${poses}, the arm is ${figures.arm}. Start goes on with it.` : `The run is ${figures.state}: ${poses}, the arm is ${figures.arm}.`, true);
-    if (figures.arm === "at HOME") follow(state.cell.home);
+    if (figures.arm === "at HOME") move("posture", { q: state.cell.home });
     showFolders().then(() => openRecord(result.folder));
   }
 }
@@ -146,9 +146,12 @@ let following = false;
 async function follow(q) { // the arm as the controller says it, without stopping to wait
   if (following) return;
   following = true;
-  const answer = await ask("posture", { q }).catch(() => null);
-  if (answer) showPosture(answer.posture);
-  following = false;
+  try {
+    const answer = await ask("posture", { q }).catch(() => null);
+    if (answer) showPosture(answer.posture);
+  } finally {
+    following = false;
+  }
 }
 
 async function openRecord(folder) {
