@@ -17,8 +17,7 @@ from unittest import mock
 import pytest
 
 from elastocal import plugins
-from elastocal.cli import COMMANDS, Command, Given, plugged, run
-from elastocal.cli.generator import on_a_terminal
+from elastocal.cli import COMMANDS, Command, Given, on_a_terminal, plugged, run
 from elastocal.options import OWN, REQUIRED, settings_fields
 from elastocal.records import parse_json
 
