@@ -27,8 +27,6 @@ _MODULE = re.compile(r"\b(?:[a-z_]\w*\.)+(?=\w)")
 _LONGEST, _SHORT = 300, 40
 """Characters of a value beyond which it is not shown, and of one that stands for its name."""
 _UNDESCRIBED = re.compile(r"–\s*<div class=\"doc-md-description\">\s*</div>")
-
-
 _REFUSALS = re.compile(r"<code>(?:\w+Error|, |<[^>]*>)+</code>")
 _REFUSAL = re.compile(r"<(a|autoref)\b.*?</\1>|<[^>]*>|(\w+Error)", flags=re.DOTALL)
 """A link, a tag, or the name of a refusal that is no link yet."""
@@ -139,7 +137,7 @@ def is_list_of_types(annotation: Any) -> bool:
 def has_no_signature(owner: griffe.Object) -> bool:
     """Return whether a class shows its members one by one alone, so that none may be left out."""
     return owner.is_class and not any(
-        each.callable_path.endswith(("dataclass", "record")) for each in owner.decorators
+        each.callable_path.endswith("dataclass") for each in owner.decorators
     )
 
 

@@ -193,8 +193,8 @@ def _draw_streams(cell: Cell, streams: Streams, commit: PoseLog) -> Figure:
     highest = max(float(told[some].max()) for some in pressed)
     lower.set(ylim=(-0.2, 1.1 * highest), ylabel="marker displacement in mm")
     lower.set(xlabel="time since the pose was begun in s", xlim=(0.0, arm.time[-1] - start))
-    for axes, corner in ((upper, "lower left"), (lower, "lower left")):
+    for axes in (upper, lower):
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(loc=corner, fontsize=8, framealpha=1.0)
+        axes.legend(loc="lower left", fontsize=8, framealpha=1.0)
     figure.subplots_adjust(left=0.09, right=0.97, top=0.86, bottom=0.1, hspace=0.08)
     return figure

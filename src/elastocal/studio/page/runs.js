@@ -22,8 +22,9 @@ export function showWork(work) {
   const now = `${work.kind} ${work.state}`, before = seen;
   seen = now;
   document.documentElement.dataset.work = now;
-  if (busy && before !== now && work.kind === "run") curves = { force: [], slip: [], name: "" };
-  if (busy && before !== now && work.kind === "watch") $("devices").replaceChildren();
+  const begins = busy && before !== now;
+  if (begins && work.kind === "run") curves = { force: [], slip: [], name: "" };
+  if (begins && work.kind === "watch") $("devices").replaceChildren();
   if (work.kind === "watch") showDevices(work.live);
   if (before && before !== now && !busy) ended(work);
 }
